@@ -1,0 +1,1 @@
+"""Which calibration computed a file."""

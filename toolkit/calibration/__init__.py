@@ -1,0 +1,1 @@
+"""Calibration: sessions, fits, records, the registry and its gates."""

@@ -1,0 +1,93 @@
+"""Nomenclature: every channel's symbol, name, unit, sign and aliases, and the axis systems.
+
+| system      | z    | y     | SA > 0 gives             | used by                                   |
+|-------------|------|-------|--------------------------|-------------------------------------------|
+| SAE         | down | right | FY < 0, MZ > 0           | SAE J670; the toolkit's own results       |
+| adapted-SAE | down | right | FY > 0, MZ < 0 (SA flips)| Pacejka's book, Pacejka '94               |
+| ISO-W       | up   | left  | FY < 0, MZ > 0           | ISO 8855, .tir files                      |
+| machine     | the load cells in the carriage: equal to SAE with the drum forward; with the drum reversed  |
+|             | x and y point the other way (a half turn about z), so FY changes sign and MZ and SA do not  |
+
+FZ is the load on the tire and positive in every system. The sign of SA in ISO-W follows from ISO 8855:
+the lateral velocity changes sign with y, the slip angle with it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal, get_args
+
+Axes = Literal["SAE", "adapted-SAE", "ISO-W", "machine"]
+Rotation = Literal["forward", "reverse"]
+
+AXES: tuple[str, ...] = get_args(Axes)
+ROTATIONS: tuple[str, ...] = get_args(Rotation)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Channel:
+    """One quantity of the field."""
+
+    symbol: str
+    name: str
+    si: str
+    dimension: str
+    tydex: str | None = None
+    aliases: tuple[str, ...] = ()
+
+
+_ALL = (
+    Channel(symbol="t", name="time", si="s", dimension="time", tydex="MEASNUMB", aliases=("time", "T [s]")),
+    Channel(symbol="FX", name="longitudinal force", si="N", dimension="force", tydex="FX"),
+    Channel(symbol="FY", name="lateral force", si="N", dimension="force", tydex="FYW", aliases=("Fy",)),
+    Channel(
+        symbol="FZ", name="normal force", si="N", dimension="force", tydex="FZW", aliases=("FZ load", "Fz")
+    ),
+    Channel(symbol="MX", name="overturning moment", si="N*m", dimension="moment", tydex="MXW"),
+    Channel(symbol="MZ", name="aligning moment", si="N*m", dimension="moment", tydex="MZW", aliases=("Mz",)),
+    Channel(
+        symbol="SA",
+        name="slip angle",
+        si="rad",
+        dimension="angle",
+        tydex="SLIPANGL",
+        aliases=("SA (Filtered)",),
+    ),
+    Channel(symbol="IA", name="inclination angle", si="rad", dimension="angle", tydex="INCLANGL"),
+    Channel(symbol="KAPPA", name="longitudinal slip", si="1", dimension="ratio", tydex="LONGSLIP"),
+    Channel(symbol="P", name="inflation pressure", si="Pa", dimension="pressure", tydex="INFLPRES"),
+    Channel(symbol="V", name="speed", si="m/s", dimension="speed", tydex="LONGVEL"),
+    Channel(symbol="T", name="temperature", si="K", dimension="temperature"),
+    Channel(symbol="TIRE_ANGLE", name="tire revolution angle", si="rad", dimension="angle"),
+    Channel(symbol="DRUM_ANGLE", name="drum revolution angle", si="rad", dimension="angle"),
+)
+
+CHANNELS: dict[str, Channel] = {channel.symbol: channel for channel in _ALL}
+
+
+def signs(source: Axes, target: Axes, rotation: Rotation = "forward") -> dict[str, int]:
+    """Return the factor (+1 or -1) of each signed channel from one axis system to another.
+
+    ``rotation`` matters only where one of the two is ``machine``. Channels that are not named keep
+    their sign: FX, FZ, IA and KAPPA are the same in all four (the systems differ by half turns about x,
+    which keep a rotation about x, and FZ is the load).
+
+    >>> signs("machine", "SAE", "reverse")
+    {'SA': 1, 'FY': -1, 'MZ': 1}
+    >>> signs("ISO-W", "adapted-SAE")
+    {'SA': 1, 'FY': -1, 'MZ': -1}
+    """
+    one, other = _from_sae(source, rotation), _from_sae(target, rotation)
+    return {symbol: one[symbol] * other[symbol] for symbol in one}
+
+
+def _from_sae(axes: Axes, rotation: Rotation) -> dict[str, int]:
+    if axes == "SAE":
+        return {"SA": 1, "FY": 1, "MZ": 1}
+    if axes == "adapted-SAE":
+        return {"SA": -1, "FY": 1, "MZ": 1}
+    if axes == "ISO-W":
+        return {"SA": -1, "FY": -1, "MZ": -1}
+    if axes == "machine":
+        return {"SA": 1, "FY": 1 if rotation == "forward" else -1, "MZ": 1}
+    raise ValueError(f"unknown axis system {axes!r}; one of {', '.join(AXES)}")

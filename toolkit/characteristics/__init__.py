@@ -1,0 +1,1 @@
+"""Cornering and aligning stiffness, pull, Gough plots: what a requester reads off a test."""

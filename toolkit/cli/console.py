@@ -1,0 +1,118 @@
+"""How every command speaks: data to stdout, progress and errors to stderr, one JSON document on request."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import math
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import click
+import typer
+
+if TYPE_CHECKING:
+    from toolkit.errors import ToolkitError
+    from toolkit.findings import Finding
+
+Json = Annotated[bool, typer.Option("--json", help="Print one JSON document and nothing else.")]
+Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")]
+Calibrations = Annotated[
+    Path | None,
+    typer.Option("--calibrations", help="Registry folder; default: calibrations/ of the laboratory's home."),
+]
+Home = Annotated[
+    Path | None,
+    typer.Option("--home", help="Laboratory's home; default: the nearest folder upward with calibrations/."),
+]
+
+
+def answer(payload: dict[str, Any], text: str, *, as_json: bool, quiet: bool) -> None:
+    """Print a command's result: the JSON document, or the text for people, or nothing."""
+    if as_json:
+        typer.echo(
+            json.dumps({"schema": 1, **_plain(payload)}, ensure_ascii=False, indent=2, allow_nan=False)
+        )
+    elif not quiet and text:
+        typer.echo(text)
+
+
+def exit_code(findings: Sequence[Finding]) -> int:
+    """Return 1 where a finding asks for a person's attention, else 0; notes only inform."""
+    return 1 if any(finding.level != "note" for finding in findings) else 0
+
+
+def finding_lines(findings: Sequence[Finding]) -> list[str]:
+    """Return findings as lines for people."""
+    return [f"  {one.level:<8}{one.rule:<18}{one.where}: {one.message}" for one in findings]
+
+
+def table(header: Sequence[str], rows: Sequence[Sequence[str]], *, align: str = "") -> str:
+    """Return a plain text table; ``align`` has one of ``<`` and ``>`` a column, default ``<`` then ``>``."""
+    if not rows:
+        return ""
+    align = align or "<" + ">" * (len(header) - 1)
+    widths = [max(len(str(row[i])) for row in [header, *rows]) for i in range(len(header))]
+    lines = [
+        "  ".join(
+            f"{cell!s:{side}{width}}" for cell, side, width in zip(row, align, widths, strict=True)
+        ).rstrip()
+        for row in [header, ["-" * width for width in widths], *rows]
+    ]
+    return "\n".join(lines)
+
+
+def print_error(error: ToolkitError, *, as_json: bool) -> None:
+    """Print an error: JSON to stdout where it was asked for, else lines to stderr."""
+    if as_json:
+        typer.echo(json.dumps({"schema": 1, "error": error.as_dict()}, ensure_ascii=False, indent=2))
+    else:
+        typer.echo(f"error: {error}", err=True)
+
+
+def print_usage_error(error: click.ClickException, *, as_json: bool) -> None:
+    """Print what was wrong with the command's words."""
+    hint = "see 'toolkit --help' or 'toolkit COMMAND --help'"
+    message = error.format_message()
+    if as_json:
+        parts = {"rule": "usage", "what": message, "next_step": hint}
+        typer.echo(json.dumps({"schema": 1, "error": parts}, ensure_ascii=False, indent=2))
+    else:
+        typer.echo(f"error: {message}\n  next:     {hint}", err=True)
+
+
+@contextlib.contextmanager
+def progress(total: int | None, title: str, *, show: bool = True) -> Iterator[Callable[[str], None]]:
+    """Yield ``step(text)``: advances a bar on stderr, drawn only on a terminal."""
+    if not (show and sys.stderr.isatty()):
+        yield lambda _text: None
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+    with Progress(
+        TextColumn("{task.description}"),
+        BarColumn(),
+        TextColumn("{task.fields[text]}"),
+        TimeElapsedColumn(),
+        console=Console(stderr=True),
+        transient=True,
+    ) as bar:
+        task = bar.add_task(title, total=total, text="")
+        yield lambda text: bar.update(task, advance=1, text=text)
+
+
+def _plain(value: Any) -> Any:
+    # JSON has no NaN and no infinity: what is not a number is null.
+    if isinstance(value, dict):
+        return {str(key): _plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in value]
+    if hasattr(value, "item") and not isinstance(value, str):
+        value = value.item() if getattr(value, "ndim", 0) == 0 else value.tolist()
+        return _plain(value)
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return str(value) if isinstance(value, Path) else value

@@ -1,0 +1,95 @@
+"""The `toolkit` command: every subcommand is a file of this folder, registered here."""
+
+from __future__ import annotations
+
+import sys
+import traceback
+from typing import Annotated, NoReturn
+
+import click
+import typer
+
+from toolkit import __version__
+from toolkit.cli.console import print_error, print_usage_error
+from toolkit.errors import ToolkitError
+
+app = typer.Typer(
+    name="toolkit",
+    help="Calibration and standards toolkit for a tire force-and-moment laboratory.",
+    no_args_is_help=True,
+    add_completion=False,
+    rich_markup_mode=None,
+    pretty_exceptions_enable=False,
+)
+
+
+def _version(value: bool) -> None:
+    if value:
+        typer.echo(f"toolkit {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _root(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version and end.")
+    ] = False,
+) -> None:
+    pass
+
+
+def _register() -> None:
+    # Each module holds one command and imports what is heavy only when it runs.
+    from toolkit.cli import (
+        calibrate,
+        calibration,
+        demo,
+        doctor,
+        explain,
+        fit,
+        init,
+        inspect,
+        process,
+        report,
+        simulate,
+        template,
+    )
+
+    for module in (demo, init, doctor, inspect, calibrate):
+        app.command(module.NAME)(module.command)
+    app.add_typer(calibration.app, name="calibration")
+    for module in (process, fit, report):
+        app.command(module.NAME)(module.command)
+    app.add_typer(template.app, name="template")
+    for module in (simulate, explain):
+        app.command(module.NAME)(module.command)
+
+
+def run(arguments: list[str] | None = None) -> NoReturn:
+    """Run the command line: 0 clean, 1 findings, 2 bad input, 101 a bug."""
+    arguments = sys.argv[1:] if arguments is None else arguments
+    as_json = "--json" in arguments
+    _register()
+    try:
+        code = app(args=arguments, prog_name="toolkit", standalone_mode=False)
+    except ToolkitError as error:
+        print_error(error, as_json=as_json)
+        code = error.exit_code
+    except click.exceptions.NoArgsIsHelpError as error:
+        typer.echo(error.format_message())
+        code = 2
+    except click.ClickException as error:
+        print_usage_error(error, as_json=as_json)
+        code = 2
+    except (click.Abort, KeyboardInterrupt):
+        typer.echo("interrupted; nothing was left half-written", err=True)
+        code = 130
+    except BrokenPipeError:
+        code = 0
+    except Exception:  # noqa: BLE001  the last line of defence: a bug, told as one
+        traceback.print_exc()
+        typer.echo(
+            f"\ntoolkit {__version__}: this is a bug. Please report it with the lines above.", err=True
+        )
+        code = 101
+    sys.exit(code if isinstance(code, int) else 0)

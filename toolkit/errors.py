@@ -1,0 +1,140 @@
+"""Every error that the toolkit raises on purpose.
+
+    ToolkitError                    what, where, got, expected, next step; exit code 2
+     |- ConfigError                 a TOML file: unknown key, wrong type, missing value
+     |- RecordingError              a recording that cannot be used
+     |   |- UnreadableError         its content is no recording (rule: not-a-workbook zip-truncated ...)
+     |   |- ColumnError             a column is missing, doubled, or has no known unit
+     |   `- CellError               text, an error value or NaN in a number's place
+     |- UnitError                   an unknown unit, or one of another dimension
+     |- SessionError                reference-load data that cannot be fitted
+     |- RegistryError               the registry cannot be used, or no record applies
+     |   `- RecordError             one record: wrong hash, does not reproduce, wrong units
+     |- FitError                    a tire model cannot be fitted
+     |- TemplateError               a Word template that cannot be used
+     |- RenderError                 LibreOffice is missing, failed, or made a PDF that is not the report
+     `- OutputError                 a result cannot be written
+
+Anything else that reaches the command line is a bug and ends with exit code 101.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+
+class ToolkitError(Exception):
+    """An error that a user can act on.
+
+    Attributes
+    ----------
+    what : one sentence that names the problem
+    where : file, sheet, row, channel or record
+    got, expected : what stood there and what should have
+    next_step : what the user can do about it
+    rule : id of the finding's rule, for ``toolkit explain``
+    """
+
+    exit_code = 2
+
+    def __init__(
+        self,
+        what: str,
+        *,
+        where: object = None,
+        got: object = None,
+        expected: object = None,
+        next_step: str | None = None,
+        rule: str | None = None,
+    ) -> None:
+        super().__init__(what)
+        self.what = what
+        self.where = None if where is None else str(where)
+        self.got = None if got is None else str(got)
+        self.expected = None if expected is None else str(expected)
+        self.next_step = next_step
+        self.rule = rule
+
+    def __str__(self) -> str:
+        """Return the error as lines: what first, then each part that is known."""
+        parts = [self.what]
+        for label, text in (
+            ("where", self.where),
+            ("got", self.got),
+            ("expected", self.expected),
+            ("next", self.next_step),
+        ):
+            if text is not None:
+                parts.append(f"  {label + ':':<10}{text}")
+        return "\n".join(parts)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickle by keyword: exceptions cross process borders in isolated workers."""
+        return (_rebuild, (type(self), self.what, self.as_dict()))
+
+    def as_dict(self) -> dict[str, str | None]:
+        """Return the parts as a JSON-ready dict."""
+        return {
+            "rule": self.rule,
+            "what": self.what,
+            "where": self.where,
+            "got": self.got,
+            "expected": self.expected,
+            "next_step": self.next_step,
+        }
+
+
+def _rebuild(cls: type[ToolkitError], what: str, parts: dict[str, str | None]) -> ToolkitError:
+    return cls(what, **{key: value for key, value in parts.items() if key != "what"})
+
+
+class ConfigError(ToolkitError):
+    """A TOML file: unknown key, wrong type, missing value."""
+
+
+class RecordingError(ToolkitError):
+    """A recording that cannot be used."""
+
+
+class UnreadableError(RecordingError):
+    """The content of a file is no recording."""
+
+
+class ColumnError(RecordingError):
+    """A column is missing, doubled, or has no known unit."""
+
+
+class CellError(RecordingError):
+    """Text, an error value or NaN stands in a number's place."""
+
+
+class UnitError(ToolkitError):
+    """An unknown unit, or one of another dimension."""
+
+
+class SessionError(ToolkitError):
+    """Reference-load data that cannot be fitted."""
+
+
+class RegistryError(ToolkitError):
+    """The registry cannot be used, or no record applies."""
+
+
+class RecordError(RegistryError):
+    """One record: its hash is wrong, it does not reproduce, or its units differ."""
+
+
+class FitError(ToolkitError):
+    """A tire model cannot be fitted to the data."""
+
+
+class TemplateError(ToolkitError):
+    """A Word template that cannot be used."""
+
+
+class RenderError(ToolkitError):
+    """LibreOffice is missing, failed, or made a PDF that is not the report."""
+
+
+class OutputError(ToolkitError):
+    """A result cannot be written."""

@@ -1,0 +1,131 @@
+"""Files as every module touches them: whole or not at all, hashed, and TOML without unknown keys."""
+
+from __future__ import annotations
+
+import contextlib
+import difflib
+import hashlib
+import os
+import tempfile
+import tomllib
+from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from toolkit.errors import ConfigError, OutputError
+
+
+def sha256_bytes(data: bytes) -> str:
+    """Return the SHA-256 of bytes as 64 hexadecimal digits."""
+    return hashlib.sha256(data).hexdigest()
+
+
+def sha256_file(path: Path) -> str:
+    """Return the SHA-256 of a file's content."""
+    with path.open("rb") as stream:
+        return hashlib.file_digest(stream, "sha256").hexdigest()
+
+
+@contextlib.contextmanager
+def atomic_path(target: Path) -> Iterator[Path]:
+    """Yield a temporary path beside ``target`` and rename it there when the block succeeds.
+
+    A reader sees the old file or the new one, never a part: the content is flushed to the disk before
+    the rename and the folder after it. When the block raises, nothing is left behind.
+
+    Raises
+    ------
+    OutputError
+        the folder cannot be written to, or the disk is full
+    """
+    temporary: Path | None = None
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        handle, name = tempfile.mkstemp(prefix=f".{target.name}.", suffix=".part", dir=target.parent)
+        os.close(handle)
+        temporary = Path(name)
+        yield temporary
+        with temporary.open("rb") as stream:
+            os.fsync(stream.fileno())
+        temporary.chmod(0o644)
+        temporary.replace(target)
+        sync_folder(target.parent)
+    except OSError as error:
+        raise OutputError(
+            "a file cannot be written",
+            where=target,
+            got=error.strerror or str(error),
+            expected="a folder with write permission and free space",
+            next_step="free space or choose another folder with --out; nothing was changed",
+        ) from error
+    finally:
+        if temporary is not None:
+            temporary.unlink(missing_ok=True)
+
+
+def write_atomic(target: Path, data: bytes | str) -> None:
+    """Write a whole file or nothing (see `atomic_path`)."""
+    with atomic_path(target) as temporary:
+        temporary.write_bytes(data.encode() if isinstance(data, str) else data)
+
+
+def sync_folder(folder: Path) -> None:
+    """Flush a folder's entries to the disk, so that a rename survives a power cut."""
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)
+
+
+def read_toml(path: Path) -> dict[str, Any]:
+    """Read a TOML file.
+
+    Raises
+    ------
+    ConfigError
+        the file is missing, unreadable, or not TOML
+    """
+    try:
+        return tomllib.loads(path.read_bytes().decode("utf-8"))
+    except OSError as error:
+        raise ConfigError(
+            "a settings file cannot be read",
+            where=path,
+            got=error.strerror,
+            expected="a readable TOML file",
+            next_step="check the path",
+        ) from error
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise ConfigError(
+            "a settings file is not TOML",
+            where=path,
+            got=error,
+            expected="TOML 1.0 in UTF-8",
+            next_step="mend the line that is named",
+        ) from error
+
+
+def check_keys(table: Mapping[str, Any], known: Iterable[str], *, where: object) -> None:
+    """Refuse a key that is not known and name the nearest one that is.
+
+    >>> check_keys({"sped": 1}, ["speed", "surface"], where="test.toml")
+    Traceback (most recent call last):
+    toolkit.errors.ConfigError: unknown key 'sped'
+      where:    test.toml
+      got:      sped
+      expected: speed
+      next:     did you mean 'speed'?
+    """
+    names = sorted(known)
+    for key in table:
+        if key not in names:
+            near = difflib.get_close_matches(key, names, n=1, cutoff=0.5)
+            raise ConfigError(
+                f"unknown key {key!r}",
+                where=where,
+                got=key,
+                expected=near[0] if near else ", ".join(names),
+                next_step=f"did you mean {near[0]!r}?" if near else "remove it or use one of those expected",
+                rule="unknown-key",
+            )

@@ -1,0 +1,255 @@
+"""Read a machine definition (TOML) into a frozen `Machine`."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import Any, Literal, cast
+
+from toolkit.channels import AXES, ROTATIONS, Axes, Rotation
+from toolkit.errors import ConfigError
+from toolkit.files import check_keys, read_toml
+from toolkit.units import si_scale, unit
+
+Role = Literal["load", "indication", "slip_angle", "acquired", "time", "angle", "covariate"]
+Acquisition = Literal["after_settling", "continuous"]
+
+_PACKAGED = Path(__file__).parent
+_KEYS = (
+    "schema name extends title kind axes rotations column drum cells protocol type_b "
+    "indication_unit sample_rate"
+).split()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Column:
+    """A column of the machine's own files: ``header`` as written there, ``unit`` as meant there."""
+
+    symbol: str
+    header: str
+    unit: str
+    role: Role
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Drum:
+    """The road: circumference [m], surface speed and its tolerance [m/s]."""
+
+    surface: str
+    circumference_m: float
+    speed_m_s: float
+    speed_tolerance_m_s: float
+
+    @property
+    def radius_m(self) -> float:
+        """Radius of the drum [m]."""
+        return self.circumference_m / (2 * math.pi)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Protocol:
+    """The test plan that a test is checked against; loads [N], slip angles [rad]."""
+
+    source: str
+    slip_angles_rad: tuple[float, ...]
+    loads_N: tuple[float, ...]
+    slip_angle_tolerance_rad: float
+    load_tolerance: float
+    settle_revolutions: float
+    average_revolutions: float
+    acquisition: Acquisition
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TypeB:
+    """A stated standard uncertainty: ``u`` [SI] plus ``relative`` of the value, and its source."""
+
+    symbol: str
+    u: float
+    relative: float
+    source: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Machine:
+    """A tire test machine as data."""
+
+    name: str
+    title: str
+    simulated: bool
+    axes: Axes
+    rotations: tuple[Rotation, ...]
+    columns: tuple[Column, ...]
+    drum: Drum
+    cell_pitch_diameter_m: float
+    overturning_lever_m: tuple[tuple[str, float], ...]
+    protocol: Protocol
+    type_b: tuple[TypeB, ...]
+    sample_rate_Hz: float | None = None
+
+    @property
+    def indications(self) -> tuple[Column, ...]:
+        """The load cells' columns, in file order."""
+        return tuple(column for column in self.columns if column.role == "indication")
+
+    def column(self, symbol: str) -> Column:
+        """Return the column of a symbol; KeyError where the machine has none."""
+        for column in self.columns:
+            if column.symbol == symbol:
+                return column
+        raise KeyError(symbol)
+
+    def stated_uncertainty(self, symbol: str) -> TypeB:
+        """Return the stated uncertainty of a channel, zero where none is stated."""
+        for stated in self.type_b:
+            if stated.symbol == symbol:
+                return stated
+        return TypeB(symbol=symbol, u=0.0, relative=0.0, source="not stated")
+
+
+def machine_names() -> tuple[str, ...]:
+    """Return the names of the packaged machines."""
+    return tuple(sorted(path.stem for path in _PACKAGED.glob("*.toml")))
+
+
+@lru_cache(maxsize=32)
+def load_machine(name_or_path: str) -> Machine:
+    """Return a packaged machine by name, or one from a .toml file by path.
+
+    Raises
+    ------
+    ConfigError
+        unknown name, unknown key, missing entry, a unit of the wrong dimension
+
+    Examples
+    --------
+    >>> m15 = load_machine("m15")
+    >>> [column.symbol for column in m15.columns]
+    ['FZ', 'D52', 'D51', 'E5', 'SA', 'FY', 'MZ']
+    >>> round(m15.drum.radius_m, 3)
+    1.353
+    """
+    path = Path(name_or_path) if name_or_path.endswith(".toml") else _PACKAGED / f"{name_or_path}.toml"
+    if not path.is_file():
+        raise ConfigError(
+            f"unknown machine {name_or_path!r}",
+            where=path if name_or_path.endswith(".toml") else None,
+            got=name_or_path,
+            expected=", ".join(machine_names()),
+            next_step="name one of those, or give the path of a machine definition (.toml)",
+            rule="unknown-machine",
+        )
+    return _build(_merged(path), path)
+
+
+def _merged(path: Path) -> dict[str, Any]:
+    table = read_toml(path)
+    check_keys(table, _KEYS, where=path)
+    if "extends" in table:
+        base = _merged(_PACKAGED / f"{table.pop('extends')}.toml")
+        table = {**base, **table}
+    return table
+
+
+def _build(table: dict[str, Any], path: Path) -> Machine:
+    try:
+        indication_unit = table.get("indication_unit")
+        columns = tuple(
+            Column(
+                symbol=entry["symbol"],
+                header=entry["header"],
+                unit=unit(
+                    indication_unit if indication_unit and entry["role"] == "indication" else entry["unit"],
+                    where=path,
+                ).text,
+                role=entry["role"],
+            )
+            for entry in table["column"]
+        )
+        drum, protocol, cells = table["drum"], table["protocol"], table["cells"]
+        return Machine(
+            name=table["name"],
+            title=table["title"],
+            simulated=_one_of(table["kind"], ("real", "simulated"), path) == "simulated",
+            axes=cast("Axes", _one_of(table["axes"], AXES, path)),
+            rotations=tuple(cast("Rotation", _one_of(r, ROTATIONS, path)) for r in table["rotations"]),
+            columns=columns,
+            drum=Drum(
+                surface=drum["surface"],
+                circumference_m=quantity(drum["circumference"], "length", path),
+                speed_m_s=quantity(drum["speed"], "speed", path),
+                speed_tolerance_m_s=quantity(drum["speed_tolerance"], "speed", path),
+            ),
+            cell_pitch_diameter_m=quantity(cells["pitch_diameter"], "length", path),
+            overturning_lever_m=tuple((k, float(v)) for k, v in cells["overturning_lever"].items()),
+            protocol=Protocol(
+                source=protocol["source"],
+                slip_angles_rad=_quantities(protocol["slip_angles"], "angle", path),
+                loads_N=_quantities(protocol["loads"], "force", path),
+                slip_angle_tolerance_rad=quantity(protocol["slip_angle_tolerance"], "angle", path),
+                load_tolerance=float(protocol["load_tolerance"]),
+                settle_revolutions=float(protocol["settle_revolutions"]),
+                average_revolutions=float(protocol["average_revolutions"]),
+                acquisition=cast(
+                    "Acquisition",
+                    _one_of(protocol["acquisition"], ("after_settling", "continuous"), path),
+                ),
+            ),
+            type_b=tuple(_type_b(symbol, entry, path) for symbol, entry in table.get("type_b", {}).items()),
+            sample_rate_Hz=quantity(table["sample_rate"], "frequency", path)
+            if "sample_rate" in table
+            else None,
+        )
+    except KeyError as error:
+        raise ConfigError(
+            "a machine definition lacks an entry",
+            where=path,
+            got="nothing",
+            expected=error.args[0],
+            next_step="add it; the packaged m15.toml shows every entry",
+        ) from error
+
+
+def quantity(entry: dict[str, Any], dimension: str, where: object) -> float:
+    """Return ``{ value, unit }`` as a float in SI; the unit must have the dimension that is named."""
+    if not isinstance(entry, dict) or not {"value", "unit"} <= set(entry):
+        raise ConfigError(
+            "a quantity has no unit",
+            where=where,
+            got=entry,
+            expected='{ value = NUMBER, unit = "..." }',
+            next_step="write value and unit",
+        )
+    if isinstance(entry["value"], bool) or not isinstance(entry["value"], int | float):
+        raise ConfigError(
+            "a quantity's value is not a number", where=where, got=entry["value"], expected="a number",
+            next_step="write value as a plain number",
+        )  # fmt: skip
+    found = unit(entry["unit"], where=where)
+    if found.dimension == dimension:
+        return float(entry["value"]) * found.factor + found.offset
+    return float(entry["value"]) * si_scale(entry["unit"], dimension, where=where)
+
+
+def _quantities(entry: dict[str, Any], dimension: str, where: object) -> tuple[float, ...]:
+    return tuple(quantity({"value": v, "unit": entry["unit"]}, dimension, where) for v in entry["value"])
+
+
+def _type_b(symbol: str, entry: dict[str, Any], where: object) -> TypeB:
+    check_keys(entry, ("u", "unit", "relative", "source"), where=f"{where}: type_b.{symbol}")
+    u = float(entry.get("u", 0.0)) * (si_scale(entry["unit"], where=where) if "unit" in entry else 1.0)
+    return TypeB(symbol=symbol, u=u, relative=float(entry.get("relative", 0.0)), source=entry["source"])
+
+
+def _one_of(value: str, allowed: tuple[str, ...], where: object) -> str:
+    if value not in allowed:
+        raise ConfigError(
+            "a setting has a value that is not known",
+            where=where,
+            got=value,
+            expected=", ".join(allowed),
+            next_step="use one of those expected",
+        )
+    return value

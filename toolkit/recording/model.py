@@ -1,0 +1,83 @@
+"""Recording: what one file holds, in the units of the file, and what it says about itself."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from toolkit.errors import ColumnError
+from toolkit.units import to_si
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from toolkit.machine import Machine
+    from toolkit.machine.definition import Role
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Series:
+    """One column of a recording.
+
+    ``values`` (rows,) float64, read-only, in ``unit`` as the file has them; ``header`` as written there.
+    """
+
+    symbol: str
+    header: str
+    unit: str
+    role: Role
+    values: NDArray[np.float64]
+
+    @property
+    def si(self) -> NDArray[np.float64]:
+        """The values in SI (rows,)."""
+        return to_si(self.values, self.unit)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Recording:
+    """One file of a test. Rows count from 1 at the first data row."""
+
+    path: Path
+    sha256: str
+    machine: Machine
+    series: tuple[Series, ...]
+    simulated: bool
+    format: str
+
+    @property
+    def rows(self) -> int:
+        """Number of data rows."""
+        return len(self.series[0].values)
+
+    @property
+    def name(self) -> str:
+        """The file's name."""
+        return self.path.name
+
+    def has(self, symbol: str) -> bool:
+        """Tell whether the recording has a channel."""
+        return any(one.symbol == symbol for one in self.series)
+
+    def __getitem__(self, symbol: str) -> Series:
+        """Return a channel.
+
+        Raises
+        ------
+        ColumnError
+            the recording has no such channel
+        """
+        for one in self.series:
+            if one.symbol == symbol:
+                return one
+        raise ColumnError(
+            f"the recording has no channel {symbol}",
+            where=self.path,
+            got=", ".join(one.header for one in self.series),
+            expected=symbol,
+            next_step="check the file's header row",
+            rule="missing-column",
+        )

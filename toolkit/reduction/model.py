@@ -1,0 +1,119 @@
+"""ReducedTest: one mean a load block, corrected, in SI and SAE J670 axes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from toolkit.channels import Rotation
+from toolkit.findings import Finding
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TestInfo:
+    """What ``test.toml`` says; texts as written, None where it is silent. Pressure [Pa], speed [m/s]."""
+
+    __test__ = False  # not a pytest class
+
+    name: str
+    machine: str
+    date: str | None = None
+    operator: str | None = None
+    requestor: str | None = None
+    surface: str | None = None
+    special: str | None = None
+    speed_m_s: float | None = None
+    pressure_Pa: float | None = None
+    rated_load_N: float | None = None
+    tire_size: str | None = None
+    tire_company: str | None = None
+    tire_DOT: str | None = None
+    tire_series: str | None = None
+    tire_construction: str | None = None
+    tire_rim: str | None = None
+    simulated: bool = False
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CalibrationUse:
+    """Which record computed the forces: its id, its hash, and whether it is only a legacy import."""
+
+    id: str
+    sha256: str
+    unverified: bool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Condition:
+    """One load block of one file, averaged.
+
+    Forces in N, moments in N·m, angles in rad, in SAE axes that follow the travel (a reversed run is
+    turned by half a turn about z). ``u_FY`` and ``u_MZ`` are the standard uncertainties of the mean
+    (repeatability over the rows, autocorrelation included). ``*_common`` are carried to the load
+    ``FZ_common`` that all blocks of this nominal load share; ``u_*_common`` includes that correction.
+    ``FY_file`` and ``MZ_file`` are the acquisition program's own values, None where the file has none.
+    ``first_row`` and ``last_row`` count from 1 at the first data row of the file.
+    """
+
+    file: str
+    file_sha256: str
+    rotation: Rotation
+    first_row: int
+    last_row: int
+    step_SA: float | None
+    step_FZ: float | None
+    SA: float
+    FZ: float
+    FY: float
+    MZ: float
+    sd_SA: float
+    sd_FZ: float
+    u_FY: float
+    u_MZ: float
+    FY_file: float | None
+    MZ_file: float | None
+    FZ_common: float
+    FY_common: float
+    MZ_common: float
+    u_FY_common: float
+    u_MZ_common: float
+    used: bool
+    calibration_sha256: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Tare:
+    """The tare that was subtracted, each indication in its own unit; source ``none`` where there is none."""
+
+    source: str
+    values: tuple[tuple[str, float], ...]
+    unit: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ReducedTest:
+    """A whole test, reduced. ``conditions`` in the order of the protocol, unused ones last."""
+
+    info: TestInfo
+    calibration: CalibrationUse
+    conditions: tuple[Condition, ...]
+    tare: Tare
+    averaging: str
+    findings: tuple[Finding, ...]
+    code_version: str
+    axes: str = "SAE"
+
+    def used(self, rotation: Rotation | None = None) -> tuple[Condition, ...]:
+        """Return the conditions that feed results, optionally of one direction of rotation."""
+        return tuple(c for c in self.conditions if c.used and rotation in (None, c.rotation))
+
+    def table(self) -> pd.DataFrame:
+        """Return the conditions as a table, one row each, in SI."""
+        import dataclasses
+
+        import pandas as pd
+
+        return pd.DataFrame([dataclasses.asdict(c) for c in self.conditions])

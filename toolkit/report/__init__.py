@@ -1,0 +1,1 @@
+"""Content to tables, figures, Word and PDF; every renderer lives here."""

@@ -1,0 +1,1 @@
+"""The virtual machine: tire, road, carriage, load cells, data acquisition, walked forward."""

@@ -1,0 +1,1 @@
+"""Tire models, one a file, and their fits."""

@@ -1,0 +1,270 @@
+"""The one place where units are read and converted.
+
+Inside the toolkit every array is float64 in SI (N, N·m, rad, m/s, Pa, K, s); units exist at the edges:
+files in, reports out. ``lb`` in a file of this field means pound-force, and only this module says so.
+A bridge output in mV/V and a digitiser's counts are dimensions of their own, so that neither can be
+taken for the other or for a plain number.
+
+pint does the arithmetic; it is imported when the first unit is read.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass
+from functools import cache
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from toolkit.errors import UnitError
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+    from pint import UnitRegistry
+
+# What files, certificates and people write -> an expression of the registry. Everything else that pint
+# itself reads is accepted too; spellings that pint would read as something else must stand here.
+_SPELLINGS = {
+    "lb": "force_pound",
+    "lbs": "force_pound",
+    "lbf": "force_pound",
+    "lb-ft": "force_pound*foot",
+    "lb*ft": "force_pound*foot",
+    "lb ft": "force_pound*foot",
+    "lb.ft": "force_pound*foot",
+    "lbf-ft": "force_pound*foot",
+    "lbf ft": "force_pound*foot",
+    "lbf*ft": "force_pound*foot",
+    "lbf.ft": "force_pound*foot",
+    "ft-lb": "force_pound*foot",
+    "ft-lbf": "force_pound*foot",
+    "ft lb": "force_pound*foot",
+    "ft*lb": "force_pound*foot",
+    "ft lbf": "force_pound*foot",
+    "ft*lbf": "force_pound*foot",
+    "klbf": "1000*force_pound",
+    "kip": "1000*force_pound",
+    "Nm": "newton*meter",
+    "N-m": "newton*meter",
+    "N m": "newton*meter",
+    "N*m": "newton*meter",
+    "kNm": "kilonewton*meter",
+    "kN*m": "kilonewton*meter",
+    "mV/V": "1e-3*bridge_ratio",
+    "µV/V": "1e-6*bridge_ratio",
+    "uV/V": "1e-6*bridge_ratio",
+    "V/V": "bridge_ratio",
+    "count": "digitiser_count",
+    "counts": "digitiser_count",
+    "°": "degree",
+    "degC": "degC",
+    "°C": "degC",
+    "C": "degC",
+    "degF": "degF",
+    "°F": "degF",
+    "psi": "psi",
+    "km/h": "kilometer/hour",
+    "kph": "kilometer/hour",
+    "kmh": "kilometer/hour",
+    "mph": "mile/hour",
+    "1": "dimensionless",
+    "-": "dimensionless",
+    "": "dimensionless",
+    "%": "0.01*dimensionless",
+    "rev": "turn",
+}
+
+# How the toolkit writes a unit, whatever the spelling that was read.
+_CANONICAL = {
+    "lb": "lbf", "lbs": "lbf", "°": "deg", "degree": "deg", "degrees": "deg", "radian": "rad",
+    "radians": "rad", "°C": "degC", "C": "degC", "°F": "degF", "counts": "count", "kph": "km/h",
+    "kmh": "km/h", "-": "1", "": "1", "newton": "N", "newtons": "N", "second": "s", "seconds": "s",
+    "uV/V": "µV/V", "kNm": "kN*m",
+}  # fmt: skip
+
+_ANGLES = ("degree", "radian", "turn", "arcminute", "milliradian")
+_NEVER_GUESSED = re.compile(r"[^\w\s*/^.()·°µ%+-]")
+
+
+@dataclass(frozen=True, slots=True)
+class Unit:
+    """A unit as read at the edge: SI value = ``factor`` x value + ``offset``, in ``si``."""
+
+    text: str
+    factor: float
+    offset: float
+    si: str
+    dimension: str
+
+
+@cache
+def registry() -> UnitRegistry[Any]:
+    """Return the one pint registry, with bridge ratio and digitiser count as dimensions."""
+    import pint
+
+    made: UnitRegistry[Any] = pint.UnitRegistry(autoconvert_offset_to_baseunit=True, cache_folder=None)
+    made.define("bridge_ratio = [bridge_ratio]")
+    made.define("digitiser_count = [digitiser_count]")
+    return made
+
+
+# The units of the machine's own files, so that reading one needs no pint: the test of this module
+# holds every line against pint. The international pound-force is exact: 0.45359237 kg x 9.80665 m/s^2.
+_LBF = 0.45359237 * 9.80665
+_EXACT = {
+    "N": (1.0, 0.0, "N", "force"),
+    "kN": (1e3, 0.0, "N", "force"),
+    "lbf": (_LBF, 0.0, "N", "force"),
+    "N*m": (1.0, 0.0, "N*m", "moment"),
+    "lbf*ft": (_LBF * 0.3048, 0.0, "N*m", "moment"),
+    "deg": (math.pi / 180, 0.0, "rad", "angle"),
+    "rad": (1.0, 0.0, "rad", "angle"),
+    "mV/V": (1e-3, 0.0, "V/V", "bridge_ratio"),
+    "V/V": (1.0, 0.0, "V/V", "bridge_ratio"),
+    "count": (1.0, 0.0, "count", "count"),
+    "m": (1.0, 0.0, "m", "length"),
+    "s": (1.0, 0.0, "s", "time"),
+    "m/s": (1.0, 0.0, "m/s", "speed"),
+    "km/h": (1 / 3.6, 0.0, "m/s", "speed"),
+    "Pa": (1.0, 0.0, "Pa", "pressure"),
+    "kPa": (1e3, 0.0, "Pa", "pressure"),
+    "bar": (1e5, 0.0, "Pa", "pressure"),
+    "psi": (_LBF / 0.0254**2, 0.0, "Pa", "pressure"),
+    "degC": (1.0, 273.15, "K", "temperature"),
+    "K": (1.0, 0.0, "K", "temperature"),
+    "1": (1.0, 0.0, "1", "ratio"),
+    "Hz": (1.0, 0.0, "Hz", "frequency"),
+}
+
+_DIMENSIONS = {
+    "[mass] * [length] / [time] ** 2": ("force", "N"),
+    "[mass] * [length] ** 2 / [time] ** 2": ("moment", "N*m"),
+    "[bridge_ratio]": ("bridge_ratio", "V/V"),
+    "[digitiser_count]": ("count", "count"),
+    "[length]": ("length", "m"),
+    "[time]": ("time", "s"),
+    "[length] / [time]": ("speed", "m/s"),
+    "[mass] / [length] / [time] ** 2": ("pressure", "Pa"),
+    "[temperature]": ("temperature", "K"),
+    "[mass]": ("mass", "kg"),
+    "1 / [time]": ("frequency", "Hz"),
+}
+
+
+def unit(text: str, *, where: object = None) -> Unit:
+    """Read a unit.
+
+    Parameters
+    ----------
+    text : a spelling such as ``lbf``, ``lb-ft``, ``mV/V``, ``deg``, ``N·m``
+    where : the file and column, for the message
+
+    Raises
+    ------
+    UnitError
+        the spelling is unknown; a unit is never guessed
+
+    Examples
+    --------
+    >>> unit("lb").factor
+    4.4482216152605
+    >>> unit("lb-ft").si
+    'N*m'
+    """
+    try:
+        return _parse(" ".join(text.split()))
+    except _UnknownUnitError as error:
+        raise UnitError(
+            f"unknown unit {text!r}",
+            where=where,
+            got=text,
+            expected="a unit such as N, lbf, N*m, lbf*ft, deg, rad, mV/V, count, degC, kPa, km/h, s",
+            next_step="write the unit in the header as 'NAME [unit]' or in the machine definition",
+            rule="unknown-unit",
+        ) from error
+
+
+class _UnknownUnitError(Exception):
+    pass
+
+
+@cache
+def _parse(text: str) -> Unit:
+    text = text.replace("·", "*").replace("⋅", "*").replace("μ", "µ")
+    name = _canonical(text)
+    if name in _EXACT:
+        factor, offset, si, dimension = _EXACT[name]
+        return Unit(name, factor, offset, si, dimension)
+    if _NEVER_GUESSED.search(text):
+        raise _UnknownUnitError(text)
+    ureg = registry()
+    try:
+        read: Any = ureg.parse_expression(_SPELLINGS.get(text, text))
+        one: Any = read if hasattr(read, "units") else ureg.Quantity(float(read), "dimensionless")
+        if dict(one.dimensionality) == {"[temperature]": 1}:
+            zero = float(ureg.Quantity(0.0, one.units).to("kelvin").magnitude)
+            factor = float(ureg.Quantity(1.0, one.units).to("kelvin").magnitude) - zero
+            return Unit(name, factor, zero, "K", "temperature")
+        if not one.dimensionality:
+            # pint counts an angle as a pure number; only a named angle becomes one here.
+            is_angle = any(part in _ANGLES for part in one._units)
+            factor = float(one.to("radian").magnitude if is_angle else one.to("dimensionless").magnitude)
+            return Unit(name, factor, 0.0, "rad" if is_angle else "1", "angle" if is_angle else "ratio")
+        base = one.to_base_units()
+        kind = str(one.dimensionality)
+        dimension, symbol = _DIMENSIONS.get(kind, (kind, f"{base.units:~}"))
+        return Unit(name, float(base.magnitude), 0.0, symbol, dimension)
+    except Exception as error:  # pint raises many kinds for text that is no unit
+        raise _UnknownUnitError(text) from error
+
+
+def _canonical(text: str) -> str:
+    if text in _CANONICAL:
+        return _CANONICAL[text]
+    spelled = _SPELLINGS.get(text)
+    if spelled == "force_pound*foot":
+        return "lbf*ft"
+    if spelled == "newton*meter":
+        return "N*m"
+    return text
+
+
+def to_si(values: ArrayLike, text: str, *, where: object = None) -> NDArray[np.float64]:
+    """Return values in SI; the shape is kept.
+
+    >>> to_si([1.0, 2.0], "lbf").round(3).tolist()
+    [4.448, 8.896]
+    >>> float(to_si(20.0, "degC"))
+    293.15
+    """
+    found = unit(text, where=where)
+    return np.asarray(values, dtype=np.float64) * found.factor + found.offset
+
+
+def from_si(values: ArrayLike, text: str) -> NDArray[np.float64]:
+    """Return SI values in a unit for people; the inverse of `to_si`."""
+    found = unit(text)
+    return (np.asarray(values, dtype=np.float64) - found.offset) / found.factor
+
+
+def si_scale(text: str, dimension: str | None = None, *, where: object = None) -> float:
+    """Return the factor to SI of a unit without an offset, optionally of a demanded dimension.
+
+    Raises
+    ------
+    UnitError
+        the unit is unknown, of another dimension, or has an offset
+    """
+    found = unit(text, where=where)
+    if (dimension is not None and found.dimension != dimension) or found.offset:
+        raise UnitError(
+            f"unit {text!r} is not one of {dimension or 'a plain scale'}",
+            where=where,
+            got=f"{text} ({found.dimension})",
+            expected=dimension or "a unit without an offset",
+            next_step="correct the unit in the file or the machine definition",
+            rule="unit-dimension",
+        )
+    return found.factor
