@@ -1,5 +1,5 @@
 """Files from the machine: hostile until checked, then frozen recordings."""
 
-from toolkit.recording.model import Recording, Series
+from toolkit.recording.model import Recording, Series, TestInfo
 
-__all__ = ["Recording", "Series"]
+__all__ = ["Recording", "Series", "TestInfo"]

@@ -7,34 +7,10 @@ from typing import TYPE_CHECKING
 
 from toolkit.channels import Rotation
 from toolkit.findings import Finding
+from toolkit.recording.model import TestInfo
 
 if TYPE_CHECKING:
     import pandas as pd
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class TestInfo:
-    """What ``test.toml`` says; texts as written, None where it is silent. Pressure [Pa], speed [m/s]."""
-
-    __test__ = False  # not a pytest class
-
-    name: str
-    machine: str
-    date: str | None = None
-    operator: str | None = None
-    requestor: str | None = None
-    surface: str | None = None
-    special: str | None = None
-    speed_m_s: float | None = None
-    pressure_Pa: float | None = None
-    rated_load_N: float | None = None
-    tire_size: str | None = None
-    tire_company: str | None = None
-    tire_DOT: str | None = None
-    tire_series: str | None = None
-    tire_construction: str | None = None
-    tire_rim: str | None = None
-    simulated: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
