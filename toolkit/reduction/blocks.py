@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 
 import numpy as np
@@ -55,7 +56,7 @@ def find_blocks(FZ: NDArray[np.float64]) -> tuple[Block, ...]:
     limit = float(np.clip(_NOISE_FACTOR * noise, _LEAST_JUMP * largest, _LARGEST_JUMP * largest))
     edges = [0, *(np.flatnonzero(steps > limit) + 1).tolist(), len(FZ)]
     return tuple(
-        Block(start=a, stop=b, mean_FZ=float(np.mean(FZ[a:b]))) for a, b in zip(edges, edges[1:], strict=False)
+        Block(start=a, stop=b, mean_FZ=float(np.mean(FZ[a:b]))) for a, b in itertools.pairwise(edges)
     )
 
 

@@ -1,0 +1,65 @@
+"""Carry the values of one nominal load to one common load.
+
+Blocks of one nominal load differ by some percent; forces are compared and halved only at one load. The
+slope comes from the neighbouring loads of the same file, so that it is taken at the same slip angle.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Slope:
+    """dy/dFZ at one block and the standard uncertainty that the choice of neighbours leaves."""
+
+    value: float
+    u: float
+
+
+def slopes(FZ: NDArray[np.float64], y: NDArray[np.float64]) -> tuple[Slope | None, ...]:
+    """Return dy/dFZ at each block of one file from its neighbours in load.
+
+    Parameters
+    ----------
+    FZ : (blocks,) mean loads [N]; y : (blocks,) mean force or moment
+
+    Returns
+    -------
+    one entry a block; None where the file has one load only. Inside: the slope of the parabola through
+    the block and both neighbours; at an end the same parabola's slope there. The uncertainty is that of a
+    rectangle between the two secants (GUM 4.3.7); with two blocks, half the secant itself.
+
+    Examples
+    --------
+    >>> [round(s.value, 9) for s in slopes(np.array([1.0, 2.0, 4.0]), np.array([1.0, 4.0, 16.0]))]
+    [2.0, 4.0, 8.0]
+    """
+    n = len(FZ)
+    order = np.argsort(FZ, kind="stable")
+    found: list[Slope | None] = [None] * n
+    if n < 2 or np.min(np.diff(FZ[order])) <= 0:
+        return tuple(found)
+    x, values = FZ[order], y[order]
+    secants = np.diff(values) / np.diff(x)
+    if n == 2:
+        one = Slope(value=float(secants[0]), u=float(abs(secants[0])) / 2)
+        return (one, one)
+    for place, block in enumerate(order):
+        middle = min(max(place, 1), n - 2)
+        left, right = secants[middle - 1], secants[middle]
+        bend = (right - left) / (x[middle + 1] - x[middle - 1])
+        # Newton's form of the parabola through the three, differentiated at the block itself.
+        value = left + bend * ((x[place] - x[middle - 1]) + (x[place] - x[middle]))
+        found[block] = Slope(value=float(value), u=float(abs(right - left)) / (2 * np.sqrt(3)))
+    return tuple(found)
+
+
+def carry(value: float, u: float, *, slope: Slope | None, delta_FZ: float) -> tuple[float, float]:
+    """Return (value, u) at a load that differs by ``delta_FZ`` [N]; without a slope nothing is carried."""
+    if slope is None:
+        return value, u
+    return value + slope.value * delta_FZ, float(np.hypot(u, slope.u * delta_FZ))

@@ -1,0 +1,202 @@
+"""Hold a test against its protocol: which condition each block is, and what departs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from toolkit.channels import Rotation
+from toolkit.findings import Finding
+from toolkit.units import from_si
+
+if TYPE_CHECKING:
+    from toolkit.machine import Protocol
+
+# A block belongs to a nominal load when it is nearer to it than this part of the load; beyond, it is a
+# load that the protocol does not know.
+_LOAD_REACH = 0.15
+_FEEDS = "slip-angle curves, fits and stiffness at these steps"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Placed:
+    """Where one block stands in the protocol; ``file_order`` is its file's place in the sorted names."""
+
+    file: str
+    file_order: int
+    rotation: Rotation
+    SA: float
+    FZ: float
+    step_SA: float | None
+    step_FZ: float | None
+
+
+def nearest_step(SA: float, protocol: Protocol) -> float | None:
+    """Return the slip angle step [rad] nearest to a measured angle, None where every one is too far.
+
+    The reach is half the distance to the neighbouring step, at least the tolerance: a file that is out
+    of tolerance still is that step, with a finding.
+    """
+    steps = np.asarray(protocol.slip_angles_rad)
+    distances = np.abs(steps - SA)
+    best = int(np.argmin(distances))
+    others = np.abs(np.delete(steps, best) - steps[best])
+    reach = max(protocol.slip_angle_tolerance_rad, float(np.min(others)) / 2) if len(steps) > 1 else np.inf
+    return float(steps[best]) if distances[best] <= reach else None
+
+
+def nearest_load(FZ: float, protocol: Protocol) -> float | None:
+    """Return the nominal load [N] nearest to a measured one, None where the protocol has none there."""
+    loads = np.asarray(protocol.loads_N)
+    best = float(loads[np.argmin(np.abs(loads - FZ))])
+    return best if abs(FZ - best) <= _LOAD_REACH * best else None
+
+
+def doubled(placed: Sequence[Placed]) -> tuple[int, ...]:
+    """Return the indices of blocks whose condition an earlier file already holds: they stay unused."""
+    seen: set[tuple[Rotation, float, float]] = set()
+    later: list[int] = []
+    for index in sorted(range(len(placed)), key=lambda i: placed[i].file_order):
+        one = placed[index]
+        if one.step_SA is None or one.step_FZ is None:
+            continue
+        key = (one.rotation, one.step_SA, one.step_FZ)
+        if key in seen:
+            later.append(index)
+        seen.add(key)
+    return tuple(sorted(later))
+
+
+def check(
+    placed: Sequence[Placed], later: Sequence[int], protocol: Protocol, rotations: Sequence[Rotation]
+) -> list[Finding]:
+    """Return the departures from the protocol as findings."""
+    return [
+        *_missing(placed, protocol, rotations),
+        *_doubled(placed, later),
+        *_angles(placed, protocol),
+        *_loads(placed, protocol),
+    ]
+
+
+def _missing(placed: Sequence[Placed], protocol: Protocol, rotations: Sequence[Rotation]) -> list[Finding]:
+    found: list[Finding] = []
+    for rotation in rotations:
+        there = {(p.step_SA, p.step_FZ) for p in placed if p.rotation == rotation}
+        if not there:
+            found.append(
+                Finding(
+                    rule="missing",
+                    where=f"drum {rotation}",
+                    message=f"no recording of this direction: {_feeds_of_direction(rotation)} are null",
+                )
+            )
+            continue
+        gone = [step for step in protocol.slip_angles_rad if not any(step == s for s, _ in there)]
+        if gone:
+            found.append(
+                Finding(
+                    rule="missing",
+                    where=f"drum {rotation}",
+                    message=f"no file at slip angle {_list(gone, 'deg')}; "
+                    + ("the secant stiffness and " if _has_one_degree(gone) else "")
+                    + f"{_FEEDS} lack it",
+                )
+            )
+        for step in protocol.slip_angles_rad:
+            loads = [load for load in protocol.loads_N if (step, load) not in there]
+            if step not in gone and loads:
+                found.append(
+                    Finding(
+                        rule="missing",
+                        where=f"drum {rotation}, slip angle {_list([step], 'deg')}",
+                        message=f"no block at load {_list(loads, 'lbf')}",
+                    )
+                )
+    return found
+
+
+def _doubled(placed: Sequence[Placed], later: Sequence[int]) -> list[Finding]:
+    files: dict[str, list[Placed]] = {}
+    for index in later:
+        files.setdefault(placed[index].file, []).append(placed[index])
+    return [
+        Finding(
+            rule="doubled",
+            where=file,
+            message=f"slip angle {_list([some[0].step_SA or 0.0], 'deg')}, drum {some[0].rotation}: {len(some)} block(s) of a condition that an earlier file holds, "
+            "with no declared repeat; unused",
+        )
+        for file, some in files.items()
+    ]
+
+
+def _angles(placed: Sequence[Placed], protocol: Protocol) -> list[Finding]:
+    found: list[Finding] = []
+    for file in dict.fromkeys(p.file for p in placed):
+        angles = [p for p in placed if p.file == file]
+        SA = float(np.mean([p.SA for p in angles]))
+        step = angles[0].step_SA
+        if step is None:
+            message = (
+                f"slip angle {_list([SA], 'deg')} is no step of the protocol; its blocks feed the curves only"
+            )
+        elif abs(SA - step) > protocol.slip_angle_tolerance_rad:
+            message = (
+                f"slip angle {_list([SA], 'deg')} is out of tolerance of the step {_list([step], 'deg')} "
+                f"(+-{_list([protocol.slip_angle_tolerance_rad], 'deg')})"
+            )
+        else:
+            continue
+        found.append(Finding(rule="slip-angle-tolerance", where=file, message=message))
+    return found
+
+
+def _loads(placed: Sequence[Placed], protocol: Protocol) -> list[Finding]:
+    found: list[Finding] = []
+    for file in dict.fromkeys(p.file for p in placed):
+        mine = [p for p in placed if p.file == file]
+        unknown = [p.FZ for p in mine if p.step_FZ is None]
+        off = [
+            p.FZ
+            for p in mine
+            if p.step_FZ is not None and abs(p.FZ - p.step_FZ) > protocol.load_tolerance * p.step_FZ
+        ]
+        if unknown:
+            found.append(
+                Finding(
+                    rule="unplanned-load",
+                    where=file,
+                    message=f"load {_list(unknown, 'lbf')} is none of the protocol's",
+                )
+            )
+        if off:
+            found.append(
+                Finding(
+                    rule="load-tolerance",
+                    where=file,
+                    message=f"load {_list(off, 'lbf')} is more than {protocol.load_tolerance:.0%} "
+                    "off the protocol's",
+                )
+            )
+    return found
+
+
+def _feeds_of_direction(rotation: Rotation) -> str:
+    return "conicity, plysteer, CRAT and PRAT" + (" and every curve" if rotation == "forward" else "")
+
+
+def _has_one_degree(steps: Sequence[float]) -> bool:
+    return any(abs(abs(float(from_si(step, "deg"))) - 1) < 1e-9 for step in steps)
+
+
+def _list(values: Sequence[float], unit: str) -> str:
+    digits = 2 if unit == "deg" else 0
+    texts = []
+    for value in from_si(list(values), unit):
+        text = f"{value:.{digits}f}"
+        texts.append(text.rstrip("0").rstrip(".") if "." in text else text)
+    return f"{', '.join(texts)} {unit}"
