@@ -30,6 +30,7 @@ class Condition:
     turned by half a turn about z). ``u_FY`` and ``u_MZ`` are the standard uncertainties of the mean
     (repeatability over the rows, autocorrelation included). ``*_common`` are carried to the load
     ``FZ_common`` that all blocks of this nominal load share; ``u_*_common`` includes that correction.
+    ``indications`` are the cells' means minus tare, in the record's order and units.
     ``FY_file`` and ``MZ_file`` are the acquisition program's own values, None where the file has none.
     ``first_row`` and ``last_row`` count from 1 at the first data row of the file.
     """
@@ -49,6 +50,7 @@ class Condition:
     sd_FZ: float
     u_FY: float
     u_MZ: float
+    indications: tuple[float, ...]
     FY_file: float | None
     MZ_file: float | None
     FZ_common: float

@@ -35,6 +35,7 @@ class _File:
     # One recording on its way: corrected rows, its blocks, the rows of each that are averaged.
     recording: Recording
     rotation: Rotation
+    indications: tuple[NDArray[np.float64], ...]
     loads: Mapping[str, NDArray[np.float64]]
     blocks: tuple[Block, ...]
     windows: tuple[Window, ...]
@@ -133,7 +134,7 @@ def _open(
             "the file has no load block" if not blocks else "the load is negative",
             where=recording.path,
             got=f"FZ from {_lbf(np.min(recording['FZ'].si))} to {_lbf(np.max(recording['FZ'].si))} lbf",
-            expected=f"rows at loads such as {', '.join(_lbf(load) for load in machine.protocol.loads_N)} lbf",
+            expected=f"loads such as {', '.join(_lbf(load) for load in machine.protocol.loads_N)} lbf",
             next_step="declare a tare file with '[tare] file' in test.toml; else check the load channel",
             rule="no-load-block",
         )
@@ -154,6 +155,7 @@ def _open(
     return _File(
         recording=recording,
         rotation=rotation,
+        indications=tuple(values - dict(tare.values).get(name, 0.0) for name, values in indications.items()),
         loads=apply_record(record, indications, units=units, tare=offsets),
         blocks=blocks,
         windows=windows,
@@ -228,6 +230,7 @@ def _condition(
         sd_FZ=FZ.sd,
         u_FY=FY.u,
         u_MZ=MZ.u,
+        indications=tuple(float(np.mean(values[rows])) for values in file.indications),
         FY_file=_acquired(recording, "FY", rows, sign["FY"]),
         MZ_file=_acquired(recording, "MZ", rows, sign["MZ"]),
         FZ_common=FZ.value,
@@ -331,8 +334,8 @@ def _acquired_findings(files: Sequence[_File], record: CalibrationRecord) -> lis
             rule="acquired-differs",
             where=_some(list(dict.fromkeys(d.file for d in wrong))),
             message=f"FY and MZ in the file were not computed by {record.id}: they differ by up to "
-            f"{largest['FY']:.1f} N and {largest['MZ']:.2f} N·m; the values here are recomputed from the cells "
-            "(toolkit inspect tells which calibration wrote them)",
+            f"{largest['FY']:.1f} N and {largest['MZ']:.2f} N·m; the values here are recomputed from the "
+            "cells (toolkit inspect tells which calibration wrote them)",
         )
     ]
 

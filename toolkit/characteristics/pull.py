@@ -1,0 +1,141 @@
+"""Pull: conicity, plysteer, CRAT and PRAT from a forward and a reversed run.
+
+By symmetry conicity keeps FY and flips MZ under x -> -x; plysteer flips FY and keeps MZ under a half turn
+about z. With F and R the values at SA = 0 in machine-fixed axes (cells in the carriage):
+
+    conicity = (F + R)/2   plysteer = (F - R)/2   of FY
+    CRAT     = (F - R)/2   PRAT     = (F + R)/2   of MZ
+
+In axes that follow the travel FY of the reversed run has the other sign and MZ the same, so the same
+physics reads conicity = (F - R)/2 there. The source document's own formulas take (F + R)/2 for CRAT and
+(F - R)/2 for PRAT on machine-fixed values; they are given apart under its name.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from toolkit.characteristics.model import DirectionFit, Pull
+from toolkit.characteristics.shared import calibration_u, weights_at_zero
+from toolkit.estimate import Estimate, effective_dof
+from toolkit.tires.fit import estimate_at, slope_estimate_at, zero_crossing
+
+if TYPE_CHECKING:
+    from toolkit.calibration.record import CalibrationRecord
+    from toolkit.characteristics.groups import Group
+    from toolkit.tires.model import CurveFit
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Direction:
+    """One direction's group and curves; None where the direction was not run or not fitted."""
+
+    group: Group
+    fit: DirectionFit
+
+
+def pull(
+    load_N: float,
+    forward: Direction | None,
+    reverse: Direction | None,
+    *,
+    record: CalibrationRecord | None,
+    machine_axes: str,
+    u_SA_zero: float,
+) -> Pull:
+    """Return the pull characteristics of one load.
+
+    Parameters
+    ----------
+    forward, reverse : curves in SAE axes that follow the travel, at one common load
+    u_SA_zero : standard uncertainty [rad] of the slip angle's zero, the same for both directions: it
+        stays whole in plysteer and PRAT and cancels in conicity, CRAT and PRAT at FY = 0
+    """
+
+    def half(channel: str, sign: float) -> Estimate | None:
+        return _half(
+            channel, forward, reverse, sign, record=record, machine_axes=machine_axes, u_zero=u_SA_zero
+        )
+
+    CRAT, PRAT = half("MZ", -1.0), half("MZ", 1.0)
+    ahead, back = _moment_without_force(forward), _moment_without_force(reverse)
+    return Pull(
+        load_N=load_N,
+        conicity=half("FY", -1.0),
+        plysteer=half("FY", 1.0),
+        CRAT=CRAT,
+        PRAT=PRAT,
+        PRAT_at_FY_zero=_mean_of(ahead, back),
+        # MZ is the same in machine-fixed axes and in those that follow the travel: the source document's
+        # pair for MZ is this pair with the names exchanged.
+        thesis_CRAT=PRAT,
+        thesis_PRAT=CRAT,
+        residual_forward=ahead,
+        residual_reverse=back,
+    )
+
+
+def _half(
+    channel: str,
+    forward: Direction | None,
+    reverse: Direction | None,
+    sign: float,
+    *,
+    record: CalibrationRecord | None,
+    machine_axes: str,
+    u_zero: float,
+) -> Estimate | None:
+    one, other = _curve(forward, channel), _curve(reverse, channel)
+    if one is None or other is None or forward is None or reverse is None:
+        return None
+    F, R = estimate_at(one, 0.0), estimate_at(other, 0.0)
+    parts = [(c, w / 2) for c, w in weights_at_zero(forward.group)]
+    parts += [(c, sign * w / 2) for c, w in weights_at_zero(reverse.group)]
+    shared = calibration_u(record, channel, parts, machine_axes=machine_axes)
+    slope = slope_estimate_at(one, 0.0).value + sign * slope_estimate_at(other, 0.0).value
+    zero = abs(slope) / 2 * u_zero
+    contributions = [(F.u / 2, F.dof), (R.u / 2, R.dof), (shared, np.inf), (zero, np.inf)]
+    return Estimate(
+        value=(F.value + sign * R.value) / 2,
+        u=float(np.sqrt(sum(u * u for u, _ in contributions))),
+        unit=F.unit,
+        dof=effective_dof(contributions),
+    )
+
+
+def _curve(direction: Direction | None, channel: str) -> CurveFit | None:
+    if direction is None or not weights_at_zero(direction.group):
+        return None
+    return direction.fit.FY if channel == "FY" else direction.fit.MZ
+
+
+def _moment_without_force(direction: Direction | None) -> Estimate | None:
+    """Return MZ where the direction's own FY is zero: the residual aligning torque."""
+    FY, MZ = _curve(direction, "FY"), _curve(direction, "MZ")
+    if FY is None or MZ is None:
+        return None
+    crossing = zero_crossing(FY)
+    if crossing is None:
+        return None
+    moment, slope = estimate_at(MZ, crossing.value), slope_estimate_at(MZ, crossing.value)
+    moved = abs(slope.value) * crossing.u
+    return Estimate(
+        value=moment.value,
+        u=float(np.hypot(moment.u, moved)),
+        unit=moment.unit,
+        dof=effective_dof([(moment.u, moment.dof), (moved, crossing.dof)]),
+    )
+
+
+def _mean_of(one: Estimate | None, other: Estimate | None) -> Estimate | None:
+    if one is None or other is None:
+        return None
+    return Estimate(
+        value=(one.value + other.value) / 2,
+        u=float(np.hypot(one.u, other.u)) / 2,
+        unit=one.unit,
+        dof=effective_dof([(one.u, one.dof), (other.u, other.dof)]),
+    )

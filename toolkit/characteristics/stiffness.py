@@ -1,0 +1,77 @@
+"""Cornering and aligning stiffness: the +-1 deg secant (thesis, SAE) and the slope of the curve.
+
+In SAE axes FY falls and MZ rises with the slip angle: cornering stiffness is -dFY/dSA and aligning
+stiffness +dMZ/dSA, both positive. The secant is biased low against the slope at zero (-6 to -0.3 % on a
+passenger tire) because the curve bends.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from toolkit.characteristics.model import DirectionFit, Stiffness
+from toolkit.characteristics.shared import calibration_u, slope_weights
+from toolkit.estimate import Estimate, effective_dof
+from toolkit.tires.fit import slope_estimate_at
+
+if TYPE_CHECKING:
+    from toolkit.calibration.record import CalibrationRecord
+    from toolkit.characteristics.groups import Group
+    from toolkit.tires.model import CurveFit
+
+_SIGN = {"FY": -1.0, "MZ": 1.0}
+_UNIT = {"FY": "N/rad", "MZ": "N*m/rad"}
+
+
+def stiffness(
+    group: Group, fit: DirectionFit, *, record: CalibrationRecord | None, machine_axes: str
+) -> Stiffness:
+    """Return both stiffnesses of one load and direction, by secant and by slope [N/rad, N·m/rad]."""
+    return Stiffness(
+        load_N=group.load_N,
+        rotation=group.rotation,
+        secant_cornering=_secant(group, "FY", record=record, machine_axes=machine_axes),
+        secant_aligning=_secant(group, "MZ", record=record, machine_axes=machine_axes),
+        slope_cornering=_slope(group, fit.FY, "FY", record=record, machine_axes=machine_axes),
+        slope_aligning=_slope(group, fit.MZ, "MZ", record=record, machine_axes=machine_axes),
+    )
+
+
+def _secant(
+    group: Group, channel: str, *, record: CalibrationRecord | None, machine_axes: str
+) -> Estimate | None:
+    plus, minus = group.step(1.0), group.step(-1.0)
+    if plus is None or minus is None or plus.SA <= minus.SA:
+        return None
+    span = plus.SA - minus.SA
+    if channel == "FY":
+        rise, own = plus.FY_common - minus.FY_common, np.hypot(plus.u_FY_common, minus.u_FY_common)
+    else:
+        rise, own = plus.MZ_common - minus.MZ_common, np.hypot(plus.u_MZ_common, minus.u_MZ_common)
+    shared = calibration_u(record, channel, ((plus, 1 / span), (minus, -1 / span)), machine_axes=machine_axes)
+    # The zero of the slip angle cancels in the span; what is left of the angle is its scatter.
+    angle = abs(rise / span) * np.hypot(plus.sd_SA, minus.sd_SA) / span
+    u = float(np.sqrt((own / span) ** 2 + shared**2 + angle**2))
+    return Estimate(value=_SIGN[channel] * rise / span, u=u, unit=_UNIT[channel])
+
+
+def _slope(
+    group: Group,
+    fit: CurveFit | None,
+    channel: str,
+    *,
+    record: CalibrationRecord | None,
+    machine_axes: str,
+) -> Estimate | None:
+    if fit is None or "slope_at_zero" in fit.not_determined or fit.slope_at_zero is None:
+        return None
+    one = slope_estimate_at(fit, 0.0)
+    shared = calibration_u(record, channel, slope_weights(group), machine_axes=machine_axes)
+    return Estimate(
+        value=_SIGN[channel] * one.value,
+        u=float(np.hypot(one.u, shared)),
+        unit=_UNIT[channel],
+        dof=effective_dof([(one.u, one.dof), (shared, np.inf)]) if one.u or shared else one.dof,
+    )
