@@ -20,8 +20,8 @@ from typing import Literal, get_args
 Axes = Literal["SAE", "adapted-SAE", "ISO-W", "machine"]
 Rotation = Literal["forward", "reverse"]
 
-AXES: tuple[str, ...] = get_args(Axes)
-ROTATIONS: tuple[str, ...] = get_args(Rotation)
+AXES: tuple[Axes, ...] = get_args(Axes)
+ROTATIONS: tuple[Rotation, ...] = get_args(Rotation)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

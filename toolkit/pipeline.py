@@ -2,10 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal
 
+from toolkit.characteristics.characterise import characterise
 from toolkit.characteristics.model import Characteristics
-from toolkit.reduction.model import ReducedTest
+from toolkit.findings import Finding
+from toolkit.machine import load_machine
+from toolkit.recording.read import read_recording
+from toolkit.reduction.model import ReducedTest, Tare
+from toolkit.reduction.reduce import reduce_test, tare_of_file
+
+if TYPE_CHECKING:
+    from toolkit.calibration.record import CalibrationRecord
+    from toolkit.machine import Machine
+    from toolkit.recording.folder import TestFolder
+    from toolkit.recording.model import Recording
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -16,3 +29,48 @@ class TestResult:
 
     reduced: ReducedTest
     characteristics: Characteristics
+
+    @property
+    def findings(self) -> tuple[Finding, ...]:
+        """The findings of every stage."""
+        return (*self.reduced.findings, *self.characteristics.findings)
+
+
+def read_test(
+    folder: TestFolder,
+    *,
+    reader: Literal["calamine", "both"] = "calamine",
+    step: Callable[[str], None] = lambda _name: None,
+) -> tuple[Recording, ...]:
+    """Read every recording of a test, all or nothing; ``step`` is told each name."""
+    machine = load_machine(folder.info.machine)
+    found = []
+    for path in folder.files:
+        found.append(read_recording(path, machine, reader=reader))
+        step(path.name)
+    return tuple(found)
+
+
+def process(folder: TestFolder, recordings: tuple[Recording, ...], record: CalibrationRecord) -> TestResult:
+    """Reduce, fit and characterise the recordings of a test with one calibration record."""
+    machine = load_machine(folder.info.machine)
+    reduced = reduce_test(
+        info=folder.info,
+        machine=machine,
+        record=record,
+        recordings=[(one, folder.rotation_of(one.path)) for one in recordings],
+        tare=declared_tare(folder, machine),
+    )
+    return TestResult(reduced=reduced, characteristics=characterise(reduced, machine=machine, record=record))
+
+
+def declared_tare(folder: TestFolder, machine: Machine) -> Tare | None:
+    """Return the tare that ``test.toml`` declares, as values or as a file, in the machine's units."""
+    if folder.tare_file is not None:
+        return tare_of_file(read_recording(folder.tare_file, machine))
+    if not folder.tare_values:
+        return None
+    unit = machine.indications[0].unit
+    return Tare(
+        source="test.toml", values=tuple((name, value) for name, value, _ in folder.tare_values), unit=unit
+    )

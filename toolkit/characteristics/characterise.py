@@ -109,8 +109,8 @@ def _line_findings(directions: list[Direction]) -> list[Finding]:
                     Finding(
                         rule="curve-against-line",
                         where=f"drum {one.group.rotation}, {float(from_si(one.group.load_N, 'lbf')):.0f} lbf",
-                        message=f"{channel} at SA = 0 is {at_zero.value:.4g} by the curve and {line:.4g} by the "
-                        "line through the nearest points: look at the residuals",
+                        message=f"{channel} at SA = 0 is {at_zero.value:.4g} by the curve and {line:.4g} by "
+                        "the line through the nearest points: look at the residuals",
                     )
                 )
     return found

@@ -24,6 +24,7 @@ from toolkit.estimate import Estimate, effective_dof
 from toolkit.tires.fit import estimate_at, slope_estimate_at, zero_crossing
 
 if TYPE_CHECKING:
+    from toolkit.channels import Axes
     from toolkit.calibration.record import CalibrationRecord
     from toolkit.characteristics.groups import Group
     from toolkit.tires.model import CurveFit
@@ -43,7 +44,7 @@ def pull(
     reverse: Direction | None,
     *,
     record: CalibrationRecord | None,
-    machine_axes: str,
+    machine_axes: Axes,
     u_SA_zero: float,
 ) -> Pull:
     """Return the pull characteristics of one load.
@@ -85,7 +86,7 @@ def _half(
     sign: float,
     *,
     record: CalibrationRecord | None,
-    machine_axes: str,
+    machine_axes: Axes,
     u_zero: float,
 ) -> Estimate | None:
     one, other = _curve(forward, channel), _curve(reverse, channel)

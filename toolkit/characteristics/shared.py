@@ -19,6 +19,7 @@ from toolkit.units import si_scale
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from toolkit.channels import Axes
     from toolkit.calibration.record import CalibrationRecord
     from toolkit.characteristics.groups import Group
     from toolkit.reduction.model import Condition
@@ -46,10 +47,11 @@ def calibration_u(
         return 0.0
     total = np.zeros(len(fit.terms))
     for condition, weight in parts:
-        sign = signs(machine_axes, "SAE", condition.rotation)[channel]  # type: ignore[arg-type]
+        sign = signs(machine_axes, "SAE", condition.rotation)[channel]
         row = {name: np.array([v]) for name, v in zip(record.indications, condition.indications, strict=True)}
         total += weight * sign * coefficient_jacobian(record, channel, row, None)[0]
-    return float(np.sqrt(max(total @ covariance @ total, 0.0))) * si_scale(fit.unit)
+    variance = float(total @ covariance @ total)
+    return float(np.sqrt(max(variance, 0.0))) * si_scale(fit.unit)
 
 
 def weights_at_zero(group: Group) -> tuple[tuple[Condition, float], ...]:

@@ -17,6 +17,7 @@ from toolkit.estimate import Estimate, effective_dof
 from toolkit.tires.fit import slope_estimate_at
 
 if TYPE_CHECKING:
+    from toolkit.channels import Axes
     from toolkit.calibration.record import CalibrationRecord
     from toolkit.characteristics.groups import Group
     from toolkit.tires.model import CurveFit
@@ -26,7 +27,7 @@ _UNIT = {"FY": "N/rad", "MZ": "N*m/rad"}
 
 
 def stiffness(
-    group: Group, fit: DirectionFit, *, record: CalibrationRecord | None, machine_axes: str
+    group: Group, fit: DirectionFit, *, record: CalibrationRecord | None, machine_axes: Axes
 ) -> Stiffness:
     """Return both stiffnesses of one load and direction, by secant and by slope [N/rad, N·m/rad]."""
     return Stiffness(
@@ -40,7 +41,7 @@ def stiffness(
 
 
 def _secant(
-    group: Group, channel: str, *, record: CalibrationRecord | None, machine_axes: str
+    group: Group, channel: str, *, record: CalibrationRecord | None, machine_axes: Axes
 ) -> Estimate | None:
     plus, minus = group.step(1.0), group.step(-1.0)
     if plus is None or minus is None or plus.SA <= minus.SA:
@@ -63,7 +64,7 @@ def _slope(
     channel: str,
     *,
     record: CalibrationRecord | None,
-    machine_axes: str,
+    machine_axes: Axes,
 ) -> Estimate | None:
     if fit is None or "slope_at_zero" in fit.not_determined or fit.slope_at_zero is None:
         return None

@@ -128,7 +128,8 @@ def _doubled(placed: Sequence[Placed], later: Sequence[int]) -> list[Finding]:
             rule="doubled",
             where=file,
             message=f"slip angle {_list([some[0].step_SA or 0.0], 'deg')}, drum {some[0].rotation}: "
-            f"{len(some)} block(s) of a condition that an earlier file holds, with no declared repeat; unused",
+            f"{len(some)} block(s) of a condition that an earlier file holds, with no "
+            "declared repeat; unused",
         )
         for file, some in files.items()
     ]

@@ -1,0 +1,61 @@
+"""How results lie in sheets: one dataclass a row, one field a column, headers with units."""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import json
+import math
+from typing import TYPE_CHECKING, Any
+
+from toolkit.reduction.model import Condition
+
+if TYPE_CHECKING:
+    from toolkit.pipeline import TestResult
+
+SCHEMA = 1
+KIND = "toolkit reduced test"
+
+SHEETS = (
+    "provenance", "reduced", "fits", "fit_covariance", "characteristics", "characteristic_findings",
+    "findings", "raw",
+)  # fmt: skip
+
+_UNITS = {"SA": "rad", "FZ": "N", "FY": "N", "MZ": "N*m"}
+
+CONDITION_FIELDS: tuple[str, ...] = tuple(field.name for field in dataclasses.fields(Condition))
+
+
+def header(field: str) -> str:
+    """Return a condition's column header: ``u_FY`` -> ``u_FY [N]``.
+
+    >>> header("step_SA"), header("rotation")
+    ('step_SA [rad]', 'rotation')
+    """
+    for symbol, unit in _UNITS.items():
+        if symbol in field.split("_"):
+            return f"{field} [{unit}]"
+    return field
+
+
+def cell(value: Any) -> Any:
+    """Return a value as a cell: numbers as numbers, infinite and missing ones as words."""
+    if isinstance(value, float) and not math.isfinite(value):
+        return str(value)
+    return value
+
+
+def number(value: Any) -> float:
+    """Return a cell as a float; the inverse of `cell`."""
+    return float(value)
+
+
+def optional(value: Any) -> float | None:
+    """Return a cell as a float or None where it is empty."""
+    return None if value in ("", None) else float(value)
+
+
+def content_hash(result: TestResult) -> str:
+    """Return the SHA-256 of a result's canonical JSON: every number in its shortest exact form."""
+    text = json.dumps(dataclasses.asdict(result), sort_keys=True, separators=(",", ":"), ensure_ascii=True)
+    return hashlib.sha256(text.encode()).hexdigest()

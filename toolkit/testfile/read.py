@@ -1,0 +1,232 @@
+"""Read a whole test back from its .xlsx file."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+from typing import Any, cast, get_type_hints
+
+from toolkit.channels import Rotation
+from toolkit.characteristics.model import Characteristics, DirectionFit, Pull, Stiffness
+from toolkit.errors import RecordingError
+from toolkit.estimate import Estimate
+from toolkit.findings import Finding, Level
+from toolkit.pipeline import TestResult
+from toolkit.recording.gate import check_workbook
+from toolkit.recording.model import TestInfo
+from toolkit.reduction.model import CalibrationUse, Condition, ReducedTest, Tare
+from toolkit.testfile.layout import (
+    CONDITION_FIELDS,
+    KIND,
+    SCHEMA,
+    SHEETS,
+    content_hash,
+    header,
+    number,
+    optional,
+)
+from toolkit.tires.model import CurveFit, Parameter
+
+Row = dict[str, Any]
+
+
+def is_test_file(path: Path) -> bool:
+    """Tell whether a file is a whole test as `write_test_file` makes it."""
+    from python_calamine import CalamineError, load_workbook
+
+    try:
+        check_workbook(path)
+        return set(SHEETS) <= set(load_workbook(path).sheet_names)
+    except (RecordingError, CalamineError, OSError):
+        return False
+
+
+def read_test_file(path: Path) -> TestResult:
+    """Read a whole test.
+
+    Raises
+    ------
+    RecordingError
+        the file is no test file, of a newer schema, or was changed after it was written
+    """
+    from python_calamine import load_workbook
+
+    check_workbook(path)
+    book = load_workbook(path)
+    lacking = [name for name in SHEETS if name not in book.sheet_names]
+    if lacking:
+        raise _broken(path, f"no sheet {lacking[0]}", "the sheets of a reduced test")
+    sheets = {
+        name: _rows(book.get_sheet_by_name(name).to_python(skip_empty_area=False))
+        for name in SHEETS
+        if name != "raw"
+    }
+    items = {str(row["item"]): row["value"] for row in sheets["provenance"]}
+    if items.get("kind") != KIND or items.get("schema") != SCHEMA:
+        got = f"{items.get('kind')}, schema {items.get('schema')}"
+        raise _broken(path, got, f"{KIND}, schema {SCHEMA}")
+    try:
+        result = _result(sheets, items)
+    except (KeyError, ValueError, TypeError, IndexError) as error:
+        raise _broken(path, f"{type(error).__name__}: {error}", "the layout of a reduced test") from error
+    if content_hash(result) != items["content_sha256"]:
+        raise RecordingError(
+            "the reduced test was changed after it was written",
+            where=path,
+            got=f"content hash {content_hash(result)[:16]}...",
+            expected=f"{str(items['content_sha256'])[:16]}...",
+            next_step="process the recordings again; a reduced test is never edited by hand",
+            rule="test-file-changed",
+        )
+    return result
+
+
+def _broken(path: Path, got: str, expected: str) -> RecordingError:
+    return RecordingError(
+        "the file is no reduced test",
+        where=path,
+        got=got,
+        expected=expected,
+        next_step="give the folder of the test, or a file made by 'toolkit process --out'",
+        rule="not-a-test-file",
+    )
+
+
+def _rows(table: list[list[Any]]) -> list[Row]:
+    if not table:
+        return []
+    head = [str(text) for text in table[0]]
+    return [dict(zip(head, row, strict=True)) for row in table[1:]]
+
+
+def _result(sheets: dict[str, list[Row]], items: Row) -> TestResult:
+    reduced = ReducedTest(
+        info=TestInfo(
+            **{
+                field.name: _as(get_type_hints(TestInfo)[field.name], items[f"info.{field.name}"])
+                for field in dataclasses.fields(TestInfo)
+            }
+        ),
+        calibration=CalibrationUse(
+            id=items["calibration.id"],
+            sha256=items["calibration.sha256"],
+            unverified=bool(items["calibration.unverified"]),
+        ),
+        conditions=tuple(_condition(row) for row in sheets["reduced"]),
+        tare=Tare(
+            source=items["tare.source"],
+            values=tuple(
+                (key.removeprefix("tare.values."), number(value))
+                for key, value in items.items()
+                if key.startswith("tare.values.")
+            ),
+            unit=items["tare.unit"],
+        ),
+        averaging=items["averaging"],
+        findings=_findings(sheets["findings"]),
+        code_version=items["code_version"],
+        axes=items["axes"],
+    )
+    return TestResult(reduced=reduced, characteristics=_characteristics(sheets))
+
+
+def _as(kind: Any, value: Any) -> Any:
+    """Return a cell as the type of its field; an empty cell is None."""
+    if value in ("", None):
+        return None
+    if "bool" in str(kind):
+        return bool(value)
+    if "float" in str(kind):
+        return float(value)
+    return int(value) if "int" in str(kind) else str(value)
+
+
+def _condition(row: Row) -> Condition:
+    hints = get_type_hints(Condition)
+    given = {name: _as(hints[name], row[header(name)]) for name in CONDITION_FIELDS if name != "indications"}
+    cells = tuple(number(value) for key, value in row.items() if key.startswith("indication_"))
+    return Condition(**given, indications=cells)
+
+
+def _findings(rows: list[Row]) -> tuple[Finding, ...]:
+    return tuple(
+        Finding(
+            level=cast("Level", row["level"]), rule=row["rule"], where=row["where"], message=row["message"]
+        )
+        for row in rows
+    )
+
+
+def _estimate(value: Any, u: Any, dof: Any, unit: Any) -> Estimate | None:
+    if value in ("", None):
+        return None
+    return Estimate(value=number(value), u=number(u), dof=number(dof), unit=str(unit))
+
+
+def _fit(index: int, row: Row, covariances: dict[int, dict[tuple[str, str], float]]) -> CurveFit:
+    hints = get_type_hints(CurveFit)
+    given: Row = {}
+    for field in dataclasses.fields(CurveFit):
+        if field.name in row:
+            value = row[field.name]
+            is_list = "tuple" in str(hints[field.name])
+            given[field.name] = tuple(str(value).split()) if is_list else _as(hints[field.name], value)
+    given["message"] = given["message"] or ""
+    parameters = tuple(
+        Parameter(
+            name=name,
+            value=number(row[key]),
+            unit=key[len(name) + 2 : -1],
+            standard_error=optional(row[f"standard error {name}"]),
+        )
+        for key, name in ((key, key.split(" [")[0]) for key in row if key.endswith("]"))
+        if row[key] not in ("", None)
+    )
+    mine = covariances.get(index, {})
+    return CurveFit(
+        **given,
+        parameters=parameters,
+        covariance=tuple(tuple(mine[a.name, b.name] for b in parameters) for a in parameters) if mine else (),
+        slope_at_zero=_estimate(*(row[f"slope_at_zero {p}"] for p in ("value", "u", "dof", "unit"))),
+        value_at_zero=_estimate(*(row[f"value_at_zero {p}"] for p in ("value", "u", "dof", "unit"))),
+    )
+
+
+def _characteristics(sheets: dict[str, list[Row]]) -> Characteristics:
+    covariances: dict[int, dict[tuple[str, str], float]] = {}
+    for row in sheets["fit_covariance"]:
+        covariances.setdefault(int(row["fit"]), {})[row["parameter"], row["with"]] = number(row["covariance"])
+    fits = {
+        (row["rotation"], number(row["group_load_N"]), row["channel"]): _fit(index, row, covariances)
+        for index, row in enumerate(sheets["fits"])
+    }
+    rows = sheets["characteristics"]
+    groups = [(number(r["load_N"]), r["rotation"]) for r in rows if r["name"] == "group"]
+    values = {
+        (number(r["load_N"]), r["rotation"], r["name"]): _estimate(r["value"], r["u"], r["dof"], r["unit"])
+        for r in rows
+    }
+    return Characteristics(
+        fits=tuple(
+            DirectionFit(
+                rotation=cast("Rotation", rotation),
+                load_N=load,
+                FY=fits.get((rotation, load, "FY")),
+                MZ=fits.get((rotation, load, "MZ")),
+            )
+            for load, rotation in groups
+        ),
+        stiffness=tuple(
+            Stiffness(
+                load_N=load,
+                rotation=cast("Rotation", rotation),
+                **{f.name: values[load, rotation, f.name] for f in dataclasses.fields(Stiffness)[2:]},
+            )
+            for load, rotation in groups
+        ),
+        pull=tuple(
+            Pull(load_N=load, **{f.name: values[load, "both", f.name] for f in dataclasses.fields(Pull)[1:]})
+            for load in dict.fromkeys(load for load, _ in groups)
+        ),
+        findings=_findings(sheets["characteristic_findings"]),
+    )

@@ -1,0 +1,191 @@
+"""Write a whole test into one .xlsx file."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from toolkit.estimate import Estimate
+from toolkit.files import atomic_path
+from toolkit.recording.marks import mark_workbook
+from toolkit.testfile.layout import CONDITION_FIELDS, KIND, SCHEMA, cell, content_hash, header
+
+if TYPE_CHECKING:
+    from toolkit.findings import Finding
+    from toolkit.pipeline import TestResult
+    from toolkit.recording.model import Recording
+    from toolkit.tires.model import CurveFit
+
+Rows = Iterable[Sequence[Any]]
+
+
+def write_test_file(path: Path, result: TestResult, recordings: Sequence[Recording] = ()) -> str:
+    """Write the file whole or not at all and return the content's SHA-256.
+
+    ``recordings`` fill the sheet ``raw`` (every row of every file, in the file's own units).
+    """
+    from openpyxl import Workbook
+
+    digest = content_hash(result)
+    book = Workbook(write_only=True)
+    mark_workbook(book, simulated=result.reduced.info.simulated, machine=result.reduced.info.machine)
+    for name, rows in (
+        ("provenance", _provenance(result, digest)),
+        ("reduced", _reduced(result)),
+        ("fits", _fits(result)),
+        ("fit_covariance", _covariances(result)),
+        ("characteristics", _characteristics(result)),
+        ("characteristic_findings", _findings(result.characteristics.findings)),
+        ("findings", _findings(result.reduced.findings)),
+        ("raw", _raw(recordings)),
+    ):
+        _sheet(book, name, rows)
+    with atomic_path(path) as temporary:
+        book.save(temporary)
+    return digest
+
+
+def _sheet(book: Any, name: str, rows: Rows) -> None:
+    from openpyxl.cell import WriteOnlyCell
+    from openpyxl.styles import Font
+
+    sheet = book.create_sheet(name)
+    sheet.freeze_panes = "A2"
+    bold = Font(bold=True)
+
+    def made(value: Any, *, head: bool) -> Any:
+        # A text is a text even where it begins like a formula: openpyxl would guess otherwise.
+        if not (head or (isinstance(value, str) and value.startswith("="))):
+            return value
+        one = WriteOnlyCell(sheet, value=value)
+        if isinstance(value, str):
+            one.data_type = "s"
+        if head:
+            one.font = bold
+        return one
+
+    for index, row in enumerate(rows):
+        if index == 0:
+            for column, text in enumerate(row):
+                sheet.column_dimensions[_letter(column)].width = max(11, min(len(str(text)) + 2, 40))
+        sheet.append([made(cell(value), head=index == 0) for value in row])
+
+
+def _letter(column: int) -> str:
+    from openpyxl.utils import get_column_letter
+
+    return str(get_column_letter(column + 1))
+
+
+def _provenance(result: TestResult, digest: str) -> Rows:
+    reduced = result.reduced
+    yield ("item", "value")
+    yield ("kind", KIND)
+    yield ("schema", SCHEMA)
+    yield ("content_sha256", digest)
+    if reduced.info.simulated:
+        yield ("SIMULATED", "these values come from the virtual machine, not from a tire")
+    yield ("code_version", reduced.code_version)
+    yield ("axes", reduced.axes)
+    yield ("averaging", reduced.averaging)
+    for field in dataclasses.fields(reduced.calibration):
+        yield (f"calibration.{field.name}", getattr(reduced.calibration, field.name))
+    yield ("tare.source", reduced.tare.source)
+    yield ("tare.unit", reduced.tare.unit)
+    for name, value in reduced.tare.values:
+        yield (f"tare.values.{name}", value)
+    for field in dataclasses.fields(reduced.info):
+        yield (f"info.{field.name}", getattr(reduced.info, field.name))
+
+
+def _reduced(result: TestResult) -> Rows:
+    conditions = result.reduced.conditions
+    cells = len(conditions[0].indications) if conditions else 0
+    plain = [name for name in CONDITION_FIELDS if name != "indications"]
+    yield [*(header(name) for name in plain), *(f"indication_{i + 1}" for i in range(cells))]
+    for one in conditions:
+        yield [*(getattr(one, name) for name in plain), *one.indications]
+
+
+def _all_fits(result: TestResult) -> list[tuple[str, float, CurveFit]]:
+    return [
+        (direction.rotation, direction.load_N, fit)
+        for direction in result.characteristics.fits
+        for fit in (direction.FY, direction.MZ)
+        if fit is not None
+    ]
+
+
+def _fits(result: TestResult) -> Rows:
+    fits = _all_fits(result)
+    plain = [
+        field.name
+        for field in dataclasses.fields(fits[0][2])
+        if field.name not in ("parameters", "covariance", "slope_at_zero", "value_at_zero")
+    ] if fits else []  # fmt: skip
+    names = list(dict.fromkeys((p.name, p.unit) for _, _, fit in fits for p in fit.parameters))
+    estimates = ("slope_at_zero", "value_at_zero")
+    yield [
+        "rotation",
+        "group_load_N",
+        *plain,
+        *(f"{name} [{unit}]" for name, unit in names),
+        *(f"standard error {name}" for name, _ in names),
+        *(f"{name} {part}" for name in estimates for part in ("value", "u", "dof", "unit")),
+    ]
+    for rotation, load, fit in fits:
+        mine = {(p.name, p.unit): p for p in fit.parameters}
+        values = [mine[key].value if key in mine else None for key in names]
+        errors = [mine[key].standard_error if key in mine else None for key in names]
+        flat = [getattr(fit, name) for name in plain]
+        flat = [" ".join(value) if isinstance(value, tuple) else value for value in flat]
+        given = [part for name in estimates for part in _parts(getattr(fit, name))]
+        yield [rotation, load, *flat, *values, *errors, *given]
+
+
+def _parts(estimate: Estimate | None) -> list[Any]:
+    if estimate is None:
+        return [None, None, None, None]
+    return [estimate.value, estimate.u, estimate.dof, estimate.unit]
+
+
+def _covariances(result: TestResult) -> Rows:
+    yield ("fit", "parameter", "with", "covariance")
+    for index, (_, _, fit) in enumerate(_all_fits(result)):
+        for one, row in zip(fit.parameters, fit.covariance, strict=False):
+            for other, value in zip(fit.parameters, row, strict=False):
+                yield (index, one.name, other.name, value)
+
+
+def _characteristics(result: TestResult) -> Rows:
+    yield ("load_N", "rotation", "name", "value", "u", "dof", "unit")
+    for direction in result.characteristics.fits:
+        yield (direction.load_N, direction.rotation, "group", None, None, None, None)
+    for stiffness in result.characteristics.stiffness:
+        for field in dataclasses.fields(stiffness)[2:]:
+            estimate = getattr(stiffness, field.name)
+            yield (stiffness.load_N, stiffness.rotation, field.name, *_parts(estimate))
+    for pull in result.characteristics.pull:
+        for field in dataclasses.fields(pull)[1:]:
+            yield (pull.load_N, "both", field.name, *_parts(getattr(pull, field.name)))
+
+
+def _findings(findings: Sequence[Finding]) -> Rows:
+    yield ("level", "rule", "where", "message")
+    for one in findings:
+        yield (one.level, one.rule, one.where, one.message)
+
+
+def _raw(recordings: Sequence[Recording]) -> Rows:
+    if not recordings:
+        yield ("file", "row")
+        return
+    columns = list(dict.fromkeys((s.symbol, s.unit) for one in recordings for s in one.series))
+    yield ["file", "row", *(f"{symbol} [{unit}]" for symbol, unit in columns)]
+    for one in recordings:
+        mine = {(s.symbol, s.unit): s.values.tolist() for s in one.series}
+        lists = [mine.get(key, [None] * one.rows) for key in columns]
+        for row, values in enumerate(zip(*lists, strict=True), start=1):
+            yield [one.name, row, *values]
