@@ -28,7 +28,7 @@ Weighted = Sequence[tuple["Condition", float]]
 
 
 def calibration_u(
-    record: CalibrationRecord | None, channel: str, parts: Weighted, *, machine_axes: str
+    record: CalibrationRecord | None, channel: str, parts: Weighted, *, machine_axes: Axes
 ) -> float:
     """Return the standard uncertainty [SI] that the record's covariance gives a weighted sum.
 

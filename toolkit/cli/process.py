@@ -1,0 +1,219 @@
+"""`toolkit process`: recordings to one reduced test."""
+
+from __future__ import annotations
+
+import time
+from datetime import datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from toolkit.cli.console import (
+    Calibrations,
+    Home,
+    Json,
+    Quiet,
+    answer,
+    exit_code,
+    finding_lines,
+    progress,
+    table,
+)
+
+if TYPE_CHECKING:
+    from toolkit.cli.resolve import Resolved
+    from toolkit.estimate import Estimate
+
+NAME = "process"
+
+
+def command(
+    test: Annotated[Path, typer.Argument(metavar="TEST", help="Folder with test.toml and the recordings.")],
+    calibration: Annotated[
+        str | None,
+        typer.Option("--calibration", help="Record id; default: the one in force on the test's date."),
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option("--out", help="Write the reduced test (.xlsx: the whole test in one file).")
+    ] = None,
+    known_at: Annotated[
+        datetime | None,
+        typer.Option("--known-at", formats=["%Y-%m-%d"], help="Judge the registry as known on this day."),
+    ] = None,
+    reader: Annotated[
+        str, typer.Option("--reader", help="calamine, or both: read again with openpyxl and compare.")
+    ] = "calamine",
+    calibrations: Calibrations = None,
+    home: Home = None,
+    json: Json = False,
+    quiet: Quiet = False,
+) -> int:
+    """Turn a test's recordings into one reduced test: corrected, in SI and SAE axes.
+
+    Example: toolkit process tests/2019-06-04 --out test.xlsx
+    """
+    from toolkit.cli.resolve import resolve_test
+    from toolkit.testfile import write_test_file
+
+    if reader not in ("calamine", "both"):
+        raise typer.BadParameter("calamine or both", param_hint="--reader")
+    started = time.perf_counter()
+    with progress(None, "reading", show=not (json or quiet)) as step:
+        resolved = resolve_test(
+            test,
+            calibration=calibration,
+            calibrations=calibrations,
+            home=home,
+            known_at=known_at.date() if known_at else None,
+            reader="both" if reader == "both" else "calamine",
+            step=step,
+        )
+    digest = write_test_file(out, resolved.result, resolved.recordings) if out else None
+    payload = test_payload(resolved)
+    payload |= {
+        "out": out,
+        "content_sha256": digest,
+        "timing": {"seconds": time.perf_counter() - started},
+    }
+    answer(payload, _text(resolved, out), as_json=json, quiet=quiet)
+    return exit_code(resolved.findings)
+
+
+def test_payload(resolved: Resolved) -> dict[str, Any]:
+    """Return a reduced test as the JSON answer: SI units, SAE axes; names carry the units."""
+    reduced = resolved.result.reduced
+    return {
+        "test": reduced.info.name,
+        "machine": reduced.info.machine,
+        "simulated": reduced.info.simulated,
+        "axes": reduced.axes,
+        "averaging": reduced.averaging,
+        "calibration": {
+            "id": reduced.calibration.id,
+            "sha256": reduced.calibration.sha256,
+            "unverified": reduced.calibration.unverified,
+        },
+        "tare": {
+            "source": reduced.tare.source,
+            "values": dict(reduced.tare.values),
+            "unit": reduced.tare.unit,
+        },
+        "conditions": [
+            {
+                "file": c.file,
+                "rotation": c.rotation,
+                "rows": [c.first_row, c.last_row],
+                "step_SA_rad": c.step_SA,
+                "step_FZ_N": c.step_FZ,
+                "SA_rad": c.SA,
+                "FZ_N": c.FZ,
+                "FY_N": c.FY,
+                "MZ_Nm": c.MZ,
+                "u_FY_N": c.u_FY,
+                "u_MZ_Nm": c.u_MZ,
+                "FY_file_N": c.FY_file,
+                "MZ_file_Nm": c.MZ_file,
+                "FZ_common_N": c.FZ_common,
+                "FY_common_N": c.FY_common,
+                "MZ_common_Nm": c.MZ_common,
+                "u_FY_common_N": c.u_FY_common,
+                "u_MZ_common_Nm": c.u_MZ_common,
+                "used": c.used,
+                "calibration_sha256": c.calibration_sha256,
+            }
+            for c in reduced.conditions
+        ],
+        "characteristics": {
+            "stiffness": [_characteristic(s) for s in resolved.result.characteristics.stiffness],
+            "pull": [_characteristic(p) for p in resolved.result.characteristics.pull],
+        },
+        "findings": [finding.as_dict() for finding in resolved.findings],
+    }
+
+
+def _characteristic(one: Any) -> dict[str, Any]:
+    import dataclasses
+
+    from toolkit.estimate import Estimate
+
+    found: dict[str, Any] = {}
+    for field in dataclasses.fields(one):
+        value = getattr(one, field.name)
+        found[field.name] = _estimate(value) if isinstance(value, Estimate) else value
+    return found
+
+
+def _estimate(estimate: Estimate) -> dict[str, Any]:
+    U, k = estimate.expanded()
+    return {
+        "value": estimate.value,
+        "standard_uncertainty": estimate.u,
+        "dof": estimate.dof,
+        "expanded_uncertainty": U,
+        "k": k,
+        "unit": estimate.unit,
+    }
+
+
+def _text(resolved: Resolved, out: Path | None) -> str:
+    from toolkit.units import from_si
+
+    reduced = resolved.result.reduced
+    mark = "  SIMULATED" if reduced.info.simulated else ""
+    used = sum(c.used for c in reduced.conditions)
+    lines = [
+        f"{reduced.info.name}: {used} conditions of {len({c.file for c in reduced.conditions})} files{mark}",
+        f"calibration {reduced.calibration.id} ({reduced.calibration.sha256[:12]}...)"
+        + ("  UNVERIFIED" if reduced.calibration.unverified else ""),
+        f"averaging: {reduced.averaging}",
+        f"tare: {reduced.tare.source}",
+        "",
+        _pull_table(resolved),
+    ]
+    if resolved.findings:
+        lines += ["", f"{len(resolved.findings)} findings (toolkit explain RULE tells more):"]
+        lines += finding_lines(resolved.findings)
+    loads = ", ".join(
+        f"{float(from_si(load, 'lbf')):.0f}" for load in dict.fromkeys(p.load_N for p in _pulls(resolved))
+    )
+    lines += ["", f"loads [lbf]: {loads}"]
+    lines.append(
+        f"written: {out}" if out else "nothing written; --out test.xlsx keeps the whole test in one file"
+    )
+    return "\n".join(lines)
+
+
+def _pulls(resolved: Resolved) -> Any:
+    return resolved.result.characteristics.pull
+
+
+def _pull_table(resolved: Resolved) -> str:
+    from toolkit.units import from_si
+
+    stiffness = {(s.load_N, s.rotation): s for s in resolved.result.characteristics.stiffness}
+    per_degree = 3.141592653589793 / 180
+    rows = []
+    for pull in resolved.result.characteristics.pull:
+        one = stiffness.get((pull.load_N, "forward")) or stiffness.get((pull.load_N, "reverse"))
+        rows.append(
+            [
+                f"{pull.load_N:.0f}",
+                f"{float(from_si(pull.load_N, 'lbf')):.0f}",
+                _shown(one.slope_cornering if one else None, per_degree, 1),
+                _shown(one.slope_aligning if one else None, per_degree, 2),
+                _shown(pull.conicity, 1, 1),
+                _shown(pull.plysteer, 1, 1),
+                _shown(pull.CRAT, 1, 2),
+                _shown(pull.PRAT, 1, 2),
+            ]
+        )
+    head = ["FZ [N]", "FZ [lbf]", "C_FY [N/deg]", "C_MZ [N·m/deg]", "conicity [N]", "plysteer [N]"]
+    return table([*head, "CRAT [N·m]", "PRAT [N·m]"], rows, align=">" * 8)
+
+
+def _shown(estimate: Estimate | None, factor: float, digits: int) -> str:
+    if estimate is None:
+        return "-"
+    U, _ = estimate.expanded()
+    return f"{estimate.value * factor:.{digits}f} ± {U * factor:.{digits}f}"

@@ -1,0 +1,160 @@
+"""TEST to result: a folder of recordings or a reduced test, with the record that applies."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from datetime import date
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+from toolkit.cli.home import calibrations_folder
+from toolkit.errors import ConfigError
+
+if TYPE_CHECKING:
+    from toolkit.calibration.record import CalibrationRecord
+    from toolkit.calibration.registry import Registry
+    from toolkit.findings import Finding
+    from toolkit.pipeline import TestResult
+    from toolkit.recording.model import Recording
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Resolved:
+    """A test's result, the record that made it, every finding, and the recordings where they were read."""
+
+    result: TestResult
+    record: CalibrationRecord
+    findings: tuple[Finding, ...]
+    recordings: tuple[Recording, ...] = ()
+
+
+def resolve_test(
+    test: Path,
+    *,
+    calibration: str | None = None,
+    calibrations: Path | None = None,
+    home: Path | None = None,
+    known_at: date | None = None,
+    reader: Literal["calamine", "both"] = "calamine",
+    step: Callable[[str], None] = lambda _name: None,
+) -> Resolved:
+    """Return the result of a TEST argument.
+
+    The record is ``calibration`` where it is named, else the one in force on the test's date as known at
+    ``known_at``. A reduced test keeps the record that made it, which must still be in the registry, whole
+    and with the same hash.
+
+    Raises
+    ------
+    ToolkitError
+        whatever stage cannot go on; nothing is written
+    """
+    from toolkit.calibration.registry import Registry
+
+    registry = Registry(calibrations_folder(calibrations, home))
+    if test.is_dir():
+        return _from_folder(
+            test, registry, calibration=calibration, known_at=known_at, reader=reader, step=step
+        )
+    return _from_file(test, registry, calibration=calibration)
+
+
+def _from_folder(
+    test: Path,
+    registry: Registry,
+    *,
+    calibration: str | None,
+    known_at: date | None,
+    reader: Literal["calamine", "both"],
+    step: Callable[[str], None],
+) -> Resolved:
+    from toolkit.findings import Finding
+    from toolkit.machine import load_machine
+    from toolkit.pipeline import process, read_test
+    from toolkit.recording.folder import read_test_folder
+
+    folder = read_test_folder(test)
+    machine = load_machine(folder.info.machine)
+    on = date.fromisoformat(folder.info.date) if folder.info.date else None
+    findings: list[Finding] = []
+    if calibration is not None:
+        record = registry.load(calibration)
+        findings += _not_in_force(registry, record, machine.name, on=on, known_at=known_at)
+    elif on is None:
+        raise ConfigError(
+            "the test has no date, so no calibration record can be chosen",
+            where=test / "test.toml",
+            got="no date",
+            expected="date = YYYY-MM-DD",
+            next_step="write the test's date into test.toml, or name a record with --calibration ID",
+            rule="no-date",
+        )
+    else:
+        record = registry.in_force(machine.name, on=on, known_at=known_at)
+    recordings = read_test(folder, reader=reader, step=step)
+    result = process(folder, recordings, record)
+    return Resolved(
+        result=result, record=record, findings=(*findings, *result.findings), recordings=recordings
+    )
+
+
+def _not_in_force(
+    registry: Registry,
+    record: CalibrationRecord,
+    instrument: str,
+    *,
+    on: date | None,
+    known_at: date | None,
+) -> list[Finding]:
+    from toolkit.errors import RegistryError
+    from toolkit.findings import Finding
+
+    if on is None:
+        return []
+    try:
+        due = registry.in_force(instrument, on=on, known_at=known_at).id
+    except RegistryError:
+        due = "no record"
+    if due == record.id:
+        return []
+    message = f"{due} was in force on {on.isoformat()}; {record.id} was named and used"
+    return [Finding(rule="not-in-force", where=record.id, message=message)]
+
+
+def _from_file(test: Path, registry: Registry, *, calibration: str | None) -> Resolved:
+    from toolkit.errors import RecordError
+    from toolkit.recording.marks import is_own_output
+    from toolkit.testfile import read_test_file
+
+    if not test.exists():
+        raise ConfigError(
+            "the test does not exist",
+            where=test,
+            got="no folder and no file",
+            expected="a folder with test.toml and recordings, or a reduced test (.xlsx)",
+            next_step="check the path",
+            rule="no-test",
+        )
+    if not is_own_output(test):
+        raise ConfigError(
+            "a single recording is not a test",
+            where=test,
+            got="a file",
+            expected="a folder with test.toml and the recordings, or a reduced test made by 'toolkit process'",
+            next_step="put the recording into a folder with a test.toml; 'toolkit inspect' reads single files",
+            rule="not-a-test",
+        )
+    result = read_test_file(test)
+    used = result.reduced.calibration
+    record = registry.load(used.id)
+    if record.sha256 != used.sha256 or calibration not in (None, used.id):
+        raise RecordError(
+            "the reduced test was made with another calibration record",
+            where=test,
+            got=f"{used.id}, {used.sha256[:16]}...",
+            expected=f"{calibration or record.id}, {record.sha256[:16]}...",
+            next_step="process the recordings again with the record that is wanted",
+            rule="record-differs",
+        )
+    return Resolved(result=result, record=record, findings=result.findings)
