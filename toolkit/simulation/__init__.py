@@ -1,1 +1,5 @@
-"""The virtual machine: tire, road, carriage, load cells, data acquisition, walked forward."""
+"""The virtual M-15: tire, road, carriage, load cells and data acquisition, one stage a file.
+
+Every stage is a pure function of the signals of the stage before it; `run` walks them in order and
+`write` stores what comes out as the machine itself would, marked *simulated*.
+"""

@@ -1,0 +1,70 @@
+"""Carriage stage: where the wheel is held, and what reaches the hub.
+
+The rack has 1 deg steps and a zero of its own, which the slip-angle sensor shows; an error of that sensor
+(``steer_offset``) it does not show. The load actuator stops near the load it was told, not at it.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from toolkit.simulation.tire import TireForces
+from toolkit.units import to_si
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CarriageTruth:
+    """The virtual carriage.
+
+    ``steering_zero_rad`` measured and true slip angle at the rack's zero; ``steer_offset_rad`` how much
+    the sensor shows too much; ``load_spread`` largest deviation of a block's load, as a share of it;
+    ``overturning_Nm`` moment of the wheel's own weight about the hub.
+    """
+
+    steering_zero_rad: float = math.radians(-0.3)
+    steer_offset_rad: float = 0.0
+    camber_offset_rad: float = 0.0
+    load_spread: float = 0.03
+    # Fitted to the moment of the ten rows of Figure 4.4: 28.9 lbf·m at no lateral force.
+    overturning_Nm: float = float(to_si(28.9, "lbf"))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class HubLoads:
+    """FY [N], MZ and MX [N·m] on the hub, machine axes, and the load FZ [N] beside them."""
+
+    FY: NDArray[np.float64]
+    MZ: NDArray[np.float64]
+    MX: NDArray[np.float64]
+    FZ: NDArray[np.float64]
+
+
+def wheel_angle(carriage: CarriageTruth, *, step_rad: float) -> float:
+    """Return the wheel's slip angle [rad] at a step of the rack."""
+    return step_rad + carriage.steering_zero_rad - carriage.steer_offset_rad
+
+
+def sensed_angle(carriage: CarriageTruth, *, SA: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return what the slip-angle sensor stands at [rad]."""
+    return SA + carriage.steer_offset_rad
+
+
+def set_load(carriage: CarriageTruth, *, step_N: float, rng: np.random.Generator) -> float:
+    """Return the load [N] at which the actuator stops for a step of the protocol."""
+    return step_N * (1.0 + carriage.load_spread * float(rng.uniform(-1.0, 1.0)))
+
+
+def hub_loads(carriage: CarriageTruth, *, tire: TireForces, FZ: NDArray[np.float64]) -> HubLoads:
+    """Carry the tire's forces to the hub: MX = loaded radius x FY + the wheel's weight moment.
+
+    Without load (a wheel that hangs free) only the weight is left.
+    """
+    MX = tire.loaded_radius * tire.FY + carriage.overturning_Nm
+    return HubLoads(FY=tire.FY, MZ=tire.MZ, MX=MX, FZ=FZ)

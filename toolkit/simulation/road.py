@@ -1,0 +1,51 @@
+"""Road stage: a drum that is not quite round presses the tire more and less, once a revolution."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RoadTruth:
+    """Run-out as load variation at the drum's revolution and at twice that; phases against drum angle 0."""
+
+    runout_1_N: float = 20.0
+    runout_1_phase_rad: float = 0.6
+    runout_2_N: float = 5.0
+    runout_2_phase_rad: float = 2.1
+
+
+def drum_angle(
+    *, time: NDArray[np.float64], speed_m_s: float, radius_m: float, start_rad: float, reverse: bool
+) -> NDArray[np.float64]:
+    """Return the drum's angle [rad] at times [s]; a reversed drum counts down."""
+    return start_rad + (-1.0 if reverse else 1.0) * time * speed_m_s / radius_m
+
+
+def load_on_drum(
+    road: RoadTruth, *, load: NDArray[np.float64], angle: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return the load [N] between tire and drum: the actuator's load plus the run-out's lines.
+
+    >>> import numpy as np
+    >>> lines = load_on_drum(RoadTruth(), load=np.zeros(360), angle=np.radians(np.arange(360)))
+    >>> bool(abs(lines.mean()) < 1e-9)  # over a whole revolution of the drum, and only then
+    True
+    """
+    return (
+        load
+        + road.runout_1_N * np.cos(angle + road.runout_1_phase_rad)
+        + road.runout_2_N * np.cos(2 * angle + road.runout_2_phase_rad)
+    )
+
+
+def revolution_s(*, speed_m_s: float, radius_m: float) -> float:
+    """Return the time [s] of one drum revolution."""
+    return 2 * math.pi * radius_m / speed_m_s

@@ -1,0 +1,117 @@
+"""Tire stage: what the road does to the tire, as the machine feels it.
+
+The symmetric tire is the one of `bakker1987`; ply-steer and conicity break its symmetry as pseudo-angles,
+so that both grow with load (plysteer = cornering stiffness x pseudo slip angle, conicity = camber
+stiffness x pseudo camber angle). Forces are in the machine's own axes. With the drum reversed:
+
+* plysteer is even under half a turn about z. In axes that follow the travel nothing changes, so in the
+  machine's axes FY changes sign and MZ does not;
+* conicity is even under x -> -x: the machine feels the same FY and the opposite MZ. In axes that follow
+  the travel its pseudo camber angle changes sign. An error of the wheel's camber acts in the same way.
+
+So for a symmetric tire FY(SA) = -FY_forward(SA) and MZ(SA) = +MZ_forward(SA).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from toolkit.channels import Rotation
+from toolkit.errors import ConfigError
+from toolkit.simulation.bakker1987 import aligning_moment, lateral_force
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TireTruth:
+    """The virtual tire.
+
+    ``plysteer_rad`` pseudo slip angle (SAE); ``conicity_N`` force at ``nominal_load_N``;
+    ``vertical_stiffness_N_m`` of the loaded tire on the drum; ``rolling_ratio`` effective rolling radius
+    over free radius.
+    """
+
+    plysteer_rad: float = math.radians(0.12)
+    conicity_N: float = 45.0
+    nominal_load_N: float = 3700.0
+    free_radius_m: float = 0.316
+    rolling_ratio: float = 0.97
+    vertical_stiffness_N_m: float = 210e3
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class TireForces:
+    """FY [N] and MZ [N·m] in the machine's axes, and the loaded radius [m]; all of one shape."""
+
+    FY: NDArray[np.float64]
+    MZ: NDArray[np.float64]
+    loaded_radius: NDArray[np.float64]
+
+
+def forces(
+    tire: TireTruth, *, SA: ArrayLike, FZ: ArrayLike, rotation: Rotation, camber: float = 0.0
+) -> TireForces:
+    """Return what the tire does to the wheel.
+
+    Parameters
+    ----------
+    SA : slip angle [rad], machine axes (equal to SAE in both directions of rotation)
+    FZ : load [N], positive; broadcasts with SA
+    rotation : of the drum
+    camber : error of the wheel's camber [rad], as it acts with the drum forward
+    """
+    travel = 1.0 if rotation == "forward" else -1.0
+    gamma = travel * (pseudo_camber(tire) + camber)
+    slip = -(np.asarray(SA, dtype=np.float64) + tire.plysteer_rad)  # SAE to adapted SAE
+    load = np.asarray(FZ, dtype=np.float64)
+    return TireForces(
+        FY=travel * lateral_force(slip_angle=slip, load=load, camber=gamma),
+        MZ=aligning_moment(slip_angle=slip, load=load, camber=gamma),
+        loaded_radius=tire.free_radius_m - np.maximum(load, 0.0) / tire.vertical_stiffness_N_m,
+    )
+
+
+@lru_cache(maxsize=64)
+def pseudo_camber(tire: TireTruth) -> float:
+    """Return the pseudo camber angle [rad] whose force at the nominal load is the tire's conicity.
+
+    Raises
+    ------
+    ConfigError
+        the published camber coefficients cannot carry so large a force (they hold for a few degrees)
+    """
+    limit = math.radians(8.0)
+
+    def force(gamma: float) -> float:
+        return float(lateral_force(slip_angle=0.0, load=tire.nominal_load_N, camber=gamma))
+
+    reach = force(limit)
+    if abs(tire.conicity_N) > abs(reach):
+        raise ConfigError(
+            "the conicity is larger than the tire's camber force can be",
+            where="tire.conicity",
+            got=f"{tire.conicity_N:g} N",
+            expected=f"at most {abs(reach):.0f} N at {tire.nominal_load_N:g} N",
+            next_step="give a smaller conicity",
+        )
+    low, high = -limit, limit  # the force grows with the angle: bisection needs no derivative
+    for _ in range(80):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if force(middle) < tire.conicity_N else (low, middle)
+    return 0.5 * (low + high)
+
+
+def revolution_time_s(tire: TireTruth, speed_m_s: float) -> float:
+    """Return the time [s] of one tire revolution at a drum surface speed.
+
+    >>> round(revolution_time_s(TireTruth(), 7.66 / 3.6), 2)
+    0.91
+    """
+    return 2 * math.pi * tire.free_radius_m * tire.rolling_ratio / speed_m_s

@@ -1,0 +1,157 @@
+"""Truth: what a report on a virtual test is judged against, computed from the tire itself.
+
+No recording, no calibration and no fit is involved: stiffness and pull are those of the virtual tire at a
+load, in SI, in SAE axes that follow the travel.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from dataclasses import dataclass
+from typing import Any
+
+from toolkit.channels import Rotation
+from toolkit.simulation.cells import CELLS, LOADS, true_coefficients
+from toolkit.simulation.run import VirtualTest
+from toolkit.simulation.tire import TireTruth, forces, pseudo_camber
+
+_SMALL = math.radians(1e-3)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TrueStiffness:
+    """Cornering -dFY/dSA [N/rad] and aligning +dMZ/dSA [N·m/rad]: slope at 0, secant through +-1 deg."""
+
+    rotation: Rotation
+    slope_cornering: float
+    slope_aligning: float
+    secant_cornering: float
+    secant_aligning: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TruePull:
+    """Pull of the tire at one load [N, N·m] by symmetry; forces of the forward direction in SAE axes.
+
+    ``PRAT`` is MZ at SA = 0, ``PRAT_at_FY_zero`` the mean of MZ at each direction's own FY = 0.
+    """
+
+    conicity: float
+    plysteer: float
+    CRAT: float
+    PRAT: float
+    PRAT_at_FY_zero: float
+
+
+def true_stiffness(tire: TireTruth, *, load_N: float, rotation: Rotation) -> TrueStiffness:
+    """Return the stiffness of the virtual tire at a load [N]."""
+    one = math.radians(1.0)
+    slope_FY, slope_MZ = _difference(tire, load_N, rotation, _SMALL)
+    secant_FY, secant_MZ = _difference(tire, load_N, rotation, one)
+    return TrueStiffness(
+        rotation=rotation,
+        slope_cornering=-slope_FY,
+        slope_aligning=slope_MZ,
+        secant_cornering=-secant_FY,
+        secant_aligning=secant_MZ,
+    )
+
+
+def true_pull(tire: TireTruth, *, load_N: float) -> TruePull:
+    """Return the pull characteristics of the virtual tire at a load [N].
+
+    From the machine's axes at SA = 0, F forward and R reversed: conicity (F + R)/2 and plysteer (F - R)/2
+    of FY; CRAT (F - R)/2 and PRAT (F + R)/2 of MZ.
+    """
+    forward = forces(tire, SA=0.0, FZ=load_N, rotation="forward")
+    reverse = forces(tire, SA=0.0, FZ=load_N, rotation="reverse")
+    free = [
+        float(forces(tire, SA=_angle_of_no_force(tire, load_N, one), FZ=load_N, rotation=one).MZ)
+        for one in ("forward", "reverse")
+    ]
+    return TruePull(
+        conicity=float(forward.FY + reverse.FY) / 2,
+        plysteer=float(forward.FY - reverse.FY) / 2,
+        CRAT=float(forward.MZ - reverse.MZ) / 2,
+        PRAT=float(forward.MZ + reverse.MZ) / 2,
+        PRAT_at_FY_zero=sum(free) / 2,
+    )
+
+
+def truth_document(test: VirtualTest) -> dict[str, Any]:
+    """Return the whole truth of a virtual test as JSON values, marked as the toolkit's own output.
+
+    ``per_load`` stands at the median of the true loads of all files at each step, where a reduced test
+    compares them, and at the nominal step too.
+    """
+    plan = test.plan
+    blocks = [block for file in test.files for block in file.truth]
+    per_load = []
+    for step in plan.loads_N:
+        loads = sorted(block.FZ_N for block in blocks if block.step_FZ_N == step)
+        middle = len(loads) // 2
+        median = loads[middle] if len(loads) % 2 else (loads[middle - 1] + loads[middle]) / 2
+        per_load.append({"step_load_N": step, "at_median": _at(test, median), "at_step": _at(test, step)})
+    return {
+        "schema": 1,
+        "generator": "toolkit",
+        "content": "truth of a virtual test",
+        "simulated": True,
+        "title": plan.title,
+        "machine": plan.machine.name,
+        "date": plan.date,
+        "seed": plan.seed,
+        "effects": [{"name": name, "value": value} for name, value in plan.effects],
+        "axes": {"conditions": "machine", "per_load": "SAE"},
+        "stages": {
+            "tire": {**dataclasses.asdict(plan.tire), "pseudo_camber_rad": pseudo_camber(plan.tire)},
+            "road": dataclasses.asdict(plan.road),
+            "carriage": dataclasses.asdict(plan.carriage),
+            "cells": dataclasses.asdict(plan.cells),
+            "acquisition": dataclasses.asdict(plan.acquisition),
+        },
+        "true_coefficients": {
+            "units": {"indications": "V/V", "FY": "N", "MZ": "N*m", "MX": "N*m"},
+            **{load: dict(zip(CELLS, true_coefficients(plan.cells)[load], strict=True)) for load in LOADS},
+        },
+        "acquisition_program": {
+            "record": test.program.record,
+            "negated": list(plan.acquisition.negated),
+            "FY": [*test.program.FY, test.program.FY_constant],
+            "MZ": [*test.program.MZ, test.program.MZ_constant],
+        },
+        "tare": {"unit": test.tare_unit, "values": dict(test.tare)},
+        "conditions": [dataclasses.asdict(block) for block in blocks],
+        "per_load": per_load,
+    }
+
+
+def _at(test: VirtualTest, load_N: float) -> dict[str, Any]:
+    tire = test.plan.tire
+    return {
+        "load_N": load_N,
+        "stiffness": [
+            dataclasses.asdict(true_stiffness(tire, load_N=load_N, rotation=one))
+            for one in test.plan.rotations
+        ],
+        "pull": dataclasses.asdict(true_pull(tire, load_N=load_N)),
+    }
+
+
+def _sae(tire: TireTruth, SA: float, load: float, rotation: Rotation) -> tuple[float, float]:
+    answer = forces(tire, SA=SA, FZ=load, rotation=rotation)
+    return (1.0 if rotation == "forward" else -1.0) * float(answer.FY), float(answer.MZ)
+
+
+def _difference(tire: TireTruth, load: float, rotation: Rotation, step: float) -> tuple[float, float]:
+    up, down = _sae(tire, step, load, rotation), _sae(tire, -step, load, rotation)
+    return (up[0] - down[0]) / (2 * step), (up[1] - down[1]) / (2 * step)
+
+
+def _angle_of_no_force(tire: TireTruth, load: float, rotation: Rotation) -> float:
+    low, high = math.radians(-3.0), math.radians(3.0)  # FY falls with SA in SAE axes
+    for _ in range(80):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if _sae(tire, middle, load, rotation)[0] > 0 else (low, middle)
+    return 0.5 * (low + high)
