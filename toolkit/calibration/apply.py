@@ -1,0 +1,134 @@
+"""From indications to loads: one record's equation on arrays."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from toolkit.calibration.terms import term_matrix
+from toolkit.errors import RecordError
+from toolkit.units import si_scale, unit
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from toolkit.calibration.record import CalibrationRecord, LoadFit
+
+
+def apply_record(
+    record: CalibrationRecord,
+    indications: Mapping[str, NDArray[np.float64]],
+    *,
+    units: Mapping[str, str],
+    tare: Mapping[str, float] | None = None,
+    issued: bool = False,
+) -> dict[str, NDArray[np.float64]]:
+    """Return the loads [N, N*m] of a record from indications in its own units.
+
+    Parameters
+    ----------
+    record : a record that the registry has checked
+    indications : name to values (rows,), in the record's indication units
+    units : name to the unit of those values, compared with the record's
+    tare : name to the unloaded indication, in the same units; None where there is none
+    issued : use the issued coefficients, those that an acquisition program is given
+
+    Notes
+    -----
+    With a tare, a record with ``zero = "tared"`` was fitted to tared indications: load = f(x - tare), and
+    its intercept applies. One with ``zero = "included"`` was fitted to indications as they come:
+    load = f(x) - f(tare), in which the intercept cancels. Without a tare load = f(x).
+
+    Raises
+    ------
+    RecordError
+        an indication is missing, or its unit is not the record's
+    """
+    check_units(record, units)
+    _check_present(record, indications)
+    return {
+        one.load: _evaluate(record, one, indications, tare, issued=issued)
+        * si_scale(one.unit, where=record.id)
+        for one in record.loads
+    }
+
+
+def coefficient_jacobian(
+    record: CalibrationRecord,
+    load: str,
+    indications: Mapping[str, NDArray[np.float64]],
+    tare: Mapping[str, float] | None = None,
+) -> NDArray[np.float64]:
+    """Return d load / d coefficient (rows, terms), in the load's unit per unit of coefficient.
+
+    With the record's covariance V, the variance of row i is J[i] V J[i]^T; a mean over rows has the mean
+    of J, because the coefficients are common to all rows.
+    """
+    return _terms(record, record.load(load), indications, tare)
+
+
+def check_units(record: CalibrationRecord, units: Mapping[str, str]) -> None:
+    """Refuse a record whose indication units are not those given.
+
+    Raises
+    ------
+    RecordError
+        ``units``: the recording and the record differ
+    """
+    for name, expected in zip(record.indications, record.indication_units, strict=True):
+        got = units.get(name)
+        wanted = unit(expected, where=record.id)
+        found = None if got is None else unit(got, where=f"channel {name}")
+        if found is None or (found.factor, found.dimension) != (wanted.factor, wanted.dimension):
+            raise RecordError(
+                f"the unit of {name} is not that of record {record.id}",
+                where=f"{record.id}, {name}",
+                got=got or f"no unit for {name}",
+                expected=expected,
+                next_step="use a record fitted in the recording's unit, or correct the machine definition",
+                rule="units",
+            )
+
+
+def _check_present(record: CalibrationRecord, indications: Mapping[str, object]) -> None:
+    missing = [name for name in record.indications if name not in indications]
+    if missing:
+        raise RecordError(
+            f"record {record.id} needs an indication that is not there",
+            where=record.id,
+            got=", ".join(indications),
+            expected=", ".join(record.indications),
+            next_step="check the recording's columns: " + ", ".join(missing),
+            rule="units",
+        )
+
+
+def _terms(
+    record: CalibrationRecord,
+    one: LoadFit,
+    indications: Mapping[str, NDArray[np.float64]],
+    tare: Mapping[str, float] | None,
+) -> NDArray[np.float64]:
+    values = {name: np.asarray(indications[name], dtype=np.float64) for name in record.indications}
+    if tare is None:
+        return term_matrix(one.terms, values)
+    if record.zero == "tared":
+        return term_matrix(one.terms, {name: values[name] - tare[name] for name in values})
+    unloaded = {name: np.array([tare[name]]) for name in values}
+    return term_matrix(one.terms, values) - term_matrix(one.terms, unloaded)
+
+
+def _evaluate(
+    record: CalibrationRecord,
+    one: LoadFit,
+    indications: Mapping[str, NDArray[np.float64]],
+    tare: Mapping[str, float] | None,
+    *,
+    issued: bool,
+) -> NDArray[np.float64]:
+    loads: NDArray[np.float64] = _terms(record, one, indications, tare) @ np.asarray(
+        one.issued if issued else one.coefficients
+    )
+    return loads

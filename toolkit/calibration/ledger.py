@@ -1,0 +1,138 @@
+"""The ledger: one JSON line an event, each chained to the one before by SHA-256.
+
+``ledger.jsonl`` only ever grows. ``head.json`` repeats the number of lines and the last hash, and
+certificates and reports print that hash: a chain by itself cannot see that its end was cut off.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from datetime import date
+from pathlib import Path
+from typing import Any
+
+from toolkit.calibration.record import canonical
+from toolkit.files import sha256_bytes
+
+LEDGER = "ledger.jsonl"
+HEAD = "head.json"
+START = "0" * 64
+EVENTS = ("entered", "approved", "withdrawn")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Entry:
+    """One event of a record. What an event does not have is None or empty.
+
+    ``entered``: ``by``, ``record`` (its hash) and ``file`` (the hash of its file's bytes).
+    ``approved``: ``known_on``, ``since`` (in force from), ``by`` (checked by), ``approved_by``, ``reason``,
+    ``unverifiable`` terms as "load: term".
+    ``withdrawn``: ``known_on``, ``since`` (void from; None is the in-force date), ``by``, ``reason``.
+    """
+
+    seq: int
+    prev: str
+    sha256: str
+    event: str
+    id: str
+    time: str
+    by: str
+    record: str | None = None
+    file: str | None = None
+    known_on: date | None = None
+    since: date | None = None
+    approved_by: str | None = None
+    reason: str | None = None
+    unverifiable: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Ledger:
+    """What was read. ``damage`` says what is wrong, None where the chain and the head hold."""
+
+    entries: tuple[Entry, ...]
+    damage: str | None
+
+    @property
+    def head(self) -> str:
+        """The last line's hash; zeros where there is none."""
+        return self.entries[-1].sha256 if self.entries else START
+
+    def of(self, record_id: str) -> tuple[Entry, ...]:
+        """Return the events of one record, oldest first."""
+        return tuple(entry for entry in self.entries if entry.id == record_id)
+
+    def entered(self) -> dict[str, Entry]:
+        """Return each record's entry by id."""
+        return {entry.id: entry for entry in self.entries if entry.event == "entered"}
+
+
+def next_line(seq: int, prev: str, event: Mapping[str, Any]) -> tuple[bytes, str]:
+    """Return a ledger line (with its line feed) and its hash."""
+    body = {"seq": seq, "prev": prev, **event}
+    digest = sha256_bytes(canonical(body).encode())
+    return (canonical({**body, "sha256": digest}) + "\n").encode(), digest
+
+
+def head_bytes(count: int, digest: str) -> bytes:
+    """Return the content of head.json."""
+    return (canonical({"count": count, "sha256": digest}) + "\n").encode()
+
+
+def read_ledger(folder: Path) -> Ledger:
+    """Read an instrument's ledger and check chain and head; damage is told in the result, not raised."""
+    try:
+        lines = (folder / LEDGER).read_bytes() if (folder / LEDGER).exists() else None
+        head = (folder / HEAD).read_bytes() if (folder / HEAD).exists() else None
+    except OSError as error:
+        return Ledger(entries=(), damage=f"the ledger cannot be read: {error.strerror}")
+    if lines is None and head is None:
+        return Ledger(entries=(), damage=None)
+    if lines is None:
+        return Ledger(entries=(), damage="ledger.jsonl is missing while head.json exists")
+    return parse_ledger(lines, head)
+
+
+def parse_ledger(lines: bytes, head: bytes | None) -> Ledger:
+    """Parse a ledger's bytes; entries end before the first damaged line."""
+    entries: list[Entry] = []
+    damage: str | None = None
+    prev = START
+    parts = lines.split(b"\n")
+    if parts[-1] != b"":
+        damage = f"line {len(parts)} of the ledger is incomplete"
+    for number, line in enumerate(parts[:-1], start=1):
+        try:
+            entry = _entry(line, number, prev)
+        except (ValueError, KeyError, TypeError, AttributeError) as error:
+            damage = f"line {number} of the ledger is damaged: {error}"
+            break
+        entries.append(entry)
+        prev = entry.sha256
+    if damage is None and head != head_bytes(len(entries), prev):
+        damage = (
+            "head.json is missing"
+            if head is None
+            else f"head.json does not match the ledger's {len(entries)} lines: lines were cut off or changed"
+        )
+    return Ledger(entries=tuple(entries), damage=damage)
+
+
+def _entry(line: bytes, number: int, prev: str) -> Entry:
+    body = json.loads(line.decode("utf-8"))
+    if canonical(body).encode() != line:
+        raise ValueError("its text is not canonical")
+    stated = body.pop("sha256")
+    if sha256_bytes(canonical(body).encode()) != stated:
+        raise ValueError("its hash does not match")
+    if body["seq"] != number or body["prev"] != prev:
+        raise ValueError("it does not follow the line before")
+    if body["event"] not in EVENTS:
+        raise ValueError(f"unknown event {body['event']!r}")
+    for key in ("known_on", "since"):
+        if body.get(key) is not None:
+            body[key] = date.fromisoformat(body[key])
+    body["unverifiable"] = tuple(body.get("unverifiable", ()))
+    return Entry(**{**body, "sha256": stated})

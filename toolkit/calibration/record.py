@@ -1,0 +1,304 @@
+"""The calibration record: an immutable value, its canonical JSON and its SHA-256.
+
+The hash covers ``content``: data hashes, terms, settings, coefficients, covariance, units, polarity,
+degrees of freedom and ranges. Software versions stand beside it. Floats are written as the shortest
+decimal that reads back to the same double, so that a record is the same bytes for ever.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from typing import Any, Literal, cast
+
+from toolkit.errors import RecordError
+from toolkit.files import sha256_bytes
+
+Zero = Literal["included", "tared"]
+Kind = Literal["fit", "legacy"]
+SCHEMA = 1
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DataFile:
+    """A file that lies beside the record and belongs to it: ``role`` is loads, check, session or source."""
+
+    role: str
+    file: str
+    sha256: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Indication:
+    """One load cell's output: its unit, the range of the fitted data in it, its serial number."""
+
+    name: str
+    unit: str
+    minimum: float | None = None
+    maximum: float | None = None
+    serial: str | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LoadFit:
+    """One load's equation, in the session's own units: load = sum of coefficient times term.
+
+    ``terms``, ``coefficients`` (full precision), ``issued`` (the digits an acquisition program is given)
+    and ``polarity`` (-1, 0, +1) stand in the same order, the intercept last. ``covariance`` is a square of
+    the same order, empty for a legacy import, whose ``dof`` and ``residual_sd`` are None.
+    ``tolerance`` is that of the check loads, ``minimum`` and ``maximum`` the range of the fitted loads.
+    """
+
+    load: str
+    unit: str
+    terms: tuple[str, ...]
+    coefficients: tuple[float, ...]
+    issued: tuple[float, ...]
+    polarity: tuple[int, ...]
+    covariance: tuple[tuple[float, ...], ...] = ()
+    method: str = "none"
+    n: int | None = None
+    dof: int | None = None
+    residual_sd: float | None = None
+    minimum: float | None = None
+    maximum: float | None = None
+    tolerance: float | None = None
+
+    @property
+    def largest(self) -> float:
+        """Largest absolute load of the fitted data; NaN where there is none."""
+        if self.minimum is None or self.maximum is None:
+            return float("nan")
+        return max(abs(self.minimum), abs(self.maximum))
+
+    @property
+    def standard_errors(self) -> tuple[float, ...]:
+        """Standard errors of the coefficients; empty for a legacy import."""
+        return tuple(row[i] ** 0.5 for i, row in enumerate(self.covariance))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Golden:
+    """Input and output pairs computed apart from the coefficients, in exact rational arithmetic.
+
+    ``inputs`` are rows of indications in the record's order; ``outputs`` one row of values a load.
+    """
+
+    inputs: tuple[tuple[float, ...], ...] = ()
+    outputs: tuple[tuple[float, ...], ...] = ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CalibrationRecord:
+    """A calibration as it was fitted or imported. Never edited: a correction is a new record."""
+
+    id: str
+    instrument: str
+    kind: Kind
+    date: str
+    entered_by: str
+    zero: Zero
+    cells: tuple[Indication, ...]
+    loads: tuple[LoadFit, ...]
+    golden: Golden
+    data: tuple[DataFile, ...]
+    settings: str
+    inputs_sha256: str
+    sha256: str = ""
+    software: tuple[tuple[str, str], ...] = ()
+
+    @property
+    def verified(self) -> bool:
+        """Whether the record reproduces from its own data; False for a legacy import."""
+        return self.kind == "fit"
+
+    @property
+    def indications(self) -> tuple[str, ...]:
+        """Names of the indications."""
+        return tuple(cell.name for cell in self.cells)
+
+    @property
+    def indication_units(self) -> tuple[str, ...]:
+        """Units of the indications, in the same order."""
+        return tuple(cell.unit for cell in self.cells)
+
+    def load(self, name: str) -> LoadFit:
+        """Return one load's equation.
+
+        Raises
+        ------
+        RecordError
+            the record has no such load
+        """
+        for one in self.loads:
+            if one.load == name:
+                return one
+        raise RecordError(
+            f"record {self.id} has no load {name}",
+            where=self.id,
+            got=name,
+            expected=", ".join(one.load for one in self.loads),
+            next_step="use one of those loads, or calibrate with a session that has it",
+            rule="load",
+        )
+
+    def data_file(self, role: str) -> DataFile | None:
+        """Return the file of a role, None where the record has none."""
+        return next((one for one in self.data if one.role == role), None)
+
+
+def canonical(value: Any) -> str:
+    """Return canonical JSON: sorted keys, no white space, shortest exact floats.
+
+    >>> canonical({"b": 0.1, "a": [1, None]})
+    '{"a":[1,null],"b":0.1}'
+    """
+    return json.dumps(value, sort_keys=True, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
+
+
+def content_of(record: CalibrationRecord) -> dict[str, Any]:
+    """Return what the hash covers, as JSON values."""
+    return {
+        "id": record.id,
+        "instrument": record.instrument,
+        "kind": record.kind,
+        "date": record.date,
+        "entered_by": record.entered_by,
+        "zero": record.zero,
+        "cells": [
+            {"name": c.name, "unit": c.unit, "minimum": c.minimum, "maximum": c.maximum, "serial": c.serial}
+            for c in record.cells
+        ],
+        "loads": [_load_content(one) for one in record.loads],
+        "golden": {"inputs": record.golden.inputs, "outputs": record.golden.outputs},
+        "data": [{"role": d.role, "file": d.file, "sha256": d.sha256} for d in record.data],
+        "settings": json.loads(record.settings),
+        "inputs_sha256": record.inputs_sha256,
+    }
+
+
+_LOAD_KEYS = (
+    "load unit terms coefficients issued polarity covariance method n dof residual_sd minimum "
+    "maximum tolerance"
+).split()
+
+
+def _load_content(one: LoadFit) -> dict[str, Any]:
+    return {key: getattr(one, key) for key in _LOAD_KEYS}
+
+
+def content_hash(content: dict[str, Any]) -> str:
+    """Return the SHA-256 of a record's content."""
+    return sha256_bytes(canonical(content).encode())
+
+
+def to_bytes(record: CalibrationRecord) -> bytes:
+    """Return the record's file: content, hash and software versions as indented JSON."""
+    document = {
+        "schema": SCHEMA,
+        "sha256": record.sha256,
+        "content": content_of(record),
+        "software": dict(record.software),
+    }
+    return (
+        json.dumps(document, indent=1, sort_keys=True, ensure_ascii=False, allow_nan=False) + "\n"
+    ).encode()
+
+
+def sealed(record: CalibrationRecord) -> CalibrationRecord:
+    """Return the record with its hash computed."""
+    import dataclasses
+
+    return dataclasses.replace(record, sha256=content_hash(content_of(record)))
+
+
+def from_bytes(data: bytes, *, where: object) -> CalibrationRecord:
+    """Read a record's file and check its hash.
+
+    Raises
+    ------
+    RecordError
+        ``unreadable``: not a record; ``hash``: its content is not what the hash was taken of
+    """
+    try:
+        document = json.loads(data.decode("utf-8"))
+        content = document["content"]
+        stated = {SCHEMA: document["sha256"]}[document["schema"]]
+        actual = content_hash(content)
+        record = _from_content(content, str(stated), tuple(sorted(document["software"].items())))
+    except (ValueError, KeyError, TypeError, AttributeError) as error:
+        raise RecordError(
+            "a calibration record cannot be read",
+            where=where,
+            got=f"{type(error).__name__}: {error}",
+            expected=f"a record of schema {SCHEMA}",
+            next_step="restore the file from a backup; 'toolkit calibration verify' lists every bad file",
+            rule="unreadable",
+        ) from error
+    if actual != stated:
+        raise RecordError(
+            f"the content of record {record.id} was changed",
+            where=where,
+            got=f"sha256 {actual}",
+            expected=f"sha256 {stated}",
+            next_step="restore the file from a backup; a correction is a new record",
+            rule="hash",
+        )
+    return record
+
+
+def _floats(values: Any) -> tuple[float, ...]:
+    if not all(type(value) is float for value in values):
+        raise TypeError("a number that is no float")
+    return tuple(values)
+
+
+def _optional(value: Any, kind: type) -> Any:
+    if value is not None and type(value) is not kind:
+        raise TypeError(f"{value!r} is no {kind.__name__}")
+    return value
+
+
+def _from_content(
+    content: dict[str, Any], sha256: str, software: tuple[tuple[str, str], ...]
+) -> CalibrationRecord:
+    loads = []
+    for entry in content["loads"]:
+        one = LoadFit(
+            **{
+                **entry,
+                "terms": tuple(entry["terms"]),
+                "coefficients": _floats(entry["coefficients"]),
+                "issued": _floats(entry["issued"]),
+                "polarity": tuple(entry["polarity"]),
+                "covariance": tuple(_floats(row) for row in entry["covariance"]),
+                "n": _optional(entry["n"], int),
+                "dof": _optional(entry["dof"], int),
+                "residual_sd": _optional(entry["residual_sd"], float),
+            }
+        )
+        if not len(one.terms) == len(one.coefficients) == len(one.issued) == len(one.polarity):
+            raise ValueError(f"{one.load}: terms and coefficients differ in number")
+        loads.append(one)
+    golden = content["golden"]
+    if content["kind"] not in ("fit", "legacy") or content["zero"] not in ("included", "tared"):
+        raise ValueError("kind or zero is not known")
+    return CalibrationRecord(
+        id=content["id"],
+        instrument=content["instrument"],
+        kind=cast("Kind", content["kind"]),
+        date=content["date"],
+        entered_by=content["entered_by"],
+        zero=cast("Zero", content["zero"]),
+        cells=tuple(Indication(**cell) for cell in content["cells"]),
+        loads=tuple(loads),
+        golden=Golden(
+            inputs=tuple(_floats(row) for row in golden["inputs"]),
+            outputs=tuple(_floats(row) for row in golden["outputs"]),
+        ),
+        data=tuple(DataFile(**entry) for entry in content["data"]),
+        settings=canonical(content["settings"]),
+        inputs_sha256=content["inputs_sha256"],
+        sha256=sha256,
+        software=software,
+    )

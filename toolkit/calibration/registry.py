@@ -1,0 +1,303 @@
+"""The registry: which record applies to a test, and whether it may be used.
+
+``calibrations/<instrument>/`` holds ``<record-id>.json``, the data files that belong to each record,
+``ledger.jsonl`` and ``head.json``. Records are only read here; `store` writes.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from datetime import UTC, date, datetime
+from pathlib import Path
+
+from toolkit.calibration import store
+from toolkit.calibration.ledger import HEAD, LEDGER, Ledger
+from toolkit.calibration.record import CalibrationRecord, from_bytes
+from toolkit.calibration.refit import check_reproduces, check_transcribed
+from toolkit.calibration.status import RecordStatus, status_of
+from toolkit.calibration.table import read_table
+from toolkit.errors import RecordError, RegistryError, ToolkitError
+from toolkit.files import sha256_bytes
+
+ID = re.compile(r"(?P<instrument>[A-Za-z0-9][A-Za-z0-9_.-]*)-r(?P<number>[1-9][0-9]*)\Z")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Refused:
+    """A record that may not be used, and why."""
+
+    id: str
+    rule: str
+    reason: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class VerifyRow:
+    """One row of `verify`: a record, or a file that belongs to none (``id`` is its name)."""
+
+    id: str
+    ok: bool
+    verified: bool
+    reason: str | None
+
+
+def today() -> date:
+    """Return the day in UTC: the default day of knowledge."""
+    return datetime.now(tz=UTC).date()
+
+
+def instrument_of(record_id: str) -> str:
+    """Return the instrument of a record id.
+
+    >>> instrument_of("m15-virtual-r12")
+    'm15-virtual'
+    """
+    match = ID.match(record_id)
+    if match is None:
+        raise RegistryError(
+            f"not a record id: {record_id!r}",
+            got=record_id,
+            expected="<instrument>-r<N>, such as m15-r2",
+            next_step="see 'toolkit calibration list'",
+            rule="record-id",
+        )
+    return match["instrument"]
+
+
+class Registry:
+    """The records of every instrument below one folder."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+
+    def instruments(self) -> tuple[str, ...]:
+        """Return the instruments, sorted."""
+        if not self.folder.is_dir():
+            return ()
+        return tuple(
+            sorted(p.name for p in self.folder.iterdir() if p.is_dir() and not p.name.startswith("."))
+        )
+
+    def ids(self, instrument: str) -> tuple[str, ...]:
+        """Return the ids of an instrument, on disk or in its ledger, oldest first."""
+        folder = self.folder / instrument
+        found = {entry.id for entry in self.ledger(instrument).entries}
+        if folder.is_dir():
+            found |= {path.stem for path in folder.glob("*.json") if path.name != HEAD}
+        return tuple(sorted((i for i in found if ID.match(i)), key=_number))
+
+    def ledger(self, instrument: str) -> Ledger:
+        """Return an instrument's ledger; a write that was cut off is finished first."""
+        return store.read(self.folder / instrument)
+
+    def head(self, instrument: str) -> str:
+        """Return the hash of the ledger's last line, to be printed on what leaves the laboratory."""
+        return self.ledger(instrument).head
+
+    def digest(self, instrument: str) -> str:
+        """Return a hash of everything that decides about this instrument's records: every file there."""
+        folder = self.folder / instrument
+        store.read(folder)
+        if not folder.is_dir():
+            return sha256_bytes(b"")
+        lines = [
+            f"{path.relative_to(folder).as_posix()} {sha256_bytes(path.read_bytes())}"
+            for path in sorted(folder.rglob("*"))
+            if path.is_file()
+        ]
+        return sha256_bytes("\n".join(lines).encode())
+
+    def load(self, record_id: str) -> CalibrationRecord:
+        """Return a record that passes every load-time gate.
+
+        Raises
+        ------
+        RecordError
+            with rule ``missing unreadable hash ledger data refit golden``
+        RegistryError
+            the text is no record id
+        """
+        instrument = instrument_of(record_id)
+        return load_checked(self.folder / instrument, record_id, self.ledger(instrument))
+
+    def usable(self, instrument: str) -> tuple[tuple[CalibrationRecord, ...], tuple[Refused, ...]]:
+        """Return the records that pass every gate, and those that do not with the reason."""
+        good: list[CalibrationRecord] = []
+        bad: list[Refused] = []
+        ledger = self.ledger(instrument)
+        for record_id in self.ids(instrument):
+            try:
+                good.append(load_checked(self.folder / instrument, record_id, ledger))
+            except ToolkitError as error:
+                bad.append(Refused(id=record_id, rule=error.rule or "unreadable", reason=_reason(error)))
+        return tuple(good), tuple(bad)
+
+    def status(self, record_id: str, *, known_at: date | None = None) -> RecordStatus:
+        """Return what the ledger tells of a record, as known on a day (default: today).
+
+        Raises
+        ------
+        RegistryError
+            the ledger is damaged, or does not know the record
+        """
+        instrument = instrument_of(record_id)
+        ledger = self._sound(instrument)
+        if record_id not in ledger.entered():
+            raise self._unknown(record_id, instrument)
+        return status_of(record_id, ledger.of(record_id), known_at or today())
+
+    def in_force(self, instrument: str, *, on: date, known_at: date | None = None) -> CalibrationRecord:
+        """Return the record in force on a test's day, as known on another day (default: today).
+
+        The newest ``in_force_from`` not after ``on`` wins, among equals the one approved last. A record
+        that is void on ``on``, by a withdrawal known at ``known_at``, does not count. An approval that was
+        entered after ``known_at`` serves only where no earlier one does: a report of that time could not
+        know it, but a ledger may begin later than the calibrations that it tells of.
+
+        Raises
+        ------
+        RegistryError
+            no record applies (the message lists the candidates), or the ledger is damaged
+        RecordError
+            the record that applies fails a gate
+        """
+        ledger = self._sound(instrument)
+        known = known_at or today()
+        best: tuple[bool, date, int, str] | None = None
+        told: list[str] = []
+        for record_id in ledger.entered():
+            entries = ledger.of(record_id)
+            status = status_of(record_id, entries, known)
+            told.append(_told(status))
+            for entry in entries:
+                if entry.event != "approved" or entry.since is None or entry.since > on:
+                    continue
+                if status.void_from is not None and on >= status.void_from:
+                    continue
+                was_known = entry.known_on is not None and entry.known_on <= known
+                rank = (was_known, entry.since, entry.seq, record_id)
+                best = rank if best is None else max(best, rank)
+        if best is None:
+            raise RegistryError(
+                f"no calibration of {instrument} is in force on {on.isoformat()}",
+                where=self.folder / instrument,
+                got="; ".join(told) or "no record",
+                expected=f"an approved record in force on {on.isoformat()}, as known on {known.isoformat()}",
+                next_step="approve one with 'toolkit calibration approve ID --in-force-from DATE', "
+                "or name one with --calibration ID",
+                rule="no-record-in-force",
+            )
+        return load_checked(self.folder / instrument, best[3], ledger)
+
+    def verify(self, head: str | None = None) -> tuple[VerifyRow, ...]:
+        """Check every record and every file; see `toolkit.calibration.verify`."""
+        from toolkit.calibration.verify import verify_registry
+
+        return verify_registry(self, head)
+
+    def _sound(self, instrument: str) -> Ledger:
+        ledger = self.ledger(instrument)
+        if ledger.damage is not None:
+            raise store.damaged(self.folder / instrument, ledger.damage)
+        return ledger
+
+    def _unknown(self, record_id: str, instrument: str) -> RegistryError:
+        return RegistryError(
+            f"the registry has no record {record_id}",
+            where=self.folder / instrument,
+            got=record_id,
+            expected=", ".join(self.ids(instrument)) or "a record",
+            next_step="see 'toolkit calibration list'",
+            rule="missing",
+        )
+
+
+def load_checked(folder: Path, record_id: str, ledger: Ledger) -> CalibrationRecord:
+    """Read one record and run every load-time gate, in the order of the rules in `Registry.load`."""
+    path = folder / f"{record_id}.json"
+    entered = ledger.entered().get(record_id)
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise RecordError(
+            f"record {record_id} is missing",
+            where=path,
+            got=error.strerror,
+            expected="the record's file" if entered else "a record that the registry has",
+            next_step="restore it from a backup, or see 'toolkit calibration list'",
+            rule="missing",
+        ) from error
+    record = from_bytes(data, where=path)
+    if ledger.damage is not None:
+        raise _bad(record_id, path, f"the ledger is damaged: {ledger.damage}", "an unbroken ledger", "ledger")
+    if entered is None or record.id != record_id or record.instrument != folder.name:
+        raise _bad(record_id, path, "no entry of this record in the ledger", "an 'entered' line", "ledger")
+    if entered.record != record.sha256:
+        raise _bad(record_id, path, f"sha256 {record.sha256}", f"{entered.record} as entered", "ledger")
+    if entered.file != sha256_bytes(data):
+        raise _bad(record_id, path, "a file whose bytes were changed", "the file as entered", "hash")
+    contents = {one.role: _data_file(record_id, folder / one.file, one.sha256) for one in record.data}
+    try:
+        if record.kind == "legacy":
+            check_transcribed(record, contents["source"])
+        else:
+            _refit(record, contents["loads"], folder)
+    except KeyError as error:
+        raise _bad(record_id, path, f"no data file {error}", "its reference-load data", "data") from error
+    return record
+
+
+def _refit(record: CalibrationRecord, data: bytes, folder: Path) -> None:
+    needed = [*record.indications, *(one.load for one in record.loads)]
+    uncertainties = [f"u_{one.load}" for one in record.loads]
+    where = folder / f"{record.id}: loads"
+    try:
+        table = read_table(data, where=where, required=needed, optional=uncertainties)
+    except RegistryError:
+        raise
+    except ToolkitError as error:
+        raise _bad(
+            record.id, where, _reason(error), "reference-load data that can be read", "data"
+        ) from error
+    check_reproduces(record, table)
+
+
+def _data_file(record_id: str, path: Path, expected: str) -> bytes:
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise _bad(record_id, path, error.strerror, "the data that belong to the record", "data") from error
+    if sha256_bytes(data) != expected:
+        raise _bad(record_id, path, f"sha256 {sha256_bytes(data)}", expected, "data")
+    return data
+
+
+def _bad(record_id: str, where: object, got: object, expected: object, rule: str) -> RecordError:
+    return RecordError(
+        f"record {record_id} may not be used",
+        where=where,
+        got=got,
+        expected=expected,
+        next_step="restore the registry from a backup; 'toolkit calibration verify' lists every bad file",
+        rule=rule,
+    )
+
+
+def _reason(error: ToolkitError) -> str:
+    return f"{error.what}: got {error.got}, expected {error.expected}" if error.got else error.what
+
+
+def _told(status: RecordStatus) -> str:
+    if status.in_force_from is None:
+        return f"{status.id} ({status.state})"
+    void = "" if status.void_from is None else f", void from {status.void_from.isoformat()}"
+    return f"{status.id} (in force from {status.in_force_from.isoformat()}{void})"
+
+
+def _number(record_id: str) -> tuple[str, int]:
+    match = ID.match(record_id)
+    return ("", 0) if match is None else (match["instrument"], int(match["number"]))
+
+
+__all__ = ["ID", "LEDGER", "Refused", "Registry", "VerifyRow", "instrument_of", "load_checked", "today"]

@@ -1,0 +1,217 @@
+"""Reference-load data: a CSV with units in its header, whole or not at all.
+
+The same light reader serves a session and the load-time refit of a record, so that what is checked is
+what was fitted; it needs numpy alone.
+"""
+
+from __future__ import annotations
+
+import csv
+import difflib
+import io
+import math
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from toolkit.errors import SessionError
+from toolkit.units import unit
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+_HEADER = re.compile(r"(?P<name>[^\[\]]+?)\s*(?:\[(?P<unit>[^\[\]]*)\])?\s*\Z")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Table:
+    """A read file: ``names`` and ``units`` of the numeric columns, ``values`` (rows, columns) as written.
+
+    ``run`` (rows,), ``direction`` and ``rotation`` [deg] are None where the file has no such column.
+    """
+
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    values: NDArray[np.float64]
+    run: NDArray[np.float64] | None
+    direction: tuple[str, ...] | None
+    rotation: NDArray[np.float64] | None
+
+    @property
+    def rows(self) -> int:
+        """Number of rows."""
+        return len(self.values)
+
+    def has(self, name: str) -> bool:
+        """Tell whether the file has a numeric column."""
+        return name in self.names
+
+    def column(self, name: str) -> NDArray[np.float64]:
+        """Return a column (rows,) in the unit of the file."""
+        return self.values[:, self.names.index(name)]
+
+    def unit(self, name: str) -> str:
+        """Return a column's unit."""
+        return self.units[self.names.index(name)]
+
+    def columns(self, names: Sequence[str]) -> dict[str, NDArray[np.float64]]:
+        """Return columns by name."""
+        return {name: self.column(name) for name in names}
+
+    def matrix(self, names: Sequence[str]) -> NDArray[np.float64]:
+        """Return columns side by side (rows, names)."""
+        return self.values[:, [self.names.index(name) for name in names]]
+
+
+def read_table(
+    data: bytes, *, where: object, required: Sequence[str], optional: Sequence[str] = (), runs: bool = True
+) -> Table:
+    """Read reference-load data.
+
+    Parameters
+    ----------
+    data : the file's content
+    where : the file, for messages
+    required, optional : names of the numeric columns; each needs a unit in the header
+    runs : whether ``run`` and ``direction`` are required (and ``rotation`` allowed), or not allowed
+
+    Raises
+    ------
+    SessionError
+        a column is missing, doubled, unknown or without unit; a cell is no finite number; no rows
+    UnitError
+        a unit is unknown
+    """
+    rows = _rows(data, where)
+    header, body = rows[0], rows[1:]
+    parsed = [_HEADER.match(cell.strip()) for cell in header]
+    names = [
+        match["name"].strip() if match else cell.strip() for match, cell in zip(parsed, header, strict=True)
+    ]
+    extra = ("run", "direction", "rotation") if runs else ()
+    _check_header(names, header, [*required, *(extra[:2])], [*optional, *extra], where)
+    if not body:
+        raise _error(where, "the file has no rows", "0 rows", "one row a reference load", "no-data")
+    for number, row in enumerate(body, start=1):
+        if len(row) != len(names):
+            raise _error(
+                f"{where}, row {number} (line {number + 1})",
+                "a row has another number of cells than the header",
+                f"{len(row)} cells", f"{len(names)} cells", "columns",
+            )  # fmt: skip
+    cells = dict(zip(names, zip(*body, strict=True), strict=True))
+    numeric = [name for name in names if name not in ("run", "direction", "rotation")]
+    units = []
+    for name in numeric:
+        match = parsed[names.index(name)]
+        if match is None or match["unit"] is None:
+            raise _error(
+                f"{where}, column {name}", f"column {name} has no unit",
+                header[names.index(name)], f"a header such as '{name} [N]' or '{name} [mV/V]'", "no-unit",
+            )  # fmt: skip
+        units.append(unit(match["unit"].strip(), where=f"{where}, column {name}").text)
+    direction = None
+    if "direction" in cells:
+        direction = tuple(cell.strip().lower() for cell in cells["direction"])
+        for number, cell in enumerate(direction, start=1):
+            if cell not in ("up", "down"):
+                raise _cell(where, number, "direction", cell, "up or down")
+    run = _numbers(cells["run"], "run", where) if "run" in cells else None
+    if run is not None and (fraction := np.flatnonzero(run != np.floor(run))).size:
+        at = int(fraction[0])
+        raise _cell(where, at + 1, "run", cells["run"][at], "a whole number")
+    return Table(
+        names=tuple(numeric),
+        units=tuple(units),
+        values=np.column_stack([_numbers(cells[name], name, where) for name in numeric]),
+        run=run,
+        direction=direction,
+        rotation=_numbers(cells["rotation"], "rotation", where) if "rotation" in cells else None,
+    )
+
+
+def _rows(data: bytes, where: object) -> list[list[str]]:
+    try:
+        text = data.decode("utf-8-sig")
+        rows = [
+            row
+            for row in csv.reader(io.StringIO(text, newline=""), strict=True)
+            if any(c.strip() for c in row)
+        ]
+    except (ValueError, csv.Error) as error:
+        raise _error(
+            where, "the file is no CSV text", str(error), "comma-separated UTF-8 text", "no-csv"
+        ) from error
+    if not rows:
+        raise _error(where, "the file is empty", "no header", "a header with units, then rows", "no-data")
+    return rows
+
+
+def _check_header(
+    names: list[str], header: list[str], required: list[str], optional: list[str], where: object
+) -> None:
+    for name in names:
+        if names.count(name) > 1:
+            raise _error(
+                where, f"column {name} stands twice", ", ".join(header), f"one column {name}", "columns"
+            )
+    for name in required:
+        if name not in names:
+            raise _error(
+                where, f"column {name} is missing", ", ".join(header), ", ".join(required), "columns"
+            )
+    known = [*required, *optional]
+    for name in names:
+        if name not in known:
+            near = difflib.get_close_matches(name, known, n=1, cutoff=0.4)
+            hint = f"did you mean {near[0]!r}? " if near else ""
+            raise _error(
+                where, f"unknown column {name!r}", name, ", ".join(dict.fromkeys(known)), "columns",
+                hint + "name it in indications or loads of the session, or remove it",
+            )  # fmt: skip
+
+
+def _numbers(cells: Sequence[str], name: str, where: object) -> NDArray[np.float64]:
+    try:
+        values = np.array(list(map(float, cells)))
+    except ValueError:
+        values = np.array([_number(cell, at, name, where) for at, cell in enumerate(cells, start=1)])
+    if not np.isfinite(values).all() or "_" in "".join(cells):
+        for at, cell in enumerate(cells, start=1):
+            _number(cell, at, name, where)
+    return values
+
+
+def _number(cell: str, at: int, name: str, where: object) -> float:
+    try:
+        value = float(cell)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value) or "_" in cell:
+        raise _cell(where, at, name, cell, "a finite number")
+    return value
+
+
+def _cell(where: object, row: int, name: str, got: str, expected: str) -> SessionError:
+    return SessionError(
+        f"row {row}, column {name} holds no usable value",
+        where=f"{where}, row {row} (line {row + 1}), column {name}",
+        got=repr(got),
+        expected=expected,
+        next_step="correct the cell, or remove the whole row with a reason in the laboratory's notes",
+        rule="cell",
+    )
+
+
+def _error(
+    where: object,
+    what: str,
+    got: object,
+    expected: object,
+    rule: str,
+    next_step: str = "correct the file; nothing was written",
+) -> SessionError:
+    return SessionError(what, where=where, got=got, expected=expected, next_step=next_step, rule=rule)
