@@ -1,0 +1,204 @@
+"""Headers to channels: by the machine's own headers, or as ``SYMBOL [unit]``; nothing is guessed.
+
+A header printed as the machine prints it has the unit of the machine definition. A header with a unit in
+brackets has that unit, which must be of the machine's dimension. Any other column is refused.
+"""
+
+from __future__ import annotations
+
+import difflib
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NoReturn
+
+from toolkit.channels import CHANNELS, Channel
+from toolkit.errors import ColumnError, UnitError
+from toolkit.machine import Machine
+from toolkit.machine.definition import Column, Role
+from toolkit.units import unit
+
+_WITH_UNIT = re.compile(r"(.*?)\s*\[([^\[\]]*)\]\s*")
+_EXTRA_ROLES: dict[str, Role] = {"t": "time", "TIRE_ANGLE": "angle", "DRUM_ANGLE": "angle"}
+_OPTIONAL: tuple[Role, ...] = ("acquired",)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Assigned:
+    """A column of a file that was recognised; ``index`` counts from 0 at the file's first column."""
+
+    index: int
+    symbol: str
+    header: str
+    unit: str
+    role: Role
+
+
+def assign_columns(headers: Sequence[str], machine: Machine, *, where: object) -> tuple[Assigned, ...]:
+    """Return the channel of every column, in the order of the file.
+
+    Parameters
+    ----------
+    headers : texts of the header row; an empty text is an unused column
+    machine : whose definition names headers, units and roles
+    where : file and sheet, for the messages
+
+    Raises
+    ------
+    ColumnError
+        rule ``unknown-unit unit-dimension unknown-column doubled-column missing-column``
+
+    Examples
+    --------
+    >>> from toolkit.machine import load_machine
+    >>> row = ["SA [deg]", "fz LOAD", "D51 (Filtered)", "D52 (Filtered)", "E5 (Filtered)", "t [s]"]
+    >>> [(one.symbol, one.unit) for one in assign_columns(row, load_machine("m15"), where="doctest")]
+    [('SA', 'deg'), ('FZ', 'lbf'), ('D51', 'lbf'), ('D52', 'lbf'), ('E5', 'lbf'), ('t', 's')]
+    """
+    found = tuple(
+        _assign(index, header, machine, where) for index, header in enumerate(headers) if header.strip()
+    )
+    _check_once(found, where)
+    _check_whole(found, machine, headers, where)
+    return found
+
+
+def looks_like_header(headers: Sequence[str], machine: Machine) -> bool:
+    """Tell whether a row has at least one header of the machine: enough to take it for a recording's."""
+    return any(_machine_column(_split(header)[0], machine) is not None for header in headers)
+
+
+def _assign(index: int, header: str, machine: Machine, where: object) -> Assigned:
+    name, printed = _split(header)
+    column = _machine_column(name, machine)
+    if printed is None:
+        # Without a printed unit only the machine's own header has one: a bare symbol could be anything.
+        if column is None or _plain(name) != _plain(column.header):
+            _no_unit(header, name, column, machine, where)
+        return Assigned(index=index, symbol=column.symbol, header=header, unit=column.unit, role=column.role)
+    try:
+        read = unit(printed, where=where)
+    except UnitError as error:
+        raise ColumnError(
+            f"column {header!r} has a unit that is not known",
+            where=where, got=printed, expected=error.expected, next_step=error.next_step, rule="unknown-unit",
+        ) from error  # fmt: skip
+    if column is not None:
+        _check_dimension(header, read.text, read.dimension, unit(column.unit).dimension, column.unit, where)
+        return Assigned(index=index, symbol=column.symbol, header=header, unit=read.text, role=column.role)
+    channel = _channel(name, header)
+    if channel is not None:
+        _check_dimension(header, read.text, read.dimension, channel.dimension, channel.si, where)
+    symbol = channel.symbol if channel else name
+    return Assigned(
+        index=index, symbol=symbol, header=header, unit=read.text, role=_EXTRA_ROLES.get(symbol, "covariate")
+    )
+
+
+def _split(header: str) -> tuple[str, str | None]:
+    match = _WITH_UNIT.fullmatch(header.strip())
+    if match is None or not match.group(1).strip():
+        return header.strip(), None
+    return match.group(1).strip(), match.group(2)
+
+
+def _plain(text: str) -> str:
+    return " ".join(text.split()).casefold()
+
+
+def _machine_column(name: str, machine: Machine) -> Column | None:
+    wanted = _plain(name)
+    for column in machine.columns:
+        channel = CHANNELS.get(column.symbol)
+        names = (column.header, column.symbol, *(channel.aliases if channel else ()))
+        if any(_plain(one) == wanted for one in names):
+            return column
+    return None
+
+
+def _channel(name: str, header: str) -> Channel | None:
+    # `t` is time and `T` temperature: the exact spelling goes first, then the one that fits uniquely.
+    if name in CHANNELS:
+        return CHANNELS[name]
+    for texts in ({" ".join(header.split())}, {_plain(name)}):
+        fits = [
+            channel
+            for channel in CHANNELS.values()
+            if any(
+                one in texts or _plain(one) in texts
+                for one in (channel.symbol, channel.name, *channel.aliases)
+            )
+        ]
+        if len(fits) == 1:
+            return fits[0]
+    return None
+
+
+def _check_dimension(
+    header: str, printed: str, dimension: str, wanted: str, example: str, where: object
+) -> None:
+    if dimension != wanted:
+        raise ColumnError(
+            f"column {header!r} has a unit of another kind",
+            where=where,
+            got=f"{printed} ({dimension})",
+            expected=f"a unit of {wanted}, such as {example}",
+            next_step="correct the header, or name the machine that wrote the file",
+            rule="unit-dimension",
+        )
+
+
+def _no_unit(header: str, name: str, column: Column | None, machine: Machine, where: object) -> NoReturn:
+    if column is not None:
+        raise ColumnError(
+            f"column {header!r} has no unit",
+            where=where,
+            got=header,
+            expected=f"{column.header!r} as the machine writes it, or '{column.symbol} [unit]'",
+            next_step=f"write the unit into the header, for example '{column.symbol} [{column.unit}]'",
+            rule="unknown-unit",
+        )
+    known = [column.header for column in machine.columns]
+    near = difflib.get_close_matches(_plain(name), [_plain(one) for one in known], n=1, cutoff=0.6)
+    match = next((one for one in known if near and _plain(one) == near[0]), None)
+    raise ColumnError(
+        f"column {header!r} is not known and has no unit",
+        where=where,
+        got=header,
+        expected=f"{match!r}" if match else f"{', '.join(known)}, or 'NAME [unit]'",
+        next_step=f"did you mean {match!r}?" if match else "write its unit into the header as 'NAME [unit]'",
+        rule="unknown-unit",
+    )
+
+
+def _check_once(found: tuple[Assigned, ...], where: object) -> None:
+    first: dict[str, Assigned] = {}
+    for one in found:
+        # `t` and `T` are two channels; everything else is the same in either case.
+        key = one.symbol if one.symbol in CHANNELS else one.symbol.casefold()
+        if key in first:
+            raise ColumnError(
+                f"channel {one.symbol} has two columns",
+                where=where,
+                got=f"{first[key].header!r} and {one.header!r}",
+                expected="one column a channel",
+                next_step="remove or rename one of them in a copy of the file",
+                rule="doubled-column",
+            )
+        first[key] = one
+
+
+def _check_whole(
+    found: tuple[Assigned, ...], machine: Machine, headers: Sequence[str], where: object
+) -> None:
+    have = {one.symbol for one in found}
+    missing = [c for c in machine.columns if c.role not in _OPTIONAL and c.symbol not in have]
+    if missing:
+        raise ColumnError(
+            f"the recording lacks {', '.join(repr(column.header) for column in missing)}",
+            where=where,
+            got=", ".join(repr(header) for header in headers if header.strip())[:400] or "no header",
+            expected=", ".join(repr(c.header) for c in machine.columns if c.role not in _OPTIONAL),
+            next_step=f"check the header row and the machine ({machine.name})",
+            rule="missing-column",
+        )

@@ -1,0 +1,120 @@
+"""The marks by which the toolkit knows its own files again, whatever they are called.
+
+A *recording* that the toolkit wrote (the virtual machine's files, the packaged example) is read like any
+other; a *result* that it wrote (reduced test, report, truth of a simulation) never is. Both carry marks in
+the keywords of their core properties; a JSON result has ``"generator": "toolkit"`` at its top level.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+
+from toolkit.recording.archive import MAX_FILE_BYTES, read_members
+from toolkit.recording.sniff import sniff
+
+GENERATOR = "toolkit"
+"""Creator in the properties of every file that the toolkit writes, and ``generator`` of its JSON."""
+
+OWN_OUTPUT = "toolkit-output"
+"""Keyword of a result (.xlsx, .docx, PDF) that must never be read as a recording."""
+
+RECORDING = "toolkit-recording"
+"""Keyword of a recording that the toolkit wrote."""
+
+SIMULATED = "simulated"
+"""Keyword of everything that comes from the virtual machine."""
+
+_HEAD = 4096
+_KEYWORDS = re.compile(rb"<(?:\w+:)?keywords[^>]*>([^<]*)<")
+
+
+def recording_keywords(*, machine: str, simulated: bool) -> str:
+    """Return the keywords of a recording that the toolkit writes.
+
+    >>> recording_keywords(machine="m15-virtual", simulated=True)
+    'toolkit-recording; machine=m15-virtual; simulated'
+    """
+    return "; ".join([RECORDING, f"machine={machine}", *([SIMULATED] if simulated else [])])
+
+
+def output_keywords(*, simulated: bool) -> str:
+    """Return the keywords of a result that the toolkit writes.
+
+    >>> output_keywords(simulated=False)
+    'toolkit-output'
+    """
+    return "; ".join([OWN_OUTPUT, *([SIMULATED] if simulated else [])])
+
+
+def keywords_of(core_xml: bytes) -> tuple[str, ...]:
+    """Return the keywords in ``docProps/core.xml``; empty where there are none.
+
+    >>> keywords_of(b"<cp:keywords>toolkit-recording; simulated</cp:keywords>")
+    ('toolkit-recording', 'simulated')
+    """
+    found = _KEYWORDS.search(core_xml)
+    text = found.group(1).decode("utf-8", "replace") if found else ""
+    return tuple(word.strip() for word in text.split(";") if word.strip())
+
+
+def machine_named(keywords: tuple[str, ...]) -> str | None:
+    """Return the machine that a recording's keywords name."""
+    if RECORDING in keywords:
+        for word in keywords:
+            if word.startswith("machine="):
+                return word.removeprefix("machine=")
+    return None
+
+
+def machine_of(path: Path) -> str | None:
+    """Return the machine that a recording written by the toolkit names in its properties, else None.
+
+    Never raises for what a file holds: a file that cannot be opened names no machine.
+    """
+    return machine_named(_core_keywords(_content(path)))
+
+
+def is_own_output(path: Path) -> bool:
+    """Tell by its content whether a file is a result that the toolkit wrote.
+
+    True for JSON with ``"generator": "toolkit"`` at the top level, an .xlsx or .docx whose keywords hold
+    `OWN_OUTPUT`, a PDF that carries it, and any other file that shows it in its first 4096 bytes.
+    """
+    data = _content(path)
+    kind = sniff(data)
+    if kind.id == "zip":
+        return OWN_OUTPUT in _core_keywords(data)
+    if kind.id == "pdf":
+        # Writers store the keywords as bytes, as UTF-16 or as hexadecimal UTF-16, or in the XMP packet.
+        wide = OWN_OUTPUT.encode("utf-16-be")
+        return any(mark in data for mark in (OWN_OUTPUT.encode(), wide, wide.hex().upper().encode()))
+    if data[:64].lstrip().startswith(b"{"):
+        try:
+            top = json.loads(data)
+        except (ValueError, RecursionError):
+            return False
+        return isinstance(top, dict) and top.get("generator") == GENERATOR
+    return OWN_OUTPUT.encode() in data[:_HEAD]
+
+
+def _content(path: Path) -> bytes:
+    try:
+        if not path.is_file() or path.stat().st_size > MAX_FILE_BYTES:
+            return b""
+        return path.read_bytes()
+    except OSError:
+        return b""
+
+
+def _core_keywords(data: bytes) -> tuple[str, ...]:
+    from toolkit.errors import UnreadableError
+
+    if sniff(data).id != "zip":
+        return ()
+    try:
+        parts = read_members(data, where=None, only=("docProps/core.xml",))
+    except UnreadableError:
+        return ()
+    return keywords_of(parts.get("docProps/core.xml", b""))

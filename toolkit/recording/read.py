@@ -1,0 +1,88 @@
+"""One file to one recording, by its content: the thesis's files have no extension."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Literal
+
+from toolkit.errors import RecordingError, UnreadableError
+from toolkit.machine import Machine
+from toolkit.recording.csvfile import read_csv
+from toolkit.recording.gate import gate
+from toolkit.recording.marks import OWN_OUTPUT, SIMULATED, keywords_of, machine_named
+from toolkit.recording.model import Recording
+from toolkit.recording.table import read_table
+from toolkit.recording.xlsx import read_sheet
+
+Reader = Literal["calamine", "both"]
+
+
+def read_recording(path: Path, machine: Machine, *, reader: Reader = "calamine") -> Recording:
+    """Read a recording whole or not at all.
+
+    Parameters
+    ----------
+    path : an .xlsx workbook or a CSV file, under any name
+    machine : the machine that wrote it
+    reader : ``both`` has openpyxl read every cell a second time
+
+    Raises
+    ------
+    UnreadableError
+        the content is no recording: see `toolkit.recording.gate` and the rules ``no-data own-output``
+    ColumnError
+        a column is missing, doubled, or has no known unit
+    CellError
+        text, an error value, NaN or nothing stands in a number's place
+    RecordingError
+        several worksheets look like recordings, or the file names another machine
+    """
+    gated = gate(path)
+    if gated.kind == "text":
+        return Recording(
+            path=path,
+            sha256=gated.sha256,
+            machine=machine,
+            series=read_table(read_csv(gated, machine), machine),
+            simulated=machine.simulated,
+            format="csv",
+        )
+    keywords = keywords_of(gated.members.get("docProps/core.xml", b""))
+    _check_origin(path, keywords, machine)
+    sheet, table = read_sheet(gated, machine)
+    series = read_table(table, machine)
+    if reader == "both":
+        from toolkit.recording.crosscheck import cross_check
+
+        cross_check(gated, sheet, table)
+    return Recording(
+        path=path,
+        sha256=gated.sha256,
+        machine=machine,
+        series=series,
+        simulated=machine.simulated or SIMULATED in keywords,
+        format="xlsx",
+    )
+
+
+def _check_origin(path: Path, keywords: tuple[str, ...], machine: Machine) -> None:
+    if OWN_OUTPUT in keywords:
+        raise UnreadableError(
+            "the file is a result of this toolkit, not a recording",
+            where=path,
+            got="a workbook with computed values",
+            expected="a file that the acquisition program wrote",
+            next_step="give the recording that it was computed from",
+            rule="own-output",
+        )
+    named = machine_named(keywords)
+    # The headers print no units: read by another machine's definition, mV/V would become lbf.
+    if named is not None and named != machine.name:
+        raise RecordingError(
+            "the recording comes from another machine",
+            where=path,
+            got=named,
+            expected=machine.name,
+            next_step=f"read it with the machine {named!r} (in test.toml: machine = {named!r})",
+            rule="other-machine",
+        )

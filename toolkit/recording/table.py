@@ -1,0 +1,171 @@
+"""A table of cells, as any reader returns it, to checked columns of numbers."""
+
+from __future__ import annotations
+
+import datetime
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, NoReturn
+
+import numpy as np
+
+from toolkit.errors import CellError, ColumnError, UnreadableError
+from toolkit.machine import Machine
+from toolkit.recording.cells import reference
+from toolkit.recording.columns import Assigned, assign_columns
+from toolkit.recording.model import Series
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+_NUMBERS = frozenset((float, int))
+_EMPTY = ("", None)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Table:
+    """Cells of one sheet, row by row from the first row of the sheet; ``""`` is an empty cell.
+
+    ``errors``: (reference, text) of cells with an error value, which readers return as empty.
+    """
+
+    where: str
+    rows: Sequence[Sequence[Any]]
+    errors: tuple[tuple[str, str], ...] = ()
+
+
+def read_table(table: Table, machine: Machine) -> tuple[Series, ...]:
+    """Return the table's columns: the first row that is not empty is the header, the rest are numbers.
+
+    Raises
+    ------
+    ColumnError
+        see `toolkit.recording.columns.assign_columns`
+    CellError
+        rule ``text-cell error-cell empty-cell nan-cell boolean-cell date-cell``: the first bad cell, with
+        sheet, spreadsheet row, column header, what stands there and what should
+    UnreadableError
+        rule ``no-data``: there is no header or no row of data
+    """
+    first = next((i for i, row in enumerate(table.rows) if not _blank(row)), None)
+    if first is None:
+        _no_data(table, "an empty sheet")
+    header_row = table.rows[first]
+    if all(not isinstance(cell, str) for cell in header_row if cell not in _EMPTY):
+        raise ColumnError(
+            "the recording has no header row",
+            where=f"{table.where}, row {first + 1}",
+            got=", ".join(str(cell) for cell in header_row)[:200],
+            expected=", ".join(repr(column.header) for column in machine.columns),
+            next_step="add the header row",
+            rule="missing-column",
+        )
+    headers = [cell if isinstance(cell, str) else "" if cell is None else str(cell) for cell in header_row]
+    assigned = assign_columns(headers, machine, where=f"{table.where}, row {first + 1}")
+    last = len(table.rows)
+    while last > first + 1 and _blank(table.rows[last - 1]):
+        last -= 1
+    _check_errors(table, first, headers)
+    if last == first + 1:
+        _no_data(table, "a header row and nothing below it")
+    body = table.rows[first + 1 : last]
+    _check_nameless(table, body, headers, first + 2)
+    return tuple(_series(one, [row[one.index] for row in body], table.where, first + 2) for one in assigned)
+
+
+def _series(one: Assigned, cells: list[Any], where: str, first_row: int) -> Series:
+    # The types are looked at before numpy sees them: it would take True for 1 and "12.3" for text.
+    values: NDArray[np.float64] | None = None
+    if _NUMBERS.issuperset(map(type, cells)):
+        try:
+            values = np.array(cells, dtype=np.float64)
+        except OverflowError:  # a whole number of more than 308 digits
+            values = None
+    if values is None or not np.isfinite(values).all():
+        _refuse_first(one, cells, where, first_row)
+    values.setflags(write=False)
+    return Series(symbol=one.symbol, header=one.header, unit=one.unit, role=one.role, values=values)
+
+
+def _refuse_first(one: Assigned, cells: list[Any], where: str, first_row: int) -> NoReturn:
+    for offset, cell in enumerate(cells):
+        rule, got = judge(cell)
+        if rule:
+            refuse_cell(rule, got, where, first_row + offset, one.index + 1, one.header)
+    raise AssertionError("a column was refused although all its cells are numbers")
+
+
+def judge(cell: object) -> tuple[str | None, str]:
+    """Return why a cell is no number (a rule id, None where it is one) and what stands there."""
+    if cell in _EMPTY:
+        return "empty-cell", "an empty cell"
+    if isinstance(cell, bool):
+        return "boolean-cell", str(cell).upper()
+    if isinstance(cell, int | float):
+        try:
+            return (None, "") if math.isfinite(cell) else ("nan-cell", str(cell))
+        except OverflowError:
+            return "nan-cell", "a number beyond double precision"
+    if isinstance(cell, str):
+        kind = "error-cell" if cell.startswith("#") else "text-cell"
+        return kind, f"{'the text ' if kind == 'text-cell' else ''}{cell[:80]!r}"
+    if isinstance(cell, datetime.date | datetime.time | datetime.timedelta):
+        return "date-cell", f"a date or time, {cell}"
+    return "text-cell", repr(cell)[:80]
+
+
+def refuse_cell(rule: str, got: str, where: str, row: int, column: int, header: str) -> NoReturn:
+    """Raise the `CellError` of one cell; ``row`` and ``column`` count from 1 in the spreadsheet."""
+    raise CellError(
+        f"row {row}, column {header!r}: no number",
+        where=f"{where}, row {row}, column {header!r} (cell {reference(row, column)})",
+        got=got,
+        expected="a finite number",
+        next_step="look at that cell in the file; repeat the recording or mend a copy of the file",
+        rule=rule,
+    )
+
+
+def _check_errors(table: Table, first: int, headers: list[str]) -> None:
+    for place, text in table.errors:
+        letters = place.rstrip("0123456789")
+        row = int(place[len(letters) :] or 0)
+        column = 0
+        for letter in letters.upper():
+            column = column * 26 + ord(letter) - ord("A") + 1
+        header = headers[column - 1] if 0 < column <= len(headers) else "?"
+        if row != first + 1 or not header:
+            refuse_cell("error-cell", f"the error value {text}", table.where, row, column, header or "?")
+
+
+def _check_nameless(table: Table, body: Sequence[Sequence[Any]], headers: list[str], first_row: int) -> None:
+    for index in range(max(map(len, body))):
+        if index < len(headers) and headers[index].strip():
+            continue
+        for offset, row in enumerate(body):
+            if index < len(row) and row[index] not in _EMPTY:
+                place = reference(first_row + offset, index + 1)
+                raise ColumnError(
+                    "a column has values and no header",
+                    where=f"{table.where}, cell {place}",
+                    got=repr(row[index])[:80],
+                    expected="a header in the first row, or an empty column",
+                    next_step="name the column as 'NAME [unit]' or clear it in a copy of the file",
+                    rule="unknown-column",
+                )
+
+
+def _blank(row: Sequence[Any]) -> bool:
+    return all(cell in _EMPTY or (isinstance(cell, str) and not cell.strip()) for cell in row)
+
+
+def _no_data(table: Table, got: str) -> NoReturn:
+    raise UnreadableError(
+        "the recording has no data",
+        where=table.where,
+        got=got,
+        expected="a header row and at least one row of numbers",
+        next_step="repeat the recording, or leave the file out of the test",
+        rule="no-data",
+    )

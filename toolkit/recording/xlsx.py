@@ -1,0 +1,146 @@
+"""Workbooks: python-calamine reads the members that passed the gate."""
+
+from __future__ import annotations
+
+import io
+import posixpath
+from collections.abc import Mapping
+from typing import Any, NoReturn
+from xml.etree import ElementTree
+
+from toolkit.errors import CellError, RecordingError, UnreadableError
+from toolkit.machine import Machine
+from toolkit.recording.archive import stored_archive
+from toolkit.recording.cells import error_cells
+from toolkit.recording.columns import looks_like_header
+from toolkit.recording.gate import Gated
+from toolkit.recording.table import Table
+
+_MAIN = "{http://schemas.openxmlformats.org/spreadsheetml/2006/main}"
+_ID = "{http://schemas.openxmlformats.org/officeDocument/2006/relationships}id"
+_STRICT_MAIN = "{http://purl.oclc.org/ooxml/spreadsheetml/main}"
+_STRICT_ID = "{http://purl.oclc.org/ooxml/officeDocument/relationships}id"
+
+
+def read_sheet(gated: Gated, machine: Machine) -> tuple[str, Table]:
+    """Return the name and the cells of the one visible worksheet that holds the recording.
+
+    Hidden worksheets are never read. With several visible ones, the recording is the one whose first row
+    has headers of the machine.
+
+    Raises
+    ------
+    UnreadableError
+        rule ``no-data unreadable``: nothing visible, or the reader fails
+    CellError
+        rule ``error-cell``: an error value that the reader cannot represent
+    RecordingError
+        rule ``several-sheets``: more than one worksheet looks like a recording
+    """
+    errors = _errors_by_sheet(gated.members)
+    sheets = _visible_sheets(gated, errors)
+    filled = [(name, rows) for name, rows in sheets if any(any(c not in ("", None) for c in r) for r in rows)]
+    if not filled:
+        raise UnreadableError(
+            "the workbook has no data",
+            where=gated.path,
+            got=f"{len(sheets)} visible worksheets, all of them empty",
+            expected="a worksheet with a header row and rows of numbers",
+            next_step="repeat the recording; hidden worksheets are not read",
+            rule="no-data",
+        )
+    fitting = [(name, rows) for name, rows in filled if looks_like_header(_first(rows), machine)] or filled[
+        :1
+    ]
+    if len(fitting) > 1:
+        raise RecordingError(
+            "more than one worksheet looks like a recording",
+            where=gated.path,
+            got=", ".join(repr(name) for name, _ in fitting),
+            expected="one",
+            next_step="save each worksheet as a file of its own",
+            rule="several-sheets",
+        )
+    name, rows = fitting[0]
+    return name, Table(where=f"{gated.path}, sheet {name!r}", rows=rows, errors=errors.get(name, ()))
+
+
+def _visible_sheets(
+    gated: Gated, errors: Mapping[str, tuple[tuple[str, str], ...]]
+) -> list[tuple[str, list[list[Any]]]]:
+    from python_calamine import CalamineWorkbook, SheetTypeEnum, SheetVisibleEnum
+
+    sheets: list[tuple[str, list[list[Any]]]] = []
+    name = "?"
+    try:
+        with CalamineWorkbook.from_filelike(io.BytesIO(stored_archive(gated.members))) as workbook:
+            for meta in workbook.sheets_metadata:
+                if meta.typ == SheetTypeEnum.WorkSheet and meta.visible == SheetVisibleEnum.Visible:
+                    name = meta.name
+                    rows = workbook.get_sheet_by_name(name).to_python(skip_empty_area=False)
+                    sheets.append((name, rows))
+    except BaseException as error:
+        # A panic of the reader's Rust code derives from BaseException; whatever fails, the file is at fault.
+        if not isinstance(error, Exception) and type(error).__name__ != "PanicException":
+            raise
+        _refuse(gated, name, errors.get(name, ()), error)
+    return sheets
+
+
+def _refuse(gated: Gated, name: str, errors: tuple[tuple[str, str], ...], error: BaseException) -> NoReturn:
+    if errors:
+        place, text = errors[0]
+        raise CellError(
+            f"cell {place}: an error value",
+            where=f"{gated.path}, sheet {name!r}, cell {place}",
+            got=text,
+            expected="a finite number",
+            next_step="look at that cell in the file; repeat the recording or mend a copy of the file",
+            rule="error-cell",
+        ) from error
+    raise UnreadableError(
+        "the workbook cannot be read",
+        where=f"{gated.path}, sheet {name!r}" if name != "?" else gated.path,
+        got=f"{type(error).__name__}: {error}"[:300],
+        expected="a workbook as the acquisition program or Excel writes it",
+        next_step="open it in Excel and save it again, or copy it again from the machine",
+        rule="unreadable",
+    ) from (error if isinstance(error, Exception) else None)
+
+
+def _first(rows: list[list[Any]]) -> list[str]:
+    for row in rows:
+        texts = [cell for cell in row if isinstance(cell, str) and cell.strip()]
+        if texts:
+            return texts
+        if any(cell not in ("", None) for cell in row):
+            break
+    return []
+
+
+def _errors_by_sheet(members: Mapping[str, bytes]) -> dict[str, tuple[tuple[str, str], ...]]:
+    parts = {name: error_cells(xml) for name, xml in members.items() if b"#" in xml and b"sheetData" in xml}
+    if not any(parts.values()):
+        return {}
+    found: dict[str, tuple[tuple[str, str], ...]] = {}
+    for name, part in _sheet_parts(members).items():
+        if parts.get(part):
+            found[name] = parts[part]
+    return found
+
+
+def _sheet_parts(members: Mapping[str, bytes]) -> dict[str, str]:
+    # The package says which part is which sheet; only needed when there are error values to place.
+    try:
+        links = ElementTree.fromstring(members["xl/_rels/workbook.xml.rels"])  # noqa: S314  gated: no DTD
+        workbook = ElementTree.fromstring(members["xl/workbook.xml"])  # noqa: S314
+    except (KeyError, ElementTree.ParseError, ValueError, LookupError):
+        return {}
+    targets = {one.get("Id"): one.get("Target", "") for one in links}
+    sheets = [*workbook.iter(f"{_MAIN}sheet"), *workbook.iter(f"{_STRICT_MAIN}sheet")]
+    return {
+        sheet.get("name", ""): posixpath.normpath(
+            posixpath.join("xl", targets.get(sheet.get(_ID) or sheet.get(_STRICT_ID), ""))
+        ).lstrip("/")
+        for sheet in sheets
+    }
