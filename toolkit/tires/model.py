@@ -1,10 +1,51 @@
-"""CurveFit: the result of fitting one curve of one channel."""
+"""Curve, CurveFit, and the interface that every tire model has."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal, Protocol, get_args
 
+from toolkit.channels import Axes
 from toolkit.estimate import Estimate
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import ArrayLike, NDArray
+
+Loss = Literal["linear", "robust"]
+LOSSES: tuple[str, ...] = get_args(Loss)
+CHANNEL_UNIT = {"FY": "N", "MZ": "N*m"}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Curve:
+    """One channel against slip angle at one load, rows in the order in which they were recorded.
+
+    ``SA`` [rad] and ``y`` [N or N·m] have one length; ``sigma`` are known standard uncertainties of y
+    [its unit], None where nothing is known (every row then has the same weight).
+    """
+
+    SA: NDArray[np.float64]
+    y: NDArray[np.float64]
+    channel: Literal["FY", "MZ"]
+    load_N: float | None
+    axes: Axes = "SAE"
+    sigma: NDArray[np.float64] | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ParameterSpec:
+    """A model's parameter: ``unit`` ``y`` is the channel's own; ``bounds`` and ``text`` in words."""
+
+    name: str
+    unit: str
+    bounds: str
+    text: str
+
+    def unit_of(self, channel: str) -> str:
+        """Return the unit for a channel, in SI."""
+        return self.unit.replace("y", CHANNEL_UNIT[channel])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -22,7 +63,9 @@ class CurveFit:
     """One model fitted to one channel (FY [N] or MZ [N·m]) of one load block or of all.
 
     ``load_N`` is the mean load of the block, None for a model over all loads. ``covariance`` is the
-    parameters' covariance in their order, row by row, zero where not determined. ``error_percent`` and
+    parameters' covariance in their order, row by row, for propagation: a parameter that is not
+    determined enters it with the spread that its bounds leave (it moves together with others, and a
+    stiffness may be known where it is not), one at its bound with zero. ``error_percent`` and
     ``scatter_floor_percent`` as in the files contract; the floor is None where bins are too thin.
     """
 
@@ -48,3 +91,34 @@ class CurveFit:
     def values(self) -> tuple[float, ...]:
         """Parameter values in their order."""
         return tuple(parameter.value for parameter in self.parameters)
+
+
+class TireModel(Protocol):
+    """What a model file offers. Derivatives are stacked in front: (parameters, points)."""
+
+    name: str
+    title: str
+    reference: str
+    per_load: bool
+    channels: tuple[str, ...]
+    parameters: tuple[ParameterSpec, ...]
+
+    def value(self, values: ArrayLike, SA: ArrayLike) -> NDArray[np.float64]:
+        """Return y at slip angles [rad]."""
+        ...
+
+    def slope(self, values: ArrayLike, SA: ArrayLike) -> NDArray[np.float64]:
+        """Return dy/dSA."""
+        ...
+
+    def jacobian(self, values: ArrayLike, SA: ArrayLike) -> NDArray[np.float64]:
+        """Return dy/dparameter."""
+        ...
+
+    def slope_jacobian(self, values: ArrayLike, SA: ArrayLike) -> NDArray[np.float64]:
+        """Return d(dy/dSA)/dparameter."""
+        ...
+
+    def fit(self, curves: Sequence[Curve], *, loss: Loss = "linear") -> tuple[CurveFit, ...]:
+        """Return one fit a curve, without start values."""
+        ...

@@ -1,0 +1,43 @@
+"""The models that are built: one file of ``toolkit/tires/models`` each, found and never listed by hand."""
+
+from __future__ import annotations
+
+from functools import cache
+from importlib import import_module
+from pkgutil import iter_modules
+from typing import cast
+
+from toolkit.errors import FitError
+from toolkit.tires import models
+from toolkit.tires.model import TireModel
+
+
+@cache
+def model_names() -> tuple[str, ...]:
+    """Return the names of all models.
+
+    >>> "magic_formula" in model_names()
+    True
+    """
+    return tuple(sorted(module.name for module in iter_modules(models.__path__)))
+
+
+@cache
+def model(name: str) -> TireModel:
+    """Return a model by name.
+
+    Raises
+    ------
+    FitError
+        no model of that name is built
+    """
+    if name not in model_names():
+        raise FitError(
+            f"the tire model {name!r} is not available",
+            where="--model",
+            got=name,
+            expected=", ".join(model_names()),
+            next_step="name one of those expected",
+            rule="unknown-model",
+        )
+    return cast("TireModel", import_module(f"{models.__name__}.{name}").MODEL)

@@ -1,0 +1,190 @@
+"""The Magic Formula's least-squares problem, reduced to four unknowns, for many curves at once.
+
+D and Sv enter linearly: for any shape (B, C, E, Sh) their best values within bounds have a closed form,
+so they are solved and not searched (variable projection, Golub and Pereyra 1973; the derivative is
+Kaufman's, 1975, exact where the linear part is free or at a bound). Curves are normalised: slip angle by
+its half range about its middle, ordinate by max|y|; the four unknowns are
+
+    p = (ln B, C, q, h)    E = 1.25 - exp(q),    h the shift in units of the half range
+
+because the cost is far closer to a parabola in ln B and q than in B and E.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    Array = NDArray[np.float64]
+
+_E_TOP = 1.25
+C_LOW, C_HIGH = 1e-3, 4.0
+E_LOW, E_HIGH = -20.0, 1.0
+D_LIMIT, SV_LIMIT = 3.0, 1.0
+SPAN_LOW, SPAN_HIGH = 0.05, 50.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Problems:
+    """Normalised curves, padded to one length: ``u y sw`` (problems, points), ``low high`` (problems, 4).
+
+    ``sw`` is the square root of the weight, zero for padding.
+    """
+
+    u: Array
+    y: Array
+    sw: Array
+    low: Array
+    high: Array
+
+    def take(self, index: NDArray[np.intp]) -> Problems:
+        """Return the problems of an index, repeats allowed."""
+        return Problems(
+            u=self.u[index],
+            y=self.y[index],
+            sw=self.sw[index],
+            low=self.low[index],
+            high=self.high[index],
+        )
+
+    def weighted(self, sw: Array) -> Problems:
+        """Return the same problems with other weights."""
+        return Problems(u=self.u, y=self.y, sw=sw, low=self.low, high=self.high)
+
+
+@dataclass(slots=True, kw_only=True, eq=False)
+class State:
+    """Shapes ``p`` (problems, 4) with their best ``linear`` (D, Sv), cost, gradient and curvature."""
+
+    p: Array
+    linear: Array
+    cost: Array
+    gradient: Array
+    curvature: Array
+
+    def take(self, index: NDArray[np.intp]) -> State:
+        """Return the states of an index."""
+        return State(
+            p=self.p[index],
+            linear=self.linear[index],
+            cost=self.cost[index],
+            gradient=self.gradient[index],
+            curvature=self.curvature[index],
+        )
+
+    def put(self, where: NDArray[np.bool_], other: State) -> None:
+        """Take over the other's entries where a mask is true."""
+        self.p[where] = other.p[where]
+        self.linear[where] = other.linear[where]
+        self.cost[where] = other.cost[where]
+        self.gradient[where] = other.gradient[where]
+        self.curvature[where] = other.curvature[where]
+
+    def put_at(self, index: NDArray[np.intp], other: State) -> None:
+        """Write the other's entries to positions."""
+        self.p[index] = other.p
+        self.linear[index] = other.linear
+        self.cost[index] = other.cost
+        self.gradient[index] = other.gradient
+        self.curvature[index] = other.curvature
+
+
+def curvature_parameter(E: Array | float) -> Array:
+    """Return q of E."""
+    return np.log(_E_TOP - np.asarray(E, dtype=np.float64))
+
+
+def shape_of(p: Array) -> tuple[Array, Array, Array, Array]:
+    """Return normalised (B, C, E, shift) of unknowns (..., 4)."""
+    return np.exp(p[..., 0]), p[..., 1], _E_TOP - np.exp(p[..., 2]), p[..., 3]
+
+
+def sine(p: Array, u: Array) -> Array:
+    """Return sin(C arctan(...)) for unknowns (problems, 4) at normalised slip angles (problems, points)."""
+    B, C, E, h = (column[..., None] for column in shape_of(p))
+    z = B * (u + h)
+    result: Array = np.sin(C * np.arctan(z - E * (z - np.arctan(z))))
+    return result
+
+
+def assess(p: Array, problems: Problems) -> State:
+    """Return cost, gradient and Gauss-Newton curvature of shapes, D and Sv solved within their bounds."""
+    u, y, sw = problems.u, problems.y, problems.sw
+    B, C, q, h = p[:, 0:1], p[:, 1:2], p[:, 2:3], p[:, 3:4]
+    B, eq = np.exp(B), np.exp(q)
+    E = _E_TOP - eq
+    z = B * (u + h)
+    bend = z - np.arctan(z)
+    psi = z - E * bend
+    phi = np.arctan(psi)
+    angle = C * phi
+    s, c = np.sin(angle), np.cos(angle)
+    outer = (c * C) / (1.0 + psi * psi)
+    zz = z * z
+    inner = outer * (1.0 - E * (zz / (1.0 + zz)))
+    a = np.empty((len(p), 6, u.shape[1]))
+    np.multiply(inner, z, out=a[:, 0])
+    np.multiply(c, phi, out=a[:, 1])
+    np.multiply(outer * bend, eq, out=a[:, 2])
+    np.multiply(inner, B, out=a[:, 3])
+    a[:, 4] = s
+    a[:, 5] = 1.0
+    a *= sw[:, None, :]
+    target = y * sw
+    gram = a @ a.transpose(0, 2, 1)
+    D, Sv, inverse = solve_linear(gram[:, 4:, 4:], np.matvec(a[:, 4:], target))
+    residual = target - D[:, None] * a[:, 4] - Sv[:, None] * a[:, 5]
+    cross = gram[:, :4, 4:]
+    curvature = (gram[:, :4, :4] - cross @ inverse @ cross.transpose(0, 2, 1)) * (D * D)[:, None, None]
+    return State(
+        p=p,
+        linear=np.stack([D, Sv], axis=1),
+        cost=np.vecdot(residual, residual),
+        gradient=-D[:, None] * np.matvec(a[:, :4], residual),
+        curvature=curvature,
+    )
+
+
+def solve_linear(gram: Array, right: Array) -> tuple[Array, Array, Array]:
+    """Return the best D and Sv within their bounds, and the inverse of the free part of ``gram``.
+
+    Parameters
+    ----------
+    gram : (problems, 2, 2) weighted sums ss, s1, 11 of the sine s
+    right : (problems, 2) weighted sums sy, 1y
+    """
+    ss, s1, ww = gram[:, 0, 0], gram[:, 0, 1], gram[:, 1, 1]
+    sy, wy = right[:, 0], right[:, 1]
+    determinant = ss * ww - s1 * s1
+    regular = determinant > 1e-13 * ss * ww + 1e-300
+    safe = np.where(regular, determinant, 1.0)
+    D = np.where(regular, (sy * ww - wy * s1) / safe, 0.0)
+    Sv = np.where(regular, (wy * ss - sy * s1) / safe, wy / ww)
+    inverse = np.zeros_like(gram)
+    inverse[:, 0, 0] = np.where(regular, ww / safe, 0.0)
+    inverse[:, 0, 1] = inverse[:, 1, 0] = np.where(regular, -s1 / safe, 0.0)
+    inverse[:, 1, 1] = np.where(regular, ss / safe, 1.0 / ww)
+    outside = (np.abs(D) > D_LIMIT) | (np.abs(Sv) > SV_LIMIT)
+    if outside.any():
+        # The cost is a convex parabola in (D, Sv): beyond the box its minimum lies on one of the edges.
+        i = np.flatnonzero(outside)
+        ss, s1, ww, sy, wy = ss[i], s1[i], ww[i], sy[i], wy[i]
+        floor = np.maximum(ss, 1e-300)
+        edges = []
+        for bound in (D_LIMIT, -D_LIMIT):
+            edges.append((np.full(len(i), bound), np.clip((wy - bound * s1) / ww, -SV_LIMIT, SV_LIMIT)))
+        for bound in (SV_LIMIT, -SV_LIMIT):
+            edges.append((np.clip((sy - bound * s1) / floor, -D_LIMIT, D_LIMIT), np.full(len(i), bound)))
+        d, v = np.array([edge[0] for edge in edges]), np.array([edge[1] for edge in edges])
+        best = np.argmin(d * d * ss + 2 * d * v * s1 + v * v * ww - 2 * d * sy - 2 * v * wy, axis=0)
+        d, v = d[best, np.arange(len(i))], v[best, np.arange(len(i))]
+        D[i], Sv[i] = d, v
+        inverse[i] = 0.0
+        inverse[i, 0, 0] = np.where(np.abs(d) < D_LIMIT, 1.0 / floor, 0.0)
+        inverse[i, 1, 1] = np.where(np.abs(v) < SV_LIMIT, 1.0 / ww, 0.0)
+    return D, Sv, inverse

@@ -1,0 +1,50 @@
+"""How well a fit describes its rows: the error in percent, and the scatter that no model could remove."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+_BIN = np.deg2rad(0.25)
+_ROWS = 3  # fewer rows in a bin have no mean to speak of
+
+
+def error_percent(residual: NDArray[np.float64], y: NDArray[np.float64]) -> float:
+    """Return 100 sqrt(sum residual^2 / sum y^2) over the rows fitted, the channel as given.
+
+    >>> error_percent(np.array([3.0, 4.0]), np.array([30.0, 40.0]))
+    10.0
+    """
+    return float(100 * np.sqrt(np.sum(residual**2) / np.sum(y**2)))
+
+
+def scatter_floor_percent(
+    SA: NDArray[np.float64], y: NDArray[np.float64], load: NDArray[np.intp] | None = None
+) -> float | None:
+    """Return the error in percent of the rows about their own mean in bins of slip angle (and load).
+
+    Parameters
+    ----------
+    SA : (rows,) rad; the bins are 0.25 deg wide and centred on multiples of it, so that set angles
+        fall in the middle of a bin and not on its edge
+    y : (rows,) N or N·m
+    load : (rows,) number of the load block
+
+    Returns
+    -------
+    percent, over the rows of bins that hold at least three; None where these are under half of the rows
+    """
+    place = np.rint(SA / _BIN).astype(np.intp)
+    place -= place.min()
+    if load is not None:
+        place += (place.max() + 1) * np.asarray(load)
+    rows = np.bincount(place)
+    full = rows[place] >= _ROWS
+    if 2 * np.count_nonzero(full) < len(y):
+        return None
+    mean = np.bincount(place, y) / np.maximum(rows, 1)
+    return error_percent((y - mean[place])[full], y[full])

@@ -1,0 +1,192 @@
+"""The global search: many starts for many curves in one batch, Levenberg-Marquardt with bounds.
+
+All curves and all their starts advance together in numpy; a problem that has converged leaves the batch.
+Long curves are searched on bin means and polished on their rows. A minimum counts as found only where
+several starts end at the same lowest cost: an optimiser's own flag is true on misses.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from toolkit.tires.kernel import Problems, State, assess, sine
+from toolkit.tires.starts import pick
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from toolkit.tires.kernel import Array
+
+STARTS = 8
+_SAME = 1e-3  # the files contract: starts that agree in cost to this are at one minimum
+_BINS = 48
+_EXACT = 1e-18  # a cost below this share of sum(y^2) is rounding
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Solution:
+    """The lowest minimum of every problem, and how many starts ended there."""
+
+    state: State
+    agreeing: NDArray[np.intp]
+
+
+def solve(problems: Problems) -> Solution:
+    """Return the global minimum of every problem."""
+    curves = len(problems.u)
+    coarse = compress(problems)
+    starts = pick(coarse, STARTS)
+    owner = np.repeat(np.arange(curves), STARTS)
+    many = coarse.take(owner)
+    state = descend(starts.reshape(-1, 4), many, steps=12, tolerance=1e-5)
+    floor = _EXACT * np.sum((coarse.sw * coarse.y) ** 2, axis=1)
+    # The starts that may still win go on; the rest ended higher.
+    cost = state.cost.reshape(curves, STARTS)
+    order = np.argsort(cost, axis=1)[:, : STARTS // 2]
+    index = (order + STARTS * np.arange(curves)[:, None]).ravel()
+    state = descend(state.p[index], many.take(index), steps=60, tolerance=1e-7)
+    cost = state.cost.reshape(curves, -1)
+    lowest = cost.min(axis=1)
+    agreeing = np.sum(cost <= lowest[:, None] * (1 + _SAME) + floor[:, None], axis=1)
+    best = cost.argmin(axis=1) + cost.shape[1] * np.arange(curves)
+    state = state.take(best)
+    state = descend(state.p, problems, steps=40, tolerance=1e-12)
+    return Solution(state=state, agreeing=agreeing)
+
+
+def descend(p: Array, problems: Problems, *, steps: int, tolerance: float) -> State:
+    """Return where Levenberg-Marquardt ends from shapes ``p`` (problems, 4), one start a problem.
+
+    A problem leaves when the decrease that its step predicts falls below ``tolerance`` of its cost.
+    """
+    low, high = problems.low, problems.high
+    final = assess(np.clip(p, low, high), problems)
+    alive = np.arange(len(p))
+    state, part = final, problems
+    damping, growth = np.full(len(p), 1e-2), np.full(len(p), 2.0)
+    for step in range(steps):
+        delta, predicted = _step(state, part, damping)
+        done = predicted <= tolerance * state.cost + 1e-30
+        if done.any():
+            if step:
+                final.put_at(alive[done], state.take(np.flatnonzero(done)))
+            keep = np.flatnonzero(~done)
+            if not len(keep):
+                return final
+            alive, state, part = alive[keep], state.take(keep), part.take(keep)
+            damping, growth, delta, predicted = damping[keep], growth[keep], delta[keep], predicted[keep]
+        elif step == 0:
+            state = state.take(np.arange(len(alive)))
+        trial = assess(np.clip(state.p + delta, part.low, part.high), part)
+        gain = (state.cost - trial.cost) / predicted
+        better = trial.cost < state.cost
+        state.put(better, trial)
+        shrink = np.maximum(0.1, 1.0 - (2.0 * np.minimum(gain, 1.0) - 1.0) ** 3)
+        damping = np.where(better, damping * shrink, damping * growth)
+        growth = np.where(better, 2.0, growth * 2.0)
+        damping = np.clip(damping, 1e-12, 1e12)
+    final.put_at(alive, state)
+    return final
+
+
+def _step(state: State, problems: Problems, damping: Array) -> tuple[Array, Array]:
+    # The damped Gauss-Newton step with the bounds' active set frozen, and the decrease it predicts.
+    gradient, p = state.gradient, state.p
+    frozen = ((p <= problems.low) & (gradient > 0)) | ((p >= problems.high) & (gradient < 0))
+    free = (~frozen).astype(np.float64)
+    gradient = gradient * free
+    curvature = state.curvature * (free[:, :, None] * free[:, None, :])
+    diagonal = np.einsum("pii->pi", curvature)
+    scale = diagonal + 1e-10 * diagonal.max(axis=1)[:, None] + 1e-300
+    matrix = curvature.copy()
+    np.einsum("pii->pi", matrix)[...] += damping[:, None] * scale + 1e-14 * scale
+    # Scaled to a unit diagonal before it is solved: the unknowns differ by orders of magnitude.
+    unit = 1.0 / np.sqrt(np.einsum("pii->pi", matrix) + frozen)
+    matrix *= unit[:, :, None] * unit[:, None, :]
+    np.einsum("pii->pi", matrix)[...] += frozen
+    delta = -np.linalg.solve(matrix, (gradient * unit)[..., None])[..., 0] * unit * free
+    delta = np.clip(delta, -_REACH, _REACH)
+    predicted = -2.0 * np.vecdot(gradient, delta) - np.vecdot(delta, np.matvec(curvature, delta))
+    return delta, np.maximum(predicted, 0.0)
+
+
+_REACH = np.array([1.5, 1.0, 1.5, 1.0])
+
+
+def compress(problems: Problems) -> Problems:
+    """Return long curves as bin means with their weights; short ones as they are."""
+    curves, points = problems.u.shape
+    if points <= 1.5 * _BINS:
+        return problems
+    w = problems.sw**2
+    place = np.clip(((problems.u + 1.0) * (0.5 * _BINS)).astype(np.intp), 0, _BINS - 1)
+    slot = (place + _BINS * np.arange(curves)[:, None]).ravel()
+    total = np.bincount(slot, w.ravel(), curves * _BINS)
+    safe = np.where(total > 0, total, 1.0)
+    u = np.bincount(slot, (w * problems.u).ravel(), curves * _BINS) / safe
+    y = np.bincount(slot, (w * problems.y).ravel(), curves * _BINS) / safe
+    return Problems(
+        u=u.reshape(curves, _BINS),
+        y=y.reshape(curves, _BINS),
+        sw=np.sqrt(total).reshape(curves, _BINS),
+        low=problems.low,
+        high=problems.high,
+    )
+
+
+def solve_robust(problems: Problems) -> tuple[Solution, Problems, Array]:
+    """Return the minimum under Tukey's biweight by reweighting, the weighted problems, and an inflation.
+
+    The inflation turns cost / (n - 6) of the weighted problem into the variance that goes with its
+    weighted normal matrix (Huber 1981, 7.6). Reweighting starts from least absolute values, not from
+    least squares: ten percent of gross outliers would mislead the latter.
+    """
+    curves = len(problems.u)
+    coarse = problems
+    starts = pick(coarse, STARTS)
+    owner = np.repeat(np.arange(curves), STARTS)
+    many = coarse.take(owner)
+    state = descend(starts.reshape(-1, 4), many, steps=6, tolerance=1e-3)
+    for _ in range(8):
+        residual = np.abs(_residual(state, many))
+        width = 0.1 * _mad(residual, many.sw) + 1e-12
+        part = many.weighted(many.sw / np.sqrt(np.sqrt(residual**2 + width[:, None] ** 2)))
+        state = descend(state.p, part, steps=4, tolerance=1e-4)
+    size = np.sum(np.abs(_residual(state, many)) * many.sw, axis=1).reshape(curves, STARTS)
+    agreeing = np.sum(size <= size.min(axis=1)[:, None] * 1.02 + 1e-12, axis=1)
+    state = state.take(size.argmin(axis=1) + STARTS * np.arange(curves))
+    scale = _mad(np.abs(_residual(state, problems)), problems.sw) / 0.6745 + 1e-12
+    part, share = problems, np.zeros_like(problems.sw)
+    for _ in range(25):
+        share = _residual(state, problems) * problems.sw / (_BIWEIGHT * scale[:, None])
+        weight = np.clip(1.0 - share**2, 0.0, None)
+        part = problems.weighted(problems.sw * np.maximum(weight, 1e-9))
+        before = state.cost
+        state = descend(state.p, part, steps=6, tolerance=1e-9)
+        if np.all(np.abs(state.cost - before) <= 1e-6 * before):
+            break
+    used = problems.sw > 0
+    inside = np.clip(1.0 - share**2, 0.0, None)
+    count = used.sum(axis=1)
+    curvature = np.sum(np.where(used, inside * (1 - 5 * share**2), 0), axis=1) / count
+    mean = np.sum(np.where(used, inside**2, 0), axis=1) / count
+    influence = np.sum((_residual(state, problems) * problems.sw * inside**2) ** 2, axis=1)
+    inflation = influence * mean / (np.maximum(curvature, 0.1) ** 2 * np.maximum(state.cost, 1e-300))
+    return Solution(state=state, agreeing=agreeing), part, inflation
+
+
+_BIWEIGHT = 4.685  # 95 % efficiency on normal noise
+
+
+def _residual(state: State, problems: Problems) -> Array:
+    model = state.linear[:, :1] * sine(state.p, problems.u) + state.linear[:, 1:]
+    return np.asarray(problems.y - model)
+
+
+def _mad(residual: Array, sw: Array) -> Array:
+    # The median of the weighted absolute residuals of each row that counts.
+    size = np.where(sw > 0, residual * sw, np.nan)
+    return np.asarray(np.nanmedian(size, axis=1))
