@@ -1,0 +1,223 @@
+"""A test's result to report content: values, tables, figures and conditions."""
+
+from __future__ import annotations
+
+import datetime as dt
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from toolkit import __version__
+from toolkit.files import sha256_bytes
+from toolkit.report.content import Cell, ReportContent, Table, Value
+from toolkit.report.plots import build_plots, load_groups
+from toolkit.report.style import Style
+from toolkit.report.tables import build_tables
+from toolkit.report.tags import FIGURES, UNITS, catalogue, format_number
+
+if TYPE_CHECKING:
+    from toolkit.calibration.record import CalibrationRecord
+    from toolkit.estimate import Estimate
+    from toolkit.findings import Finding
+    from toolkit.pipeline import TestResult
+
+SIMULATED = "SIMULATED DATA"
+UNVERIFIED = "UNVERIFIED CALIBRATION"
+
+
+def build_content(
+    result: TestResult,
+    record: CalibrationRecord | None = None,
+    *,
+    findings: Sequence[Finding] | None = None,
+    style: Style | None = None,
+    issued: dt.date | None = None,
+) -> ReportContent:
+    """Return what a template can ask for.
+
+    Parameters
+    ----------
+    result : the test, reduced and characterised, SI and SAE J670
+    record : the calibration record that computed the forces, for its coefficients; None leaves them out
+    findings : what the report lists; default those of the result
+    style : units, decimals and laboratory
+    issued : date of issue; default today
+    """
+    style = style or Style()
+    day = (issued or dt.datetime.now(tz=dt.UTC).date()).isoformat()
+    listed = tuple(
+        (*result.reduced.findings, *result.characteristics.findings) if findings is None else findings
+    )
+    info, use = result.reduced.info, result.reduced.calibration
+    plots = build_plots(result, style, SIMULATED if info.simulated else None)
+    tables = build_tables(result, record, listed, style)
+    values = _values(result, record, listed, style, day)
+    values |= {f"caption.{name}": Value(kind="text", value=plots[name].caption) for name in FIGURES if name in plots}
+    marks = []
+    if info.simulated:
+        marks.append(("simulated", f"{SIMULATED}: made by simulation, not a measurement of a tire."))
+    if use.unverified:
+        marks.append(
+            ("unverified", f"{UNVERIFIED}: {use.id} is a legacy import; its coefficients are not reproduced "
+             "from reference data.")
+        )  # fmt: skip
+    return ReportContent(
+        values=values,
+        tables=tables,
+        plots=plots,
+        conditions=_conditions(result, values, tables, list(plots), len(listed)),
+        calibrations=((use.id, use.sha256, use.unverified),),
+        title=str(values["report.title"].value),
+        author=style.laboratory or info.operator or "Tire force and moment laboratory",
+        issued=day,
+        marks=tuple(marks),
+        style=style,
+    )
+
+
+def report_id(result: TestResult) -> str:
+    """Return an id made from the inputs: the same recordings and calibration give the same id."""
+    reduced = result.reduced
+    parts = sorted({c.file_sha256 for c in reduced.conditions})
+    digest = sha256_bytes("\n".join([reduced.info.name, reduced.calibration.sha256, *parts]).encode())
+    date = "".join(ch for ch in (reduced.info.date or "") if ch.isdigit())
+    return "-".join(part for part in ("TR", date, digest[:8].upper()) if part)
+
+
+def _values(
+    result: TestResult,
+    record: CalibrationRecord | None,
+    findings: Sequence[Finding],
+    style: Style,
+    day: str,
+) -> dict[str, Value]:
+    reduced = result.reduced
+    info, use = reduced.info, reduced.calibration
+    used = reduced.used()
+    pressure = info.pressure_Pa
+    psi = None if pressure is None else pressure / (0.45359237 * 9.80665 / 0.0254**2)
+    groups = load_groups(used)
+    force, factor = style.unit("N")
+    texts: dict[str, str | None] = {
+        "test.name": info.name, "test.operator": info.operator, "test.requestor": info.requestor,
+        "test.special": info.special, "test.surface": info.surface, "test.machine": info.machine,
+        "test.pressure": None if pressure is None or psi is None else _pressure(psi, pressure, style),
+        "test.loads": ", ".join(format_number(load * factor, ".0f") for load, _ in groups) + f" {force}"
+        if groups else None,
+        "test.slip_angles": _angles([c.step_SA for c in used]),
+        "test.directions": " and ".join(r for r in ("forward", "reverse") if any(c.rotation == r for c in used)),
+        "test.axes": "SAE J670" if reduced.axes == "SAE" else reduced.axes,
+        "test.averaging": reduced.averaging,
+        "test.tare": "no tare was subtracted" if reduced.tare.source == "none" else reduced.tare.source,
+        "tire.size": info.tire_size, "tire.company": info.tire_company, "tire.DOT": info.tire_DOT,
+        "tire.series": info.tire_series, "tire.construction": info.tire_construction, "tire.rim": info.tire_rim,
+        "calibration.id": use.id, "calibration.hash": use.sha256,
+        "calibration.instrument": record.instrument if record else info.machine,
+        "calibration.status": "unverified (legacy import)" if use.unverified else "verified",
+        "report.id": report_id(result),
+        "report.title": "Tire force and moment test" + (f" {info.tire_size}" if info.tire_size else ""),
+        "software.name": "toolkit", "software.version": __version__,
+        "laboratory.name": style.laboratory, "laboratory.address": style.address,
+        "simulated": "simulated data" if info.simulated else "measured data",
+    }  # fmt: skip
+    numbers: dict[str, float | None] = {
+        "test.pressure.psi": psi,
+        "test.pressure.bar": None if pressure is None else pressure / 1e5,
+        "test.pressure.kPa": None if pressure is None else pressure / 1e3,
+        "test.speed": None if info.speed_m_s is None else info.speed_m_s * 3.6,
+        "test.rated_load": info.rated_load_N,
+        "test.files": len({c.file for c in reduced.conditions}),
+        "test.conditions": len(used),
+        "test.findings": len(findings),
+        **_summary(result),
+    }
+    made = {path: Value(kind="text", value=text) for path, text in texts.items()}
+    made |= {
+        "test.date": Value(kind="date", value=info.date),
+        "report.date": Value(kind="date", value=day),
+    }
+    entries = {one.path: one for one in catalogue() if one.kind == "number"}
+    for path, number in numbers.items():
+        made[path] = _number(number, path, entries[path].unit, entries[path].spec, style)
+    if record is not None:
+        for load in record.loads:
+            for term, coefficient in zip(load.terms, load.coefficients, strict=True):
+                path = f"calibration.{load.load}.{term}"
+                made[path] = _number(coefficient, path, None, ".6g", style)
+    return made
+
+
+def _number(value: float | None, path: str, unit: str | None, spec: str, style: Style) -> Value:
+    shown, factor = style.unit(unit)
+    digits = style.digits(path, shown)
+    if digits is not None and spec.endswith("f"):
+        spec = f".{digits}f"
+    return Value(kind="number", value=None if value is None else value * factor, unit=shown, spec=spec)
+
+
+def _pressure(psi: float, pascal: float, style: Style) -> str:
+    # As the source document's title page has it: 34 psi, 2.34 bar.
+    text = f"{format(round(psi, 1), 'g')} psi, {pascal / 1e5:.2f} bar"
+    return text.replace(".", ",").replace(" psi, ", " psi; ") if style.decimal_comma else text
+
+
+def _angles(steps: Sequence[float | None]) -> str | None:
+    found = sorted({round(math.degrees(step), 2) for step in steps if step is not None})
+    return ", ".join(f"{angle:g}" for angle in found) + " deg" if found else None
+
+
+def _summary(result: TestResult) -> dict[str, float | None]:
+    chars, info = result.characteristics, result.reduced.info
+    loads = sorted({one.load_N for one in chars.stiffness} | {one.load_N for one in chars.pull})
+    if not loads:
+        return {f"summary.{name}": None for name in _SUMMARY_NAMES}
+    rated = info.rated_load_N
+    load = min(loads, key=lambda one: abs(one - rated)) if rated else loads[len(loads) // 2]
+    near = 0.04 * load
+    stiff = next((s for s in chars.stiffness if s.rotation == "forward" and abs(s.load_N - load) <= near), None)
+    pull = next((p for p in chars.pull if abs(p.load_N - load) <= near), None)
+
+    def pick(owner: object, name: str, factor: float = 1.0) -> float | None:
+        found: Estimate | None = getattr(owner, name, None)
+        return None if found is None else found.value * factor
+
+    return {
+        "summary.load": load,
+        "summary.cornering_stiffness": pick(stiff, "secant_cornering", math.pi / 180),
+        "summary.aligning_stiffness": pick(stiff, "secant_aligning", math.pi / 180),
+        **{f"summary.{name}": pick(pull, name) for name in ("conicity", "plysteer", "CRAT", "PRAT")},
+    }
+
+
+_SUMMARY_NAMES = "load cornering_stiffness aligning_stiffness conicity plysteer CRAT PRAT".split()
+
+
+def _conditions(
+    result: TestResult, values: dict[str, Value], tables: dict[str, Table], plots: list[str], findings: int
+) -> dict[str, bool]:
+    info, chars = result.reduced.info, result.characteristics
+    pull = any(
+        getattr(one, name) is not None for one in chars.pull for name in ("conicity", "plysteer", "CRAT", "PRAT")
+    )
+    made = {path: not value.missing for path, value in values.items()}
+    made |= {name: bool(table.rows) for name, table in tables.items()}
+    made |= {name: name in plots for name in FIGURES}
+    return made | {
+        "simulated": info.simulated,
+        "measured": not info.simulated,
+        "unverified": result.reduced.calibration.unverified,
+        "verified": not result.reduced.calibration.unverified,
+        "pull": pull,
+        "no_pull": not pull,
+        "reverse": any(c.rotation == "reverse" for c in result.reduced.used()),
+        "stiffness": any(
+            getattr(one, f"{way}_{kind}") is not None
+            for one in chars.stiffness
+            for way in ("secant", "slope")
+            for kind in ("cornering", "aligning")
+        ),
+        "no_findings": findings == 0,
+    }
+
+
+__all__ = ["SIMULATED", "UNITS", "UNVERIFIED", "Cell", "build_content", "report_id"]

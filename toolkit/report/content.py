@@ -1,0 +1,90 @@
+"""ReportContent: everything that a template can ask for, ready to be tested without drawing."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import Literal
+
+from toolkit.report.style import Style
+from toolkit.report.tags import Column, format_number
+
+Cell = str | float | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Value:
+    """One value: text as it is, a number with unit and default format, or an ISO date."""
+
+    kind: Literal["text", "number", "date"]
+    value: Cell
+    unit: str | None = None
+    spec: str = "g"
+
+    @property
+    def missing(self) -> bool:
+        """True where there is nothing to print: absent, empty, or not finite."""
+        if isinstance(self.value, str):
+            return not self.value.strip()
+        return self.value is None or not math.isfinite(self.value)
+
+    def text(self, spec: str | None, style: Style) -> str:
+        """Return what the report prints; call only where the value is not missing."""
+        if isinstance(self.value, str):
+            return style.date(self.value) if self.kind == "date" else self.value
+        assert self.value is not None  # noqa: S101  missing values are refused before
+        return format_number(self.value, spec or self.spec, decimal_comma=style.decimal_comma)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Table:
+    """Columns with their units as shown, and rows of cells in the columns' order."""
+
+    name: str
+    columns: tuple[Column, ...]
+    rows: tuple[tuple[Cell, ...], ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Curve:
+    """One line or point set: ``x``, ``y`` and optional standard error bars, in the axes' units."""
+
+    label: str
+    x: tuple[float, ...]
+    y: tuple[float, ...]
+    error: tuple[float, ...] | None = None
+    group: int = 0
+    style: Literal["points", "line", "both", "grid"] = "points"
+    open: bool = False
+    note: str | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Plot:
+    """A figure before it is drawn: its curves, labels with units, caption and alternative text."""
+
+    name: str
+    x_label: str
+    y_label: str
+    curves: tuple[Curve, ...]
+    caption: str
+    alt: str
+    watermark: str | None = None
+    zero_x: bool = False
+    legend_title: str | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ReportContent:
+    """A report's content. ``marks`` must stand in the document whatever the template says."""
+
+    values: dict[str, Value]
+    tables: dict[str, Table]
+    plots: dict[str, Plot]
+    conditions: dict[str, bool]
+    calibrations: tuple[tuple[str, str, bool], ...]
+    title: str
+    author: str
+    issued: str
+    marks: tuple[tuple[str, str], ...] = ()
+    style: Style = field(default_factory=Style)

@@ -1,0 +1,139 @@
+"""Draw a `Plot` as a lossless PNG: Agg, no global state, the same colour per load in every figure."""
+
+from __future__ import annotations
+
+import io
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from toolkit.report.content import Curve, Plot
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+# Okabe and Ito's palette: distinct for every common colour vision and in print; yellow left out.
+COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
+MARKERS = "os^Dvp*"
+SIZE_IN = (6.3, 3.7)
+DPI = 150
+_GREY = "#8a8a8a"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Picture:
+    """A drawn figure: PNG bytes and its size in pixels."""
+
+    png: bytes
+    width_px: int
+    height_px: int
+
+
+def draw(plot: Plot) -> Picture:
+    """Draw one figure.
+
+    The margins are fixed fractions: measuring every text to trim them doubles the time.
+    """
+    import matplotlib as mpl
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    with mpl.rc_context(_RC):
+        figure = Figure(figsize=SIZE_IN, dpi=DPI)
+        canvas = FigureCanvasAgg(figure)
+        axes = figure.add_axes((0.115, 0.135, 0.70, 0.835))
+        _furnish(axes, plot)
+        for curve in plot.curves:
+            _curve(axes, curve)
+        _legend(figure, plot)
+        if plot.watermark:
+            axes.text(
+                0.5, 0.5, plot.watermark, transform=axes.transAxes, ha="center", va="center",
+                rotation=24, fontsize=30, color="#000000", alpha=0.10, fontweight="bold", zorder=0,
+            )  # fmt: skip
+        stream = io.BytesIO()
+        canvas.print_png(stream, pil_kwargs={"compress_level": 3, "dpi": (DPI, DPI)}, metadata={"Software": None})
+    width, height = canvas.get_width_height()
+    return Picture(png=stream.getvalue(), width_px=width, height_px=height)
+
+
+_RC = {
+    "font.family": "sans-serif",
+    "font.sans-serif": ["Carlito", "Calibri", "Liberation Sans", "DejaVu Sans"],
+    "font.size": 10.0,
+    "axes.linewidth": 0.8,
+    "axes.formatter.use_mathtext": False,
+    "axes.unicode_minus": True,
+    "path.simplify": True,
+}
+
+
+def _furnish(axes: Axes, plot: Plot) -> None:
+    from matplotlib.ticker import MaxNLocator
+
+    axes.set_xlabel(plot.x_label)
+    axes.set_ylabel(plot.y_label)
+    axes.grid(visible=True, color="#d9d9d9", linewidth=0.6)
+    axes.set_axisbelow(True)
+    axes.axhline(0.0, color="#606060", linewidth=0.8, zorder=1)
+    if plot.zero_x:
+        axes.axvline(0.0, color="#606060", linewidth=0.8, zorder=1)
+    for side in ("top", "right"):
+        axes.spines[side].set_visible(False)
+    axes.yaxis.set_major_locator(MaxNLocator(nbins=7))
+    axes.xaxis.set_major_locator(MaxNLocator(nbins=8))
+
+
+def _curve(axes: Axes, curve: Curve) -> None:
+    colour = COLOURS[curve.group % len(COLOURS)]
+    marker = MARKERS[curve.group % len(MARKERS)]
+    dashes = (0, (4, 2)) if curve.open else "solid"
+    face = "white" if curve.open else colour
+    if curve.style == "grid":
+        axes.plot(curve.x, curve.y, color=_GREY, linewidth=0.7, zorder=2)
+        if curve.note:
+            axes.annotate(
+                curve.note, (curve.x[-1], curve.y[-1]), textcoords="offset points", xytext=(4, 1),
+                fontsize=7.5, color="#505050", zorder=5,
+            )  # fmt: skip
+        return
+    if curve.style == "line":
+        axes.plot(curve.x, curve.y, color=colour, linewidth=1.3, linestyle=dashes, zorder=3)
+        return
+    line = {"linestyle": "none"} if curve.style == "points" else {"linestyle": dashes, "linewidth": 1.2}
+    if curve.error is not None and any(curve.error):
+        axes.errorbar(
+            curve.x, curve.y, yerr=curve.error, color=colour, marker=marker, markersize=5, mfc=face,
+            capsize=3, elinewidth=1.0, zorder=4, **line,
+        )  # fmt: skip
+        return
+    axes.plot(
+        curve.x, curve.y, color=colour, marker=marker, markersize=4.5, mfc=face, mew=1.0, zorder=4, **line
+    )  # fmt: skip
+
+
+def _legend(figure: Figure, plot: Plot) -> None:
+    from matplotlib.lines import Line2D
+
+    handles, seen = [], set()
+    for curve in plot.curves:
+        # A reversed run or a negative angle shares its colour and its entry with the other one.
+        key = (curve.label, curve.group)
+        if not curve.label or key in seen:
+            continue
+        seen.add(key)
+        colour = COLOURS[curve.group % len(COLOURS)]
+        alone = curve.open and curve.style == "both" and not plot.legend_title
+        handles.append(
+            Line2D(
+                [], [], color=colour, marker=MARKERS[curve.group % len(MARKERS)], markersize=5, linewidth=1.2,
+                label=curve.label.replace(", ", ",\n"), mfc="white" if alone else colour,
+                linestyle=(0, (4, 2)) if alone else "solid",
+            )  # fmt: skip
+        )
+    if len(handles) > 1 or plot.legend_title:
+        figure.legend(
+            handles=handles, title=plot.legend_title, loc="upper left", bbox_to_anchor=(0.825, 0.975),
+            frameon=False, fontsize=8.5, title_fontsize=8.5, borderaxespad=0.0, handlelength=1.8,
+            alignment="left",
+        )  # fmt: skip

@@ -1,0 +1,309 @@
+"""A test's figures as data: curves, labels, caption and alternative text, without drawing."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from toolkit.report.content import Curve, Plot
+from toolkit.report.style import Style
+from toolkit.report.tags import format_number
+
+if TYPE_CHECKING:
+    from toolkit.estimate import Estimate
+    from toolkit.pipeline import TestResult
+    from toolkit.reduction.model import Condition
+    from toolkit.tires.model import CurveFit
+
+ANGLES_DEG = (1, 2, 4, 6, 8, 10)
+_AXES_NOTE = "SAE J670 axes"
+_SYMBOLS = {"FY": "lateral force FY", "MZ": "aligning moment MZ"}
+
+
+def curve_values(fit: CurveFit, slip_rad: np.ndarray) -> np.ndarray | None:
+    """Return a per-load Magic Formula at slip angles [rad] (n,); None for another model.
+
+    y = D sin(C arctan(Bx - E(Bx - arctan Bx))) + Sv, x = SA + Sh (Bakker, Nyborg and Pacejka 1987).
+    """
+    values = {one.name: one.value for one in fit.parameters}
+    if not {"B", "C", "D", "E", "Sh", "Sv"} <= set(values):
+        return None
+    bx = values["B"] * (slip_rad + values["Sh"])
+    inner = bx - values["E"] * (bx - np.arctan(bx))
+    return np.asarray(values["D"] * np.sin(values["C"] * np.arctan(inner)) + values["Sv"], dtype=np.float64)
+
+
+def load_groups(conditions: Sequence[Condition]) -> list[tuple[float, tuple[Condition, ...]]]:
+    """Return the conditions by load, lightest first: (mean common load [N], conditions).
+
+    Blocks of one nominal load share ``FZ_common``; a gap of 4 % separates two loads.
+    """
+    groups: list[list[Condition]] = []
+    for one in sorted(conditions, key=lambda c: c.FZ_common):
+        if groups and one.FZ_common - groups[-1][-1].FZ_common <= 0.04 * one.FZ_common:
+            groups[-1].append(one)
+        else:
+            groups.append([one])
+    return [(float(np.mean([c.FZ_common for c in group])), tuple(group)) for group in groups]
+
+
+def build_plots(result: TestResult, style: Style, watermark: str | None) -> dict[str, Plot]:
+    """Return every figure that the test has data for, by name."""
+    maker = _Plots(result, style, watermark)
+    plots = (
+        maker.against_slip("FY"), maker.against_slip("MZ"), maker.against_load("FY"), maker.against_load("MZ"),
+        maker.gough(), *maker.pull(), *maker.stiffness(),
+    )  # fmt: skip
+    return {plot.name: plot for plot in plots if plot is not None}
+
+
+class _Plots:
+    def __init__(self, result: TestResult, style: Style, watermark: str | None) -> None:
+        self.result, self.style, self.watermark = result, style, watermark
+        self.groups = load_groups(result.reduced.used())
+        self.loads = [load for load, _ in self.groups]
+        self.fits = result.characteristics.fits
+        self.tire = result.reduced.info.tire_size or result.reduced.info.name
+
+    def _scale(self, channel: str) -> tuple[str, float]:
+        unit, factor = self.style.unit("N" if channel in ("FY", "FZ") else "N*m")
+        return str(unit).replace("*", "·"), factor
+
+    def _number(self, value: float, spec: str = ".0f") -> str:
+        return format_number(value, spec, decimal_comma=self.style.decimal_comma)
+
+    def _load_text(self, load: float) -> str:
+        unit, factor = self._scale("FZ")
+        return f"{self._number(load * factor)} {unit}"
+
+    def _group(self, load: float) -> int:
+        return min(range(len(self.loads)), key=lambda i: abs(self.loads[i] - load), default=0)
+
+    def _fit(self, rotation: str, load: float, channel: str) -> CurveFit | None:
+        index = self._group(load)
+        for one in self.fits:
+            if one.rotation == rotation and self._group(one.load_N) == index:
+                fit: CurveFit | None = getattr(one, channel)
+                return fit
+        return None
+
+    def _rotations(self) -> list[str]:
+        used = {c.rotation for c in self.result.reduced.used()}
+        return [one for one in ("forward", "reverse") if one in used]
+
+    def _plot(
+        self, name: str, x: str, y: str, curves: list[Curve], caption: str, alt: str, **more: bool | str
+    ) -> Plot | None:
+        if not any(curve.x for curve in curves):
+            return None
+        mark = f"{self.watermark}. " if self.watermark else ""
+        return Plot(
+            name=name, x_label=x, y_label=y, curves=tuple(curves), caption=f"{caption}.",
+            alt=f"{mark}{alt} Axis system: SAE J670.", watermark=self.watermark,
+            zero_x=bool(more.get("zero_x", False)), legend_title=str(more["legend"]) if "legend" in more else None,
+        )  # fmt: skip
+
+    def against_slip(self, channel: str) -> Plot | None:
+        """Measured means and fitted curves against slip angle, one colour a load."""
+        unit, factor = self._scale(channel)
+        curves, said, lines = [], [], False
+        for index, (load, group) in enumerate(self.groups):
+            for rotation in self._rotations():
+                points = sorted((c for c in group if c.rotation == rotation), key=lambda c: c.SA)
+                if not points:
+                    continue
+                x = [math.degrees(c.SA) for c in points]
+                y = [getattr(c, f"{channel}_common") * factor for c in points]
+                label = self._load_text(load)
+                curves.append(_curve(label, x, y, index, "points", open_=rotation == "reverse"))
+                said.append(
+                    f"{label} {rotation}: {self._number(y[0])} to {self._number(y[-1])} {unit} "
+                    f"from {self._number(x[0], '.1f')} to {self._number(x[-1], '.1f')} deg"
+                )
+                fit = self._fit(rotation, load, channel)
+                grid = np.linspace(x[0], x[-1], 121)
+                drawn = curve_values(fit, np.radians(grid)) if fit else None
+                if drawn is not None:
+                    lines = True
+                    curves.append(
+                        _curve(label, grid, drawn * factor, index, "line", open_=rotation == "reverse")
+                    )
+        what = _SYMBOLS[channel]
+        both = "; filled: drum forward, open and dashed: reversed" if len(self._rotations()) > 1 else ""
+        curves_text = ", fitted curves as lines" if lines else ""
+        return self._plot(
+            f"{channel.lower()}_vs_slip", "slip angle SA [deg]", f"{what} [{unit}]", curves,
+            f"{_upper(what)} against slip angle at {len(self.groups)} loads, measured means as symbols"
+            f"{curves_text}{both}. {_AXES_NOTE}",
+            f"{_upper(what)} [{unit}] against slip angle [deg] at {len(self.groups)} loads. {'; '.join(said)}.",
+            legend="load FZ", zero_x=True,
+        )  # fmt: skip
+
+    def _at_angle(self, channel: str, load: float, group: Sequence[Condition], angle: float) -> float | None:
+        fit = self._fit("forward", load, channel) or self._fit("reverse", load, channel)
+        if fit is not None:
+            drawn = curve_values(fit, np.radians([angle]))
+            if drawn is not None:
+                return float(drawn[0])
+        near = [c for c in group if abs(math.degrees(c.SA) - angle) <= 0.5]
+        return float(np.mean([getattr(c, f"{channel}_common") for c in near])) if near else None
+
+    def against_load(self, channel: str) -> Plot | None:
+        """Values at +-1, 2, 4, 6, 8, 10 deg against load."""
+        unit, factor = self._scale(channel)
+        load_unit, load_factor = self._scale("FZ")
+        curves, said = [], []
+        for index, size in enumerate(ANGLES_DEG):
+            for angle in (size, -size):
+                found = [
+                    (load * load_factor, value * factor)
+                    for load, group in self.groups
+                    if _covers(group, angle)
+                    and (value := self._at_angle(channel, load, group, angle)) is not None
+                ]
+                if not found:
+                    continue
+                x, y = zip(*found, strict=True)
+                curves.append(_curve(f"±{size} deg", x, y, index, "both", open_=angle < 0))
+                said.append(f"{angle:+d} deg: {self._number(y[0])} to {self._number(y[-1])} {unit}")
+        what = _SYMBOLS[channel]
+        return self._plot(
+            f"{channel.lower()}_vs_load", f"load FZ [{load_unit}]", f"{what} [{unit}]", curves,
+            f"{_upper(what)} against load at constant slip angles, from the curves fitted to the means; "
+            f"filled: positive, open and dashed: negative slip angle. {_AXES_NOTE}",
+            f"{_upper(what)} [{unit}] against load [{load_unit}] at constant slip angles of plus and minus "
+            f"{', '.join(str(a) for a in ANGLES_DEG)} deg. {'; '.join(said)}.",
+            legend="slip angle",
+        )  # fmt: skip
+
+    def gough(self) -> Plot | None:
+        """FY against MZ: lines of constant load and of constant slip angle."""
+        fy_unit, fy = self._scale("FY")
+        mz_unit, mz = self._scale("MZ")
+        curves, at = [], {}
+        for index, (load, group) in enumerate(self.groups):
+            points = sorted((c for c in group if c.rotation == self._rotations()[0]), key=lambda c: c.SA)
+            x, y = [c.MZ_common * mz for c in points], [c.FY_common * fy for c in points]
+            curves.append(_curve(self._load_text(load), x, y, index, "points"))
+            fits = self._fit(points[0].rotation, load, "FY"), self._fit(points[0].rotation, load, "MZ")
+            if not points or fits[0] is None or fits[1] is None:
+                continue
+            grid = np.linspace(points[0].SA, points[-1].SA, 121)
+            fitted_y, fitted_x = curve_values(fits[0], grid), curve_values(fits[1], grid)
+            if fitted_x is None or fitted_y is None:
+                continue
+            curves.append(_curve(self._load_text(load), fitted_x * mz, fitted_y * fy, index, "line"))
+            for angle in (s * a for a in ANGLES_DEG for s in (1, -1)):
+                if _covers(points, angle):
+                    one = np.radians([angle])
+                    xx, yy = curve_values(fits[1], one), curve_values(fits[0], one)
+                    assert xx is not None  # noqa: S101  the same fits gave a curve above
+                    assert yy is not None  # noqa: S101
+                    at.setdefault(angle, []).append((float(xx[0]) * mz, float(yy[0]) * fy))
+        for angle in sorted(at):
+            if len(at[angle]) > 1:
+                x, y = zip(*at[angle], strict=True)
+                curves.append(_curve("", x, y, 0, "grid", note=f"{angle:+d}°"))
+        loads = ", ".join(self._load_text(load) for load in self.loads)
+        return self._plot(
+            "gough", f"aligning moment MZ [{mz_unit}]", f"lateral force FY [{fy_unit}]", curves,
+            "Gough plot: lateral force against aligning moment; coloured: constant load, grey: constant slip "
+            f"angle. {_AXES_NOTE}",
+            f"Gough plot, lateral force FY [{fy_unit}] against aligning moment MZ [{mz_unit}], with lines of "
+            f"constant load ({loads}) and of constant slip angle"
+            + (f" ({', '.join(f'{a:+d}' for a in sorted(at))} deg)." if at else "."),
+            legend="load FZ",
+        )  # fmt: skip
+
+    def _series(
+        self, items: Sequence[object], pick: Callable[[object], Estimate | None], factor: float
+    ) -> tuple[list[float], list[float], list[float]]:
+        _, load_factor = self._scale("FZ")
+        x, y, u = [], [], []
+        for one in items:
+            found = pick(one)
+            if found is not None and math.isfinite(found.value):
+                x.append(one.load_N * load_factor)  # type: ignore[attr-defined]
+                y.append(found.value * factor)
+                U = found.expanded()[0] * factor
+                u.append(U if math.isfinite(U) else 0.0)
+        return x, y, u
+
+    def _against(
+        self, name: str, what: str, quantity: str, series: list[tuple[str, str, list[object]]], angle: bool
+    ) -> Plot | None:
+        base, factor = self._scale(quantity)
+        unit, load_unit = base, self._scale("FZ")[0]
+        if angle:
+            unit, factor = f"{base}/deg", factor * math.pi / 180
+        curves, said = [], []
+        for index, (label, attribute, items) in enumerate(series):
+            x, y, u = self._series(items, lambda one, a=attribute: getattr(one, a), factor)  # type: ignore[misc]
+            if not x:
+                continue
+            curves.append(
+                _curve(label, x, y, index, "both", error=u, open_="reverse" in label)
+            )
+            spec = ".1f" if quantity == "FY" else ".2f"
+            listed = ", ".join(
+                f"{self._number(b, spec)} ± {self._number(c, spec)} at {self._number(a)}"
+                for a, b, c in zip(x, y, u, strict=True)
+            )
+            said.append(f"{label}: {listed} {load_unit}")
+        return self._plot(
+            name, f"load FZ [{load_unit}]", f"{what} [{unit}]", curves,
+            f"{_upper(what)} against load; bars: expanded uncertainty (95 %). {_AXES_NOTE}",
+            f"{_upper(what)} [{unit}] against load [{load_unit}] with expanded uncertainty. {'; '.join(said)}.",
+        )  # fmt: skip
+
+    def pull(self) -> list[Plot | None]:
+        """Conicity, plysteer, CRAT and PRAT against load."""
+        items: list[object] = list(self.result.characteristics.pull)
+        return [
+            self._against("conicity", "conicity", "FY", [("conicity", "conicity", items)], False),
+            self._against("plysteer", "plysteer", "FY", [("plysteer", "plysteer", items)], False),
+            self._against("crat", "conicity residual aligning torque", "MZ", [("CRAT", "CRAT", items)], False),
+            self._against(
+                "prat", "plysteer residual aligning torque", "MZ",
+                [("PRAT at 0 deg", "PRAT", items), ("PRAT at FY = 0", "PRAT_at_FY_zero", items)], False,
+            ),
+        ]  # fmt: skip
+
+    def stiffness(self) -> list[Plot | None]:
+        """Cornering and aligning stiffness against load, by secant and by slope."""
+        plots = []
+        for kind, quantity in (("cornering", "FY"), ("aligning", "MZ")):
+            series: list[tuple[str, str, list[object]]] = []
+            for rotation in self._rotations():
+                items: list[object] = [
+                    one for one in self.result.characteristics.stiffness if one.rotation == rotation
+                ]
+                series += [
+                    (f"±1 deg secant, {rotation}", f"secant_{kind}", items),
+                    (f"slope at 0 deg, {rotation}", f"slope_{kind}", items),
+                ]
+            plots.append(self._against(f"{kind}_stiffness", f"{kind} stiffness", quantity, series, True))
+        return plots
+
+
+def _covers(group: Sequence[Condition], angle: float) -> bool:
+    # A curve is never read outside the slip angles that were measured, beyond the tolerance of a step.
+    measured = [math.degrees(c.SA) for c in group]
+    return bool(measured) and min(measured) - 0.5 <= angle <= max(measured) + 0.5
+
+
+def _curve(
+    label: str, x: Sequence[float] | np.ndarray, y: Sequence[float] | np.ndarray, group: int, style: str, *,
+    open_: bool = False, error: Sequence[float] | None = None, note: str | None = None,
+) -> Curve:  # fmt: skip
+    return Curve(
+        label=label, x=tuple(float(v) for v in x), y=tuple(float(v) for v in y), group=group,
+        style=style, open=open_, note=note, error=tuple(error) if error is not None else None,  # type: ignore[arg-type]
+    )  # fmt: skip
+
+
+def _upper(text: str) -> str:
+    return text[:1].upper() + text[1:]

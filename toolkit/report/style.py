@@ -1,0 +1,126 @@
+"""The style file beside a template (``org.toml``): laboratory, units, decimals, names of styles."""
+
+from __future__ import annotations
+
+import datetime as dt
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from toolkit.errors import ConfigError
+from toolkit.files import check_keys, read_toml
+from toolkit.units import si_scale
+
+_KEYS = "schema laboratory decimal_comma dates missing required styles decimals units".split()
+_STYLES = ("heading", "caption", "table")
+_UNITS = ("force", "moment")
+_DEFAULT_REQUIRED = ("tk:calibration.hash",)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Style:
+    """How an organisation writes numbers and dates, and what its templates must hold.
+
+    ``decimals`` maps a unit, a tag's path or ``<table>.<column>`` to digits after the point; ``styles`` maps
+    heading, caption and table to the names of the template's Word styles.
+    """
+
+    laboratory: str | None = None
+    address: str | None = None
+    decimal_comma: bool = False
+    dates: str = "%Y-%m-%d"
+    missing: str = "n/a"
+    required: tuple[str, ...] = _DEFAULT_REQUIRED
+    styles: tuple[tuple[str, str], ...] = ()
+    decimals: tuple[tuple[str, int], ...] = ()
+    force: str = "N"
+    moment: str = "N*m"
+
+    def date(self, iso: str) -> str:
+        """Return an ISO date in the organisation's form; text that is no date stays as it is."""
+        try:
+            return dt.date.fromisoformat(iso).strftime(self.dates)
+        except ValueError:
+            return iso
+
+    def digits(self, *names: str | None) -> int | None:
+        """Return the decimals of the first name that the style file has."""
+        table = dict(self.decimals)
+        return next((table[name] for name in names if name in table), None)
+
+    def unit(self, unit: str | None) -> tuple[str | None, float]:
+        """Return a report unit in the organisation's choice, and the factor from the SI-side one."""
+        if unit is None:
+            return None, 1.0
+        head, slash, tail = unit.partition("/")
+        chosen = {"N": self.force, "N*m": self.moment}.get(head)
+        if chosen is None or chosen == head:
+            return unit, 1.0
+        return f"{chosen}{slash}{tail}", 1 / si_scale(chosen)
+
+
+def style_file(template: Path) -> Path | None:
+    """Return the style file of a template: ``<its name>.toml`` beside it, else ``org.toml`` there."""
+    for path in (template.with_suffix(".toml"), template.with_name("org.toml")):
+        if path.is_file():
+            return path
+    return None
+
+
+def read_style(path: Path | None) -> Style:
+    """Read a style file; the defaults where there is none.
+
+    Raises
+    ------
+    ConfigError
+        not TOML, an unknown key, a value of the wrong type, a unit of the wrong dimension
+    """
+    if path is None:
+        return Style()
+    table = read_toml(path)
+    check_keys(table, _KEYS, where=path)
+    parts = {key: _typed(table, key, dict, {}, path) for key in ("laboratory", "styles", "decimals", "units")}
+    check_keys(parts["laboratory"], ("name", "address"), where=f"{path}: laboratory")
+    check_keys(parts["styles"], _STYLES, where=f"{path}: styles")
+    check_keys(parts["units"], _UNITS, where=f"{path}: units")
+    for name, digits in parts["decimals"].items():
+        if isinstance(digits, bool) or not isinstance(digits, int) or not 0 <= digits <= 12:
+            raise _wrong(path, f"decimals.{name}", digits, "a whole number from 0 to 12")
+    for name in _UNITS:
+        if name in parts["units"]:
+            si_scale(str(parts["units"][name]), name, where=f"{path}: units.{name}")
+    required = _typed(table, "required", list, list(_DEFAULT_REQUIRED), path)
+    missing = _typed(table, "missing", str, "n/a", path)
+    if not missing.strip():
+        raise _wrong(path, "missing", missing, "a visible text")
+    return Style(
+        laboratory=_text(parts["laboratory"], "name", path),
+        address=_text(parts["laboratory"], "address", path),
+        decimal_comma=_typed(table, "decimal_comma", bool, False, path),
+        dates=_typed(table, "dates", str, "%Y-%m-%d", path),
+        missing=missing,
+        required=tuple(dict.fromkeys([*_DEFAULT_REQUIRED, *(str(one) for one in required)])),
+        styles=tuple((str(k), str(v)) for k, v in parts["styles"].items()),
+        decimals=tuple(parts["decimals"].items()),
+        force=str(parts["units"].get("force", "N")),
+        moment=str(parts["units"].get("moment", "N*m")),
+    )
+
+
+def _text(table: dict[str, Any], key: str, path: Path) -> str | None:
+    return _typed(table, key, str, None, path)
+
+
+def _typed(table: dict[str, Any], key: str, kind: type, default: Any, path: Path) -> Any:
+    value = table.get(key, default)
+    if value is default or isinstance(value, kind):
+        return value
+    names = {dict: "a table", list: "a list", str: "a text", bool: "true or false"}
+    raise _wrong(path, key, value, names[kind])
+
+
+def _wrong(path: Path, key: str, got: object, expected: str) -> ConfigError:
+    return ConfigError(
+        f"the style file has a wrong value for {key!r}", where=path, got=got, expected=expected,
+        next_step="correct it in the style file beside the template",
+    )  # fmt: skip

@@ -1,0 +1,197 @@
+"""A test's tables: columns of the catalogue, rows of plain numbers in the report's units."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+from toolkit.report.content import Cell, Table
+from toolkit.report.style import Style
+from toolkit.report.tags import TABLES, Column
+
+if TYPE_CHECKING:
+    from toolkit.calibration.record import CalibrationRecord
+    from toolkit.estimate import Estimate
+    from toolkit.findings import Finding
+    from toolkit.pipeline import TestResult
+
+_DEG = math.pi / 180
+Row = dict[str, Cell]
+
+
+def build_tables(
+    result: TestResult, record: CalibrationRecord | None, findings: Sequence[Finding], style: Style
+) -> dict[str, Table]:
+    """Return every table of the catalogue; one without data has no rows."""
+    makers: dict[str, Callable[[], list[Row]]] = {
+        "results": lambda: _results(result),
+        "stiffness": lambda: _stiffness(result),
+        "pull": lambda: _pull(result, _PULL),
+        "pull_thesis": lambda: _pull(result, _THESIS),
+        "characteristics": lambda: _characteristics(result, style),
+        "fits": lambda: _fits(result, style),
+        "calibration": lambda: _calibration(record),
+        "acquisition": lambda: _acquisition(result),
+        "findings": lambda: [one.as_dict() for one in findings],  # type: ignore[misc]
+        "files": lambda: _files(result),
+    }
+    return {name: _table(name, makers[name](), style) for name in TABLES}
+
+
+def _table(name: str, rows: list[Row], style: Style) -> Table:
+    columns, factors = [], []
+    for column in TABLES[name][1]:
+        unit, factor = style.unit(column.unit)
+        digits = style.digits(f"{name}.{column.name}", column.name, unit)
+        spec = f".{digits}f" if digits is not None and column.spec.endswith("f") else column.spec
+        columns.append(replace(column, unit=unit, spec=spec))
+        factors.append(factor)
+    cells = tuple(
+        tuple(_scaled(row.get(c.name), c, f) for c, f in zip(columns, factors, strict=True)) for row in rows
+    )
+    return Table(name=name, columns=tuple(columns), rows=cells)
+
+
+def _scaled(cell: Cell, column: Column, factor: float) -> Cell:
+    return cell if cell is None or isinstance(cell, str) or column.quantity is None else cell * factor
+
+
+def _put(row: Row, name: str, estimate: Estimate | None, factor: float = 1.0) -> None:
+    row[name] = None if estimate is None else estimate.value * factor
+    U = math.nan if estimate is None else estimate.expanded()[0] * factor
+    row[f"U_{name}"] = U if math.isfinite(U) else None
+
+
+def _results(result: TestResult) -> list[Row]:
+    return [
+        {
+            "rotation": c.rotation, "SA": c.SA / _DEG, "FZ": c.FZ, "FY": c.FY, "U_FY": 2 * c.u_FY, "MZ": c.MZ,
+            "U_MZ": 2 * c.u_MZ, "file": c.file,
+        }
+        for c in result.reduced.used()
+    ]  # fmt: skip
+
+
+_STIFFNESS = ("cornering_secant", "cornering_slope", "aligning_secant", "aligning_slope")
+_PULL = ("conicity", "plysteer", "CRAT", "PRAT", "PRAT_at_FY_zero")
+_THESIS = ("thesis_CRAT", "thesis_PRAT", "residual_forward", "residual_reverse")
+
+
+def _stiffness(result: TestResult) -> list[Row]:
+    rows = []
+    for one in result.characteristics.stiffness:
+        row: Row = {"load": one.load_N, "rotation": one.rotation}
+        for name in _STIFFNESS:
+            kind, way = name.split("_")
+            _put(row, name, getattr(one, f"{way}_{kind}"), _DEG)
+        rows.append(row)
+    return rows
+
+
+def _pull(result: TestResult, names: tuple[str, ...]) -> list[Row]:
+    rows = []
+    for one in result.characteristics.pull:
+        if all(getattr(one, name) is None for name in names):
+            continue
+        row: Row = {"load": one.load_N}
+        for name in names:
+            _put(row, name, getattr(one, name))
+        rows.append(row)
+    return rows
+
+
+_LONG = {
+    "cornering_secant": ("cornering stiffness, ±1 deg secant", "N/deg"),
+    "cornering_slope": ("cornering stiffness, slope at 0 deg", "N/deg"),
+    "aligning_secant": ("aligning stiffness, ±1 deg secant", "N*m/deg"),
+    "aligning_slope": ("aligning stiffness, slope at 0 deg", "N*m/deg"),
+    "conicity": ("conicity", "N"),
+    "plysteer": ("plysteer", "N"),
+    "CRAT": ("CRAT", "N*m"),
+    "PRAT": ("PRAT at 0 deg", "N*m"),
+    "PRAT_at_FY_zero": ("PRAT at FY = 0", "N*m"),
+    "thesis_CRAT": ("CRAT, the thesis's formula", "N*m"),
+    "thesis_PRAT": ("PRAT, the thesis's formula", "N*m"),
+    "residual_forward": ("residual aligning torque, forward", "N*m"),
+    "residual_reverse": ("residual aligning torque, reverse", "N*m"),
+}
+
+
+def _characteristics(result: TestResult, style: Style) -> list[Row]:
+    rows: list[Row] = []
+    for name, (text, unit) in _LONG.items():
+        shown, factor = style.unit(unit)
+        kind, _, way = name.partition("_")
+        stiff = name in _STIFFNESS
+        items: Sequence[Any] = result.characteristics.stiffness if stiff else result.characteristics.pull
+        for one in items:
+            found: Estimate | None = getattr(one, f"{way}_{kind}" if stiff else name)
+            if found is None:
+                continue
+            U, k = found.expanded()
+            scale = factor * (_DEG if stiff else 1.0)
+            rows.append(
+                {
+                    "quantity": text, "rotation": one.rotation if stiff else "both", "load": one.load_N,
+                    "value": found.value * scale, "U": U * scale if math.isfinite(U) else None,
+                    "k": k if math.isfinite(k) else None, "unit": str(shown).replace("*", "·"),
+                }
+            )  # fmt: skip
+    return rows
+
+
+def _fits(result: TestResult, style: Style) -> list[Row]:
+    rows: list[Row] = []
+    for channel, unit in (("FY", "N"), ("MZ", "N*m")):
+        factor = style.unit(unit)[1]
+        for one in result.characteristics.fits:
+            fit = getattr(one, channel)
+            if fit is None:
+                continue
+            row: Row = {
+                "channel": channel, "rotation": one.rotation, "load": one.load_N, "error": fit.error_percent,
+                "floor": fit.scatter_floor_percent,
+            }  # fmt: skip
+            for p in fit.parameters:
+                scale = factor if p.name in ("D", "Sv") else 1 / _DEG if p.name == "Sh" else 1.0
+                row[p.name] = p.value * scale
+                row[f"u_{p.name}"] = None if p.standard_error is None else p.standard_error * scale
+            rows.append(row)
+    return rows
+
+
+def _calibration(record: CalibrationRecord | None) -> list[Row]:
+    rows: list[Row] = []
+    units = dict(zip(record.indications, record.indication_units, strict=True)) if record else {}
+    for load in record.loads if record else ():
+        for i, term in enumerate(load.terms):
+            unit = units.get(term)
+            rows.append(
+                {
+                    "load": load.load, "term": term, "coefficient": load.coefficients[i],
+                    "issued": load.issued[i] if i < len(load.issued) else None,
+                    "standard_error": math.sqrt(load.covariance[i][i]) if i < len(load.covariance) else None,
+                    "unit": (f"{load.unit} per {unit}" if unit else load.unit).replace("*", "·"),
+                }
+            )  # fmt: skip
+    return rows
+
+
+def _acquisition(result: TestResult) -> list[Row]:
+    worst: dict[str, dict[str, float]] = {}
+    for c in result.reduced.used():
+        row = worst.setdefault(c.file, {})
+        for name, theirs, ours in (
+            ("FY_difference", c.FY_file, c.FY),
+            ("MZ_difference", c.MZ_file, c.MZ),
+        ):
+            if theirs is not None:
+                row[name] = max(row.get(name, 0.0), abs(theirs - ours))
+    return [{"file": file, **row} for file, row in worst.items() if row]
+
+
+def _files(result: TestResult) -> list[Row]:
+    seen = {c.file: c for c in result.reduced.conditions}
+    return [{"file": c.file, "rotation": c.rotation, "sha256": c.file_sha256} for c in seen.values()]

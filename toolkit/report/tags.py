@@ -1,0 +1,426 @@
+"""The tag catalogue: every ``tk:`` tag that a template may use, generated lists included.
+
+A tag is ``tk:<path>`` with an optional ``|<format>``; the kinds are ``text number date figure table if
+row``. Values have a default format each; a number takes one Python format spec after the bar, a figure
+``width=120mm``.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from typing import Literal
+
+from toolkit.errors import TemplateError
+
+Kind = Literal["text", "number", "date", "figure", "table", "if", "row"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Tag:
+    """A tag as it stands in a template: path without ``tk:`` and the format after the bar."""
+
+    path: str
+    spec: str | None = None
+
+    @property
+    def family(self) -> str:
+        """``figure``, ``table``, ``if``, ``row`` or ``value``."""
+        head = self.path.partition(".")[0]
+        return head if head in ("figure", "table", "if", "row") else "value"
+
+    @property
+    def name(self) -> str:
+        """The path after the family, or the whole path of a value."""
+        return self.path if self.family == "value" else self.path.partition(".")[2]
+
+    def __str__(self) -> str:
+        """Return the tag as a template writes it."""
+        return f"tk:{self.path}" + (f"|{self.spec}" if self.spec is not None else "")
+
+
+def parse_tag(text: str) -> Tag | None:
+    """Read ``tk:path|format``; None where the text is no tag of the toolkit.
+
+    >>> parse_tag("tk:calibration.FY.D51|.5g")
+    Tag(path='calibration.FY.D51', spec='.5g')
+    >>> parse_tag("Company") is None
+    True
+    """
+    text = text.strip()
+    if not text.startswith("tk:"):
+        return None
+    path, bar, spec = text[3:].partition("|")
+    return Tag(path=_canonical(path.strip()), spec=spec.strip(" \t") if bar else None)
+
+
+def _canonical(path: str) -> str:
+    # practice and thesis write Fy and Mz; the channels are FY and MZ.
+    return re.sub(r"^calibration\.([FM])([xyz])\.", lambda m: f"calibration.{m[1]}{m[2].upper()}.", path)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Column:
+    """A column of a report table; ``unit`` is the SI-side default, shown in the heading."""
+
+    name: str
+    kind: Literal["text", "number"]
+    description: str
+    unit: str | None = None
+    spec: str = "g"
+    quantity: str | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Spec:
+    """One entry of the catalogue."""
+
+    path: str
+    kind: Kind
+    description: str
+    unit: str | None = None
+    spec: str = "g"
+    columns: tuple[Column, ...] = ()
+
+
+def _texts() -> list[Spec]:
+    pairs = """
+    test.name|name of the test
+    test.operator|operator
+    test.requestor|requestor (customer)
+    test.special|what is special about the test
+    test.surface|surface of the drum
+    test.machine|test machine
+    test.pressure|test pressure in psi and bar
+    test.loads|the loads of the test, means of the blocks
+    test.slip_angles|the slip-angle steps of the test
+    test.directions|directions of rotation
+    test.axes|axis system of all results
+    test.averaging|what was averaged and discarded
+    test.tare|which tare was subtracted
+    tire.size|tire size
+    tire.company|maker
+    tire.DOT|DOT number
+    tire.series|series
+    tire.construction|construction
+    tire.rim|rim
+    calibration.id|id of the calibration record that computed the forces
+    calibration.hash|SHA-256 of the calibration record
+    calibration.instrument|instrument of the calibration record
+    calibration.status|verified or unverified
+    report.id|id of the report, made from its inputs
+    report.title|title of the report
+    software.name|program
+    software.version|version of the program
+    laboratory.name|laboratory (from the style file)
+    laboratory.address|its address (from the style file)
+    simulated|simulated data or measured data
+    """
+    return [
+        Spec(path=p.strip(), kind="text", description=d)
+        for p, d in (line.split("|") for line in pairs.strip().splitlines())
+    ]
+
+
+_VALUES = (
+    *_texts(),
+    Spec(path="test.date", kind="date", description="date of the test"),
+    Spec(path="report.date", kind="date", description="date of issue"),
+    Spec(path="test.pressure.psi", kind="number", unit="psi", spec=".1f", description="test pressure"),
+    Spec(path="test.pressure.bar", kind="number", unit="bar", spec=".2f", description="test pressure"),
+    Spec(path="test.pressure.kPa", kind="number", unit="kPa", spec=".0f", description="test pressure"),
+    Spec(path="test.speed", kind="number", unit="km/h", spec=".2f", description="speed of the drum surface"),
+    Spec(path="test.rated_load", kind="number", unit="N", spec=".0f", description="rated load of the tire"),
+    Spec(path="test.files", kind="number", unit="1", spec="d", description="number of recordings"),
+    Spec(path="test.conditions", kind="number", unit="1", spec="d", description="number of conditions used"),
+    Spec(path="test.findings", kind="number", unit="1", spec="d", description="number of findings"),
+)
+
+_SUMMARY = (
+    ("load", "force", ".0f", "load of the summary: nearest to the rated load, else the middle one"),
+    ("cornering_stiffness", "force/angle", ".1f", "cornering stiffness there, +-1 deg secant, forward"),
+    ("aligning_stiffness", "moment/angle", ".2f", "aligning stiffness there, +-1 deg secant, forward"),
+    ("conicity", "force", ".1f", "conicity there"),
+    ("plysteer", "force", ".1f", "plysteer there"),
+    ("CRAT", "moment", ".2f", "conicity residual aligning torque there"),
+    ("PRAT", "moment", ".2f", "plysteer residual aligning torque there, at 0 deg"),
+)
+
+UNITS = {"force": "N", "moment": "N*m", "force/angle": "N/deg", "moment/angle": "N*m/deg"}
+
+FIGURES = {
+    "fy_vs_slip": "lateral force against slip angle, all loads",
+    "mz_vs_slip": "aligning moment against slip angle, all loads",
+    "fy_vs_load": "lateral force against load at constant slip angles",
+    "mz_vs_load": "aligning moment against load at constant slip angles",
+    "gough": "Gough plot: lateral force against aligning moment",
+    "conicity": "conicity against load",
+    "plysteer": "plysteer against load",
+    "crat": "conicity residual aligning torque against load",
+    "prat": "plysteer residual aligning torque against load, both definitions",
+    "cornering_stiffness": "cornering stiffness against load, secant and slope",
+    "aligning_stiffness": "aligning stiffness against load, secant and slope",
+}
+
+CONDITIONS = {
+    "simulated": "the data are simulated",
+    "measured": "the data are measured",
+    "unverified": "the calibration record is a legacy import",
+    "verified": "the calibration record reproduces from its stored data",
+    "pull": "both directions of rotation gave a pull characteristic",
+    "no_pull": "there is no pull characteristic, for instance for want of a reversed run",
+    "reverse": "the test has reversed runs",
+    "stiffness": "a cornering or aligning stiffness exists",
+    "no_findings": "the test has no findings",
+}
+
+
+def _text(name: str, description: str) -> Column:
+    return Column(name=name, kind="text", description=description)
+
+
+def _number(name: str, description: str, spec: str, *, unit: str | None = None, quantity: str | None = None) -> Column:
+    return Column(
+        name=name, kind="number", description=description, spec=spec, quantity=quantity,
+        unit=UNITS[quantity] if quantity else unit,
+    )  # fmt: skip
+
+
+def _with_u(name: str, description: str, spec: str, quantity: str) -> list[Column]:
+    return [
+        _number(name, description, spec, quantity=quantity),
+        _number(f"U_{name}", f"expanded uncertainty (95 %) of {name}", spec, quantity=quantity),
+    ]
+
+
+def _fit_columns() -> list[Column]:
+    shown = (("B", "1/rad", ".3f"), ("C", "1", ".3f"), ("D", None, ".1f"), ("E", "1", ".3f"),
+             ("Sh", "deg", ".3f"), ("Sv", None, ".2f"))  # fmt: skip
+    columns = []
+    for name, unit, spec in shown:
+        note = " in the channel's unit" if unit is None else ""
+        columns.append(_number(name, f"Magic Formula {name}{note}", spec, unit=unit))
+        columns.append(_number(f"u_{name}", f"standard error of {name}{note}", spec, unit=unit))
+    return columns
+
+
+TABLES: dict[str, tuple[str, tuple[Column, ...]]] = {
+    "results": (
+        "one row a condition, as measured, SAE J670",
+        (
+            _text("rotation", "direction of rotation"),
+            _number("SA", "measured slip angle", ".2f", unit="deg"),
+            _number("FZ", "measured load", ".0f", quantity="force"),
+            _number("FY", "lateral force", ".1f", quantity="force"),
+            _number("U_FY", "repeatability of FY, k = 2", ".1f", quantity="force"),
+            _number("MZ", "aligning moment", ".2f", quantity="moment"),
+            _number("U_MZ", "repeatability of MZ, k = 2", ".2f", quantity="moment"),
+            _text("file", "recording"),
+        ),
+    ),
+    "stiffness": (
+        "cornering and aligning stiffness, one row a load and direction",
+        (
+            _number("load", "load", ".0f", quantity="force"),
+            _text("rotation", "direction of rotation"),
+            *_with_u("cornering_secant", "cornering stiffness, +-1 deg secant", ".1f", "force/angle"),
+            *_with_u("cornering_slope", "cornering stiffness, slope of the curve at 0 deg", ".1f", "force/angle"),
+            *_with_u("aligning_secant", "aligning stiffness, +-1 deg secant", ".2f", "moment/angle"),
+            *_with_u("aligning_slope", "aligning stiffness, slope of the curve at 0 deg", ".2f", "moment/angle"),
+        ),
+    ),
+    "pull": (
+        "pull characteristics by symmetry, one row a load",
+        (
+            _number("load", "load", ".0f", quantity="force"),
+            *_with_u("conicity", "conicity", ".1f", "force"),
+            *_with_u("plysteer", "plysteer", ".1f", "force"),
+            *_with_u("CRAT", "conicity residual aligning torque", ".2f", "moment"),
+            *_with_u("PRAT", "plysteer residual aligning torque at 0 deg", ".2f", "moment"),
+            *_with_u("PRAT_at_FY_zero", "the same at FY = 0", ".2f", "moment"),
+        ),
+    ),
+    "pull_thesis": (
+        "the same by the thesis's formulas, and the single-direction residual moments",
+        (
+            _number("load", "load", ".0f", quantity="force"),
+            *_with_u("thesis_CRAT", "CRAT by the thesis's formula", ".2f", "moment"),
+            *_with_u("thesis_PRAT", "PRAT by the thesis's formula", ".2f", "moment"),
+            *_with_u("residual_forward", "residual aligning torque, forward, MZ at FY = 0", ".2f", "moment"),
+            *_with_u("residual_reverse", "residual aligning torque, reverse, MZ at FY = 0", ".2f", "moment"),
+        ),
+    ),
+    "characteristics": (
+        "every characteristic, one row each",
+        (
+            _text("quantity", "name of the characteristic"),
+            _text("rotation", "direction of rotation, or both"),
+            _number("load", "load", ".0f", quantity="force"),
+            _number("value", "value in the row's unit", ".2f"),
+            _number("U", "expanded uncertainty (95 %) in the row's unit", ".2f"),
+            _number("k", "coverage factor", ".2f", unit="1"),
+            _text("unit", "unit of the row"),
+        ),
+    ),
+    "fits": (
+        "Magic Formula per load, channel and direction",
+        (
+            _text("channel", "FY or MZ"),
+            _text("rotation", "direction of rotation"),
+            _number("load", "mean load of the block", ".0f", quantity="force"),
+            *_fit_columns(),
+            _number("error", "error of the fit", ".2f", unit="%"),
+            _number("floor", "scatter of the measurements about their bin means", ".2f", unit="%"),
+        ),
+    ),
+    "calibration": (
+        "coefficients of the calibration record",
+        (
+            _text("load", "computed load"),
+            _text("term", "term"),
+            _number("coefficient", "full-precision coefficient", ".6g"),
+            _number("issued", "coefficient as issued on the certificate", ".6g"),
+            _number("standard_error", "standard error", ".2g"),
+            _text("unit", "unit of load and indication"),
+        ),
+    ),
+    "acquisition": (
+        "the acquisition program's own FY and MZ against the report's, one row a file",
+        (
+            _text("file", "recording"),
+            _number("FY_difference", "largest |FY of the file - FY|", ".2f", quantity="force"),
+            _number("MZ_difference", "largest |MZ of the file - MZ|", ".3f", quantity="moment"),
+        ),
+    ),
+    "findings": (
+        "departures from what was expected",
+        (
+            _text("rule", "rule"),
+            _text("level", "error, warning or note"),
+            _text("where", "file, block or channel"),
+            _text("message", "what was found"),
+        ),
+    ),
+    "files": (
+        "the recordings and their hashes",
+        (
+            _text("file", "recording"),
+            _text("rotation", "direction of rotation"),
+            _text("sha256", "SHA-256 of the file"),
+        ),
+    ),
+}  # fmt: skip
+
+_LOADS = ("FY", "MZ", "MX", "FX", "FZ")
+_TERM = re.compile(rf"calibration\.(?:{'|'.join(_LOADS)})\.[A-Za-z0-9_^*()]+")
+
+
+def catalogue() -> tuple[Spec, ...]:
+    """Return every tag in the order of the manual; coefficients of the M-15's cells stand for all."""
+    coefficients = [
+        Spec(path=f"calibration.{load}.{term}", kind="number", spec=".6g",
+             description=f"coefficient of {term} in {load}, in the record's units")
+        for load in ("FY", "MZ")
+        for term in ("D51", "D52", "E5", "intercept")
+    ]  # fmt: skip
+    summary = [
+        Spec(path=f"summary.{name}", kind="number", unit=UNITS[quantity], spec=spec, description=text)
+        for name, quantity, spec, text in _SUMMARY
+    ]
+    captions = [
+        Spec(path=f"caption.{name}", kind="text", description=f"caption of the figure: {text}")
+        for name, text in FIGURES.items()
+    ]
+    figures = [Spec(path=f"figure.{name}", kind="figure", description=t) for name, t in FIGURES.items()]
+    tables = [
+        Spec(path=f"table.{name}", kind="table", description=text, columns=columns)
+        for name, (text, columns) in TABLES.items()
+    ]
+    rows = [
+        Spec(path=f"row.{column.name}", kind="row", unit=column.unit, spec=column.spec,
+             description=f"{column.description} (in the prototype row of tk:table.{name})")
+        for name, (_, columns) in TABLES.items()
+        for column in columns
+    ]  # fmt: skip
+    conditions = [
+        Spec(path=f"if.{name}", kind="if", description=f"kept when {text}")
+        for name, text in condition_names().items()
+    ]
+    return (*_VALUES, *summary, *coefficients, *captions, *figures, *tables, *conditions, *rows)
+
+
+def condition_names() -> dict[str, str]:
+    """Return every name that ``tk:if.<name>`` may have: conditions, figures, tables and values."""
+    names = dict(CONDITIONS)
+    names |= {name: f"there is a figure: {text}" for name, text in FIGURES.items()}
+    names |= {name: f"the table has rows: {text}" for name, (text, _) in TABLES.items() if name not in names}
+    names |= {one.path: f"there is a value: {one.description}" for one in _VALUES}
+    return names
+
+
+def known_value(path: str) -> bool:
+    """Tell whether a value of that path can exist for some test (coefficients of any cell included)."""
+    return path in _value_paths() or _TERM.fullmatch(path) is not None
+
+
+def value_spec(path: str) -> Spec | None:
+    """Return the catalogue's entry of a value, None for one that only a record can define."""
+    for one in catalogue():
+        if one.path == path:
+            return one
+    return None
+
+
+def _value_paths() -> frozenset[str]:
+    return frozenset(
+        [one.path for one in _VALUES]
+        + [f"summary.{name}" for name, *_ in _SUMMARY]
+        + [f"caption.{name}" for name in FIGURES]
+    )
+
+
+# A width or precision of three digits would be a denial of service, not a format.
+_NUMBER_SPEC = re.compile(r"(?:[^{}]?[<>=^])?[+\- ]?#?0?\d{0,2}[,_]?(?:\.\d{1,2})?[eEfFgG%d]?")
+_WIDTH = re.compile(r"width=(\d{1,4}(?:\.\d{1,3})?)(mm|cm|in|pt)")
+_EMU = {"mm": 36000, "cm": 360000, "in": 914400, "pt": 12700}
+
+
+def format_problem(kind: str, spec: str | None) -> str | None:
+    """Tell what is wrong with the format of a tag of some kind; None where it is right."""
+    if spec is None:
+        return None
+    if kind == "number":
+        return None if spec and _NUMBER_SPEC.fullmatch(spec) else "not a Python format spec of a number"
+    if kind == "figure":
+        return None if _WIDTH.fullmatch(spec) else "a figure takes width=NUMBERmm (or cm, in, pt)"
+    return f"a {kind} takes no format"
+
+
+def width_emu(spec: str | None) -> int | None:
+    """Return the width that a figure's tag asks for, in EMU (914 400 an inch)."""
+    found = _WIDTH.fullmatch(spec) if spec else None
+    return round(float(found[1]) * _EMU[found[2]]) if found else None
+
+
+def format_number(value: float, spec: str, *, decimal_comma: bool = False) -> str:
+    """Return a finite number in a format; minus zero is zero.
+
+    >>> format_number(-0.001, ".2f"), format_number(1234.5, ",.1f", decimal_comma=True)
+    ('0.00', '1.234,5')
+    """
+    try:
+        if spec.endswith("d"):
+            if value != round(value):
+                raise ValueError("a whole-number format for a number that is not whole")
+            text = format(round(value), spec)
+        else:
+            text = format(float(value), spec)
+            if "-" in text and not re.search(r"[1-9]", text):
+                text = format(0.0, spec)
+    except ValueError as error:
+        raise TemplateError(
+            "a number cannot be printed in the format of its tag",
+            got=f"|{spec}: {error}", expected="one Python format spec such as .2f or .5g",
+            next_step="correct the tag in the template", rule="bad-format",
+        ) from error  # fmt: skip
+    return text.translate(str.maketrans(".,", ",.")) if decimal_comma else text
