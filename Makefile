@@ -1,0 +1,53 @@
+# Two commands do everything on a fresh Debian with Python 3.11: `make demo` and `make test`.
+# Both run again in seconds when nothing is missing.
+
+PYTHON ?= python3
+VENV   := .venv
+BIN    := $(VENV)/bin
+STAMP  := $(VENV)/.installed
+SYSTEM := $(VENV)/.system
+JOBS   ?= 2
+
+APT_PACKAGES := libreoffice-writer-nogui fonts-crosextra-carlito fonts-crosextra-caladea fonts-liberation2 poppler-utils
+
+.PHONY: demo test check bench setup lock clean
+
+setup: $(STAMP) $(SYSTEM)
+
+demo: setup
+	$(BIN)/toolkit demo --out demo-out
+
+test: setup check
+	$(BIN)/python -m pytest -q -n $(JOBS) --dist worksteal
+
+check: $(STAMP)
+	$(BIN)/ruff format --check --quiet
+	$(BIN)/ruff check --quiet
+	$(BIN)/mypy --no-error-summary
+	$(BIN)/lint-imports --config pyproject.toml
+
+bench: setup
+	$(BIN)/python -m tests.benchmarks
+
+# The virtual environment from the lock file: exact versions, each with its hash.
+$(STAMP): requirements.lock pyproject.toml
+	@test -x $(BIN)/python || $(PYTHON) -m venv $(VENV) 2>/dev/null || sh .ci/as-root apt-get-install python3-venv
+	@test -x $(BIN)/pip || { rm -rf $(VENV); $(PYTHON) -m venv $(VENV); }
+	$(BIN)/pip install --quiet --disable-pip-version-check --require-hashes -r requirements.lock
+	$(BIN)/pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation -e .
+	@touch $@
+
+# LibreOffice, its fonts and poppler from the system's packages. Without root and without sudo nothing is
+# installed: `toolkit doctor` prints the one command to run.
+$(SYSTEM): $(STAMP)
+	@$(BIN)/toolkit doctor --quiet || sh .ci/as-root apt-get-install $(APT_PACKAGES) || { $(BIN)/toolkit doctor; exit 1; }
+	@touch $@
+
+# After a change of the dependencies: resolve again and pin every version with its hashes.
+lock:
+	$(PYTHON) -m venv build/lock && build/lock/bin/pip install --quiet "pip<26" pip-tools
+	build/lock/bin/pip-compile --quiet --generate-hashes --extra dev --strip-extras --allow-unsafe --no-header \
+	  --no-annotate --no-emit-index-url --no-emit-find-links --no-emit-trusted-host -o requirements.lock pyproject.toml
+
+clean:
+	rm -rf $(VENV) build dist demo-out bench-out .mypy_cache .ruff_cache .pytest_cache .hypothesis
