@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NoReturn
-from xml.etree import ElementTree
+from xml.etree import ElementTree as ET
 
 from toolkit.errors import UnreadableError
 from toolkit.files import sha256_bytes
@@ -58,8 +58,14 @@ def gate(path: Path) -> Gated:
     if kind.id == "ole":
         kind = ole_kind(data)
         if kind.id == "encrypted":
-            _refuse("encrypted", "the workbook is encrypted", path, kind.text, "a workbook without a password",
-                    "open it in Excel, remove the password and save it again")  # fmt: skip
+            _refuse(
+                "encrypted",
+                "the workbook is encrypted",
+                path,
+                kind.text,
+                "a workbook without a password",
+                "open it in Excel, remove the password and save it again",
+            )
     if kind.id in ("empty", "blank"):
         _refuse("empty-file", "the file is empty", path, f"{len(data)} bytes", "a recording",
                 "copy the file again from the machine")  # fmt: skip
@@ -68,6 +74,20 @@ def gate(path: Path) -> Gated:
     members = read_members(data, where=path)
     check_members(members, where=path)
     return Gated(path=path, data=data, sha256=sha256_bytes(data), kind="xlsx", members=members)
+
+
+def check_workbook(path: Path) -> Gated:
+    """Pass a file through the gate and demand a workbook.
+
+    Raises
+    ------
+    UnreadableError
+        as `gate`, and for a text file
+    """
+    gated = gate(path)
+    if gated.kind != "xlsx":
+        _no_workbook(path, Kind("text", "a text file"))
+    return gated
 
 
 def check_members(members: Mapping[str, bytes], *, where: Path) -> None:
@@ -81,11 +101,9 @@ def check_members(members: Mapping[str, bytes], *, where: Path) -> None:
     by_lower = {name.lower(): name for name in members}
     types = members.get(by_lower.get("[content_types].xml", ""), b"")
     kind = office_kind(frozenset(by_lower), types)
-    for name in by_lower:
-        if any(part in name for part in _MACRO_PARTS):
-            _refuse(
-                "macro", "the workbook holds macros", where, by_lower[name], "a workbook of values", _FOREIGN
-            )
+    for lower, name in by_lower.items():
+        if any(part in lower for part in _MACRO_PARTS):
+            _refuse("macro", "the workbook holds macros", where, name, "a workbook of values", _FOREIGN)
     if kind.id == "xlsm" or b"macroEnabled" in types or b"vbaProject" in types:
         _refuse("macro", "the workbook is of a kind that holds macros", where, kind.text, "an .xlsx workbook",
                 "save it as .xlsx, without macros")  # fmt: skip
@@ -122,8 +140,8 @@ def _check_xml(name: str, xml: bytes, where: Path) -> None:
 
 def _check_relationships(name: str, xml: bytes, where: Path) -> None:
     try:
-        root = ElementTree.fromstring(xml)  # noqa: S314  no DTD can be in it: just checked
-    except (ElementTree.ParseError, ValueError, LookupError) as error:
+        root = ET.fromstring(xml)  # noqa: S314  no DTD can be in it: just checked
+    except (ET.ParseError, ValueError, LookupError) as error:
         _refuse("xml", "a part of the workbook is not well-formed", where, f"{name}: {error}", "XML",
                 "copy the file again from the machine")  # fmt: skip
     for one in root.iter(_RELATIONSHIP):

@@ -10,6 +10,7 @@ from __future__ import annotations
 import json
 import re
 from pathlib import Path
+from typing import Any
 
 from toolkit.recording.archive import MAX_FILE_BYTES, read_members
 from toolkit.recording.sniff import sniff
@@ -46,6 +47,13 @@ def output_keywords(*, simulated: bool) -> str:
     'toolkit-output'
     """
     return "; ".join([OWN_OUTPUT, *([SIMULATED] if simulated else [])])
+
+
+def mark_workbook(book: Any, *, simulated: bool, machine: str) -> None:
+    """Mark an openpyxl workbook as a result of the toolkit, before it is saved."""
+    book.properties.creator = GENERATOR
+    book.properties.title = f"{'SIMULATED: ' if simulated else ''}tire test on {machine}"
+    book.properties.keywords = output_keywords(simulated=simulated)
 
 
 def keywords_of(core_xml: bytes) -> tuple[str, ...]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import datetime
+import datetime as dt
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -110,7 +110,7 @@ def judge(cell: object) -> tuple[str | None, str]:
     if isinstance(cell, str):
         kind = "error-cell" if cell.startswith("#") else "text-cell"
         return kind, f"{'the text ' if kind == 'text-cell' else ''}{cell[:80]!r}"
-    if isinstance(cell, datetime.date | datetime.time | datetime.timedelta):
+    if isinstance(cell, dt.date | dt.time | dt.timedelta):
         return "date-cell", f"a date or time, {cell}"
     return "text-cell", repr(cell)[:80]
 

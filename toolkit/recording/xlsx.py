@@ -6,7 +6,7 @@ import io
 import posixpath
 from collections.abc import Mapping
 from typing import Any, NoReturn
-from xml.etree import ElementTree
+from xml.etree import ElementTree as ET
 
 from toolkit.errors import CellError, RecordingError, UnreadableError
 from toolkit.machine import Machine
@@ -132,9 +132,9 @@ def _errors_by_sheet(members: Mapping[str, bytes]) -> dict[str, tuple[tuple[str,
 def _sheet_parts(members: Mapping[str, bytes]) -> dict[str, str]:
     # The package says which part is which sheet; only needed when there are error values to place.
     try:
-        links = ElementTree.fromstring(members["xl/_rels/workbook.xml.rels"])  # noqa: S314  gated: no DTD
-        workbook = ElementTree.fromstring(members["xl/workbook.xml"])  # noqa: S314
-    except (KeyError, ElementTree.ParseError, ValueError, LookupError):
+        links = ET.fromstring(members["xl/_rels/workbook.xml.rels"])  # noqa: S314  gated: no DTD
+        workbook = ET.fromstring(members["xl/workbook.xml"])  # noqa: S314
+    except (KeyError, ET.ParseError, ValueError, LookupError):
         return {}
     targets = {one.get("Id"): one.get("Target", "") for one in links}
     sheets = [*workbook.iter(f"{_MAIN}sheet"), *workbook.iter(f"{_STRICT_MAIN}sheet")]
