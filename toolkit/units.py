@@ -172,6 +172,8 @@ def unit(text: str, *, where: object = None) -> Unit:
     4.4482216152605
     >>> unit("lb-ft").si
     'N*m'
+    >>> unit("lbf*m").dimension
+    'moment'
     """
     try:
         return _parse(" ".join(text.split()))
@@ -213,11 +215,20 @@ def _parse(text: str) -> Unit:
             factor = float(one.to("radian").magnitude if is_angle else one.to("dimensionless").magnitude)
             return Unit(name, factor, 0.0, "rad" if is_angle else "1", "angle" if is_angle else "ratio")
         base = one.to_base_units()
-        kind = str(one.dimensionality)
+        kind = _kind(dict(one.dimensionality))
         dimension, symbol = _DIMENSIONS.get(kind, (kind, f"{base.units:~}"))
         return Unit(name, float(base.magnitude), 0.0, symbol, dimension)
     except Exception as error:  # pint raises many kinds for text that is no unit
         raise _UnknownUnitError(text) from error
+
+
+def _kind(parts: dict[str, float]) -> str:
+    # pint prints the parts in the order in which the unit was composed: N*m and lbf*m would differ.
+    order = ("[bridge_ratio]", "[digitiser_count]", "[mass]", "[length]", "[temperature]", "[time]")
+    names = sorted(parts, key=lambda name: (order.index(name) if name in order else len(order), name))
+    powers = {name: f" ** {abs(parts[name]):g}" if abs(parts[name]) != 1 else "" for name in names}
+    above = " * ".join(f"{name}{powers[name]}" for name in names if parts[name] > 0)
+    return (above or "1") + "".join(f" / {name}{powers[name]}" for name in names if parts[name] < 0)
 
 
 def _canonical(text: str) -> str:
