@@ -9,7 +9,7 @@ import numpy as np
 from toolkit.characteristics.groups import Group, group
 from toolkit.characteristics.model import Characteristics, DirectionFit
 from toolkit.characteristics.pull import Direction, pull
-from toolkit.characteristics.shared import line_at_zero
+from toolkit.characteristics.shared import Shared, line_at_zero
 from toolkit.characteristics.stiffness import stiffness
 from toolkit.findings import Finding
 from toolkit.tires.fit import Curve, estimate_at, fit_curves
@@ -34,25 +34,19 @@ def characterise(
     groups = group(reduced)
     fits = _fit(groups)
     directions = [Direction(group=g, fit=f) for g, f in zip(groups, fits, strict=True)]
-    u_SA_zero = machine.stated_uncertainty("SA").u
+    shared = Shared(
+        record=record,
+        machine_axes=machine.axes,
+        tared=reduced.tare.source != "none",
+        u_SA_zero=machine.stated_uncertainty("SA").u,
+    )
     pulls = []
     for load in sorted({d.group.load_N for d in directions}):
         there = {d.group.rotation: d for d in directions if d.group.load_N == load}
-        pulls.append(
-            pull(
-                load,
-                there.get("forward"),
-                there.get("reverse"),
-                record=record,
-                machine_axes=machine.axes,
-                u_SA_zero=u_SA_zero,
-            )
-        )
+        pulls.append(pull(load, there.get("forward"), there.get("reverse"), shared=shared))
     return Characteristics(
         fits=fits,
-        stiffness=tuple(
-            stiffness(d.group, d.fit, record=record, machine_axes=machine.axes) for d in directions
-        ),
+        stiffness=tuple(stiffness(d.group, d.fit, shared=shared) for d in directions),
         pull=tuple(pulls),
         findings=(*_curve_findings(directions), *_line_findings(directions)),
     )

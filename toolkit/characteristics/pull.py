@@ -19,13 +19,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from toolkit.characteristics.model import DirectionFit, Pull
-from toolkit.characteristics.shared import calibration_u, weights_at_zero
+from toolkit.characteristics.shared import Shared, weights_at_zero
 from toolkit.estimate import Estimate, effective_dof
 from toolkit.tires.fit import estimate_at, slope_estimate_at, zero_crossing
 
 if TYPE_CHECKING:
-    from toolkit.channels import Axes
-    from toolkit.calibration.record import CalibrationRecord
     from toolkit.characteristics.groups import Group
     from toolkit.tires.model import CurveFit
 
@@ -43,30 +41,22 @@ def pull(
     forward: Direction | None,
     reverse: Direction | None,
     *,
-    record: CalibrationRecord | None,
-    machine_axes: Axes,
-    u_SA_zero: float,
+    shared: Shared,
 ) -> Pull:
     """Return the pull characteristics of one load.
 
     Parameters
     ----------
     forward, reverse : curves in SAE axes that follow the travel, at one common load
-    u_SA_zero : standard uncertainty [rad] of the slip angle's zero, the same for both directions: it
-        stays whole in plysteer and PRAT and cancels in conicity, CRAT and PRAT at FY = 0
+    shared : what both directions have in common. The zero of the slip angle stays whole in plysteer and
+        PRAT and cancels in conicity, CRAT and PRAT at FY = 0; a zero of the cells does the opposite.
     """
-
-    def half(channel: str, sign: float) -> Estimate | None:
-        return _half(
-            channel, forward, reverse, sign, record=record, machine_axes=machine_axes, u_zero=u_SA_zero
-        )
-
-    CRAT, PRAT = half("MZ", -1.0), half("MZ", 1.0)
+    CRAT, PRAT = (_half("MZ", forward, reverse, sign, shared=shared) for sign in (-1.0, 1.0))
     ahead, back = _moment_without_force(forward), _moment_without_force(reverse)
     return Pull(
         load_N=load_N,
-        conicity=half("FY", -1.0),
-        plysteer=half("FY", 1.0),
+        conicity=_half("FY", forward, reverse, -1.0, shared=shared),
+        plysteer=_half("FY", forward, reverse, 1.0, shared=shared),
         CRAT=CRAT,
         PRAT=PRAT,
         PRAT_at_FY_zero=_mean_of(ahead, back),
@@ -85,9 +75,7 @@ def _half(
     reverse: Direction | None,
     sign: float,
     *,
-    record: CalibrationRecord | None,
-    machine_axes: Axes,
-    u_zero: float,
+    shared: Shared,
 ) -> Estimate | None:
     one, other = _curve(forward, channel), _curve(reverse, channel)
     if one is None or other is None or forward is None or reverse is None:
@@ -95,10 +83,10 @@ def _half(
     F, R = estimate_at(one, 0.0), estimate_at(other, 0.0)
     parts = [(c, w / 2) for c, w in weights_at_zero(forward.group)]
     parts += [(c, sign * w / 2) for c, w in weights_at_zero(reverse.group)]
-    shared = calibration_u(record, channel, parts, machine_axes=machine_axes)
+    common = shared.calibration_u(channel, parts)
     slope = slope_estimate_at(one, 0.0).value + sign * slope_estimate_at(other, 0.0).value
-    zero = abs(slope) / 2 * u_zero
-    contributions = [(F.u / 2, F.dof), (R.u / 2, R.dof), (shared, np.inf), (zero, np.inf)]
+    zero = abs(slope) / 2 * shared.u_SA_zero
+    contributions = [(F.u / 2, F.dof), (R.u / 2, R.dof), (common, np.inf), (zero, np.inf)]
     return Estimate(
         value=(F.value + sign * R.value) / 2,
         u=float(np.sqrt(sum(u * u for u, _ in contributions))),

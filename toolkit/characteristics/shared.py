@@ -8,6 +8,7 @@ the conditions one by one: it cancels in a difference of equal readings and adds
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -19,39 +20,55 @@ from toolkit.units import si_scale
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from toolkit.channels import Axes
     from toolkit.calibration.record import CalibrationRecord
+    from toolkit.channels import Axes
     from toolkit.characteristics.groups import Group
     from toolkit.reduction.model import Condition
 
 Weighted = Sequence[tuple["Condition", float]]
 
 
-def calibration_u(
-    record: CalibrationRecord | None, channel: str, parts: Weighted, *, machine_axes: Axes
-) -> float:
-    """Return the standard uncertainty [SI] that the record's covariance gives a weighted sum.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Shared:
+    """What every row of a test has in common.
 
-    Parameters
-    ----------
-    record : the record that computed the rows; None or one without a covariance contributes zero
-    channel : ``FY`` or ``MZ``
-    parts : (condition, weight) of the sum, the conditions' values in SAE axes
-    machine_axes : the axes of the cells, whose signs the sensitivities have
+    ``record`` computed the rows (None where it is not at hand: its share is then zero); ``machine_axes``
+    are the axes of its cells; ``tared`` says that a tare was subtracted; ``u_SA_zero`` [rad] is the
+    standard uncertainty of the slip angle's zero, the same for both directions of rotation.
     """
-    if record is None or not parts:
-        return 0.0
-    fit = next(one for one in record.loads if one.load == channel)
-    covariance = np.asarray(fit.covariance, dtype=np.float64)
-    if covariance.size == 0:
-        return 0.0
-    total = np.zeros(len(fit.terms))
-    for condition, weight in parts:
-        sign = signs(machine_axes, "SAE", condition.rotation)[channel]
-        row = {name: np.array([v]) for name, v in zip(record.indications, condition.indications, strict=True)}
-        total += weight * sign * coefficient_jacobian(record, channel, row, None)[0]
-    variance = float(total @ covariance @ total)
-    return float(np.sqrt(max(variance, 0.0))) * si_scale(fit.unit)
+
+    record: CalibrationRecord | None
+    machine_axes: Axes
+    tared: bool
+    u_SA_zero: float
+
+    def calibration_u(self, channel: str, parts: Weighted) -> float:
+        """Return the standard uncertainty [SI] that the record's covariance gives a weighted sum.
+
+        Parameters
+        ----------
+        channel : ``FY`` or ``MZ``
+        parts : (condition, weight) of the sum, the conditions' values in SAE axes
+        """
+        if self.record is None or not parts:
+            return 0.0
+        fit = self.record.load(channel)
+        if not fit.covariance:
+            return 0.0
+        names = self.record.indications
+        # The conditions hold tared means. A record whose intercept carries the zero of its session loses
+        # that term with the tare, and the difference to a tare of zero says so.
+        tare = dict.fromkeys(names, 0.0) if self.tared else None
+        rows = {
+            name: np.array([condition.indications[i] for condition, _ in parts])
+            for i, name in enumerate(names)
+        }
+        weights = np.array(
+            [w * signs(self.machine_axes, "SAE", condition.rotation)[channel] for condition, w in parts]
+        )
+        total = weights @ coefficient_jacobian(self.record, channel, rows, tare)
+        variance = float(total @ np.asarray(fit.covariance) @ total)
+        return float(np.sqrt(max(variance, 0.0))) * si_scale(fit.unit)
 
 
 def weights_at_zero(group: Group) -> tuple[tuple[Condition, float], ...]:

@@ -12,13 +12,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from toolkit.characteristics.model import DirectionFit, Stiffness
-from toolkit.characteristics.shared import calibration_u, slope_weights
+from toolkit.characteristics.shared import Shared, slope_weights
 from toolkit.estimate import Estimate, effective_dof
 from toolkit.tires.fit import slope_estimate_at
 
 if TYPE_CHECKING:
-    from toolkit.channels import Axes
-    from toolkit.calibration.record import CalibrationRecord
     from toolkit.characteristics.groups import Group
     from toolkit.tires.model import CurveFit
 
@@ -26,23 +24,19 @@ _SIGN = {"FY": -1.0, "MZ": 1.0}
 _UNIT = {"FY": "N/rad", "MZ": "N*m/rad"}
 
 
-def stiffness(
-    group: Group, fit: DirectionFit, *, record: CalibrationRecord | None, machine_axes: Axes
-) -> Stiffness:
+def stiffness(group: Group, fit: DirectionFit, *, shared: Shared) -> Stiffness:
     """Return both stiffnesses of one load and direction, by secant and by slope [N/rad, N·m/rad]."""
     return Stiffness(
         load_N=group.load_N,
         rotation=group.rotation,
-        secant_cornering=_secant(group, "FY", record=record, machine_axes=machine_axes),
-        secant_aligning=_secant(group, "MZ", record=record, machine_axes=machine_axes),
-        slope_cornering=_slope(group, fit.FY, "FY", record=record, machine_axes=machine_axes),
-        slope_aligning=_slope(group, fit.MZ, "MZ", record=record, machine_axes=machine_axes),
+        secant_cornering=_secant(group, "FY", shared=shared),
+        secant_aligning=_secant(group, "MZ", shared=shared),
+        slope_cornering=_slope(group, fit.FY, "FY", shared=shared),
+        slope_aligning=_slope(group, fit.MZ, "MZ", shared=shared),
     )
 
 
-def _secant(
-    group: Group, channel: str, *, record: CalibrationRecord | None, machine_axes: Axes
-) -> Estimate | None:
+def _secant(group: Group, channel: str, *, shared: Shared) -> Estimate | None:
     plus, minus = group.step(1.0), group.step(-1.0)
     if plus is None or minus is None or plus.SA <= minus.SA:
         return None
@@ -51,28 +45,21 @@ def _secant(
         rise, own = plus.FY_common - minus.FY_common, np.hypot(plus.u_FY_common, minus.u_FY_common)
     else:
         rise, own = plus.MZ_common - minus.MZ_common, np.hypot(plus.u_MZ_common, minus.u_MZ_common)
-    shared = calibration_u(record, channel, ((plus, 1 / span), (minus, -1 / span)), machine_axes=machine_axes)
+    common = shared.calibration_u(channel, ((plus, 1 / span), (minus, -1 / span)))
     # The zero of the slip angle cancels in the span; what is left of the angle is its scatter.
     angle = abs(rise / span) * np.hypot(plus.sd_SA, minus.sd_SA) / span
-    u = float(np.sqrt((own / span) ** 2 + shared**2 + angle**2))
+    u = float(np.sqrt((own / span) ** 2 + common**2 + angle**2))
     return Estimate(value=_SIGN[channel] * rise / span, u=u, unit=_UNIT[channel])
 
 
-def _slope(
-    group: Group,
-    fit: CurveFit | None,
-    channel: str,
-    *,
-    record: CalibrationRecord | None,
-    machine_axes: Axes,
-) -> Estimate | None:
+def _slope(group: Group, fit: CurveFit | None, channel: str, *, shared: Shared) -> Estimate | None:
     if fit is None or "slope_at_zero" in fit.not_determined or fit.slope_at_zero is None:
         return None
     one = slope_estimate_at(fit, 0.0)
-    shared = calibration_u(record, channel, slope_weights(group), machine_axes=machine_axes)
+    common = shared.calibration_u(channel, slope_weights(group))
     return Estimate(
         value=_SIGN[channel] * one.value,
-        u=float(np.hypot(one.u, shared)),
+        u=float(np.hypot(one.u, common)),
         unit=_UNIT[channel],
-        dof=effective_dof([(one.u, one.dof), (shared, np.inf)]) if one.u or shared else one.dof,
+        dof=effective_dof([(one.u, one.dof), (common, np.inf)]) if one.u or common else one.dof,
     )

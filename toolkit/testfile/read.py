@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from io import BytesIO
 from pathlib import Path
 from typing import Any, cast, get_type_hints
 
@@ -12,7 +13,7 @@ from toolkit.errors import RecordingError
 from toolkit.estimate import Estimate
 from toolkit.findings import Finding, Level
 from toolkit.pipeline import TestResult
-from toolkit.recording.gate import check_workbook
+from toolkit.recording.gate import gate
 from toolkit.recording.model import TestInfo
 from toolkit.reduction.model import CalibrationUse, Condition, ReducedTest, Tare
 from toolkit.testfile.layout import (
@@ -32,12 +33,11 @@ Row = dict[str, Any]
 
 def is_test_file(path: Path) -> bool:
     """Tell whether a file is a whole test as `write_test_file` makes it."""
-    from python_calamine import CalamineError, load_workbook
+    from python_calamine import CalamineError
 
     try:
-        check_workbook(path)
-        return set(SHEETS) <= set(load_workbook(path).sheet_names)
-    except (RecordingError, CalamineError, OSError):
+        return set(SHEETS) <= set(_open(path).sheet_names)
+    except (RecordingError, CalamineError):
         return False
 
 
@@ -49,10 +49,7 @@ def read_test_file(path: Path) -> TestResult:
     RecordingError
         the file is no test file, of a newer schema, or was changed after it was written
     """
-    from python_calamine import load_workbook
-
-    check_workbook(path)
-    book = load_workbook(path)
+    book = _open(path)
     lacking = [name for name in SHEETS if name not in book.sheet_names]
     if lacking:
         raise _broken(path, f"no sheet {lacking[0]}", "the sheets of a reduced test")
@@ -79,6 +76,15 @@ def read_test_file(path: Path) -> TestResult:
             rule="test-file-changed",
         )
     return result
+
+
+def _open(path: Path) -> Any:
+    from python_calamine import CalamineWorkbook
+
+    gated = gate(path)
+    if gated.kind != "xlsx":
+        raise _broken(path, "a text file", "an .xlsx file")
+    return CalamineWorkbook.from_filelike(BytesIO(gated.data))
 
 
 def _broken(path: Path, got: str, expected: str) -> RecordingError:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from toolkit.estimate import Estimate
 from toolkit.files import atomic_path
-from toolkit.recording.marks import mark_workbook
+from toolkit.recording.marks import GENERATOR, output_keywords
 from toolkit.testfile.layout import CONDITION_FIELDS, KIND, SCHEMA, cell, content_hash, header
 
 if TYPE_CHECKING:
@@ -30,7 +30,8 @@ def write_test_file(path: Path, result: TestResult, recordings: Sequence[Recordi
 
     digest = content_hash(result)
     book = Workbook(write_only=True)
-    mark_workbook(book, simulated=result.reduced.info.simulated, machine=result.reduced.info.machine)
+    book.properties.creator = GENERATOR
+    book.properties.keywords = output_keywords(simulated=result.reduced.info.simulated)
     for name, rows in (
         ("provenance", _provenance(result, digest)),
         ("reduced", _reduced(result)),
