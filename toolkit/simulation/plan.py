@@ -68,6 +68,7 @@ class Plan:
 # Key of a section -> (field, dimension as `units.Unit.dimension` names it). "" is a plain number.
 _TIRE = {
     "plysteer": ("plysteer_rad", "angle"),
+    "aligning_shift": ("aligning_shift_rad", "angle"),
     "conicity": ("conicity_N", "force"),
     "nominal_load": ("nominal_load_N", "force"),
     "free_radius": ("free_radius_m", "length"),

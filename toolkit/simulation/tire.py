@@ -33,12 +33,15 @@ if TYPE_CHECKING:
 class TireTruth:
     """The virtual tire.
 
-    ``plysteer_rad`` pseudo slip angle (SAE); ``conicity_N`` force at ``nominal_load_N``;
+    ``plysteer_rad`` pseudo slip angle (SAE) of force and moment; ``aligning_shift_rad`` what the moment's
+    pseudo slip angle is more than the force's, so that MZ is not zero where FY is (residual aligning torque);
+    ``conicity_N`` force at ``nominal_load_N``;
     ``vertical_stiffness_N_m`` of the loaded tire on the drum; ``rolling_ratio`` effective rolling radius
     over free radius.
     """
 
     plysteer_rad: float = math.radians(0.12)
+    aligning_shift_rad: float = math.radians(0.10)
     conicity_N: float = 45.0
     nominal_load_N: float = 3700.0
     free_radius_m: float = 0.316
@@ -73,7 +76,7 @@ def forces(
     load = np.asarray(FZ, dtype=np.float64)
     return TireForces(
         FY=travel * lateral_force(slip_angle=slip, load=load, camber=gamma),
-        MZ=aligning_moment(slip_angle=slip, load=load, camber=gamma),
+        MZ=aligning_moment(slip_angle=slip - tire.aligning_shift_rad, load=load, camber=gamma),
         loaded_radius=tire.free_radius_m - np.maximum(load, 0.0) / tire.vertical_stiffness_N_m,
     )
 

@@ -1,0 +1,179 @@
+"""Write what the virtual machine made: recordings as LabVIEW writes them, test.toml, truth.json.
+
+Every file says that it is simulated. Everything is computed before the first file is written, each file is
+whole or absent, and a folder that holds anything else is refused.
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+from toolkit.errors import OutputError
+from toolkit.files import write_atomic
+from toolkit.recording.labview import write_labview
+from toolkit.simulation.cells import CELLS, LOADS, true_coefficients
+from toolkit.simulation.run import VirtualTest
+from toolkit.simulation.session import (
+    INDICATION_UNIT,
+    LOAD_UNITS,
+    VirtualSession,
+    check_csv,
+    loads_csv,
+    reference_sd,
+)
+from toolkit.simulation.truth import truth_document
+from toolkit.units import from_si, si_scale
+
+TRUTH = "truth.json"
+TEST = "test.toml"
+SESSION = "SESSION.toml"
+# CSV has no place for a remark: the names carry it.
+LOADS_CSV = "loads_simulated.csv"
+CHECK_CSV = "check_simulated.csv"
+_MARK = "# simulated: made by the virtual machine of the toolkit, no real tire was tested\n"
+
+
+def write_test(test: VirtualTest, folder: Path) -> tuple[Path, ...]:
+    """Write a virtual test into a folder; return the files, recordings first.
+
+    Raises
+    ------
+    OutputError
+        the folder holds other files, or cannot be written to
+    """
+    names = [file.name for file in test.files]
+    _prepare(folder, {*names, TEST, TRUTH})
+    for file in test.files:
+        write_labview(folder / file.name, test.plan.machine, file.columns, simulated=True)
+    write_atomic(folder / TEST, test_toml(test))
+    write_atomic(folder / TRUTH, _json(truth_document(test)))
+    return tuple(folder / name for name in (*names, TEST, TRUTH))
+
+
+def write_session(session: VirtualSession, folder: Path) -> tuple[Path, ...]:
+    """Write a virtual reference-load session into a folder; return the files, SESSION.toml first."""
+    _prepare(folder, {SESSION, LOADS_CSV, CHECK_CSV, TRUTH})
+    write_atomic(folder / LOADS_CSV, loads_csv(session))
+    write_atomic(folder / CHECK_CSV, check_csv(session))
+    write_atomic(folder / SESSION, session_toml(session))
+    write_atomic(folder / TRUTH, _json(session_truth(session)))
+    return tuple(folder / name for name in (SESSION, LOADS_CSV, CHECK_CSV, TRUTH))
+
+
+def test_toml(test: VirtualTest) -> str:
+    """Return test.toml: what an operator would have written down, and the tare."""
+    plan = test.plan
+    label = {"size": "205/55R16", "company": "simulated", "DOT": "SIMULATED", **dict(plan.label)}
+    speed = float(from_si(plan.machine.drum.speed_m_s, "km/h"))
+    lines = [
+        "schema = 1",
+        f"date = {plan.date}",
+        f"machine = {_text(plan.machine.name)}",
+        "simulated = true",
+        'operator = "virtual operator"',
+        'requestor = "simulated test"',
+        f"surface = {_text(plan.machine.drum.surface + ' drum (simulated)')}",
+        f"special = {_text('simulated: ' + plan.title)}",
+        f"rotation = {_text(plan.rotations[0])}",
+        f'speed = {{ value = {round(speed, 6)!r}, unit = "km/h" }}',
+        f'pressure = {{ value = {round(float(from_si(plan.pressure_Pa, "psi")), 6)!r}, unit = "psi" }}',
+        f'rated_load = {{ value = {plan.tire.nominal_load_N!r}, unit = "N" }}',
+        "",
+        "[tire]",
+        *(f"{key} = {_text(value)}" for key, value in label.items()),
+    ]
+    turned = [file for file in test.files if file.rotation != plan.rotations[0]]
+    if turned:
+        lines += ["", "[rotations]", *(f"{_text(file.name)} = {_text(file.rotation)}" for file in turned)]
+    values = ", ".join(f"{name} = {value!r}" for name, value in test.tare)
+    lines += [
+        "",
+        f"[tare]  # {test.tare_unit}, wheel mounted and lifted off the drum",
+        f"values = {{ {values} }}",
+    ]
+    return _MARK + "\n".join(lines) + "\n"
+
+
+def session_toml(session: VirtualSession) -> str:
+    """Return SESSION.toml for `toolkit calibrate`."""
+    plan, sd = session.plan, reference_sd(session.plan)
+    quoted = {name: ", ".join(_text(one) for one in names) for name, names in (("i", CELLS), ("l", LOADS))}
+    lines = [
+        "schema = 1",
+        f"instrument = {_text(plan.machine.name)}",
+        f"date = {plan.date}",
+        'operator = "virtual operator"',
+        'temperature = { value = 21.0, unit = "degC" }',
+        f"indications = [{quoted['i']}]",
+        f"loads = [{quoted['l']}]",
+        f"data = {_text(LOADS_CSV)}",
+        f"check = {_text(CHECK_CSV)}",
+        'zero = "tared"  # the amplifier was zeroed before each run',
+        "",
+        "[reference]",
+        'standard = "simulated reference loads"',
+        'certificate = "none: simulated"',
+        "",
+        "[reference.uncertainty]",
+        *(
+            f"{load} = {{ U = {2 * sd[load]:.4g}, k = 2, unit = {_text(LOAD_UNITS[load])} }}"
+            for load in LOADS
+        ),
+    ]
+    for name in CELLS:
+        lines += ["", f"[cells.{name}]", f"serial = {_text('VM15-' + name)}"]
+    return _MARK + "\n".join(lines) + "\n"
+
+
+def session_truth(session: VirtualSession) -> dict[str, Any]:
+    """Return what a perfect fit of the session would find, in the units of its files."""
+    plan = session.plan
+    per_unit = si_scale(INDICATION_UNIT)
+    true = true_coefficients(plan.cells)
+    return {
+        "schema": 1,
+        "generator": "toolkit",
+        "content": "truth of a virtual reference-load session",
+        "simulated": True,
+        "title": plan.title,
+        "machine": plan.machine.name,
+        "date": plan.date,
+        "seed": plan.seed,
+        "units": {"indications": INDICATION_UNIT, **LOAD_UNITS},
+        "coefficients": {
+            load: {
+                name: float(value) * per_unit / si_scale(LOAD_UNITS[load])
+                for name, value in zip(CELLS, true[load], strict=True)
+            }
+            for load in LOADS
+        },
+        "reference_sd": reference_sd(plan),
+    }
+
+
+def _prepare(folder: Path, names: set[str]) -> None:
+    if not folder.exists():
+        return
+    strangers = (
+        sorted(entry.name for entry in folder.iterdir() if entry.name not in names)
+        if folder.is_dir()
+        else [folder.name]
+    )
+    if strangers:
+        raise OutputError(
+            "the output folder holds other files",
+            where=folder,
+            got=", ".join(strangers[:3]) + (" ..." if len(strangers) > 3 else ""),
+            expected="a new or empty folder, or an earlier output of the same plan",
+            next_step="choose another folder with --out; nothing was written",
+        )
+
+
+def _json(document: dict[str, Any]) -> str:
+    return json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def _text(value: str) -> str:
+    return json.dumps(value, ensure_ascii=False)
