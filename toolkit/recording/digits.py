@@ -7,6 +7,7 @@ that takes 15 or more significant digits, the file holds full doubles and nothin
 
 from __future__ import annotations
 
+import math
 from decimal import Decimal
 from typing import TYPE_CHECKING
 
@@ -40,7 +41,7 @@ def half_last_place(values: ArrayLike) -> NDArray[np.float64]:
     [0.0, 0.0]
     """
     given = np.asarray(values, dtype=np.float64)
-    table = given.reshape(given.shape[0], -1)
+    table = given.reshape(len(given), math.prod(given.shape[1:]))
     half = np.zeros(table.shape)
     for column in range(table.shape[1]):
         _column(np.abs(table[:, column]), half[:, column])
@@ -50,7 +51,7 @@ def half_last_place(values: ArrayLike) -> NDArray[np.float64]:
 def _column(size: NDArray[np.float64], half: NDArray[np.float64]) -> None:
     zero = size == 0
     any_zero = bool(zero.any())
-    if any_zero and bool(zero.all()):
+    if bool(zero.all()):  # also of an empty column
         return
     decade = _decades(np.where(zero, 1.0, size) if any_zero else size)
     smallest = np.inf
