@@ -85,7 +85,8 @@ _CANONICAL = {
 }  # fmt: skip
 
 _ANGLES = ("degree", "radian", "turn", "arcminute", "milliradian")
-_NEVER_GUESSED = re.compile(r"[^\w\s*/^.()·°µ%+-]")
+# Also refused: a number to a power, which no unit needs and which can be made to compute for ever.
+_NEVER_GUESSED = re.compile(r"[^\w\s*/^.()·°µ%+-]|\d\s*\)?\s*(\*\*|\^)|.{41}")
 
 
 @dataclass(frozen=True, slots=True)

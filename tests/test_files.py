@@ -1,0 +1,72 @@
+"""Files: whole or not at all."""
+
+from pathlib import Path
+
+import pytest
+
+from toolkit.errors import ConfigError, OutputError
+from toolkit.files import atomic_path, check_keys, read_toml, sha256_bytes, sha256_file, write_atomic
+
+
+def test_write_and_hash(tmp_path: Path) -> None:
+    target = tmp_path / "new" / "a.txt"
+    write_atomic(target, "text")
+    assert target.read_text() == "text"
+    assert sha256_file(target) == sha256_bytes(b"text")
+    assert [p.name for p in target.parent.iterdir()] == ["a.txt"]
+
+
+def test_a_failure_leaves_the_old_file_and_nothing_else(tmp_path: Path) -> None:
+    target = tmp_path / "a.txt"
+    write_atomic(target, "old")
+
+    def fail() -> None:
+        with atomic_path(target) as temporary:
+            temporary.write_text("half")
+            raise ZeroDivisionError
+
+    with pytest.raises(ZeroDivisionError):
+        fail()
+    assert target.read_text() == "old"
+    assert [p.name for p in tmp_path.iterdir()] == ["a.txt"]
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs /dev/full to stand for a full disk")
+def test_a_full_disk_is_an_error_with_a_next_step(tmp_path: Path) -> None:
+    def fill() -> None:
+        with atomic_path(tmp_path / "a.txt"), Path("/dev/full").open("wb", buffering=0) as stream:
+            stream.write(b"x")
+
+    with pytest.raises(OutputError) as caught:
+        fill()
+    assert "No space left" in str(caught.value.got)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_folder_that_is_a_file(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    with pytest.raises(OutputError):
+        write_atomic(tmp_path / "file" / "a.txt", "x")
+
+
+def test_unknown_key_names_the_nearest() -> None:
+    with pytest.raises(ConfigError) as caught:
+        check_keys({"operater": "x"}, ["operator", "requestor"], where="test.toml")
+    assert caught.value.next_step == "did you mean 'operator'?"
+
+
+@pytest.mark.parametrize("content", [b"a = ", b"\xff\xfe", b"a = 1\na = 2"])
+def test_broken_toml(tmp_path: Path, content: bytes) -> None:
+    (tmp_path / "x.toml").write_bytes(content)
+    with pytest.raises(ConfigError, match="not TOML"):
+        read_toml(tmp_path / "x.toml")
+
+
+def test_missing_toml(tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match="cannot be read"):
+        read_toml(tmp_path / "x.toml")
+
+
+def test_mode_is_readable_by_others(tmp_path: Path) -> None:
+    write_atomic(tmp_path / "a", b"x")
+    assert (tmp_path / "a").stat().st_mode & 0o777 == 0o644

@@ -1,0 +1,105 @@
+"""Units: exact factors, spellings, dimensions of their own, and no guesses."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from toolkit.errors import UnitError
+from toolkit.units import _EXACT, _parse, from_si, registry, si_scale, to_si, unit
+
+# NIST SP 811 (2008), appendix B: exact where it prints a bold factor.
+PUBLISHED = {
+    "lbf": (4.4482216152605, "N"),
+    "lbf*ft": (1.3558179483314004, "N*m"),
+    "psi": (6894.757293168361, "Pa"),
+    "kip": (4448.2216152605, "N"),
+    "mph": (0.44704, "m/s"),
+    "bar": (1e5, "Pa"),
+}
+
+
+@pytest.mark.parametrize("text", PUBLISHED)
+def test_published_factors(text: str) -> None:
+    factor, si = PUBLISHED[text]
+    assert unit(text).factor == pytest.approx(factor, rel=1e-14)
+    assert unit(text).si == si
+
+
+_PINT = {
+    "mV/V": "millivolt/volt",
+    "V/V": "volt/volt",
+    "count": "dimensionless",
+    "lbf*ft": "force_pound*foot",
+    "1": "dimensionless",
+    "deg": "degree",
+    "rad": "radian",
+}
+
+
+@pytest.mark.parametrize("text", sorted(_EXACT))
+def test_table_of_exact_units_agrees_with_pint(text: str) -> None:
+    ureg = registry()
+    spelled = _PINT.get(text, text)
+    target = {"V/V": "dimensionless", "count": "dimensionless", "1": "dimensionless", "rad": "radian"}
+    factor, offset, si, _ = _EXACT[text]
+    zero = ureg.Quantity(0.0, spelled).to(target.get(si, si)).magnitude
+    one = ureg.Quantity(1.0, spelled).to(target.get(si, si)).magnitude
+    assert one - zero == pytest.approx(factor, rel=1e-12)
+    assert zero == pytest.approx(offset, rel=1e-12)
+
+
+@pytest.mark.parametrize("text", ["lb", "lbs", "lbf", "LBF".lower()])
+def test_lb_in_a_file_is_pound_force(text: str) -> None:
+    assert unit(text).dimension == "force"
+    assert unit(text).text == "lbf"
+
+
+@pytest.mark.parametrize("text", ["lb-ft", "lbf·ft", "ft-lb", "lb ft", "ft*lbf", "lbf ft"])
+def test_spellings_of_the_moment(text: str) -> None:
+    assert unit(text).factor == unit("lbf*ft").factor
+    assert unit(text).text == "lbf*ft"
+
+
+def test_bridge_output_is_no_plain_number_and_no_count() -> None:
+    assert {unit(t).dimension for t in ("mV/V", "count", "1")} == {"bridge_ratio", "count", "ratio"}
+    with pytest.raises(UnitError, match="not one of ratio"):
+        si_scale("mV/V", "ratio")
+
+
+def test_units_that_only_pint_knows() -> None:
+    assert unit("kgf").factor == pytest.approx(9.80665)
+    assert unit("inch").factor == pytest.approx(0.0254)
+    assert unit("N*mm").si == "N*m"
+    assert unit("N/deg").factor == pytest.approx(180 / math.pi)
+    assert unit("degF").offset == pytest.approx(459.67 * 5 / 9)
+
+
+@pytest.mark.parametrize("text", ["furlongs per lunch", "N;drop", "??", "import os", "__class__", "N**", "9**9**9**9", "(9)**9", "m" * 60])
+def test_unknown_unit_is_an_error_that_says_where(text: str) -> None:
+    with pytest.raises(UnitError) as caught:
+        unit(text, where="file.xlsx, column FZ")
+    assert caught.value.got == text
+    assert caught.value.where == "file.xlsx, column FZ"
+    assert caught.value.exit_code == 2
+
+
+def test_an_offset_unit_has_no_plain_scale() -> None:
+    with pytest.raises(UnitError):
+        si_scale("degC")
+
+
+@given(
+    st.sampled_from(sorted(_EXACT)),
+    st.lists(st.floats(min_value=-1e9, max_value=1e9), min_size=1, max_size=5),
+)
+def test_round_trip(text: str, values: list[float]) -> None:
+    there = to_si(values, text)
+    assert there.shape == (len(values),)
+    np.testing.assert_allclose(from_si(there, text), values, rtol=1e-12, atol=1e-9)
+
+
+def test_parsing_is_cached() -> None:
+    assert _parse("lbf") is _parse("lbf")
