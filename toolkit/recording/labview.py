@@ -15,6 +15,7 @@ import numpy as np
 from toolkit.errors import OutputError
 from toolkit.files import write_atomic
 from toolkit.machine import Machine
+from toolkit.recording.cells import reference
 from toolkit.recording.marks import GENERATOR, recording_keywords
 
 if TYPE_CHECKING:
@@ -58,32 +59,17 @@ def write_labview(
     headers = [machine.column(name).header if "[" not in name else name for name in names]
     values = [np.asarray(columns[name], dtype=np.float64) for name in names]
     _check(path, names, values)
-    keywords = recording_keywords(machine=machine.name, simulated=simulated)
-    write_atomic(
-        path,
-        _reproducible(
-            _workbook(
-                headers,
-                np.column_stack(values).tolist(),
-                sheet=SIMULATED_SHEET if simulated else _SHEET,
-                title=title or f"{machine.title}{' - SIMULATED' if simulated else ''}",
-                keywords=keywords,
-                created=created,
-            ),
-            created,
-        ),
+    shell = _shell(
+        headers,
+        sheet=SIMULATED_SHEET if simulated else _SHEET,
+        title=title or f"{machine.title}{' - SIMULATED' if simulated else ''}",
+        keywords=recording_keywords(machine=machine.name, simulated=simulated),
+        created=created,
     )
+    write_atomic(path, _filled(shell, _rows_xml(values), created))
 
 
-def _workbook(
-    headers: list[str],
-    rows: list[list[float]],
-    *,
-    sheet: str,
-    title: str,
-    keywords: str,
-    created: dt.datetime,
-) -> bytes:
+def _shell(headers: list[str], *, sheet: str, title: str, keywords: str, created: dt.datetime) -> bytes:
     from openpyxl import Workbook
     from openpyxl.cell import WriteOnlyCell
 
@@ -95,8 +81,6 @@ def _workbook(
         cell.data_type = "s"  # a header that begins with = is a text all the same
         cells.append(cell)
     page.append(cells)
-    for row in rows:
-        page.append(row)
     properties = book.properties
     properties.creator = GENERATOR
     properties.lastModifiedBy = GENERATOR
@@ -108,15 +92,31 @@ def _workbook(
     return stream.getvalue()
 
 
-def _reproducible(data: bytes, created: dt.datetime) -> bytes:
+def _rows_xml(values: list[NDArray[np.float64]]) -> bytes:
+    # openpyxl writes 16 digits, one too few for a double; repr has as many as are needed.
+    letters = [reference(1, column + 1)[:-1] for column in range(len(values))]
+    lines = []
+    for row, numbers in enumerate(np.column_stack(values).tolist(), start=2):
+        cells = "".join(
+            f'<c r="{letter}{row}"><v>{number!r}</v></c>'
+            for letter, number in zip(letters, numbers, strict=True)
+        )
+        lines.append(f'<row r="{row}">{cells}</row>')
+    return "".join(lines).encode()
+
+
+def _filled(shell: bytes, rows: bytes, created: dt.datetime) -> bytes:
     # openpyxl stamps members and properties with the present time; equal content shall be equal bytes.
     stamp = created.strftime("%Y-%m-%dT%H:%M:%SZ").encode()
     stream = io.BytesIO()
-    with zipfile.ZipFile(io.BytesIO(data)) as source, zipfile.ZipFile(stream, "w") as target:
+    with zipfile.ZipFile(io.BytesIO(shell)) as source, zipfile.ZipFile(stream, "w") as target:
         for name in source.namelist():
             content = source.read(name)
             if name == "docProps/core.xml":
                 content = _MODIFIED.sub(rb"\g<1>" + stamp + rb"\g<2>", content)
+            elif name.startswith("xl/worksheets/"):
+                head, end, tail = content.partition(b"</sheetData>")
+                content = head + rows + end + tail
             info = zipfile.ZipInfo(name, date_time=_ZIP_STAMP)
             info.compress_type = zipfile.ZIP_DEFLATED
             target.writestr(info, content)
