@@ -1,103 +1,95 @@
-"""Start shapes that come from the data: a library of Magic Formula shapes, scored against every curve.
+"""Start shapes that come from the data: a grid of Magic Formula shapes, scored against every curve.
 
-The library is the same for every curve (its abscissa is normalised), so scoring all of it against all
-curves is three matrix products. It is cut into strata of C, E and B; the best few strata of a curve, each by its
-best shape, are the starts: diverse by construction, and near the data.
+The grid is the same for every curve (its abscissa is normalised), so scoring all of it against all curves is
+three matrix products. Where the score is lower than at all neighbours on the grid a basin begins: the
+lowest of these local minima are the starts, diverse by construction and near the data.
 """
 
 from __future__ import annotations
 
 from functools import cache
+from itertools import product
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolkit.tires.kernel import D_LIMIT, Problems, curvature_parameter, sine
+from toolkit.tires.kernel import D_LIMIT, SV_LIMIT, Problems, curvature_parameter, sine
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from toolkit.tires.kernel import Array
 
+    Array32 = NDArray[np.float32]
+
 _NODES = 40
-_PER_STRATUM = 60
-_C = ((0.3, 1.25), (1.25, 1.9), (1.9, 2.9), (2.9, 4.0))
-_Q = (
-    (curvature_parameter(0.999), curvature_parameter(-0.5)),
-    (curvature_parameter(-0.5), curvature_parameter(-19.0)),
-)
-_LN_B = ((np.log(0.08), np.log(1.5)), (np.log(1.5), np.log(24.0)))
+_B = (0.08, 0.2, 0.5, 1.0, 1.8, 3.2, 6.0, 12.0, 24.0)
+_C = (0.35, 0.7, 1.1, 1.6, 2.2, 2.9, 3.6)
+_E = (-19.0, -6.0, -2.0, -0.3, 0.5, 0.9)
+_H = (-3.0, -1.8, -1.2, -0.9, -0.6, -0.3, 0.0, 0.3, 0.6, 0.9, 1.2, 1.8, 3.0)
+_GRID = (len(_B), len(_C), len(_E), len(_H))
 
 
 @cache
-def library() -> tuple[Array, Array]:
-    """Return the shapes (strata, shapes, 4) and their sines at the nodes (strata * shapes, nodes)."""
-    points = _halton(_PER_STRATUM)
-    strata = []
-    for c in _C:
-        for q in _Q:
-            for b in _LN_B:
-                low = np.array([b[0], c[0], q[0], 0.0])
-                high = np.array([b[1], c[1], q[1], 0.0])
-                shapes = low + (high - low) * points
-                # Most curves pass zero near their middle; some begin there (one-sided), few lie beyond.
-                shapes[:, 3] = 1.4 * np.sign(points[:, 3] - 0.5) * np.abs(2 * points[:, 3] - 1) ** 1.7
-                strata.append(shapes)
-    shapes = np.array(strata)
-    nodes = np.broadcast_to(_nodes(), (shapes.shape[0] * shapes.shape[1], _NODES))
-    return shapes, sine(shapes.reshape(-1, 4), nodes)
+def library() -> tuple[Array, Array32, Array32]:
+    """Return the shapes (shapes, 4), their sines at the nodes and the squares (nodes, shapes).
+
+    Single precision is enough: a score only ranks starts.
+    """
+    shapes = np.array(list(product(np.log(_B), _C, curvature_parameter(np.array(_E)), _H)))
+    nodes = np.broadcast_to(np.linspace(-1.0, 1.0, _NODES), (len(shapes), _NODES))
+    sines = np.ascontiguousarray(sine(shapes, nodes).T.astype(np.float32))
+    return shapes, sines, sines * sines
 
 
 def pick(problems: Problems, count: int) -> Array:
-    """Return the best ``count`` start shapes of every curve (curves, count, 4), best first."""
-    shapes, sines = library()
-    strata, per, _ = shapes.shape
+    """Return the ``count`` best start shapes of every curve (curves, count, 4), best first."""
+    shapes, sines, squares = library()
     weight, moment = _deposit(problems)
     total = weight.sum(axis=1)[:, None]
-    f, ff, fy = weight @ sines.T, weight @ (sines * sines).T, moment @ sines.T
     y = moment.sum(axis=1)[:, None]
-    variance = np.maximum(ff - f * f / total, 1e-12 * total)
-    gain = fy - f * y / total
-    D = np.clip(gain / variance, -D_LIMIT, D_LIMIT)
-    score = D * D * variance - 2 * D * gain
-    inside = (shapes[..., 3].reshape(-1) >= problems.low[:, 3:4]) & (
-        shapes[..., 3].reshape(-1) <= problems.high[:, 3:4]
-    )
-    score = np.where(inside, score, score * 0.5).reshape(-1, strata, per)
-    best = score.argmin(axis=2)
-    order = np.argsort(np.take_along_axis(score, best[..., None], axis=2)[..., 0], axis=1)[:, :count]
-    chosen = np.take_along_axis(best, order, axis=1)
-    return np.clip(shapes[order, chosen], problems.low[:, None, :], problems.high[:, None, :])
+    f, ff, fy = weight @ sines, weight @ squares, moment @ sines
+    # D and Sv as in the kernel, each clipped in turn; then the cost without its constant sum of y^2.
+    D = np.clip((fy - f * (y / total)) / np.maximum(ff - f * f / total, 1e-6 * total), -D_LIMIT, D_LIMIT)
+    Sv = np.clip((y - D * f) / total, -SV_LIMIT, SV_LIMIT)
+    np.maximum(ff, 1e-6 * total, out=ff)
+    D = np.clip((fy - Sv * f) / ff, -D_LIMIT, D_LIMIT)
+    score = D * (D * ff + 2 * (Sv * f - fy)) + Sv * (Sv * total - 2 * y)
+    beyond = (shapes[:, 3] < problems.low[:, 3:4]) | (shapes[:, 3] > problems.high[:, 3:4])
+    score[beyond] = np.inf
+    # A large number instead of a mask: where there are too few basins, the next best shapes fill up.
+    score += np.where(_is_basin(score), np.float32(0), np.float32(1e6))
+    best = np.argpartition(score, count, axis=1)[:, :count]
+    order = np.argsort(np.take_along_axis(score, best, axis=1), axis=1)
+    best = np.take_along_axis(best, order, axis=1)
+    return np.clip(shapes[best], problems.low[:, None, :], problems.high[:, None, :])
 
 
-def _deposit(problems: Problems) -> tuple[Array, Array]:
-    # Shares each point between its two nearest nodes: weights and weighted ordinates on the library's nodes.
-    curves, points = problems.u.shape
+def _is_basin(score: Array32) -> NDArray[np.bool_]:
+    # No lower neighbour along any of the four axes of the grid.
+    grid = score.reshape(-1, *_GRID)
+    basin = np.ones(grid.shape, dtype=np.bool_)
+    for axis in range(1, grid.ndim):
+        lead = (slice(None),) * axis
+        one, other = (*lead, slice(None, -1)), (*lead, slice(1, None))
+        basin[one] &= grid[one] <= grid[other]
+        basin[other] &= grid[other] <= grid[one]
+    return basin.reshape(score.shape)
+
+
+def _deposit(problems: Problems) -> tuple[Array32, Array32]:
+    # Shares each point between its two nearest nodes: weights and weighted ordinates on the grid's nodes.
+    curves = len(problems.u)
     w = problems.sw**2
     place = np.clip((problems.u + 1.0) * (0.5 * (_NODES - 1)), 0.0, _NODES - 1 - 1e-9)
     left = place.astype(np.intp)
     share = place - left
     slot = left + _NODES * np.arange(curves)[:, None]
     size = curves * _NODES + 1
-    weight = np.bincount(slot.ravel(), (w * (1 - share)).ravel(), size)
-    weight += np.bincount(slot.ravel() + 1, (w * share).ravel(), size)
-    wy = w * problems.y
-    moment = np.bincount(slot.ravel(), (wy * (1 - share)).ravel(), size)
-    moment += np.bincount(slot.ravel() + 1, (wy * share).ravel(), size)
-    return weight[:-1].reshape(curves, _NODES), moment[:-1].reshape(curves, _NODES)
 
+    def deposit(amount: Array) -> Array32:
+        sums = np.bincount(slot.ravel(), (amount * (1 - share)).ravel(), size)
+        sums = sums + np.bincount(slot.ravel() + 1, (amount * share).ravel(), size)
+        return sums[:-1].reshape(curves, _NODES).astype(np.float32)
 
-def _nodes() -> Array:
-    return np.linspace(-1.0, 1.0, _NODES)
-
-
-def _halton(count: int) -> Array:
-    # Low-discrepancy points of [0, 1]^4 in the bases 2, 3, 5, 7 (Halton 1960).
-    result = np.empty((count, 4))
-    for column, base in enumerate((2, 3, 5, 7)):
-        for row in range(count):
-            index, fraction, value = row + 1, 1.0, 0.0
-            while index:
-                fraction /= base
-                index, digit = divmod(index, base)
-                value += fraction * digit
-            result[row, column] = value
-    return result
+    return deposit(w), deposit(w * problems.y)
