@@ -192,7 +192,7 @@ def _svd_fit(
     solution = right.T @ ((left.T @ (loads * w)) / values)
     # One step of refinement: the second solve works on the residuals and mends the first one's rounding.
     solution = solution + right.T @ ((left.T @ ((loads - design @ solution) * w)) / values)
-    residuals = (loads - design @ solution) * w
+    residuals = loads - design @ solution
     sd = float(np.sqrt(residuals @ residuals / (n - p)))
     # Back to the raw terms: c = slope / scale, intercept = constant - centre . c
     back = np.zeros((p, p))
