@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
@@ -12,16 +12,15 @@ from toolkit.characteristics.pull import Direction, pull
 from toolkit.characteristics.shared import Shared, line_at_zero
 from toolkit.characteristics.stiffness import stiffness
 from toolkit.findings import Finding
-from toolkit.tires.fit import Curve, estimate_at, fit_curves
+from toolkit.tires.evaluate import estimate_at
+from toolkit.tires.fit import fit_curves, why_not
+from toolkit.tires.model import Curve
 from toolkit.units import from_si
 
 if TYPE_CHECKING:
     from toolkit.calibration.record import CalibrationRecord
     from toolkit.machine import Machine
     from toolkit.reduction.model import ReducedTest
-
-# Six parameters and at least one degree of freedom.
-_FEWEST_POINTS = 7
 
 
 def characterise(
@@ -32,7 +31,7 @@ def characterise(
     ``record`` gives the covariance of its coefficients; None where the reduced test came without it.
     """
     groups = group(reduced)
-    fits = _fit(groups)
+    fits, findings = _fit(groups)
     directions = [Direction(group=g, fit=f) for g, f in zip(groups, fits, strict=True)]
     shared = Shared(
         record=record,
@@ -48,43 +47,54 @@ def characterise(
         fits=fits,
         stiffness=tuple(stiffness(d.group, d.fit, shared=shared) for d in directions),
         pull=tuple(pulls),
-        findings=(*_curve_findings(directions), *_line_findings(directions)),
+        findings=(*findings, *_line_findings(directions)),
     )
 
 
-def _fit(groups: tuple[Group, ...]) -> tuple[DirectionFit, ...]:
-    enough = [g for g in groups if len(g.conditions) >= _FEWEST_POINTS and np.ptp(g.SA) > 0]
-    curves = [
-        Curve(SA=g.SA, y=g.values(channel), channel=channel, load_N=g.load_N, axes="SAE")
-        for g in enough
-        for channel in ("FY", "MZ")
+def _curve(group: Group, channel: Literal["FY", "MZ"]) -> Curve:
+    return Curve(SA=group.SA, y=group.values(channel), channel=channel, load_N=group.load_N, axes="SAE")
+
+
+def _fit(groups: tuple[Group, ...]) -> tuple[tuple[DirectionFit, ...], tuple[Finding, ...]]:
+    """Fit every curve that can be fitted, all in one batch; the others become findings and None."""
+    wanted = [
+        (index, curve) for index, g in enumerate(groups) for curve in (_curve(g, "FY"), _curve(g, "MZ"))
     ]
-    solved = dict(zip([(id(g), c) for g in enough for c in ("FY", "MZ")], fit_curves(curves), strict=True))
-    return tuple(
-        DirectionFit(
-            rotation=g.rotation, load_N=g.load_N, FY=solved.get((id(g), "FY")), MZ=solved.get((id(g), "MZ"))
+    refused = {(index, curve.channel): why_not(curve) for index, curve in wanted}
+    good = [(index, curve) for index, curve in wanted if refused[index, curve.channel] is None]
+    solved = dict(
+        zip(
+            [(index, curve.channel) for index, curve in good],
+            fit_curves([curve for _, curve in good]) if good else (),
+            strict=True,
         )
-        for g in groups
     )
+    findings = [
+        Finding(
+            rule=problem.rule or "not-fitted",
+            where=f"{_where(groups[index])}, {channel}",
+            message=f"{problem.what} (got {problem.got}, expected {problem.expected}); "
+            "what the curve feeds is null",
+        )
+        for (index, channel), problem in refused.items()
+        if problem is not None
+    ]
+    findings += [
+        Finding(rule="not-converged", where=f"{_where(groups[index])}, {channel}", message=fit.message)
+        for (index, channel), fit in solved.items()
+        if not fit.converged
+    ]
+    fits = tuple(
+        DirectionFit(
+            rotation=g.rotation, load_N=g.load_N, FY=solved.get((index, "FY")), MZ=solved.get((index, "MZ"))
+        )
+        for index, g in enumerate(groups)
+    )
+    return fits, tuple(findings)
 
 
-def _curve_findings(directions: list[Direction]) -> list[Finding]:
-    found = []
-    for one in directions:
-        where = f"drum {one.group.rotation}, {float(from_si(one.group.load_N, 'lbf')):.0f} lbf"
-        for channel, fit in (("FY", one.fit.FY), ("MZ", one.fit.MZ)):
-            if fit is None:
-                found.append(
-                    Finding(
-                        rule="too-few-angles",
-                        where=where,
-                        message=f"{len(one.group.conditions)} slip angles are too few for a {channel} curve "
-                        f"(at least {_FEWEST_POINTS}); what it feeds is null",
-                    )
-                )
-            elif not fit.converged:
-                found.append(Finding(rule="not-converged", where=f"{where}, {channel}", message=fit.message))
-    return found
+def _where(group: Group) -> str:
+    return f"drum {group.rotation}, {float(from_si(group.load_N, 'lbf')):.0f} lbf"
 
 
 def _line_findings(directions: list[Direction]) -> list[Finding]:
@@ -96,13 +106,13 @@ def _line_findings(directions: list[Direction]) -> list[Finding]:
             if fit is None or line is None:
                 continue
             at_zero = estimate_at(fit, 0.0)
-            # A tenth of the channel's range: the line itself is wrong by the curve's bend.
+            # The line itself is wrong by the curve's bend: a fiftieth of the range is left to it.
             limit = max(5 * at_zero.u, 0.02 * float(np.ptp(one.group.values(channel))))
             if abs(at_zero.value - line) > limit:
                 found.append(
                     Finding(
                         rule="curve-against-line",
-                        where=f"drum {one.group.rotation}, {float(from_si(one.group.load_N, 'lbf')):.0f} lbf",
+                        where=_where(one.group),
                         message=f"{channel} at SA = 0 is {at_zero.value:.4g} by the curve and {line:.4g} by "
                         "the line through the nearest points: look at the residuals",
                     )

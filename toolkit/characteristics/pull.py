@@ -21,7 +21,7 @@ import numpy as np
 from toolkit.characteristics.model import DirectionFit, Pull
 from toolkit.characteristics.shared import Shared, weights_at_zero
 from toolkit.estimate import Estimate, effective_dof
-from toolkit.tires.fit import estimate_at, slope_estimate_at, zero_crossing
+from toolkit.tires.evaluate import estimate_at, slope_estimate_at, zero_crossing
 
 if TYPE_CHECKING:
     from toolkit.characteristics.groups import Group

@@ -14,7 +14,7 @@ import numpy as np
 from toolkit.characteristics.model import DirectionFit, Stiffness
 from toolkit.characteristics.shared import Shared, slope_weights
 from toolkit.estimate import Estimate, effective_dof
-from toolkit.tires.fit import slope_estimate_at
+from toolkit.tires.evaluate import slope_estimate_at, value_at
 
 if TYPE_CHECKING:
     from toolkit.characteristics.groups import Group
@@ -29,27 +29,38 @@ def stiffness(group: Group, fit: DirectionFit, *, shared: Shared) -> Stiffness:
     return Stiffness(
         load_N=group.load_N,
         rotation=group.rotation,
-        secant_cornering=_secant(group, "FY", shared=shared),
-        secant_aligning=_secant(group, "MZ", shared=shared),
+        secant_cornering=_secant(group, fit.FY, "FY", shared=shared),
+        secant_aligning=_secant(group, fit.MZ, "MZ", shared=shared),
         slope_cornering=_slope(group, fit.FY, "FY", shared=shared),
         slope_aligning=_slope(group, fit.MZ, "MZ", shared=shared),
     )
 
 
-def _secant(group: Group, channel: str, *, shared: Shared) -> Estimate | None:
+def _secant(group: Group, fit: CurveFit | None, channel: str, *, shared: Shared) -> Estimate | None:
+    """Return (y(1 deg) - y(-1 deg)) / 2 deg from the measured steps.
+
+    A steering zero moves both steps; each value is carried from its measured angle to the step's along
+    the fitted curve, so that the secant is that of the definition. Without a curve the measured span is
+    used as it is.
+    """
     plus, minus = group.step(1.0), group.step(-1.0)
     if plus is None or minus is None or plus.SA <= minus.SA:
         return None
-    span = plus.SA - minus.SA
-    if channel == "FY":
-        rise, own = plus.FY_common - minus.FY_common, np.hypot(plus.u_FY_common, minus.u_FY_common)
-    else:
-        rise, own = plus.MZ_common - minus.MZ_common, np.hypot(plus.u_MZ_common, minus.u_MZ_common)
+    is_force = channel == "FY"
+    values = np.array([c.FY_common if is_force else c.MZ_common for c in (plus, minus)])
+    own = np.array([c.u_FY_common if is_force else c.u_MZ_common for c in (plus, minus)])
+    angles = np.array([plus.SA, minus.SA])
+    if fit is not None:
+        steps = np.radians([1.0, -1.0])
+        values = values + value_at(fit, steps) - value_at(fit, angles)
+        angles = steps
+    span = float(angles[0] - angles[1])
+    slope = float(values[0] - values[1]) / span
     common = shared.calibration_u(channel, ((plus, 1 / span), (minus, -1 / span)))
     # The zero of the slip angle cancels in the span; what is left of the angle is its scatter.
-    angle = abs(rise / span) * np.hypot(plus.sd_SA, minus.sd_SA) / span
-    u = float(np.sqrt((own / span) ** 2 + common**2 + angle**2))
-    return Estimate(value=_SIGN[channel] * rise / span, u=u, unit=_UNIT[channel])
+    scatter = slope * np.hypot(plus.sd_SA, minus.sd_SA)
+    u = float(np.sqrt(own @ own + scatter**2)) / span
+    return Estimate(value=_SIGN[channel] * slope, u=float(np.hypot(u, common)), unit=_UNIT[channel])
 
 
 def _slope(group: Group, fit: CurveFit | None, channel: str, *, shared: Shared) -> Estimate | None:

@@ -57,6 +57,12 @@ def _sheet(book: Any, name: str, rows: Rows) -> None:
     bold = Font(bold=True)
 
     def made(value: Any, *, head: bool) -> Any:
+        # openpyxl writes 16 digits; a double that needs 17 is given as its own shortest decimal, typed as
+        # the number that it is.
+        if isinstance(value, float) and float(f"{value:.16g}") != value:
+            exact = WriteOnlyCell(sheet, value=repr(value))
+            exact.data_type = "n"
+            return exact
         # A text is a text even where it begins like a formula: openpyxl would guess otherwise.
         if not (head or (isinstance(value, str) and value.startswith("="))):
             return value
