@@ -119,6 +119,10 @@ def _values(
         "software.name": "toolkit", "software.version": __version__,
         "laboratory.name": style.laboratory, "laboratory.address": style.address,
         "simulated": "simulated data" if info.simulated else "measured data",
+        **{
+            f"unit.{name.replace('/', '_per_')}": str(style.unit(unit)[0]).replace("*", "·")
+            for name, unit in UNITS.items()
+        },
     }  # fmt: skip
     numbers: dict[str, float | None] = {
         "test.pressure.psi": psi,

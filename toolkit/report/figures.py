@@ -69,7 +69,7 @@ _RC = {
 
 
 def _furnish(axes: Axes, plot: Plot) -> None:
-    from matplotlib.ticker import MaxNLocator
+    from matplotlib.ticker import MaxNLocator, MultipleLocator
 
     axes.set_xlabel(plot.x_label)
     axes.set_ylabel(plot.y_label)
@@ -80,8 +80,9 @@ def _furnish(axes: Axes, plot: Plot) -> None:
         axes.axvline(0.0, color="#606060", linewidth=0.8, zorder=1)
     for side in ("top", "right"):
         axes.spines[side].set_visible(False)
-    axes.yaxis.set_major_locator(MaxNLocator(nbins=7))
-    axes.xaxis.set_major_locator(MaxNLocator(nbins=8))
+    round_steps = [1, 2, 2.5, 5, 10]
+    axes.yaxis.set_major_locator(MaxNLocator(nbins=8, steps=round_steps))
+    axes.xaxis.set_major_locator(MultipleLocator(2) if plot.zero_x else MaxNLocator(nbins=9, steps=round_steps))
 
 
 def _curve(axes: Axes, curve: Curve) -> None:
@@ -93,8 +94,9 @@ def _curve(axes: Axes, curve: Curve) -> None:
         axes.plot(curve.x, curve.y, color=_GREY, linewidth=0.7, zorder=2)
         if curve.note:
             axes.annotate(
-                curve.note, (curve.x[-1], curve.y[-1]), textcoords="offset points", xytext=(4, 1),
-                fontsize=7.5, color="#505050", zorder=5,
+                curve.note, (curve.x[-1], curve.y[-1]), textcoords="offset points",
+                xytext=(9 if curve.x[-1] >= 0 else -9, 7 if curve.y[-1] >= 0 else -7), ha="center", va="center",
+                fontsize=7.5, color="#303030", zorder=6,
             )  # fmt: skip
         return
     if curve.style == "line":

@@ -23,17 +23,11 @@ _AXES_NOTE = "SAE J670 axes"
 _SYMBOLS = {"FY": "lateral force FY", "MZ": "aligning moment MZ"}
 
 
-def curve_values(fit: CurveFit, slip_rad: np.ndarray) -> np.ndarray | None:
-    """Return a per-load Magic Formula at slip angles [rad] (n,); None for another model.
+def curve_values(fit: CurveFit, slip_rad: np.ndarray) -> np.ndarray:
+    """Return a fitted curve at slip angles [rad] (n,), [N] or [N·m]."""
+    from toolkit.tires.evaluate import value_at
 
-    y = D sin(C arctan(Bx - E(Bx - arctan Bx))) + Sv, x = SA + Sh (Bakker, Nyborg and Pacejka 1987).
-    """
-    values = {one.name: one.value for one in fit.parameters}
-    if not {"B", "C", "D", "E", "Sh", "Sv"} <= set(values):
-        return None
-    bx = values["B"] * (slip_rad + values["Sh"])
-    inner = bx - values["E"] * (bx - np.arctan(bx))
-    return np.asarray(values["D"] * np.sin(values["C"] * np.arctan(inner)) + values["Sv"], dtype=np.float64)
+    return np.asarray(value_at(fit, slip_rad), dtype=np.float64)
 
 
 def load_groups(conditions: Sequence[Condition]) -> list[tuple[float, tuple[Condition, ...]]]:
@@ -145,9 +139,7 @@ class _Plots:
     def _at_angle(self, channel: str, load: float, group: Sequence[Condition], angle: float) -> float | None:
         fit = self._fit("forward", load, channel) or self._fit("reverse", load, channel)
         if fit is not None:
-            drawn = curve_values(fit, np.radians([angle]))
-            if drawn is not None:
-                return float(drawn[0])
+            return float(curve_values(fit, np.radians([angle]))[0])
         near = [c for c in group if abs(math.degrees(c.SA) - angle) <= 0.5]
         return float(np.mean([getattr(c, f"{channel}_common") for c in near])) if near else None
 
@@ -193,15 +185,11 @@ class _Plots:
                 continue
             grid = np.linspace(points[0].SA, points[-1].SA, 121)
             fitted_y, fitted_x = curve_values(fits[0], grid), curve_values(fits[1], grid)
-            if fitted_x is None or fitted_y is None:
-                continue
             curves.append(_curve(self._load_text(load), fitted_x * mz, fitted_y * fy, index, "line"))
             for angle in (s * a for a in ANGLES_DEG for s in (1, -1)):
                 if _covers(points, angle):
                     one = np.radians([angle])
                     xx, yy = curve_values(fits[1], one), curve_values(fits[0], one)
-                    assert xx is not None  # noqa: S101  the same fits gave a curve above
-                    assert yy is not None  # noqa: S101
                     at.setdefault(angle, []).append((float(xx[0]) * mz, float(yy[0]) * fy))
         for angle in sorted(at):
             if len(at[angle]) > 1:

@@ -115,6 +115,10 @@ def _texts() -> list[Spec]:
     laboratory.name|laboratory (from the style file)
     laboratory.address|its address (from the style file)
     simulated|simulated data or measured data
+    unit.force|unit of forces in the report
+    unit.moment|unit of moments
+    unit.force_per_angle|unit of the cornering stiffness
+    unit.moment_per_angle|unit of the aligning stiffness
     """
     return [
         Spec(path=p.strip(), kind="text", description=d)
@@ -355,6 +359,7 @@ def condition_names() -> dict[str, str]:
     names |= {name: f"there is a figure: {text}" for name, text in FIGURES.items()}
     names |= {name: f"the table has rows: {text}" for name, (text, _) in TABLES.items() if name not in names}
     names |= {one.path: f"there is a value: {one.description}" for one in _VALUES}
+    names |= {f"summary.{name}": f"there is a value: {text}" for name, _, _, text in _SUMMARY}
     return names
 
 

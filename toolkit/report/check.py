@@ -1,0 +1,297 @@
+"""The template lint: what a template must be before it is filled, each finding with a rule and a place.
+
+Errors keep a report from being made; warnings do not. What makes a file unsafe to open is refused
+earlier, by `toolkit.report.package`.
+"""
+
+from __future__ import annotations
+
+import io
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Literal
+
+from toolkit.report.fonts import missing_fonts
+from toolkit.report.package import Template
+from toolkit.report.scan import (
+    Site,
+    broken_literals,
+    control_tag,
+    own_rows,
+    place_of,
+    row_in,
+    scan,
+    table_of,
+)
+from toolkit.report.style import Style
+from toolkit.report.tags import (
+    FIGURES,
+    TABLES,
+    condition_names,
+    format_problem,
+    known_value,
+    value_spec,
+)
+from toolkit.report.xml import SDT_CONTENT, W_P, W_SDT, W_TC, W_TR, Element, Story, ancestor, q, stories, walk_fields
+
+RULES = {
+    "no-tags": "the template has no tag of the toolkit",
+    "unknown-tag": "a tag is not in the catalogue",
+    "malformed-tag": "a literal tag is not closed or has no path",
+    "missing-required": "a required tag is not in the template",
+    "doubled-tag": "a figure or table stands twice in the body",
+    "bad-format": "the format after the bar does not fit the tag",
+    "wrong-place": "a tag stands where it cannot be filled",
+    "overlapping-tags": "a tag stands inside a control that will be filled as a whole",
+    "no-table": "a table tag has no table",
+    "prototype": "a table has no prototype row, or more than one",
+    "unknown-column": "a prototype row names a column that the table has not",
+    "column-count": "a prototype row without tags has more or fewer cells than the table has columns",
+    "tracked-changes": "the template holds tracked changes",
+    "comments": "the template holds comments",
+    "date-field": "a DATE or TIME field becomes the day of printing",
+    "if-field": "an IF field is not evaluated",
+    "contents": "a table of contents is not updated",
+    "missing-style": "a style that the style file names is not in the template",
+    "font-unavailable": "a font is not installed and will be replaced",
+    "attached-template": "the template is attached to another file, which is dropped",
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LintFinding:
+    """One finding: rule, level, the part of the package, the place in it, and a sentence."""
+
+    rule: str
+    level: Literal["error", "warning"]
+    part: str
+    place: str
+    message: str
+
+    def as_dict(self) -> dict[str, str]:
+        """Return the finding as a JSON-ready dict."""
+        return {"rule": self.rule, "level": self.level, "part": self.part, "place": self.place,
+                "message": self.message}  # fmt: skip
+
+
+def check_template(template: Template, style: Style, *, fonts: bool = True) -> tuple[LintFinding, ...]:
+    """Return what is wrong with a template, errors first, in document order.
+
+    Parameters
+    ----------
+    template : a template that is safe to open
+    style : its style file, for required tags and style names
+    fonts : also ask the system which fonts it has
+    """
+    from docx.opc.package import OpcPackage
+    from docx.package import Package
+
+    package: OpcPackage = Package.open(io.BytesIO(template.data))
+    return check_stories(package, stories(package), template, style, fonts=fonts)
+
+
+def check_stories(
+    package: object, parts: list[Story], template: Template, style: Style, *, fonts: bool
+) -> tuple[LintFinding, ...]:
+    """Return the findings of an opened package (see `check_template`)."""
+    sites = scan(parts)
+    found = [*_tags(sites, style), *_tables(sites), *_broken(parts), *_surroundings(package, parts, style)]
+    found += [
+        LintFinding(rule="attached-template", level="warning", part="word/settings.xml", place="part",
+                    message=f"attached template {target} is dropped")
+        for target in template.dropped
+    ]  # fmt: skip
+    if fonts:
+        found += [
+            LintFinding(rule="font-unavailable", level="warning", part="word/styles.xml", place=name,
+                        message=f"font {name!r} is not installed and will be replaced: check the layout of the PDF")
+            for name in missing_fonts(package, parts)
+        ]  # fmt: skip
+    return tuple(sorted(found, key=lambda one: one.level != "error"))
+
+
+def _at(site: Site, rule: str, message: str) -> LintFinding:
+    return LintFinding(rule=rule, level="error", part=site.story.name, place=site.place, message=message)
+
+
+def _tags(sites: list[Site], style: Style) -> Iterator[LintFinding]:
+    main = sites[0].story.name if sites else "word/document.xml"
+    if not sites:
+        yield LintFinding(rule="no-tags", level="error", part=main, place="part",
+                          message="the template has no tag: neither a content control tagged tk:... nor {{tk:...}}")  # fmt: skip
+    present = {f"tk:{site.tag.path}" for site in sites}
+    for required in style.required:
+        if required not in present:
+            yield LintFinding(rule="missing-required", level="error", part=main, place="part",
+                              message=f"the template lacks the required tag {required}")  # fmt: skip
+    counted: dict[str, int] = {}
+    for site in sites:
+        yield from _one(site)
+        if site.tag.family in ("figure", "table") and site.story.body and not site.fallback:
+            counted[site.tag.path] = counted.get(site.tag.path, 0) + 1
+            if counted[site.tag.path] == 2:
+                yield _at(site, "doubled-tag", f"tk:{site.tag.path} stands twice in the body; once is allowed")
+
+
+def _one(site: Site) -> Iterator[LintFinding]:
+    tag, family = site.tag, site.tag.family
+    known = {"figure": FIGURES, "table": TABLES, "if": condition_names()}
+    if not tag.path or re.search(r"[\s|{}]", tag.path):
+        yield _at(site, "malformed-tag", f"'{tag}' has no path, or white space in it")
+        return
+    if (family == "value" and not known_value(tag.path)) or (family in known and tag.name not in known[family]):
+        yield _at(site, "unknown-tag", f"{tag} is not known: {_near(tag.path)}")
+        return
+    kind = family
+    if family == "value":
+        entry = value_spec(tag.path)
+        kind = entry.kind if entry else "number"
+    if family != "row" and (problem := format_problem(kind, tag.spec)):
+        yield _at(site, "bad-format", f"{tag}: {problem}")
+    if family == "if" and site.form == "literal":
+        yield _at(site, "wrong-place", f"{tag} must be a content control around what it keeps, not a literal")
+    if family == "figure" and _in_heading(site):
+        yield _at(site, "wrong-place", f"{tag}: a figure cannot stand in a heading")
+    if site.form == "control":
+        content = site.element.find(SDT_CONTENT)
+        if content is None:
+            yield _at(site, "wrong-place", f"{tag}: the control has no content")
+        elif family not in ("if", "table") and content.find(W_TR) is not None:
+            yield _at(site, "wrong-place", f"{tag}: a value or figure cannot stand around a table row")
+        outer = next((s for s in site.element.iterancestors(W_SDT)
+                      if (t := control_tag(s)) and t.family in ("value", "figure", "row")), None)  # fmt: skip
+        if outer is not None:
+            yield _at(site, "overlapping-tags", f"{tag} stands inside {control_tag(outer)}, which replaces it")
+
+
+def _near(path: str) -> str:
+    import difflib
+
+    from toolkit.report.tags import catalogue
+
+    near = difflib.get_close_matches(path, [one.path for one in catalogue()], n=1, cutoff=0.5)
+    return f"did you mean tk:{near[0]}?" if near else "see 'toolkit template tags'"
+
+
+def _in_heading(site: Site) -> bool:
+    first = site.element if site.element.tag == W_P else (
+        ancestor(site.element, W_P) if ancestor(site.element, W_P) is not None else next(site.element.iter(W_P), None)
+    )  # fmt: skip
+    if first is None:
+        return False
+    style = first.find(f"{q('w:pPr')}/{q('w:pStyle')}")
+    if first.find(f"{q('w:pPr')}/{q('w:outlineLvl')}") is not None:
+        return True
+    if style is None:
+        return False
+    identity = style.get(q("w:val")) or ""
+    names = {identity.lower()}
+    styles = getattr(site.story.part, "_styles_part", None)
+    if styles is not None:
+        for one in styles.element.iter(q("w:style")):
+            if one.get(q("w:styleId")) == identity:
+                names.add((one.find(q("w:name")).get(q("w:val")) or "").lower())
+                if one.find(f"{q('w:pPr')}/{q('w:outlineLvl')}") is not None:
+                    return True
+    return any(name.startswith("heading") for name in names)
+
+
+def _tables(sites: list[Site]) -> Iterator[LintFinding]:
+    inside: set[int] = set()
+    for site in sites:
+        if site.tag.family != "table" or site.tag.name not in TABLES:
+            continue
+        table = table_of(site)
+        if table is None:
+            yield _at(site, "no-table", f"{site.tag}: no table inside the control, nor right after its paragraph")
+            continue
+        columns = [one.name for one in TABLES[site.tag.name][1]]
+        rows: list[Element] = []
+        for other in sites:
+            row = row_in(table, other.element) if other.story is site.story else None
+            if row is None:
+                continue
+            inside.add(id(other))
+            if other.tag.family == "row":
+                if row not in rows:
+                    rows.append(row)
+                if other.tag.name not in columns:
+                    yield _at(other, "unknown-column",
+                              f"{other.tag} is no column of {site.tag}; it has {', '.join(columns)}")  # fmt: skip
+                else:
+                    kind = next(c.kind for c in TABLES[site.tag.name][1] if c.name == other.tag.name)
+                    if problem := format_problem(kind, other.tag.spec):
+                        yield _at(other, "bad-format", f"{other.tag}: {problem}")
+            elif other.tag.family == "table" and other is not site:
+                yield _at(other, "overlapping-tags", f"{other.tag} stands inside {site.tag}")
+        if len(rows) > 1:
+            yield _at(site, "prototype", f"{site.tag}: {len(rows)} rows hold tk:row tags; one prototype row is expected")
+        if not rows:
+            yield from _untagged(site, table, columns)
+        elif any(o.tag.family == "figure" and row_in(table, o.element) is rows[0] for o in sites):
+            yield _at(site, "wrong-place", f"{site.tag}: a figure cannot stand in the prototype row")
+    for site in sites:
+        if site.tag.family == "row" and id(site) not in inside:
+            yield _at(site, "wrong-place", f"{site.tag} stands outside the table of a tk:table tag")
+
+
+def _untagged(site: Site, table: Element, columns: list[str]) -> Iterator[LintFinding]:
+    rows = own_rows(table)
+    if len(rows) < 2:
+        yield _at(site, "prototype",
+                  f"{site.tag}: the table has {len(rows)} rows; a header and a prototype row are expected")  # fmt: skip
+        return
+    cells = [cell for cell in rows[-1].iter(W_TC) if ancestor(cell, W_TR) is rows[-1]]
+    if len(cells) != len(columns):
+        yield _at(site, "column-count",
+                  f"{site.tag}: the prototype row has {len(cells)} cells and no tags, the table has "
+                  f"{len(columns)} columns: {', '.join(columns)}")  # fmt: skip
+
+
+def _broken(parts: list[Story]) -> Iterator[LintFinding]:
+    for story in parts:
+        for paragraph in broken_literals(story):
+            yield LintFinding(rule="malformed-tag", level="error", part=story.name, place=place_of(paragraph, story),
+                              message="a literal {{tk: is not closed by }} in the same paragraph")  # fmt: skip
+
+
+_TRACKED = tuple(q(f"w:{one}") for one in ("ins", "del", "moveFrom", "moveTo", "rPrChange", "pPrChange"))
+
+
+def _surroundings(package: object, parts: list[Story], style: Style) -> Iterator[LintFinding]:
+    def warn(rule: str, story: Story, element: Element, message: str) -> LintFinding:
+        return LintFinding(rule=rule, level="warning", part=story.name, place=place_of(element, story), message=message)
+
+    for story in parts:
+        for element in story.root.iter(*_TRACKED):
+            yield warn("tracked-changes", story, element, "tracked changes: accept or reject them before use")
+            break
+        for element in story.root.iter(q("w:commentReference")):
+            yield warn("comments", story, element, "a comment will stand in the report")
+            break
+        for element, code in walk_fields(story.root):
+            word = code.split()[0].upper() if code.split() else ""
+            if word in ("DATE", "TIME"):
+                yield warn("date-field", story, element, f"{word} becomes the day of printing; use tk:report.date")
+            elif word == "IF":
+                yield warn("if-field", story, element, "an IF field is not evaluated; use a tk:if control")
+            elif word == "TOC":
+                yield warn("contents", story, element, "a table of contents is updated by Word, not by the PDF's maker")
+    names = _style_names(package)
+    for use, name in style.styles:
+        if name.lower() not in names:
+            yield LintFinding(rule="missing-style", level="warning", part="word/styles.xml", place=name,
+                              message=f"the style file names {name!r} for {use}; the template has no such style")  # fmt: skip
+
+
+def _style_names(package: object) -> set[str]:
+    main = package.main_document_part  # type: ignore[attr-defined]
+    return {
+        (one.find(q("w:name")).get(q("w:val")) or "").lower()
+        for one in main._styles_part.element.iter(q("w:style"))
+        if one.find(q("w:name")) is not None
+    }
+
+
+__all__ = ["RULES", "LintFinding", "check_stories", "check_template"]

@@ -1,0 +1,153 @@
+"""Word to PDF by LibreOffice: a profile of its own per job, a time limit, and no trust in exit codes."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import signal
+import subprocess
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+from types import TracebackType
+
+from toolkit.errors import RenderError
+
+# PDF/A-2b and tagged, pictures as they are. LibreOffice ignores options that are not typed like this.
+_OPTIONS = (
+    'pdf:writer_pdf_Export:{"SelectPdfVersion":{"type":"long","value":"2"},'
+    '"UseTaggedPDF":{"type":"boolean","value":"true"},'
+    '"UseLosslessCompression":{"type":"boolean","value":"true"},'
+    '"ReduceImageResolution":{"type":"boolean","value":"false"},'
+    '"ExportBookmarks":{"type":"boolean","value":"true"}}'
+)
+_FILTER = "MS Word 2007 XML"
+# Without this LibreOffice fetches what a document names; templates that do are refused before as well.
+_PROFILE = """<?xml version="1.0" encoding="UTF-8"?>
+<oor:items xmlns:oor="http://openoffice.org/2001/registry" xmlns:xs="http://www.w3.org/2001/XMLSchema" xmlns:xsi="http://www.w3.org/2001/XMLSchema-instance">
+<item oor:path="/org.openoffice.Office.Common/Security/Scripting"><prop oor:name="BlockUntrustedRefererLinks" oor:op="fuse"><value>true</value></prop></item>
+<item oor:path="/org.openoffice.Office.Common/Security/Scripting"><prop oor:name="MacroSecurityLevel" oor:op="fuse"><value>3</value></prop></item>
+<item oor:path="/org.openoffice.Office.Common/Save/Document"><prop oor:name="CreateBackup" oor:op="fuse"><value>false</value></prop></item>
+<item oor:path="/org.openoffice.Office.Common/Misc"><prop oor:name="FirstRun" oor:op="fuse"><value>false</value></prop></item>
+<item oor:path="/org.openoffice.Setup/L10N"><prop oor:name="ooLocale" oor:op="fuse"><value>en-US</value></prop></item>
+<item oor:path="/org.openoffice.Setup/Office"><prop oor:name="ooSetupInstCompleted" oor:op="fuse"><value>true</value></prop></item>
+</oor:items>
+"""
+TIMEOUT_S = 180.0
+
+
+class Office:
+    """LibreOffice with a fresh profile, prepared in the background while figures are drawn.
+
+    Use as a context manager; the profile goes with it.
+    """
+
+    def __init__(self, *, timeout_s: float = TIMEOUT_S) -> None:
+        """Write the profile and warm it up.
+
+        Raises
+        ------
+        RenderError
+            there is no soffice
+        """
+        self.timeout_s = timeout_s
+        self.program = find_soffice()
+        self.folder = Path(tempfile.mkdtemp(prefix="toolkit-office-"))
+        user = self.folder / "profile" / "user"
+        user.mkdir(parents=True)
+        (user / "registrymodifications.xcu").write_text(_PROFILE)
+        self._warm: subprocess.Popen[bytes] | None = self._start(["--terminate_after_init"])
+
+    def __enter__(self) -> Office:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """End what still runs and remove the profile."""
+        if self._warm is not None:
+            _kill(self._warm)
+            self._warm = None
+        shutil.rmtree(self.folder, ignore_errors=True)
+
+    def convert(self, documents: Sequence[Path], out: Path) -> list[Path]:
+        """Convert Word files to PDF in one call; return the PDFs in the same order.
+
+        Raises
+        ------
+        RenderError
+            LibreOffice took too long, or a PDF is not there or is no PDF
+        """
+        if self._warm is not None:
+            try:
+                self._warm.wait(timeout=self.timeout_s)
+            except subprocess.TimeoutExpired:
+                _kill(self._warm)
+            self._warm = None
+        wanted = [out / f"{one.stem}.pdf" for one in documents]
+        for old in wanted:
+            old.unlink(missing_ok=True)
+        process = self._start(
+            [f"--infilter={_FILTER}", "--convert-to", _OPTIONS, "--outdir", str(out), *(str(one) for one in documents)]
+        )
+        try:
+            _, said = process.communicate(timeout=self.timeout_s)
+        except subprocess.TimeoutExpired as error:
+            _kill(process)
+            raise RenderError(
+                "LibreOffice took too long", where=documents[0].name, got=f"no end after {self.timeout_s:g} s",
+                expected="a PDF within the time limit", rule="render-timeout",
+                next_step="run 'toolkit doctor'; convert the document by hand to see what stops it",
+            ) from error  # fmt: skip
+        for pdf in wanted:
+            if not pdf.is_file() or not pdf.read_bytes()[:5] == b"%PDF-":
+                raise RenderError(
+                    "LibreOffice made no PDF", where=pdf.name,
+                    got=said.decode("utf-8", "replace").strip()[-300:] or f"exit code {process.returncode}",
+                    expected="a PDF of the filled report", rule="render-failed",
+                    next_step="run 'toolkit doctor'; open the .docx in LibreOffice to see why",
+                )  # fmt: skip
+        return wanted
+
+    def _start(self, arguments: list[str]) -> subprocess.Popen[bytes]:
+        environment = {**os.environ, "SAL_USE_VCLPLUGIN": "svp"}
+        environment.pop("DISPLAY", None)
+        # A HOME that cannot be written to makes LibreOffice hang; a good one holds the user's fonts.
+        if not os.access(environment.get("HOME") or "/", os.W_OK):
+            environment["HOME"] = str(self.folder)
+        return subprocess.Popen(
+            [self.program, f"-env:UserInstallation={(self.folder / 'profile').as_uri()}", "--headless", "--norestore",
+             "--nologo", "--nodefault", "--nolockcheck", *arguments],
+            stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE,
+            start_new_session=True, env=environment,
+        )  # fmt: skip
+
+
+def find_soffice() -> str:
+    """Return the path of LibreOffice.
+
+    Raises
+    ------
+    RenderError
+        it is not installed
+    """
+    found = os.environ.get("TOOLKIT_SOFFICE") or shutil.which("soffice") or shutil.which("libreoffice")
+    if found and (Path(found).is_file() or shutil.which(found)):
+        return found
+    raise RenderError(
+        "LibreOffice is not installed", where="soffice", got="no program of that name on the PATH",
+        expected="LibreOffice Writer, with its fonts",
+        next_step="run 'toolkit doctor': it prints the command that installs it", rule="no-soffice",
+    )  # fmt: skip
+
+
+def _kill(process: subprocess.Popen[bytes]) -> None:
+    """End soffice and its children: the launcher's own end leaves soffice.bin behind."""
+    try:
+        os.killpg(process.pid, signal.SIGKILL)
+    except (ProcessLookupError, PermissionError):
+        pass
+    process.communicate()
