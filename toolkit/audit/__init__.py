@@ -1,1 +1,1 @@
-"""Which calibration computed a file."""
+"""Audit: which calibration computed the acquisition program's own Fy and Mz, and what that changes."""

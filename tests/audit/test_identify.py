@@ -1,0 +1,208 @@
+import datetime as dt
+
+import numpy as np
+import pytest
+from audit_factory import (
+    FY,
+    MZ,
+    R1,
+    R2,
+    changed,
+    columns,
+    from_arrays,
+    joined,
+    negative,
+    record,
+    seven_digits,
+)
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from toolkit.audit.identify import identify, identify_columns, recompute, repair
+from toolkit.examples.fig4_4 import packaged_fig4_4
+from toolkit.machine import load_machine
+from toolkit.recording.read import read_recording
+
+DAY = dt.date(2019, 6, 4)
+BOTH = (R1, R2)
+
+
+def judged(file, records=BOTH, *, on=DAY, in_force=R2, void=()):
+    return identify_columns(file, records, on=on, in_force=in_force, void=void)
+
+
+@pytest.fixture(scope="module")
+def figure():
+    return read_recording(packaged_fig4_4()[0], load_machine("m15"))
+
+
+class TestFigure44:
+    """The ten printed rows of the source document (Figure 4.4): the accident itself."""
+
+    def test_old_record_is_found_and_stale_because_it_is_void_on_every_day(self, figure):
+        found = identify(figure, BOTH, on=None, in_force=None, void={"m15-r1"})
+        assert (found.grade, found.record, found.variant) == ("stale", "m15-r1", None)
+        assert found.repair is None
+        assert [(s.first_row, s.last_row) for s in found.segments] == [(1, 10)]
+
+    def test_published_record_alone_explains_it_with_negative_E5(self, figure):
+        found = identify(figure, (R2,), on=None, in_force=None)
+        assert (found.grade, found.record, found.variant) == (
+            "sign_variant",
+            "m15-r2",
+            "E5 negative in FY, MZ",
+        )
+
+    def test_repair_by_the_published_record(self, figure):
+        found = identify(figure, BOTH, on=DAY, in_force=R2)
+        # By hand from the last rows: 2 x 1.0228 x 497.591 lbf and 2 x 0.0026666 x 497.591 lbf·ft.
+        assert found.repair.FY_max_abs_N == pytest.approx(2 * 1.0228 * 497.591 * 4.4482216152605, rel=1e-5)
+        assert found.repair.MZ_max_abs_Nm == pytest.approx(
+            2 * 0.0026666 * 497.591 * 1.3558179483314, rel=1e-4
+        )
+        assert found.grade == "stale"
+
+    def test_corrected_first_row(self, figure):
+        from toolkit.audit.columns import columns_of
+
+        FY_N = recompute(columns_of(figure), R2)["FY"]
+        # 0.99719 x 98.59261 + 0.99718 x 86.06072 - 1.0228 x 182.415 + 0.6473, to two decimals
+        assert round(float(FY_N[0]) / 4.4482216152605, 2) == -1.79
+
+
+GRADES = [
+    ("exact", columns(), None),
+    ("rounding", columns((0.997192, 0.99718, 1.0228, 0.6473)), None),
+    ("stale", columns(negative(FY), negative(MZ)), None),
+    ("sign_variant", columns(FY, negative(MZ)), "E5 negative in MZ"),
+    ("sign_variant", columns(negative(FY, 0), MZ), "D51 negative in FY"),
+    ("sign_variant", columns(FY, negative(MZ, 0)), "D51 positive in MZ"),
+    ("sign_variant", columns(negative(FY, 3), negative(MZ, 3)), "constant negative in FY, MZ"),
+    ("column_swap", columns(order=("D52", "D51", "E5")), "D51<->D52"),
+    ("column_swap", columns(order=("D52", "E5", "D51")), "D51->D52->E5->D51"),
+    ("unknown", columns((0.9, 0.9, 0.9, 0.1)), None),
+]
+
+
+@pytest.mark.parametrize(("grade", "file", "variant"), GRADES, ids=[f"{g}-{v}" for g, _, v in GRADES])
+def test_each_grade(grade, file, variant):
+    found = judged(file)
+    assert (found.grade, found.variant) == (grade, variant)
+    assert found.repair is not None
+
+
+def test_sign_and_swap_together_are_told_in_full():
+    found = judged(columns(negative(FY), negative(MZ), order=("D52", "D51", "E5")), (R2,))
+    assert found.grade == "column_swap"
+    assert found.variant == "E5 negative in FY, MZ; D51<->D52"
+
+
+def test_without_a_date_a_sound_record_is_undated():
+    found = judged(columns(), on=None, in_force=None)
+    assert (found.grade, found.record, found.repair) == ("undated", "m15-r2", None)
+
+
+def test_a_date_before_every_record_is_stale_without_repair():
+    found = judged(columns(), in_force=None)
+    assert (found.grade, found.record, found.in_force, found.repair) == ("stale", "m15-r2", None, None)
+
+
+def test_issued_digits_and_full_coefficients_are_one_candidate():
+    more = (0.9971934, 0.9971812, 1.0228123, 0.6473), (-0.1568812, 0.1619743, 0.00266663, 0.68759)
+    full = record("m15-r3", *more, issued=(FY, MZ))
+    for coefficients in (more, (FY, MZ)):
+        found = judged(columns(*coefficients), (full,), in_force=full)
+        assert (found.grade, found.record) == ("exact", "m15-r3")
+    assert found.issued is True
+
+
+def test_equal_coefficients_are_one_candidate_named_after_the_record_in_force():
+    again = record("m15-r7")
+    assert judged(columns(), (R1, R2, again), in_force=again).record == "m15-r7"
+    assert judged(columns(), (R1, R2, again), in_force=R2).grade == "exact"
+
+
+def test_records_that_coarse_digits_cannot_tell_apart_are_ambiguous():
+    near = record("m15-r5", (0.99722, 0.99718, 1.0228, 0.6473))
+    found = judged(columns(decimals=1), (R2, near))
+    assert (found.grade, found.record, found.candidates) == ("ambiguous", None, ("m15-r2", "m15-r5"))
+    assert judged(columns(), (R2, near)).grade == "exact"
+
+
+def test_a_dead_channel_leaves_its_sign_open():
+    file = columns()
+    x = file.x.copy()
+    x[:, 2] = 0.0
+    y = {
+        "FY": seven_digits(x @ np.array(FY[:3]) + FY[3]),
+        "MZ": seven_digits(x @ np.array(MZ[:3]) + MZ[3]),
+    }
+    assert judged(from_arrays(x, y)).grade == "ambiguous"
+
+
+def test_a_constant_below_the_rounding_has_no_sign():
+    tared = record("m15-r8", (*FY[:3], 1e-9), (*MZ[:3], -1e-10))
+    assert judged(columns((*FY[:3], 0.0), (*MZ[:3], 0.0)), (tared,), in_force=tared).grade == "exact"
+
+
+def test_a_change_in_the_middle_gives_two_segments():
+    found = judged(joined(columns(rows=40), columns(negative(FY), negative(MZ), rows=25, seed=5)))
+    assert [(s.first_row, s.last_row, s.record, s.grade) for s in found.segments] == [
+        (1, 40, "m15-r2", "exact"),
+        (41, 65, "m15-r1", "stale"),
+    ]
+    assert (found.grade, found.record) == ("stale", "m15-r1")
+
+
+def test_a_single_deviating_row_is_its_own_segment():
+    found = judged(changed(columns(rows=40), "MZ", 16, 0.37))
+    assert [(s.first_row, s.last_row, s.grade) for s in found.segments] == [
+        (1, 16, "exact"),
+        (17, 17, "unknown"),
+        (18, 40, "exact"),
+    ]
+    assert (found.grade, found.record) == ("unknown", None)
+
+
+def test_both_loads_are_judged_together():
+    # FY by the record in force, MZ by the other's: a variant, never one of the two.
+    found = judged(columns(FY, negative(MZ)), BOTH)
+    assert found.grade == "sign_variant"
+
+
+def test_a_record_of_another_unit_is_no_candidate():
+    other = record("m15-r4", unit="mV/V")
+    found = judged(columns(), (other, R2))
+    assert found.grade == "exact"
+    assert [s.id for s in found.skipped] == ["m15-r4"]
+    assert "mV/V" in found.skipped[0].reason
+
+
+def test_units_of_the_record_do_not_matter():
+    N = 4.4482216152605
+    metric = record("m15-r6", (*FY[:3], FY[3] * N), tuple(v * 0.3048 for v in (*MZ[:3], MZ[3] * N)),
+                    unit="N", loads=("N", "N*m"))  # fmt: skip
+    assert judged(columns(), (metric,), in_force=metric).grade == "exact"
+    one, other = recompute(columns(), metric), recompute(columns(), R2)
+    np.testing.assert_allclose(one["MZ"], other["MZ"], rtol=1e-12, atol=1e-9)
+
+
+def test_repair_of_an_exact_file_is_rounding():
+    most = repair(columns(), R2)
+    assert 0 < most.FY_max_abs_N < 1e-3
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.permutations(range(3)), st.tuples(*[st.sampled_from((1, -1))] * 8), st.integers(0, 99))
+def test_every_variant_of_a_record_is_recognised_as_itself(order, turned, seed):
+    names = ("D51", "D52", "E5")
+    file = columns(
+        tuple(c * s for c, s in zip(FY, turned[:4], strict=True)),
+        tuple(c * s for c, s in zip(MZ, turned[4:], strict=True)),
+        order=tuple(names[i] for i in order), seed=seed, rows=30,
+    )  # fmt: skip
+    found = judged(file, (R2,))
+    plain, own = all(s > 0 for s in turned), tuple(order) == (0, 1, 2)
+    assert found.grade == ("exact" if plain and own else "sign_variant" if own else "column_swap")
+    assert found.record == "m15-r2"
+    assert (found.variant is None) == (plain and own)

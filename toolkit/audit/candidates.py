@@ -1,0 +1,202 @@
+"""Candidates: every record, with every sign of a channel or the constant, and every order of the columns.
+
+A candidate is (record, order of the columns, signs in FY, signs in MZ). The columns are exchanged for both
+loads together, signs are wrong in each load by itself. Full and issued coefficients of one record are two
+forms of the same candidate.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from toolkit.calibration.terms import INTERCEPT, parse_term, term_matrix
+from toolkit.units import si_scale, unit
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from toolkit.audit.columns import Columns
+    from toolkit.calibration.record import CalibrationRecord, LoadFit
+
+CONSTANT = "constant"
+_ALL_ORDERS = 4  # beyond so many channels only exchanges of two are tried
+_FIFTH = 4  # the fifth significant digit stands four places below the first
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Family:
+    """The sign variants of one load by one record, form and order of columns, evaluated on a file.
+
+    ``signs`` (variants, channels + 1) of +-1, the constant last; ``coefficients`` (variants, terms) in the
+    file's unit of the load; ``predicted`` (variants, rows); ``bound`` (rows,) that rounding of the printed
+    digits explains; ``slack`` (rows,) what half a unit of the coefficients' fifth digit adds.
+    """
+
+    signs: NDArray[np.int8]
+    coefficients: NDArray[np.float64]
+    predicted: NDArray[np.float64]
+    bound: NDArray[np.float64]
+    slack: NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Group:
+    """One record in one form and order of columns: a family for each load that the file has."""
+
+    record: CalibrationRecord
+    issued: bool
+    order: tuple[int, ...]
+    families: dict[str, Family]
+
+
+def orders(n: int) -> Iterator[tuple[int, ...]]:
+    """Yield orders of n columns, the file's own first.
+
+    >>> list(orders(2))
+    [(0, 1), (1, 0)]
+    """
+    if n <= _ALL_ORDERS:
+        yield from itertools.permutations(range(n))
+        return
+    yield tuple(range(n))
+    for a, b in itertools.combinations(range(n), 2):
+        swapped = list(range(n))
+        swapped[a], swapped[b] = b, a
+        yield tuple(swapped)
+
+
+def unfit(record: CalibrationRecord, columns: Columns) -> str | None:
+    """Return why a record cannot have computed a file, None where it can."""
+    if set(record.indications) != set(columns.names):
+        return f"its indications are {', '.join(record.indications)}"
+    have = dict(zip(columns.names, columns.units, strict=True))
+    for name, text in zip(record.indications, record.indication_units, strict=True):
+        if unit(text).dimension != unit(have[name]).dimension:
+            return f"its indications are in {text}, the file's in {have[name]}"
+    missing = [load for load in columns.loads if load not in {one.load for one in record.loads}]
+    return f"it has no equation for {', '.join(missing)}" if missing else None
+
+
+def groups(record: CalibrationRecord, columns: Columns) -> Iterator[Group]:
+    """Yield a record's groups on a file: full and issued coefficients, every order of the columns."""
+    # Each indication in the record's unit, in the record's order.
+    place = [columns.names.index(name) for name in record.indications]
+    scale = np.array(
+        [
+            si_scale(columns.units[p]) / si_scale(text)
+            for p, text in zip(place, record.indication_units, strict=True)
+        ]
+    )
+    x, half = columns.x[:, place] * scale, columns.half_x[:, place] * np.abs(scale)
+    forms = (False,) if all(one.issued == one.coefficients for one in record.loads) else (False, True)
+    for order in orders(len(place)):
+        shuffled, half_shuffled = x[:, order], half[:, order]
+        designs = {
+            load: _design(record, record.load(load), shuffled, half_shuffled) for load in columns.loads
+        }
+        for issued in forms:
+            families = {
+                load: _family(record, record.load(load), columns, load, *designs[load], issued=issued)
+                for load in columns.loads
+            }
+            yield Group(record=record, issued=issued, order=order, families=families)
+
+
+def _design(
+    record: CalibrationRecord, fit: LoadFit, x: NDArray[np.float64], half: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    # The terms, and how far each may be off when every indication is off by half its last place.
+    values = {name: x[:, i] for i, name in enumerate(record.indications)}
+    terms = term_matrix(fit.terms, values)
+    moved = np.zeros_like(terms)
+    for i, name in enumerate(record.indications):
+        moved += np.abs(term_matrix(fit.terms, {**values, name: x[:, i] + half[:, i]}) - terms)
+    return terms, moved
+
+
+def _family(
+    record: CalibrationRecord,
+    fit: LoadFit,
+    columns: Columns,
+    load: str,
+    terms: NDArray[np.float64],
+    moved: NDArray[np.float64],
+    *,
+    issued: bool,
+) -> Family:
+    to_file = si_scale(fit.unit) / si_scale(columns.y_units[load])
+    plain = np.array(fit.issued if issued else fit.coefficients) * to_file
+    signs = np.array(list(itertools.product((1, -1), repeat=len(record.indications) + 1)), dtype=np.int8)
+    coefficients = plain * np.column_stack([_turn(record, name, signs) for name in fit.terms])
+    rounding = columns.half_y[load] + 1e-9 * np.abs(columns.y[load])
+    return Family(
+        signs=signs,
+        coefficients=coefficients,
+        predicted=coefficients @ terms.T,
+        bound=moved @ np.abs(plain) + rounding,
+        slack=np.abs(terms) @ half_fifth_digit(plain / to_file) * abs(to_file),
+    )
+
+
+def _turn(record: CalibrationRecord, term: str, signs: NDArray[np.int8]) -> NDArray[np.float64]:
+    # A channel with the wrong sign turns every term in which it stands to an odd power.
+    if term == INTERCEPT:
+        return signs[:, -1].astype(np.float64)
+    factor = np.ones(len(signs))
+    for name, power in parse_term(term).powers:
+        if power % 2:
+            factor = factor * signs[:, record.indications.index(name)]
+    return factor
+
+
+def half_fifth_digit(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return half a unit of the fifth significant digit of each value, 0 for 0.
+
+    >>> import numpy as np
+    >>> half_fifth_digit(np.array([0.99719, -0.0026666, 0.0])).tolist()
+    [5e-06, 5e-08, 0.0]
+    """
+    size = np.abs(np.asarray(values, dtype=np.float64))
+    return np.array([0.0 if v == 0 else 0.5 * 10.0 ** (int(f"{v:e}"[-3:]) - _FIFTH) for v in size.tolist()])
+
+
+def describe(
+    record: CalibrationRecord, order: tuple[int, ...], signs: dict[str, tuple[int, ...]]
+) -> str | None:
+    """Return a variant in words, None for the plain record.
+
+    Signs first: ``E5 negative in FY, MZ`` names the sign that the file has; then exchanged columns,
+    ``D51<->D52``, or for three ``D51->D52->E5->D51``: the first one's coefficient took the next one's column.
+    """
+    told = []
+    names = (*record.indications, CONSTANT)
+    for i, name in enumerate(names):
+        by_sign: dict[str, list[str]] = {}
+        for load, turned in signs.items():
+            if turned[i] < 0:
+                by_sign.setdefault(_sign_in_file(record.load(load), name), []).append(load)
+        told += [f"{name} {sign} in {', '.join(loads)}" for sign, loads in by_sign.items()]
+    seen: set[int] = set()
+    for start, image in enumerate(order):
+        if start in seen or image == start:
+            continue
+        cycle = [start]
+        while order[cycle[-1]] != start:
+            cycle.append(order[cycle[-1]])
+        seen.update(cycle)
+        shown = [record.indications[i] for i in cycle]
+        told.append("<->".join(shown) if len(shown) == 2 else "->".join([*shown, shown[0]]))
+    return "; ".join(told) or None
+
+
+def _sign_in_file(fit: LoadFit, name: str) -> str:
+    term = INTERCEPT if name == CONSTANT else name
+    plain = dict(zip(fit.terms, fit.coefficients, strict=True)).get(term)
+    if plain is None:  # the channel stands in higher terms only
+        return "turned"
+    return "positive" if plain < 0 else "negative"

@@ -1,0 +1,60 @@
+"""What identification needs of a file: indications, own FY and MZ, and what rounding may hide of each."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from toolkit.recording.digits import half_last_place
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from toolkit.recording.model import Recording
+
+LOADS = ("FY", "MZ")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Columns:
+    """A file's columns in its own units.
+
+    ``x`` (rows, n) indications as the header names them, ``half_x`` their half last printed place;
+    ``y`` and ``half_y`` (rows,) of each acquired channel that the file has.
+    """
+
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    x: NDArray[np.float64]
+    half_x: NDArray[np.float64]
+    y: dict[str, NDArray[np.float64]]
+    half_y: dict[str, NDArray[np.float64]]
+    y_units: dict[str, str]
+
+    @property
+    def rows(self) -> int:
+        """Number of rows."""
+        return len(self.x)
+
+    @property
+    def loads(self) -> tuple[str, ...]:
+        """The acquired channels that the file has."""
+        return tuple(self.y)
+
+
+def columns_of(recording: Recording) -> Columns:
+    """Return a recording's columns for identification."""
+    cells = [one for one in recording.series if one.role == "indication"]
+    own = [one for one in recording.series if one.role == "acquired" and one.symbol in LOADS]
+    x = np.column_stack([one.values for one in cells]) if cells else np.empty((recording.rows, 0))
+    return Columns(
+        names=tuple(one.symbol for one in cells),
+        units=tuple(one.unit for one in cells),
+        x=x,
+        half_x=half_last_place(x),
+        y={one.symbol: one.values for one in own},
+        half_y={one.symbol: half_last_place(one.values) for one in own},
+        y_units={one.symbol: one.unit for one in own},
+    )

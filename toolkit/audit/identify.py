@@ -1,0 +1,299 @@
+"""Identify which calibration computed a file's own FY and MZ.
+
+A candidate (see `candidates`) is accepted only if every row of FY and of MZ lies within the bound that the
+printed digits explain, plus 1e-9 of the value; where none does, each coefficient may also move by half a
+unit of its fifth significant digit. Candidates that the file cannot tell apart make it *ambiguous*.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+from datetime import date
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from toolkit.audit.candidates import Group, describe, groups, unfit
+from toolkit.audit.columns import Columns, columns_of
+from toolkit.audit.model import Grade, Identification, Repair, Segment, Skipped, worst
+from toolkit.audit.segments import Hit, Run, distinct_rivals, partition, whole_file
+from toolkit.calibration.terms import INTERCEPT
+from toolkit.units import si_scale
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from toolkit.calibration.record import CalibrationRecord
+    from toolkit.recording.model import Recording
+
+_ALIKE = "{:.12g}"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Answer:
+    # Candidates with equal coefficients, under the name of the simplest.
+    record: str
+    variant: str | None
+    swapped: bool
+    issued: bool
+    slack: bool
+
+
+def identify(
+    recording: Recording,
+    records: Sequence[CalibrationRecord],
+    *,
+    on: date | None,
+    in_force: CalibrationRecord | None,
+    void: Collection[str] = (),
+) -> Identification:
+    """Identify which of the records computed a recording.
+
+    Parameters
+    ----------
+    recording : the file; its columns are taken as the header names them
+    records : those of its instrument that the registry lets be used
+    on : the test's date, None where it is not known
+    in_force : the record in force on that date, None where there is none
+    void : ids of records that are void on every day
+    """
+    return identify_columns(columns_of(recording), records, on=on, in_force=in_force, void=void)
+
+
+def identify_columns(
+    columns: Columns,
+    records: Sequence[CalibrationRecord],
+    *,
+    on: date | None,
+    in_force: CalibrationRecord | None,
+    void: Collection[str] = (),
+) -> Identification:
+    """Identify from plain columns; see `identify`."""
+    reasons = {record.id: unfit(record, columns) for record in records}
+    fitting = [record for record in records if reasons[record.id] is None]
+    judge = _Judge(
+        columns=columns,
+        groups=tuple(g for record in fitting for g in groups(record, columns)) if columns.loads else (),
+        on=on,
+        in_force=None if on is None else in_force,
+        void=frozenset(void),
+    )
+    segments, answers = judge.segments()
+    deciding = worst(tuple(segment.grade for segment in segments))
+    at = next(i for i, segment in enumerate(segments) if segment.grade == deciding)
+    answer = answers[at]
+    return Identification(
+        grade=deciding,
+        record=segments[at].record,
+        variant=segments[at].variant,
+        issued=answer.issued if answer is not None else None,
+        candidates=segments[at].candidates,
+        segments=segments,
+        in_force=None if judge.in_force is None else judge.in_force.id,
+        repair=None if judge.in_force is None else repair(columns, judge.in_force),
+        skipped=tuple(Skipped(id=i, reason=r) for i, r in reasons.items() if r is not None),
+    )
+
+
+def recompute(columns: Columns, record: CalibrationRecord) -> dict[str, NDArray[np.float64]]:
+    """Return FY [N] and MZ [N·m] (rows,) by a record's full coefficients, columns as named by the header."""
+    first = next(iter(groups(record, columns)))  # full coefficients, the file's own order, plain signs
+    return {
+        load: family.predicted[0] * si_scale(columns.y_units[load]) for load, family in first.families.items()
+    }
+
+
+def repair(columns: Columns, record: CalibrationRecord) -> Repair | None:
+    """Return what a record would change at most; None where it cannot be applied to the file."""
+    if unfit(record, columns) is not None:
+        return None
+    new = recompute(columns, record)
+    most = {
+        load: float(np.max(np.abs(new[load] - columns.y[load] * si_scale(columns.y_units[load]))))
+        for load in columns.loads
+    }
+    return Repair(FY_max_abs_N=most.get("FY"), MZ_max_abs_Nm=most.get("MZ"))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Judge:
+    columns: Columns
+    groups: tuple[Group, ...]
+    on: date | None
+    in_force: CalibrationRecord | None
+    void: frozenset[str]
+
+    def segments(self) -> tuple[tuple[Segment, ...], tuple[_Answer | None, ...]]:
+        """Return the file's segments and the answer of each: the whole file first, parts only if it must."""
+        tiers = [(slack, self._fits(slack=slack)) for slack in (False, True)]
+        for slack, fits in tiers:
+            hits = whole_file(fits)
+            if hits:
+                told = self._answers(hits, slack=slack)
+                if len(told) == 1:  # and does nothing else come near?
+                    told = self._answers(distinct_rivals(self.groups, hits[0], slack=slack), slack=slack)
+                return self._told([Run(start=0, stop=self.columns.rows, hits=hits)], [told])
+        parts = [(slack, partition(fits, self.columns.rows)) for slack, fits in tiers]
+        slack, runs = min(parts, key=lambda part: (_unknown_rows(part[1]), len(part[1]), part[0]))
+        return self._told(runs, [self._answers(run.hits, slack=slack) for run in runs])
+
+    def _fits(self, *, slack: bool) -> list[dict[str, NDArray[np.bool_]]]:
+        return [
+            {
+                load: np.abs(family.predicted - self.columns.y[load])
+                <= family.bound + (family.slack if slack else 0.0)
+                for load, family in group.families.items()
+            }
+            for group in self.groups
+        ]
+
+    def _told(
+        self, runs: Sequence[Run], answers: Sequence[tuple[_Answer, ...]]
+    ) -> tuple[tuple[Segment, ...], tuple[_Answer | None, ...]]:
+        made, single = [], []
+        for run, told in zip(runs, answers, strict=True):
+            one = told[0] if len(told) == 1 else None
+            made.append(
+                Segment(
+                    first_row=run.start + 1,
+                    last_row=run.stop,
+                    record=one.record if one else None,
+                    variant=one.variant if one else None,
+                    grade=self._grade(one) if one else "ambiguous" if told else "unknown",
+                    candidates=tuple(sorted({a.record for a in told})) if len(told) > 1 else (),
+                )
+            )
+            single.append(one)
+        return tuple(made), tuple(single)
+
+    def _grade(self, one: _Answer) -> Grade:
+        if one.swapped:
+            return "column_swap"
+        if one.variant is not None:
+            return "sign_variant"
+        if one.record in self.void:
+            return "stale"
+        if self.on is None:
+            return "undated"
+        if self.in_force is None or one.record != self.in_force.id:
+            return "stale"
+        return "rounding" if one.slack else "exact"
+
+    def _answers(self, hits: Sequence[Hit], *, slack: bool) -> tuple[_Answer, ...]:
+        # Equal coefficients are one candidate, named after the plain record or the one with fewest changes;
+        # full and issued digits of one record and variant are one candidate too.
+        by_key: dict[object, set[Hit]] = {}
+        for hit in hits:
+            for key in (self._coefficients(hit), self._variant(hit)):
+                by_key.setdefault(key, set()).add(hit)
+        answers: list[_Answer] = []
+        left = set(hits)
+        while left:
+            same, queue = set(), [next(hit for hit in hits if hit in left)]
+            while queue:
+                hit = queue.pop()
+                if hit in same:
+                    continue
+                same.add(hit)
+                for key in (self._coefficients(hit), self._variant(hit)):
+                    queue += by_key[key]
+            left -= same
+            answers.append(self._simplest(same, slack=slack))
+        return tuple(answers)
+
+    def _simplest(self, same: set[Hit], *, slack: bool) -> _Answer:
+        def rank(hit: Hit) -> tuple[object, ...]:
+            group = self.groups[hit.group]
+            other = self.in_force is None or group.record.id != self.in_force.id
+            return (
+                self._changes(hit), other, group.record.id in self.void, group.record.id, not group.issued,
+            )  # fmt: skip
+
+        hit = min(same, key=rank)
+        group = self.groups[hit.group]
+        signs = {load: self._signs(hit, load, variant) for load, variant in hit.signs}
+        return _Answer(
+            record=group.record.id,
+            variant=describe(group.record, group.order, signs),
+            swapped=_moved(group.order) > 0,
+            issued=group.issued,
+            slack=slack,
+        )
+
+    def _changes(self, hit: Hit) -> int:
+        turned = sum(self._signs(hit, load, variant).count(-1) for load, variant in hit.signs)
+        return turned + _moved(self.groups[hit.group].order)
+
+    def _signs(self, hit: Hit, load: str, variant: int) -> tuple[int, ...]:
+        # The sign of a constant that is smaller than what rounding hides says nothing: it counts as right.
+        family = self.groups[hit.group].families[load]
+        signs = [int(s) for s in family.signs[variant]]
+        constant = _constant(self.groups[hit.group].record, load, family.coefficients[variant])
+        if bool(np.all(abs(constant) <= family.bound)):
+            signs[-1] = 1
+        return tuple(signs)
+
+    def _variant(self, hit: Hit) -> object:
+        group = self.groups[hit.group]
+        return (group.record.id, group.order, tuple(self._signs(hit, *one) for one in hit.signs))
+
+    def _coefficients(self, hit: Hit) -> object:
+        # By load: what each column, and the constant, is multiplied by in the file's units.
+        group = self.groups[hit.group]
+        told = []
+        for load, variant in hit.signs:
+            fit = group.record.load(load)
+            names = [_in_columns(group, term) for term in fit.terms]
+            values = group.families[load].coefficients[variant].tolist()
+            told.append(
+                (
+                    load,
+                    tuple(
+                        sorted(
+                            (n, _ALIKE.format(v * _scale(group, self.columns, t)))
+                            for n, v, t in zip(names, values, fit.terms, strict=True)
+                            if v
+                        )
+                    ),
+                )
+            )
+        return tuple(told)
+
+
+def _in_columns(group: Group, term: str) -> str:
+    # A term's name when each channel is called after the column that it was read from.
+    import re
+
+    names = group.record.indications
+    return re.sub(
+        r"[A-Za-z_]\w*",
+        lambda m: names[group.order[names.index(m[0])]] if m[0] in names else m[0],
+        term,
+    )
+
+
+def _scale(group: Group, columns: Columns, term: str) -> float:
+    # From the record's indication units to the file's, so that records in other units compare.
+    from toolkit.calibration.terms import parse_term
+
+    have = dict(zip(columns.names, columns.units, strict=True))
+    units = dict(zip(group.record.indications, group.record.indication_units, strict=True))
+    factor = 1.0
+    parsed = parse_term(term)
+    for name, power in (*parsed.powers, *((name, 1) for name in parsed.absolutes)):
+        factor *= (si_scale(have[name]) / si_scale(units[name])) ** power
+    return factor
+
+
+def _constant(record: CalibrationRecord, load: str, coefficients: NDArray[np.float64]) -> float:
+    terms = record.load(load).terms
+    return float(coefficients[terms.index(INTERCEPT)]) if INTERCEPT in terms else 0.0
+
+
+def _moved(order: tuple[int, ...]) -> int:
+    return sum(i != image for i, image in enumerate(order))
+
+
+def _unknown_rows(runs: Sequence[Run]) -> int:
+    return sum(run.stop - run.start for run in runs if not run.hits)

@@ -1,0 +1,118 @@
+"""Intervals: what the printed digits of a file prove about each coefficient.
+
+Every row says |y - sum c_i x_i - c_0| <= h_y + sum |c_i| h_i, with h half a last printed place. For given
+signs of the coefficients that is linear, so a linear programme bounds each coefficient, and the union over
+the signs is all that the file allows: a sign is proven, not estimated.
+"""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from toolkit.audit.columns import Columns
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Interval:
+    """What a file allows for one coefficient, in the file's units; ``low`` or ``high`` may be infinite."""
+
+    load: str
+    name: str
+    low: float
+    high: float
+
+    @property
+    def sign(self) -> int:
+        """Return +1 or -1 where the sign is proven, else 0."""
+        return 1 if self.low > 0 else -1 if self.high < 0 else 0
+
+
+def coefficient_intervals(columns: Columns, load: str) -> tuple[Interval, ...]:
+    """Return the interval of every coefficient of a linear equation, the constant last.
+
+    Empty where no linear equation of the columns gives the file's values within their printed digits.
+
+    Examples
+    --------
+    A column whose values are exact and an own FY of two decimals:
+
+    >>> import numpy as np
+    >>> from toolkit.audit.columns import Columns
+    >>> x = np.array([[1.0], [2.0], [3.0]])
+    >>> y = np.array([2.01, 4.02, 6.01])
+    >>> columns = Columns(names=("A",), units=("N",), x=x, half_x=0 * x, y={"FY": y},
+    ...                   half_y={"FY": np.full(3, 0.005)}, y_units={"FY": "N"})
+    >>> [(i.name, round(i.low, 4), round(i.high, 4), i.sign) for i in coefficient_intervals(columns, "FY")]
+    [('A', 1.995, 2.005, 1), ('constant', -0.005, 0.02, 0)]
+    """
+    bounds = interval_bounds(
+        columns.x,
+        columns.y[load],
+        half_x=columns.half_x,
+        half_y=columns.half_y[load] + 1e-9 * np.abs(columns.y[load]),
+    )
+    if bounds is None:
+        return ()
+    names = (*columns.names, "constant")
+    return tuple(
+        Interval(load=load, name=name, low=float(low), high=float(high))
+        for name, (low, high) in zip(names, bounds, strict=True)
+    )
+
+
+def interval_bounds(
+    x: NDArray[np.float64],
+    y: NDArray[np.float64],
+    *,
+    half_x: NDArray[np.float64],
+    half_y: NDArray[np.float64],
+) -> NDArray[np.float64] | None:
+    """Return (channels + 1, 2) lowest and highest coefficients, the constant last; None where none fits.
+
+    Parameters
+    ----------
+    x, half_x : (rows, channels) values and their half last places
+    y, half_y : (rows,) the same of the load
+    """
+    n = x.shape[1]
+    rounding = np.maximum(half_y, 1e-12 * max(float(np.abs(y).max()), np.finfo(float).tiny))
+    # In the directions of a QR factorisation, about the least-squares solution and in units of the rounding,
+    # every unknown is of order one, however collinear the columns are.
+    scale = np.maximum(np.abs(np.column_stack([x, np.ones(len(x))])).max(axis=0), np.finfo(float).tiny)
+    q, r = np.linalg.qr(np.column_stack([x, np.ones(len(x))]) / scale / rounding[:, None])
+    if np.abs(np.diag(r)).min() <= 1e-10 * np.abs(np.diag(r)).max():
+        return np.tile([-np.inf, np.inf], (n + 1, 1))  # a dead channel, or one that is another's multiple
+    back = np.linalg.inv(r) / scale[:, None]
+    target = y / rounding
+    centre, rest = back @ (q.T @ target), target - q @ (q.T @ target)
+    low, high = np.full(n + 1, np.inf), np.full(n + 1, -np.inf)
+    for signs in itertools.product((1.0, -1.0), repeat=n):
+        turned = np.array(signs)
+        allowed = half_x / rounding[:, None] * turned  # |c| half_x for these signs
+        moving, fixed = allowed @ back[:n], half_y / rounding + allowed @ centre[:n]
+        size = np.linalg.norm(back[:n], axis=1)
+        area = np.vstack([q - moving, -q - moving, -turned[:, None] * back[:n] / size[:, None]])
+        right = np.concatenate([fixed + rest, fixed - rest, turned * centre[:n] / size])
+        if _lowest(np.zeros(n + 1), area, right) is None:
+            continue  # no solution has these signs
+        for i in range(n + 1):
+            unit = float(np.linalg.norm(back[i]))
+            ends = [_lowest(turn * back[i] / unit, area, right) for turn in (1.0, -1.0)]
+            low[i] = min(low[i], -np.inf if ends[0] is None else centre[i] + ends[0] * unit)
+            high[i] = max(high[i], np.inf if ends[1] is None else centre[i] - ends[1] * unit)
+    return np.column_stack([low, high]) if np.all(low <= high) else None
+
+
+def _lowest(goal: NDArray[np.float64], area: NDArray[np.float64], right: NDArray[np.float64]) -> float | None:
+    # None where the programme has no lowest value: no solution at all, or no limit.
+    from scipy.optimize import linprog
+
+    answer = linprog(goal, A_ub=area, b_ub=right, bounds=(None, None), method="highs")
+    return float(answer.fun) if answer.status == 0 and answer.fun is not None else None

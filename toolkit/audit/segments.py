@@ -1,0 +1,110 @@
+"""Segments: which candidate fits which rows of a file that changes in the middle.
+
+A row fits a candidate where FY and MZ both do. From the first row on, the candidate that fits longest takes
+the rows; rows that none fits form a segment of their own, be it a single one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from toolkit.audit.candidates import Group
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Hit:
+    """A candidate: ``group`` by its index, and the sign variant of each load by its index."""
+
+    group: int
+    signs: tuple[tuple[str, int], ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Run:
+    """Rows ``start`` to ``stop`` (0-based, stop excluded) and the candidates that fit all of them."""
+
+    start: int
+    stop: int
+    hits: tuple[Hit, ...]
+
+
+def whole_file(fits: Sequence[dict[str, NDArray[np.bool_]]]) -> tuple[Hit, ...]:
+    """Return the candidates that fit every row; ``fits`` has (variants, rows) a load for each group."""
+    hits: list[Hit] = []
+    for index, by_load in enumerate(fits):
+        choices = [[(load, int(v)) for v in np.flatnonzero(fit.all(axis=1))] for load, fit in by_load.items()]
+        hits += _products(index, choices)
+    return tuple(hits)
+
+
+def partition(fits: Sequence[dict[str, NDArray[np.bool_]]], rows: int) -> tuple[Run, ...]:
+    """Split a file into runs of rows that the same candidates fit."""
+    lengths = [{load: _run_lengths(fit) for load, fit in by_load.items()} for by_load in fits]
+    runs: list[Run] = []
+    row = 0
+    while row < rows:
+        longest = 0
+        hits: list[Hit] = []
+        for index, by_load in enumerate(lengths):
+            # A pair of variants fits as long as the shorter of the two; the longest pair is wanted.
+            reach = min((int(length[:, row].max()) for length in by_load.values()), default=0)
+            if reach == 0 or reach < longest:
+                continue
+            choices = [
+                [(load, int(v)) for v in np.flatnonzero(length[:, row] >= reach)]
+                for load, length in by_load.items()
+            ]
+            found = _products(index, choices)
+            longest, hits = (reach, found) if reach > longest else (longest, hits + found)
+        if longest == 0 and runs and not runs[-1].hits:
+            runs[-1] = Run(start=runs[-1].start, stop=row + 1, hits=())
+        else:
+            runs.append(Run(start=row, stop=row + max(longest, 1), hits=tuple(hits)))
+        row += max(longest, 1)
+    return tuple(runs)
+
+
+def _run_lengths(fit: NDArray[np.bool_]) -> NDArray[np.int64]:
+    # How many rows from this one on fit without a break, (variants, rows).
+    lengths = np.zeros(fit.shape, dtype=np.int64)
+    after = np.zeros(len(fit), dtype=np.int64)
+    for row in range(fit.shape[1] - 1, -1, -1):
+        after = np.where(fit[:, row], after + 1, 0)
+        lengths[:, row] = after
+    return lengths
+
+
+def _products(index: int, choices: list[list[tuple[str, int]]]) -> list[Hit]:
+    import itertools
+
+    if not choices:
+        return []
+    return [Hit(group=index, signs=signs) for signs in itertools.product(*choices)]
+
+
+def distinct_rivals(groups: Sequence[Group], accepted: Hit, *, slack: bool) -> tuple[Hit, ...]:
+    """Return the candidates that this file cannot tell from the accepted one, itself included.
+
+    Two candidates are told apart where their predictions differ, in some row of FY or MZ, by more than the
+    sum of their two bounds (twice the bound): then not both could fit.
+    """
+    one = groups[accepted.group]
+    close: list[Hit] = []
+    for index, group in enumerate(groups):
+        choices = []
+        for load, variant in accepted.signs:
+            mine, other = one.families[load], group.families[load]
+            limit = mine.bound + other.bound
+            if slack:
+                limit = limit + mine.slack + other.slack
+            apart = np.abs(other.predicted - mine.predicted[variant]) > limit
+            choices.append([(load, int(v)) for v in np.flatnonzero(~apart.any(axis=1))])
+        close += _products(index, choices)
+    return tuple(close)
