@@ -96,21 +96,29 @@ def _revolutions(
     return None
 
 
-def mean(values: NDArray[np.float64]) -> Mean:
-    """Return the mean of consecutive rows and its uncertainty.
+def means(values: NDArray[np.float64]) -> tuple[Mean, ...]:
+    """Return the mean of consecutive rows and its uncertainty, for each channel.
 
+    Parameters
+    ----------
+    values : (channels, rows)
+
+    Notes
+    -----
     Rows of one revolution are not independent: filter and non-uniformity tie neighbours together. The
     variance of the mean is inflated for a first-order autocorrelation, and never below that of
     independent rows nor above the scatter of one row (a slow line can hide in one revolution).
     """
-    n = len(values)
-    average = float(np.mean(values))
+    n = values.shape[1]
+    average = values.mean(axis=1)
     if n < 2:
-        return Mean(value=average, sd=0.0, u=0.0)
-    rest = values - average
-    sd = float(np.sqrt(rest @ rest / (n - 1)))
-    if sd == 0.0:
-        return Mean(value=average, sd=0.0, u=0.0)
-    rho = min(max(float(rest[1:] @ rest[:-1]) / float(rest @ rest), 0.0), 0.999)
-    u = min(sd * np.sqrt((1 + rho) / (1 - rho) / n), sd)
-    return Mean(value=average, sd=sd, u=float(u))
+        return tuple(Mean(value=value, sd=0.0, u=0.0) for value in average.tolist())
+    rest = values - average[:, None]
+    squares = np.einsum("ij,ij->i", rest, rest)
+    products = np.einsum("ij,ij->i", rest[:, 1:], rest[:, :-1])
+    sd = np.sqrt(squares / (n - 1))
+    rho = np.clip(products / np.where(squares > 0, squares, 1.0), 0.0, 0.999)
+    u = np.minimum(sd * np.sqrt((1 + rho) / (1 - rho) / n), sd)
+    return tuple(
+        Mean(value=v, sd=s, u=w) for v, s, w in zip(*np.stack([average, sd, u]).tolist(), strict=True)
+    )

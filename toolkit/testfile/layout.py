@@ -17,9 +17,16 @@ SCHEMA = 1
 KIND = "toolkit reduced test"
 
 SHEETS = (
-    "provenance", "reduced", "fits", "fit_covariance", "characteristics", "characteristic_findings",
-    "findings", "raw",
-)  # fmt: skip
+    "provenance",
+    "reduced",
+    "fits",
+    "fit_parameters",
+    "fit_covariance",
+    "characteristics",
+    "characteristic_findings",
+    "findings",
+    "raw",
+)
 
 _UNITS = {"SA": "rad", "FZ": "N", "FY": "N", "MZ": "N*m"}
 

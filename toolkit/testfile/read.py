@@ -169,7 +169,7 @@ def _estimate(value: Any, u: Any, dof: Any, unit: Any) -> Estimate | None:
     return Estimate(value=number(value), u=number(u), dof=number(dof), unit=str(unit))
 
 
-def _fit(index: int, row: Row, covariances: dict[int, dict[tuple[str, str], float]]) -> CurveFit:
+def _fit(row: Row, parameters: list[Row], covariances: dict[tuple[str, str], float]) -> CurveFit:
     hints = get_type_hints(CurveFit)
     given: Row = {}
     for field in dataclasses.fields(CurveFit):
@@ -178,21 +178,19 @@ def _fit(index: int, row: Row, covariances: dict[int, dict[tuple[str, str], floa
             is_list = "tuple" in str(hints[field.name])
             given[field.name] = tuple(str(value).split()) if is_list else _as(hints[field.name], value)
     given["message"] = given["message"] or ""
-    parameters = tuple(
-        Parameter(
-            name=name,
-            value=number(row[key]),
-            unit=key[len(name) + 2 : -1],
-            standard_error=optional(row[f"standard error {name}"]),
-        )
-        for key, name in ((key, key.split(" [")[0]) for key in row if key.endswith("]"))
-        if row[key] not in ("", None)
-    )
-    mine = covariances.get(index, {})
+    names = [str(one["parameter"]) for one in parameters]
     return CurveFit(
         **given,
-        parameters=parameters,
-        covariance=tuple(tuple(mine[a.name, b.name] for b in parameters) for a in parameters) if mine else (),
+        parameters=tuple(
+            Parameter(
+                name=str(one["parameter"]),
+                value=number(one["value"]),
+                unit=str(one["unit"]),
+                standard_error=optional(one["standard_error"]),
+            )
+            for one in parameters
+        ),
+        covariance=tuple(tuple(covariances[a, b] for b in names) for a in names) if covariances else (),
         slope_at_zero=_estimate(*(row[f"slope_at_zero {p}"] for p in ("value", "u", "dof", "unit"))),
         value_at_zero=_estimate(*(row[f"value_at_zero {p}"] for p in ("value", "u", "dof", "unit"))),
     )
@@ -202,8 +200,13 @@ def _characteristics(sheets: dict[str, list[Row]]) -> Characteristics:
     covariances: dict[int, dict[tuple[str, str], float]] = {}
     for row in sheets["fit_covariance"]:
         covariances.setdefault(int(row["fit"]), {})[row["parameter"], row["with"]] = number(row["covariance"])
+    parameters: dict[int, list[Row]] = {}
+    for row in sheets["fit_parameters"]:
+        parameters.setdefault(int(row["fit"]), []).append(row)
     fits = {
-        (row["rotation"], number(row["group_load_N"]), row["channel"]): _fit(index, row, covariances)
+        (row["rotation"], number(row["group_load_N"]), row["channel"]): _fit(
+            row, parameters.get(index, []), covariances.get(index, {})
+        )
         for index, row in enumerate(sheets["fits"])
     }
     rows = sheets["characteristics"]

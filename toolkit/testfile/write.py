@@ -36,6 +36,7 @@ def write_test_file(path: Path, result: TestResult, recordings: Sequence[Recordi
         ("provenance", _provenance(result, digest)),
         ("reduced", _reduced(result)),
         ("fits", _fits(result)),
+        ("fit_parameters", _parameters(result)),
         ("fit_covariance", _covariances(result)),
         ("characteristics", _characteristics(result)),
         ("characteristic_findings", _findings(result.characteristics.findings)),
@@ -132,30 +133,31 @@ def _fits(result: TestResult) -> Rows:
         for field in dataclasses.fields(fits[0][2])
         if field.name not in ("parameters", "covariance", "slope_at_zero", "value_at_zero")
     ] if fits else []  # fmt: skip
-    names = list(dict.fromkeys((p.name, p.unit) for _, _, fit in fits for p in fit.parameters))
     estimates = ("slope_at_zero", "value_at_zero")
     yield [
         "rotation",
         "group_load_N",
         *plain,
-        *(f"{name} [{unit}]" for name, unit in names),
-        *(f"standard error {name}" for name, _ in names),
         *(f"{name} {part}" for name in estimates for part in ("value", "u", "dof", "unit")),
     ]
     for rotation, load, fit in fits:
-        mine = {(p.name, p.unit): p for p in fit.parameters}
-        values = [mine[key].value if key in mine else None for key in names]
-        errors = [mine[key].standard_error if key in mine else None for key in names]
         flat = [getattr(fit, name) for name in plain]
         flat = [" ".join(value) if isinstance(value, tuple) else value for value in flat]
         given = [part for name in estimates for part in _parts(getattr(fit, name))]
-        yield [rotation, load, *flat, *values, *errors, *given]
+        yield [rotation, load, *flat, *given]
 
 
 def _parts(estimate: Estimate | None) -> list[Any]:
     if estimate is None:
         return [None, None, None, None]
     return [estimate.value, estimate.u, estimate.dof, estimate.unit]
+
+
+def _parameters(result: TestResult) -> Rows:
+    yield ("fit", "parameter", "value", "standard_error", "unit")
+    for index, (_, _, fit) in enumerate(_all_fits(result)):
+        for one in fit.parameters:
+            yield (index, one.name, one.value, one.standard_error, one.unit)
 
 
 def _covariances(result: TestResult) -> Rows:

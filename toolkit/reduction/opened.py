@@ -1,0 +1,149 @@
+"""Open a recording: blocks, tare, corrected rows."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from toolkit.calibration.apply import apply_record
+from toolkit.channels import Rotation
+from toolkit.errors import RecordError, RecordingError
+from toolkit.reduction.acquired import Difference, compare
+from toolkit.reduction.averaging import ROLLING_RATIO, Window, free_radius_m, window
+from toolkit.reduction.blocks import Block, find_blocks, is_tare
+from toolkit.reduction.model import Tare
+from toolkit.units import from_si
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from toolkit.calibration.record import CalibrationRecord
+    from toolkit.machine import Machine
+    from toolkit.recording.model import Recording, TestInfo
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class OpenedFile:
+    """One recording on its way to conditions.
+
+    ``channels`` (4, rows) SI: SA, FZ, and the corrected FY and MZ, in machine axes; ``indications`` minus
+    tare, in the record's order and units; ``blocks`` its load blocks and ``windows`` the rows of each that
+    are averaged; ``differences`` what the acquisition program computed otherwise.
+    """
+
+    recording: Recording
+    rotation: Rotation
+    indications: NDArray[np.float64]
+    channels: NDArray[np.float64]
+    blocks: tuple[Block, ...]
+    windows: tuple[Window, ...]
+    differences: tuple[Difference, ...]
+    tare: Tare
+
+
+def check_record(record: CalibrationRecord, machine: Machine) -> None:
+    """Refuse a record that does not take the machine's indications or does not give FY and MZ."""
+    units = {column.symbol: column.unit for column in machine.indications}
+    for name, unit in zip(record.indications, record.indication_units, strict=True):
+        if units.get(name) != unit:
+            raise RecordError(
+                "the calibration record does not fit the machine",
+                where=f"record {record.id}, indication {name}",
+                got=f"{name} in {unit}",
+                expected=", ".join(f"{symbol} in {text}" for symbol, text in units.items()),
+                next_step="use a record of this machine (toolkit calibration list)",
+                rule="record-units",
+            )
+    for needed in ("FY", "MZ"):
+        if all(fit.load != needed for fit in record.loads):
+            raise RecordError(
+                f"the calibration record has no {needed}",
+                where=f"record {record.id}",
+                got=", ".join(fit.load for fit in record.loads),
+                expected="FY and MZ",
+                next_step="use a record that was fitted to FY and MZ",
+                rule="record-loads",
+            )
+
+
+def open_file(
+    recording: Recording,
+    rotation: Rotation,
+    *,
+    info: TestInfo,
+    machine: Machine,
+    record: CalibrationRecord,
+    declared: Tare | None,
+) -> OpenedFile:
+    """Correct a recording's rows and find its blocks.
+
+    Raises
+    ------
+    RecordingError
+        the file has no load block, or its load is negative
+    """
+    smallest = min(machine.protocol.loads_N)
+    FZ = recording["FZ"].si
+    all_blocks = find_blocks(FZ)
+    tare_blocks = [block for block in all_blocks if is_tare(block, smallest_load=smallest)]
+    blocks = tuple(block for block in all_blocks if not is_tare(block, smallest_load=smallest))
+    if not blocks or any(block.mean_FZ < 0 for block in blocks):
+        raise RecordingError(
+            "the file has no load block" if not blocks else "the load is negative",
+            where=recording.path,
+            got=f"FZ from {_lbf(np.min(FZ))} to {_lbf(np.max(FZ))} lbf",
+            expected=f"loads such as {', '.join(_lbf(load) for load in machine.protocol.loads_N)} lbf",
+            next_step="declare a tare file with '[tare] file' in test.toml; else check the load channel",
+            rule="no-load-block",
+        )
+    indications = {name: recording[name].values for name in record.indications}
+    units = {name: recording[name].unit for name in record.indications}
+    tare = declared or _tare_of(recording, tare_blocks)
+    offsets = dict(tare.values) if tare.source != "none" else None
+    loads = apply_record(record, indications, units=units, tare=offsets)
+    radius = free_radius_m(info.tire_size)
+    windows = tuple(
+        window(
+            recording,
+            block,
+            machine=machine,
+            rolling_radius_m=None if radius is None else ROLLING_RATIO * radius,
+        )
+        for block in blocks
+    )
+    return OpenedFile(
+        recording=recording,
+        rotation=rotation,
+        indications=np.stack(
+            [values - (offsets or {}).get(name, 0.0) for name, values in indications.items()]
+        ),
+        channels=np.stack([recording["SA"].si, FZ, loads["FY"], loads["MZ"]]),
+        blocks=blocks,
+        windows=windows,
+        differences=compare(recording, record, indications=indications, units=units, tare=offsets),
+        tare=tare,
+    )
+
+
+def _tare_of(recording: Recording, blocks: Sequence[Block]) -> Tare:
+    indications = [one for one in recording.series if one.role == "indication"]
+    unit = indications[0].unit
+    if not blocks:
+        return Tare(source="none", values=(), unit=unit)
+    rows = np.concatenate([np.arange(block.start, block.stop) for block in blocks])
+    values = tuple((one.symbol, float(np.mean(one.values[rows]))) for one in indications)
+    return Tare(source="block", values=values, unit=unit)
+
+
+def tare_of_file(recording: Recording) -> Tare:
+    """Return the tare from a recording that holds nothing else: the mean of every row."""
+    whole = Block(start=0, stop=recording.rows, mean_FZ=0.0)
+    return dataclasses.replace(_tare_of(recording, [whole]), source=f"file {recording.name}")
+
+
+def _lbf(force_N: float) -> str:
+    return f"{float(from_si(force_N, 'lbf')):.4g}"

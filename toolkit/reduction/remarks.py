@@ -1,0 +1,97 @@
+"""What a user should know about the files of a test as a whole."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from toolkit.findings import Finding
+from toolkit.units import from_si
+
+if TYPE_CHECKING:
+    from toolkit.calibration.record import CalibrationRecord
+    from toolkit.machine import Machine
+    from toolkit.recording.model import TestInfo
+    from toolkit.reduction.opened import OpenedFile
+
+
+def machine_findings(info: TestInfo, machine: Machine) -> list[Finding]:
+    """Return what the test declares against what the machine is."""
+    if (
+        info.speed_m_s is None
+        or abs(info.speed_m_s - machine.drum.speed_m_s) <= machine.drum.speed_tolerance_m_s
+    ):
+        return []
+    got, wanted, tolerance = from_si(
+        [info.speed_m_s, machine.drum.speed_m_s, machine.drum.speed_tolerance_m_s], "km/h"
+    )
+    message = f"speed {got:.2f} km/h is outside {wanted:.2f} +- {tolerance:.0f} km/h"
+    return [Finding(rule="speed", where="test.toml", message=message)]
+
+
+def tare_findings(files: Sequence[OpenedFile], record: CalibrationRecord) -> list[Finding]:
+    """Name the files that have no tare."""
+    bare = [file.recording.name for file in files if file.tare.source == "none"]
+    if not bare:
+        return []
+    return [
+        Finding(
+            rule="no-tare",
+            where=_some(bare),
+            message="no tare was recorded or declared: the zero of the cells stays in FY and MZ"
+            + ("" if record.zero == "included" else ", and the record was fitted on tared indications"),
+        )
+    ]
+
+
+def window_findings(files: Sequence[OpenedFile]) -> list[Finding]:
+    """Name the files whose blocks end too early."""
+    short = [file.recording.name for file in files if any(w.short for w in file.windows)]
+    if not short:
+        return []
+    message = "a block ends before settling and averaging are complete; its last revolution was averaged"
+    return [Finding(rule="short-block", where=_some(short), message=message)]
+
+
+def acquired_findings(files: Sequence[OpenedFile], record: CalibrationRecord) -> list[Finding]:
+    """Tell that another calibration wrote the FY and MZ of the files."""
+    wrong = [d for file in files for d in file.differences if not d.explained]
+    if not wrong:
+        return []
+    largest = {c: max((d.largest for d in wrong if d.channel == c), default=0.0) for c in ("FY", "MZ")}
+    return [
+        Finding(
+            rule="acquired-differs",
+            where=_some(list(dict.fromkeys(d.file for d in wrong))),
+            message=f"FY and MZ in the file were not computed by {record.id}: they differ by up to "
+            f"{largest['FY']:.1f} N and {largest['MZ']:.2f} N·m; the values here are recomputed from the "
+            "cells (toolkit inspect tells which calibration wrote them)",
+        )
+    ]
+
+
+def record_findings(record: CalibrationRecord) -> list[Finding]:
+    """Tell that the record is only a legacy import."""
+    if record.verified:
+        return []
+    message = "the record is a legacy import without its reference data: nothing verifies its coefficients"
+    return [Finding(rule="unverified", where=record.id, message=message)]
+
+
+def averaging_text(files: Sequence[OpenedFile], machine: Machine) -> str:
+    """Return in words what was averaged and over how many revolutions."""
+    turns = [w.revolutions for file in files for w in file.windows if w.revolutions is not None]
+    settle, length = machine.protocol.settle_revolutions, machine.protocol.average_revolutions
+    if not turns:
+        return (
+            f"whole blocks averaged, nothing discarded: the machine starts acquisition after {settle:g} tire "
+            f"revolutions and records {length:g}; the files have no time or angle channel to count them"
+        )
+    return (
+        f"the first {settle:g} tire revolutions of each block discarded, then averaged over "
+        f"{min(turns):.2f} to {max(turns):.2f} revolutions"
+    )
+
+
+def _some(names: Sequence[str]) -> str:
+    return names[0] if len(names) == 1 else f"{len(names)} files ({names[0]}, ...)"
