@@ -10,6 +10,7 @@ import numpy as np
 
 from toolkit.errors import FitError
 from toolkit.estimate import Estimate
+from toolkit.tires.evaluate import estimate_at, slope_at, slope_estimate_at, value_at, zero_crossing
 from toolkit.tires.kernel import (
     C_HIGH,
     C_LOW,
@@ -30,6 +31,18 @@ from toolkit.tires.uncertainty import Spread, autocorrelation_time, spread
 if TYPE_CHECKING:
     from toolkit.tires.kernel import Array
     from toolkit.tires.solver import Solution
+
+__all__ = [
+    "MIN_POINTS",
+    "Curve",
+    "estimate_at",
+    "fit_curves",
+    "slope_at",
+    "slope_estimate_at",
+    "value_at",
+    "why_not",
+    "zero_crossing",
+]
 
 MIN_POINTS = 7  # six parameters and one degree of freedom
 _SHIFT = np.deg2rad(10.0)
@@ -186,7 +199,7 @@ def _fit_group(curves: Sequence[Curve], loss: Loss) -> list[CurveFit]:
     known = np.nan_to_num(scale.known) >= variance
     dof = np.where(known, np.inf, np.maximum(lengths / times - 6, 1.0))
     variance = np.maximum(variance, _TINY_VARIANCE) * times
-    found = spread(solution.state, problems, zero=-scale.middle / scale.half, variance=variance)
+    found = spread(solution, problems, zero=-scale.middle / scale.half, variance=variance)
     return [
         _result(
             curve,

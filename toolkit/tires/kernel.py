@@ -104,6 +104,12 @@ def shape_of(p: Array) -> tuple[Array, Array, Array, Array]:
     return np.exp(p[..., 0]), p[..., 1], _E_TOP - np.exp(p[..., 2]), p[..., 3]
 
 
+def theta_of(state: State) -> Array:
+    """Return the six normalised parameters B, C, D, E, h, Sv of states (problems, 6)."""
+    B, C, E, h = shape_of(state.p)
+    return np.stack([B, C, state.linear[:, 0], E, h, state.linear[:, 1]], axis=1)
+
+
 def sine(p: Array, u: Array) -> Array:
     """Return sin(C arctan(...)) for unknowns (problems, 4) at normalised slip angles (problems, points)."""
     B, C, E, h = (column[..., None] for column in shape_of(p))
@@ -175,12 +181,12 @@ def solve_linear(gram: Array, right: Array) -> tuple[Array, Array, Array]:
         i = np.flatnonzero(outside)
         ss, s1, ww, sy, wy = ss[i], s1[i], ww[i], sy[i], wy[i]
         floor = np.maximum(ss, 1e-300)
-        edges = []
-        for bound in (D_LIMIT, -D_LIMIT):
-            edges.append((np.full(len(i), bound), np.clip((wy - bound * s1) / ww, -SV_LIMIT, SV_LIMIT)))
-        for bound in (SV_LIMIT, -SV_LIMIT):
-            edges.append((np.clip((sy - bound * s1) / floor, -D_LIMIT, D_LIMIT), np.full(len(i), bound)))
-        d, v = np.array([edge[0] for edge in edges]), np.array([edge[1] for edge in edges])
+        signs = np.array([[1.0], [-1.0]])
+        d = np.empty((4, len(i)))
+        v = np.empty((4, len(i)))
+        d[:2], v[2:] = signs * D_LIMIT, signs * SV_LIMIT
+        v[:2] = np.clip((wy - d[:2] * s1) / ww, -SV_LIMIT, SV_LIMIT)
+        d[2:] = np.clip((sy - v[2:] * s1) / floor, -D_LIMIT, D_LIMIT)
         best = np.argmin(d * d * ss + 2 * d * v * s1 + v * v * ww - 2 * d * sy - 2 * v * wy, axis=0)
         d, v = d[best, np.arange(len(i))], v[best, np.arange(len(i))]
         D[i], Sv[i] = d, v

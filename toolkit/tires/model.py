@@ -65,7 +65,7 @@ class CurveFit:
     ``load_N`` is the mean load of the block, None for a model over all loads. ``covariance`` is the
     parameters' covariance in their order, row by row, for propagation: a parameter that is not
     determined enters it with the spread that its bounds leave (it moves together with others, and a
-    stiffness may be known where it is not), one at its bound with zero. ``error_percent`` and
+    stiffness may be known where it is not). ``error_percent`` and
     ``scatter_floor_percent`` as in the files contract; the floor is None where bins are too thin.
     """
 

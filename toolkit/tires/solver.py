@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolkit.tires.kernel import Problems, State, assess, sine
+from toolkit.tires.kernel import Problems, State, assess, sine, theta_of
 from toolkit.tires.starts import pick
 
 if TYPE_CHECKING:
@@ -33,10 +33,16 @@ _NEAR = np.array([0.02, 0.02, 0.05, 0.02])
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Solution:
-    """The lowest minimum of every problem, and how many starts ended there."""
+    """The lowest minimum of every problem, how many starts ended there, and where the others ended.
+
+    ``rivals`` (curves, starts, 6): B, C, D, E, h, Sv of the last starts; ``excess`` (curves, starts): their
+    cost above the lowest.
+    """
 
     state: State
     agreeing: NDArray[np.intp]
+    rivals: Array
+    excess: Array
 
 
 def solve(problems: Problems) -> Solution:
@@ -55,13 +61,16 @@ def solve(problems: Problems) -> Solution:
         part = coarse.take(np.repeat(open_, count))
         state.put_at(index, descend(state.p[index], part, steps=_LAST, tolerance=1e-7))
         agreeing = _agreeing(state.cost.reshape(-1, count), floor)
+    rivals = theta_of(state).reshape(len(curves), count, 6)
+    cost = state.cost.reshape(len(curves), count)
+    excess = cost - cost.min(axis=1, keepdims=True)
     # Bin means may rank two minima otherwise than the rows do: both are polished.
     polished = 1 if coarse is problems else 2
     order = np.argsort(state.cost.reshape(-1, count), axis=1)[:, :polished]
     index = (order + count * curves[:, None]).ravel()
     state = descend(state.p[index], problems.take(np.repeat(curves, polished)), steps=30, tolerance=1e-10)
     best = state.cost.reshape(-1, polished).argmin(axis=1) + polished * curves
-    return Solution(state=state.take(best), agreeing=agreeing)
+    return Solution(state=state.take(best), agreeing=agreeing, rivals=rivals, excess=excess)
 
 
 def _best(state: State, curves: int, count: int, keep: int) -> Array:
@@ -199,7 +208,9 @@ def solve_robust(problems: Problems) -> tuple[Solution, Problems, Array]:
     mean = np.sum(np.where(used, inside**2, 0), axis=1) / count
     influence = np.sum((_residual(state, problems) * problems.sw * inside**2) ** 2, axis=1)
     inflation = influence * mean / (np.maximum(curvature, 0.1) ** 2 * np.maximum(state.cost, 1e-300))
-    return Solution(state=state, agreeing=agreeing), part, inflation
+    rivals = theta_of(state)[:, None, :]
+    solution = Solution(state=state, agreeing=agreeing, rivals=rivals, excess=np.zeros((curves, 1)))
+    return solution, part, inflation
 
 
 _BIWEIGHT = 4.685  # 95 % efficiency on normal noise

@@ -1,8 +1,9 @@
 """Which parameters the data determine, and how well: linear propagation, checked against the real cost.
 
 The Gauss-Newton covariance holds only where the cost is a parabola. So every parameter is moved by two
-standard errors along its ridge, and the cost there is computed: where it is not what the parabola says, or
-a bound is in the way, the parameter is not determined and gets no standard error. Rows of a 100 Hz
+standard errors, all else is fitted again, and the cost is compared: where it is not what the parabola
+says, a bound is in the way, or another minimum is as good, the parameter is not determined and gets no
+standard error. Rows of a 100 Hz
 sweep repeat themselves: the covariance is multiplied by the residual's integrated autocorrelation time.
 """
 
@@ -23,18 +24,21 @@ from toolkit.tires.kernel import (
     SPAN_LOW,
     SV_LIMIT,
     Problems,
-    State,
-    shape_of,
+    theta_of,
 )
 from toolkit.tires.models.magic_formula import jacobian, slope, slope_jacobian, value
+from toolkit.tires.solver import compress
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from toolkit.tires.kernel import Array
+    from toolkit.tires.solver import Solution
 
 _STEP = 2.0  # standard errors by which a parameter is moved
-_PARABOLA = (0.35, 3.0)  # of the expected rise of the cost: beyond, a linear interval would mislead
+_PARABOLA = (0.5, 1.8)  # of the expected rise of the cost: beyond, a linear interval would mislead
+_REFITS = 4  # steps by which all else is fitted again where one quantity is held
+_APART = 3.0  # standard errors between minima that differ
 _WIDE = 0.25  # of the spread that the bounds alone leave: beyond, the data say next to nothing
 _ROWS_FOR_CORRELATION = 40
 
@@ -57,7 +61,7 @@ class Spread:
     value_se: Array
 
 
-def spread(state: State, problems: Problems, *, zero: Array, variance: Array) -> Spread:
+def spread(solution: Solution, problems: Problems, *, zero: Array, variance: Array) -> Spread:
     """Return what the data say about the parameters at a minimum.
 
     Parameters
@@ -65,8 +69,7 @@ def spread(state: State, problems: Problems, *, zero: Array, variance: Array) ->
     zero : normalised slip angle of SA = 0 (curves,)
     variance : variance of a row of weight one, autocorrelation included (curves,)
     """
-    B, C, E, h = shape_of(state.p)
-    theta = np.stack([B, C, state.linear[:, 0], E, h, state.linear[:, 1]], axis=1)
+    theta = theta_of(solution.state)
     low, high, width = _box(theta, problems)
     margin = 1e-6 * (high - low)
     at_bound = (theta <= low + margin) | (theta >= high - margin)
@@ -74,33 +77,38 @@ def spread(state: State, problems: Problems, *, zero: Array, variance: Array) ->
     information = columns @ columns.transpose(0, 2, 1) / variance[:, None, None]
     # What the bounds alone say keeps the inverse finite; it is negligible for what the data determine.
     information += np.eye(6) / (width * width)[:, :, None]
-    free = (~at_bound).astype(np.float64)
-    information = information * (free[:, :, None] * free[:, None, :])
-    np.einsum("pii->pi", information)[...] += at_bound
-    covariance = _inverse(information) * (free[:, :, None] * free[:, None, :])
-    sd = np.sqrt(np.maximum(np.einsum("pii->pi", covariance), 0.0))
-    ridge = covariance / np.where(sd > 0, sd, 1.0)[:, None, :]
-    steady = _parabolic(theta, ridge, problems, state.cost, variance, low, high)
-    determined = (~at_bound) & (sd <= _WIDE * width) & steady
-    at_zero = slope(theta.T, zero)
-    slope_se, slope_ok = _propagated(
-        slope_jacobian(theta.T, zero).T, theta, covariance, problems, state.cost, variance
+    # A parameter at its bound stays free here: the others would else look better known than they are.
+    covariance = _inverse(information)
+    at_zero, level = slope(theta.T, zero), value(theta.T, zero)
+    gradients = np.concatenate(
+        [
+            np.broadcast_to(np.eye(6)[:, None, :], (6, *theta.shape)),
+            slope_jacobian(theta.T, zero).T[None],
+            jacobian(theta.T, zero).T[None],
+        ]
     )
-    level = value(theta.T, zero)
-    value_se, value_ok = _propagated(
-        jacobian(theta.T, zero).T, theta, covariance, problems, state.cost, variance
-    )
-    inside = np.abs(zero) <= 1.05
-    slope_ok = inside & (slope_se <= _WIDE * np.abs(at_zero))
+    along = np.matvec(covariance, gradients)
+    errors = np.sqrt(np.maximum(np.vecdot(gradients, along), 0.0))
+    along /= np.where(errors > 0, errors, 1.0)[..., None]
+    steady = _steady(theta, gradients[:6], along[:6], compress(problems), variance, low, high)
+    sd = errors[:6].T
+    determined = (~at_bound) & (sd <= _WIDE * width) & steady.T
+    # Another minimum that the noise cannot tell from the lowest: what differs there is not determined.
+    rival = (solution.excess <= _STEP**2 * variance[:, None])[..., None]
+    apart = np.abs(solution.rivals - theta[:, None, :]) > _APART * sd[:, None, :] + 1e-6
+    determined &= ~(rival & apart).any(axis=1)
+    # Beyond the data a curve is an extrapolation of the model, whatever its covariance says.
+    # A slope needs rows on both sides; a value may stand at the end of them.
+    slope_ok = (np.abs(zero) <= 0.95) & (errors[6] <= _WIDE * np.abs(at_zero))
     return Spread(
         theta=theta,
         covariance=covariance,
         determined=determined,
         at_bound=at_bound,
         slope=at_zero,
-        slope_se=np.where(slope_ok, slope_se, np.nan),
+        slope_se=np.where(slope_ok, errors[6], np.nan),
         value=level,
-        value_se=np.where(inside, value_se, np.nan),
+        value_se=np.where(np.abs(zero) <= 1.05, errors[7], np.nan),
     )
 
 
@@ -120,42 +128,61 @@ def _box(theta: Array, problems: Problems) -> tuple[Array, Array, Array]:
     return low, high, width
 
 
-def _inverse(matrix: Array) -> Array:
-    scale = 1.0 / np.sqrt(np.einsum("pii->pi", matrix))
-    unit = matrix * (scale[:, :, None] * scale[:, None, :])
-    return np.linalg.inv(unit) * (scale[:, :, None] * scale[:, None, :])
-
-
-def _cost(theta: Array, problems: Problems) -> Array:
-    # theta (directions, curves, 6) -> cost (directions, curves)
-    model = value(np.moveaxis(theta, -1, 0)[..., None], problems.u)
-    residual = (model - problems.y) * problems.sw
-    return np.vecdot(residual, residual)
-
-
-def _parabolic(
-    theta: Array, ridge: Array, problems: Problems, cost: Array, variance: Array, low: Array, high: Array
+def _steady(
+    theta: Array,
+    gradients: Array,
+    along: Array,
+    problems: Problems,
+    variance: Array,
+    low: Array,
+    high: Array,
 ) -> NDArray[np.bool_]:
-    # Six parameters, two sides: does the cost rise by _STEP^2 variances, inside the box?
-    moves = _STEP * np.moveaxis(ridge, 2, 0)
-    moved = np.stack([theta + moves, theta - moves])
-    own = np.einsum("sjpj->sjp", moved)
-    inside = ((own >= low.T) & (own <= high.T)).all(axis=0)
-    rise = (_cost(moved.reshape(-1, *theta.shape), problems) - cost) / (_STEP**2 * variance)
-    fair = ((rise >= _PARABOLA[0]) & (rise <= _PARABOLA[1])).reshape(2, 6, -1).all(axis=0)
-    result: NDArray[np.bool_] = (inside & fair).T
+    # Does the cost rise as the parabola says when a quantity is held _STEP standard errors away, on both
+    # sides, and all else is fitted again? gradients, along (quantities, curves, 6) -> (quantities, curves).
+    quantities, curves = len(gradients), len(theta)
+    sides = np.array([_STEP, -_STEP])[:, None, None, None]
+    moved = (theta + sides * along).reshape(-1, 6)
+    repeat = np.tile(np.arange(curves), 2 * quantities)
+    held = np.concatenate([gradients, gradients]).reshape(-1, 6)
+    own = np.einsum("sjpj->sjp", moved.reshape(2, quantities, curves, 6)[:, :6])
+    margin = 0.02 * (high - low).T
+    reachable = np.ones((quantities, curves), dtype=np.bool_)
+    reachable[:6] = ((own >= low.T - margin) & (own <= high.T + margin)).all(axis=0)
+    part, low, high = problems.take(repeat), low[repeat], high[repeat]
+    moved = np.clip(moved, low, high)
+    cost, columns, residual = _linearised(moved, part)
+    for _ in range(_REFITS):
+        normal = columns @ columns.transpose(0, 2, 1)
+        diagonal = np.einsum("pii->pi", normal)
+        diagonal[...] += 1e-9 * diagonal.max(axis=1)[:, None] + 1e-300
+        inverse = _inverse(normal)
+        descent = np.matvec(inverse, np.matvec(columns, residual))
+        across = np.matvec(inverse, held)
+        share = np.vecdot(held, descent) / np.maximum(np.vecdot(held, across), 1e-300)
+        trial = np.clip(moved + descent - share[:, None] * across, low, high)
+        new_cost, new_columns, new_residual = _linearised(trial, part)
+        better = new_cost < cost
+        moved[better], cost[better] = trial[better], new_cost[better]
+        columns[better], residual[better] = new_columns[better], new_residual[better]
+    base, _, _ = _linearised(theta, problems)
+    rise = (cost.reshape(2, quantities, curves) - base) / (_STEP**2 * variance)
+    fair = ((rise >= _PARABOLA[0]) & (rise <= _PARABOLA[1])).all(axis=0)
+    result: NDArray[np.bool_] = reachable & fair
     return result
 
 
-def _propagated(
-    gradient: Array, theta: Array, covariance: Array, problems: Problems, cost: Array, variance: Array
-) -> tuple[Array, NDArray[np.bool_]]:
-    # Delta method for a derived quantity, with the same check of the cost along its ridge.
-    along = np.matvec(covariance, gradient)
-    se = np.sqrt(np.maximum(np.vecdot(gradient, along), 0.0))
-    direction = _STEP * along / np.where(se > 0, se, 1.0)[:, None]
-    rise = (_cost(np.stack([theta + direction, theta - direction]), problems) - cost) / (_STEP**2 * variance)
-    return se, (rise <= _PARABOLA[1]).all(axis=0) & np.isfinite(se)
+def _linearised(theta: Array, problems: Problems) -> tuple[Array, Array, Array]:
+    # Cost (curves,), the columns of the Jacobian (curves, 6, points) and the residual, all weighted.
+    columns = np.moveaxis(jacobian(theta.T[..., None], problems.u), 0, 1) * problems.sw[:, None, :]
+    residual = (problems.y - value(theta.T[..., None], problems.u)) * problems.sw
+    return np.vecdot(residual, residual), columns, residual
+
+
+def _inverse(matrix: Array) -> Array:
+    scale = 1.0 / np.sqrt(np.einsum("pii->pi", matrix))
+    unit = matrix * (scale[:, :, None] * scale[:, None, :])
+    result: Array = np.linalg.inv(unit) * (scale[:, :, None] * scale[:, None, :])
+    return result
 
 
 def autocorrelation_time(residual: Array) -> float:

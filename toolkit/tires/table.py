@@ -1,0 +1,200 @@
+"""TABLE.csv: measured forces and moments of a tire, one row a sample, units in the header.
+
+    SA [deg],FZ [N],FY [N],MZ [N*m]        optional: IA [deg], P [kPa], V [km/h], FX [N], KAPPA [1], t [s]
+
+FZ may have either sign and is the load. The axis system is declared, never guessed.
+"""
+
+from __future__ import annotations
+
+import csv
+import difflib
+import io
+import math
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, NoReturn, get_args
+
+import numpy as np
+
+from toolkit.channels import AXES, CHANNELS, Axes
+from toolkit.errors import CellError, ColumnError, ConfigError, UnreadableError
+from toolkit.units import unit
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+_HEADER = re.compile(r"\s*([A-Za-z_]+)\s*\[([^\]]*)\]\s*")
+_NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]{1,4})?")
+_AXES: dict[str, Axes] = {axes: axes for axes in get_args(Axes)}
+_SHAPE = "a header such as 'SA [deg],FZ [N],FY [N],MZ [N*m]' and rows of numbers"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class TireTable:
+    """A table in SI: ``columns`` by symbol (rows,), in the declared ``axes``; FZ is the positive load."""
+
+    path: Path
+    axes: Axes
+    columns: tuple[tuple[str, NDArray[np.float64]], ...]
+
+    def get(self, symbol: str) -> NDArray[np.float64] | None:
+        """Return a column [SI], None where the table has none."""
+        return dict(self.columns).get(symbol)
+
+    def __getitem__(self, symbol: str) -> NDArray[np.float64]:
+        """Return a column [SI]."""
+        return dict(self.columns)[symbol]
+
+
+def read_table(path: Path, *, axes: str = "SAE", required: tuple[str, ...] = ("SA", "FZ")) -> TireTable:
+    """Read a table; all of it or nothing.
+
+    Parameters
+    ----------
+    axes : the axis system that the table is in
+    required : columns that it must have; one of FY and MZ too, unless none is asked for besides SA and FZ
+
+    Raises
+    ------
+    ConfigError
+        the axis system is unknown
+    UnreadableError
+        no text, no rows
+    ColumnError
+        a column is unknown, doubled, missing, or without a unit
+    UnitError
+        a unit is unknown or of another dimension
+    CellError
+        text, an empty cell, NaN or infinity in a number's place
+    """
+    if axes not in AXES:
+        raise ConfigError(
+            f"unknown axis system {axes!r}", where="--axes", got=axes, expected=", ".join(AXES),
+            next_step="name one of those expected", rule="unknown-axes",
+        )  # fmt: skip
+    lines = _cells(path)
+    row, header = lines[0]
+    names = [_symbol(cell, path) for cell in header]
+    symbols = [name for name, _, _ in names]
+    for symbol in symbols:
+        if symbols.count(symbol) > 1:
+            _refuse(
+                path,
+                "doubled-column",
+                f"the column {symbol} stands twice",
+                ", ".join(header),
+                f"one {symbol}",
+            )
+    for symbol in required:
+        if symbol not in symbols:
+            _refuse(
+                path,
+                "missing-column",
+                f"the table has no column {symbol}",
+                ", ".join(header),
+                f"{symbol} [unit]",
+            )
+    if not {"FY", "MZ"} & set(symbols):
+        _refuse(
+            path, "missing-column", "the table has neither FY nor MZ", ", ".join(header), "FY [N] or MZ [N*m]"
+        )
+    if len(lines) == 1:
+        raise UnreadableError(
+            "the table has no data", where=path, got=f"a header in row {row} and nothing below it",
+            expected=_SHAPE, next_step="add the rows", rule="no-data",
+        )  # fmt: skip
+    values = np.array([_numbers(cells, header, path, row) for row, cells in lines[1:]], dtype=np.float64).T
+    columns = []
+    for (symbol, factor, offset), column in zip(names, values, strict=True):
+        si = column * factor + offset
+        columns.append((symbol, np.abs(si) if symbol == "FZ" else si))
+    return TireTable(path=path, axes=_AXES[axes], columns=tuple(columns))
+
+
+def _cells(path: Path) -> list[tuple[int, list[str]]]:
+    # (line number, cells) of every line that is not blank.
+    try:
+        text = path.read_bytes().decode("utf-8-sig")
+    except OSError as error:
+        raise UnreadableError(
+            "the table cannot be read", where=path, got=error.strerror, expected="a readable CSV file",
+            next_step="check the path", rule="no-file",
+        ) from error  # fmt: skip
+    except UnicodeDecodeError as error:
+        raise UnreadableError(
+            "the table is not a text file in UTF-8", where=path, got=f"a wrong byte at {error.start}",
+            expected=_SHAPE, next_step="save it as 'CSV UTF-8'", rule="encoding",
+        ) from error  # fmt: skip
+    first = next((line for line in text.splitlines() if line.strip(" ,;\t")), "")
+    reader = csv.reader(io.StringIO(text, newline=""), delimiter=max(",;", key=first.count), strict=True)
+    try:
+        lines = [(reader.line_num, cells) for cells in reader if any(cell.strip() for cell in cells)]
+    except csv.Error as error:
+        raise UnreadableError(
+            "the table is not CSV", where=f"{path}, line {reader.line_num}", got=error, expected=_SHAPE,
+            next_step="mend the quotation marks", rule="unreadable",
+        ) from error  # fmt: skip
+    if not lines:
+        raise UnreadableError(
+            "the table is empty", where=path, got="no text", expected=_SHAPE, next_step="check the path",
+            rule="no-data",
+        )  # fmt: skip
+    return lines
+
+
+def _symbol(cell: str, path: Path) -> tuple[str, float, float]:
+    # "SA [deg]" -> symbol, factor and offset to SI.
+    match = _HEADER.fullmatch(cell)
+    name = match[1] if match else cell.partition("[")[0].strip()
+    known = {symbol.upper(): symbol for symbol in CHANNELS}
+    symbol = name if name in CHANNELS else known.get(name.upper() if len(name) > 1 else name)
+    if symbol is None:
+        near = difflib.get_close_matches(name.upper(), known, n=1, cutoff=0.5)
+        _refuse(
+            path, "unknown-column", f"unknown column {name!r}", repr(cell),
+            f"{known[near[0]]} [unit]" if near else "SA FZ FY MZ, optional IA P V FX KAPPA t",
+        )  # fmt: skip
+    if match is None:
+        _refuse(
+            path, "unknown-unit", f"the column {name} has no unit", repr(cell), f"'{name} [unit]', e.g. [N]"
+        )
+    where = f"{path}, column {cell.strip()!r}"
+    found = unit(match[2], where=where)
+    wanted = CHANNELS[symbol].dimension
+    if found.dimension != wanted:
+        from toolkit.units import si_scale
+
+        si_scale(match[2], wanted, where=where)
+    return symbol, found.factor, found.offset
+
+
+def _numbers(cells: list[str], header: list[str], path: Path, row: int) -> list[float]:
+    if len(cells) != len(header):
+        raise CellError(
+            f"row {row} has another number of cells than the header", where=f"{path}, row {row}",
+            got=len(cells), expected=len(header), next_step="mend that row; decimals take a point",
+            rule="ragged-row",
+        )  # fmt: skip
+    numbers = []
+    for name, cell in zip(header, cells, strict=True):
+        text = cell.strip()
+        number = float(text) if _NUMBER.fullmatch(text) else math.nan
+        if not math.isfinite(number):
+            raise CellError(
+                f"row {row}, column {name.strip()!r}: no number",
+                where=f"{path}, row {row}, column {name.strip()!r}",
+                got=repr(text) if text else "an empty cell",
+                expected="a finite number with a decimal point",
+                next_step="remove or mend that row",
+                rule="text-cell" if text else "empty-cell",
+            )
+        numbers.append(number)
+    return numbers
+
+
+def _refuse(path: Path, rule: str, what: str, got: str, expected: str) -> NoReturn:
+    raise ColumnError(
+        what, where=path, got=got, expected=expected, next_step="mend the header row of the table", rule=rule
+    )

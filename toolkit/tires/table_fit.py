@@ -1,0 +1,134 @@
+"""Fit every load block of a table, and hold its small-angle slopes against the axes it declares."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from toolkit.channels import Axes
+from toolkit.errors import FitError
+from toolkit.findings import Finding
+from toolkit.tires.blocks import load_blocks
+from toolkit.tires.evaluate import slope_estimate_at
+from toolkit.tires.fit import Curve, why_not
+from toolkit.tires.model import CurveFit, Loss, TireModel
+from toolkit.tires.table import TireTable
+
+# Sign of dy/dSA at small angles of a tire, see `toolkit.channels`.
+_SLOPE_SIGN: dict[Axes, dict[str, int]] = {
+    "SAE": {"FY": -1, "MZ": 1},
+    "adapted-SAE": {"FY": 1, "MZ": -1},
+    "ISO-W": {"FY": -1, "MZ": 1},
+    "machine": {"FY": -1, "MZ": 1},
+}
+_SURE = 4.0  # standard errors by which a slope must differ from zero before its sign counts
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TableFits:
+    """Fits by model, load and channel, and what should be known about them."""
+
+    fits: tuple[CurveFit, ...]
+    findings: tuple[Finding, ...]
+
+
+def slope_sign(axes: Axes, channel: str) -> int:
+    """Return the sign of dFY/dSA or dMZ/dSA of a tire at small slip angles in an axis system.
+
+    >>> slope_sign("SAE", "FY"), slope_sign("adapted-SAE", "FY")
+    (-1, 1)
+    """
+    return _SLOPE_SIGN[axes][channel]
+
+
+def table_curves(table: TireTable) -> tuple[Curve, ...]:
+    """Return the curves of a table: every load block, FY and MZ; ``load_N`` is the block's mean load."""
+    curves = []
+    for rows in load_blocks(table["FZ"]):
+        for channel in ("FY", "MZ"):
+            y = table.get(channel)
+            if y is not None:
+                curves.append(
+                    Curve(
+                        SA=table["SA"][rows],
+                        y=y[rows],
+                        channel="FY" if channel == "FY" else "MZ",
+                        load_N=float(table["FZ"][rows].mean()),
+                        axes=table.axes,
+                    )
+                )
+    return tuple(curves)
+
+
+def fit_table(table: TireTable, models: tuple[TireModel, ...], *, loss: Loss = "linear") -> TableFits:
+    """Fit models to every load block and channel of a table.
+
+    Raises
+    ------
+    FitError
+        not one curve of the table can be fitted; where only some cannot, that is a finding
+    """
+    curves = table_curves(table)
+    problems = [why_not(curve) for curve in curves]
+    good = [curve for curve, problem in zip(curves, problems, strict=True) if problem is None]
+    refused = [problem for problem in problems if problem is not None]
+    if not good:
+        first = refused[0]
+        raise FitError(
+            first.what,
+            where=f"{table.path}, {first.where}",
+            got=first.got,
+            expected=first.expected,
+            next_step=first.next_step,
+            rule=first.rule,
+        )
+    fits = [fit for model in models for fit in model.fit(good, loss=loss)]
+    findings = [
+        Finding(
+            rule=one.rule or "not-fitted",
+            where=one.where or str(table.path),
+            message=f"{one.what}: {one.got}",
+        )
+        for one in refused
+    ]
+    return TableFits(
+        fits=tuple(fits), findings=(*findings, *fit_findings(fits), *_axes_findings(table, fits))
+    )
+
+
+def fit_findings(fits: list[CurveFit]) -> list[Finding]:
+    """Return a finding for every fit whose minimum is not confirmed, and a note for every limitation."""
+    found = []
+    for fit in fits:
+        load = "all loads" if fit.load_N is None else f"{fit.load_N:.0f} N"
+        where = f"{fit.model} {fit.channel} at {load}"
+        if not fit.converged:
+            found.append(Finding(rule="not-converged", where=where, message=fit.message))
+        elif fit.not_determined:
+            found.append(Finding(rule="not-determined", where=where, message=fit.message, level="note"))
+    return found
+
+
+def _axes_findings(table: TireTable, fits: list[CurveFit]) -> list[Finding]:
+    found = []
+    for channel in ("FY", "MZ"):
+        votes = []
+        for fit in fits:
+            if fit.channel == channel and fit.load_N is not None:
+                slope = slope_estimate_at(fit, 0.0)
+                if abs(slope.value) > _SURE * slope.u:
+                    votes.append(int(np.sign(slope.value)))
+        expected = slope_sign(table.axes, channel)
+        against = votes.count(-expected)
+        if against and 2 * against > len(votes):
+            word = "rises" if expected < 0 else "falls"
+            found.append(
+                Finding(
+                    rule="axes-contradiction",
+                    where=f"{table.path.name}, {channel}",
+                    message=f"{channel} {word} with SA at small angles in {against} of {len(votes)} load "
+                    f"blocks: that contradicts the declared axes {table.axes}; nothing was flipped, check --axes",
+                )
+            )
+    return found
