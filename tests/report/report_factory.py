@@ -36,11 +36,23 @@ def shape(channel: str, load: float) -> tuple[float, ...]:
 
 def info(**changes: object) -> TestInfo:
     base = TestInfo(
-        name="altimax-89", machine="m15", date="2019-06-04", operator="A. Operator", requestor="R. Requestor",
-        special="Asymmetric", surface="steel", speed_m_s=7.66 / 3.6, pressure_Pa=34 * 6894.757293168361,
-        rated_load_N=4900.0, tire_size="265/35 ZR 18", tire_company="Continental", tire_DOT="4MY8-009X-0713",
-        tire_series="Altimax", tire_construction="radial", tire_rim="9J x 18",
-    )  # fmt: skip
+        name="altimax-89",
+        machine="m15",
+        date="2019-06-04",
+        operator="A. Operator",
+        requestor="R. Requestor",
+        special="Asymmetric",
+        surface="steel",
+        speed_m_s=7.66 / 3.6,
+        pressure_Pa=34 * 6894.757293168361,
+        rated_load_N=4900.0,
+        tire_size="265/35 ZR 18",
+        tire_company="Continental",
+        tire_DOT="4MY8-009X-0713",
+        tire_series="Altimax",
+        tire_construction="radial",
+        tire_rim="9J x 18",
+    )
     return dataclasses.replace(base, **changes)  # type: ignore[arg-type]
 
 
@@ -48,15 +60,27 @@ def _fit(channel: str, load: float) -> CurveFit:
     errors = (0.11, 0.013, 14.0, 0.09, 0.0006, 1.4)
     units = ("1/rad", "1", "N" if channel == "FY" else "N*m", "1", "rad", "N" if channel == "FY" else "N*m")
     return CurveFit(
-        model="magic_formula", channel=channel, load_N=load, axes="SAE", n=13, dof=7,
+        model="magic_formula",
+        channel=channel,
+        load_N=load,
+        axes="SAE",
+        n=13,
+        dof=7,
         parameters=tuple(
             Parameter(name=n, value=v, unit=u, standard_error=e)
             for n, v, u, e in zip(NAMES, shape(channel, load), units, errors, strict=True)
         ),
-        covariance=tuple(tuple(0.0 for _ in NAMES) for _ in NAMES), not_determined=(), at_bound=(),
-        error_percent=1.33, scatter_floor_percent=None, slope_at_zero=None, value_at_zero=None, loss="linear",
-        converged=True, message="ok",
-    )  # fmt: skip
+        covariance=tuple(tuple(0.0 for _ in NAMES) for _ in NAMES),
+        not_determined=(),
+        at_bound=(),
+        error_percent=1.33,
+        scatter_floor_percent=None,
+        slope_at_zero=None,
+        value_at_zero=None,
+        loss="linear",
+        converged=True,
+        message="ok",
+    )
 
 
 def _estimate(value: float, u: float, unit: str) -> Estimate:
@@ -64,9 +88,13 @@ def _estimate(value: float, u: float, unit: str) -> Estimate:
 
 
 def make_result(
-    *, both: bool = True, fits: bool = True, unverified: bool = False, findings: tuple[Finding, ...] = (),
+    *,
+    both: bool = True,
+    fits: bool = True,
+    unverified: bool = False,
+    findings: tuple[Finding, ...] = (),
     **changes: object,
-) -> TestResult:  # fmt: skip
+) -> TestResult:
     """Return a whole test of 13 steps, 5 loads, one or two directions."""
     conditions, direction_fits, stiffness, pull = [], [], [], []
     rotations = ("forward", "reverse") if both else ("forward",)
@@ -79,13 +107,33 @@ def make_result(
                 file = f"{rotation[0]}{step:+d}"
                 conditions.append(
                     Condition(
-                        file=file, file_sha256=hashlib.sha256(file.encode()).hexdigest(),
-                        rotation=rotation, first_row=1 + 100 * i, last_row=100 * (i + 1), step_SA=step * DEG,
-                        step_FZ=load, SA=sa, FZ=load + 11, FY=fy, MZ=mz, sd_SA=0.001, sd_FZ=9.0, u_FY=0.8, u_MZ=0.04,
-                        indications=(fy / 3, fy / 3, -fy / 3), FY_file=fy + 4, MZ_file=mz - 0.2, FZ_common=load, FY_common=fy - 0.2, MZ_common=mz,
-                        u_FY_common=0.9, u_MZ_common=0.05, used=True, calibration_sha256=SHA,
+                        file=file,
+                        file_sha256=hashlib.sha256(file.encode()).hexdigest(),
+                        rotation=rotation,
+                        first_row=1 + 100 * i,
+                        last_row=100 * (i + 1),
+                        step_SA=step * DEG,
+                        step_FZ=load,
+                        SA=sa,
+                        FZ=load + 11,
+                        FY=fy,
+                        MZ=mz,
+                        sd_SA=0.001,
+                        sd_FZ=9.0,
+                        u_FY=0.8,
+                        u_MZ=0.04,
+                        indications=(fy / 3, fy / 3, -fy / 3),
+                        FY_file=fy + 4,
+                        MZ_file=mz - 0.2,
+                        FZ_common=load,
+                        FY_common=fy - 0.2,
+                        MZ_common=mz,
+                        u_FY_common=0.9,
+                        u_MZ_common=0.05,
+                        used=True,
+                        calibration_sha256=SHA,
                     )
-                )  # fmt: skip
+                )
         for load in LOADS_N:
             if fits:
                 direction_fits.append(
@@ -93,33 +141,43 @@ def make_result(
                 )
             stiffness.append(
                 Stiffness(
-                    load_N=load, rotation=rotation,
+                    load_N=load,
+                    rotation=rotation,
                     secant_cornering=_estimate(18 * load - 1e-3 * load**2, 900, "N/rad"),
                     slope_cornering=_estimate(18.4 * load - 1e-3 * load**2, 1100, "N/rad"),
                     secant_aligning=_estimate(0.5 * load + 1e-4 * load**2, 60, "N*m/rad"),
                     slope_aligning=_estimate(0.52 * load + 1e-4 * load**2, 75, "N*m/rad"),
                 )
-            )  # fmt: skip
+            )
     for load in LOADS_N if both else ():
-        pull.append(
+        pull.append(  # noqa: PERF401
             Pull(
-                load_N=load, conicity=_estimate(20 + 0.01 * load, 6, "N"), plysteer=_estimate(-0.03 * load, 25, "N"),
-                CRAT=_estimate(0.4 + 1e-4 * load, 0.2, "N*m"), PRAT=_estimate(2e-3 * load, 0.3, "N*m"),
-                PRAT_at_FY_zero=_estimate(1.8e-3 * load, 0.35, "N*m"), thesis_CRAT=_estimate(1.0, 0.2, "N*m"),
-                thesis_PRAT=_estimate(0.3, 0.2, "N*m"), residual_forward=_estimate(2.5, 0.3, "N*m"),
+                load_N=load,
+                conicity=_estimate(20 + 0.01 * load, 6, "N"),
+                plysteer=_estimate(-0.03 * load, 25, "N"),
+                CRAT=_estimate(0.4 + 1e-4 * load, 0.2, "N*m"),
+                PRAT=_estimate(2e-3 * load, 0.3, "N*m"),
+                PRAT_at_FY_zero=_estimate(1.8e-3 * load, 0.35, "N*m"),
+                thesis_CRAT=_estimate(1.0, 0.2, "N*m"),
+                thesis_PRAT=_estimate(0.3, 0.2, "N*m"),
+                residual_forward=_estimate(2.5, 0.3, "N*m"),
                 residual_reverse=_estimate(-1.5, 0.3, "N*m"),
             )
-        )  # fmt: skip
+        )
     return TestResult(
         reduced=ReducedTest(
-            info=info(**changes), calibration=CalibrationUse(id="m15-r2", sha256=SHA, unverified=unverified),
-            conditions=tuple(conditions), tare=Tare(source="none", values=(), unit="lbf"),
-            averaging="whole block, one revolution of the tire", findings=findings, code_version="0.1.0",
+            info=info(**changes),
+            calibration=CalibrationUse(id="m15-r2", sha256=SHA, unverified=unverified),
+            conditions=tuple(conditions),
+            tare=Tare(source="none", values=(), unit="lbf"),
+            averaging="whole block, one revolution of the tire",
+            findings=findings,
+            code_version="0.1.0",
         ),
         characteristics=Characteristics(
             fits=tuple(direction_fits), stiffness=tuple(stiffness), pull=tuple(pull), findings=()
         ),
-    )  # fmt: skip
+    )
 
 
 def make_record() -> CalibrationRecord:
@@ -128,16 +186,35 @@ def make_record() -> CalibrationRecord:
     cells = tuple(Indication(name=n, unit="lbf") for n in ("D51", "D52", "E5"))
     loads = tuple(
         LoadFit(
-            load=load, unit=unit, terms=terms, coefficients=c, issued=c, polarity=(1, 1, 1, 0),
-            covariance=tuple(tuple(1e-6 if i == j else 0.0 for j in range(4)) for i in range(4)), method="ols",
-            n=36, dof=32, residual_sd=0.8,
+            load=load,
+            unit=unit,
+            terms=terms,
+            coefficients=c,
+            issued=c,
+            polarity=(1, 1, 1, 0),
+            covariance=tuple(tuple(1e-6 if i == j else 0.0 for j in range(4)) for i in range(4)),
+            method="ols",
+            n=36,
+            dof=32,
+            residual_sd=0.8,
         )
         for load, unit, c in (
             ("FY", "lbf", (1.01234567, 1.0214, 1.0223, -0.45)),
             ("MZ", "lbf*ft", (0.1571, -0.1622, 0.0027, 0.0031)),
         )
-    )  # fmt: skip
+    )
     return CalibrationRecord(
-        id="m15-r2", instrument="m15", kind="fit", date="2019-05-01", entered_by="A. Operator", zero="included",
-        cells=cells, loads=loads, golden=Golden(), data=(), settings="{}", inputs_sha256="0" * 64, sha256=SHA,
-    )  # fmt: skip
+        id="m15-r2",
+        instrument="m15",
+        kind="fit",
+        date="2019-05-01",
+        entered_by="A. Operator",
+        zero="included",
+        cells=cells,
+        loads=loads,
+        golden=Golden(),
+        data=(),
+        settings="{}",
+        inputs_sha256="0" * 64,
+        sha256=SHA,
+    )

@@ -1,5 +1,6 @@
 """Pieces of a template as WordprocessingML: controls, figures with captions, tables with a prototype row."""
 
+# ruff: noqa: E501  lines of WordprocessingML read best whole
 from __future__ import annotations
 
 import struct
@@ -63,7 +64,8 @@ class Pieces:
         )
         return self.block(
             f"tk:if.{name}",
-            paragraph(control, style="Figure") + self.caption("Figure", self.inline(f"tk:caption.{name}", "caption")),
+            paragraph(control, style="Figure")
+            + self.caption("Figure", self.inline(f"tk:caption.{name}", "caption")),
         )
 
     def caption(self, kind: str, content: str, *, before: bool = False) -> str:
@@ -76,23 +78,28 @@ class Pieces:
         )
         return paragraph(field + content, style="Caption", keep=before)
 
-    def table(self, name: str, caption: str, head: Sequence[str], cells: Sequence[str], widths_mm: Sequence[float],
-              align: str) -> str:  # fmt: skip
+    def table(
+        self,
+        name: str,
+        caption: str,
+        head: Sequence[str],
+        cells: Sequence[str],
+        widths_mm: Sequence[float],
+        align: str,
+    ) -> str:
         """Return a captioned data table with one prototype row, kept only when it has rows.
 
         ``head`` and ``cells`` may hold tags in double braces; ``align`` has ``l`` or ``r`` a column.
         """
         header = "".join(
-            cell(literal(text, bold=True), width, style="TableText", align=side, shade=SHADE)
+            cell(literal(text), width, style="TableHead", align=side, shade=SHADE)
             for text, width, side in zip(head, widths_mm, align, strict=True)
         )
         prototype = "".join(
             cell(self._row_cell(text), width, style="TableText", align=side)
             for text, width, side in zip(cells, widths_mm, align, strict=True)
         )
-        grid = table(
-            row(header, header=True) + row(prototype), widths_mm, rules="data"
-        )  # fmt: skip
+        grid = table(row(header, header=True) + row(prototype), widths_mm, rules="data")
         return self.block(
             f"tk:if.{name}",
             self.caption("Table", run(caption), before=True)
@@ -104,8 +111,11 @@ class Pieces:
         """``D51`` is a control; ``B ± u_B`` two controls over two lines."""
         first, plus, second = text.partition(" ± ")
         made = self.inline(f"tk:row.{first}", first)
-        return made + (f'<w:r><w:br/><w:t xml:space="preserve">± </w:t></w:r>{self.inline(f"tk:row.{second}", second)}'
-                       if plus else "")  # fmt: skip
+        return made + (
+            f'<w:r><w:br/><w:t xml:space="preserve">± </w:t></w:r>{self.inline(f"tk:row.{second}", second)}'
+            if plus
+            else ""
+        )
 
     def facts(self, rows: Sequence[Sequence[tuple[str, str] | None]], widths_mm: Sequence[float]) -> str:
         """Return a table of labels and values; a row with one fact that a test may lack goes when it does."""
@@ -133,9 +143,9 @@ def run(text: str, *, bold: bool = False, style: str = "") -> str:
     return f'<w:r><w:rPr>{inner}</w:rPr><w:t xml:space="preserve">{escape(text)}</w:t></w:r>'
 
 
-def literal(text: str, *, bold: bool = False) -> str:
+def literal(text: str) -> str:
     """Return a run whose text holds literal tags."""
-    return run(text, bold=bold)
+    return run(text)
 
 
 def field(code: str, shown: str = "1") -> str:
@@ -149,7 +159,9 @@ def paragraph(content: str, *, style: str = "Normal", keep: bool = False) -> str
     return f'<w:p><w:pPr><w:pStyle w:val="{style}"/>{more}</w:pPr>{content}</w:p>'
 
 
-def cell(content: str, width_mm: float, *, style: str, align: str = "l", span: int = 1, shade: str = "") -> str:
+def cell(
+    content: str, width_mm: float, *, style: str, align: str = "l", span: int = 1, shade: str = ""
+) -> str:
     """Return a table cell with one paragraph."""
     side = '<w:jc w:val="right"/>' if align == "r" else ""
     fill = f'<w:shd w:val="clear" w:color="auto" w:fill="{shade}"/>' if shade else ""
@@ -175,12 +187,18 @@ def table(rows: str, widths_mm: Sequence[float], *, rules: str) -> str:
     side = none if rules == "data" else hair
     borders = "".join(
         f"<w:{edge} {kind}/>"
-        for edge, kind in (("top", outer), ("left", side), ("bottom", outer), ("right", side), ("insideH", hair),
-                           ("insideV", none if rules == "data" else hair))
-    )  # fmt: skip
+        for edge, kind in (
+            ("top", outer),
+            ("left", side),
+            ("bottom", outer),
+            ("right", side),
+            ("insideH", hair),
+            ("insideV", none if rules == "data" else hair),
+        )
+    )
     grid = "".join(f'<w:gridCol w:w="{round(w * TWIP_MM)}"/>' for w in widths_mm)
     return (
-        f'<w:tbl><w:tblPr><w:tblW w:w="{round(sum(widths_mm) * TWIP_MM)}" w:type="dxa"/><w:tblBorders>{borders}</w:tblBorders>'
+        f'<w:tbl><w:tblPr><w:tblW w:w="{round(sum(widths_mm) * TWIP_MM)}" w:type="dxa"/><w:tblInd w:w="70" w:type="dxa"/><w:tblBorders>{borders}</w:tblBorders>'
         '<w:tblLayout w:type="fixed"/><w:tblCellMar><w:left w:w="70" w:type="dxa"/><w:right w:w="70" w:type="dxa"/>'
         f"</w:tblCellMar></w:tblPr><w:tblGrid>{grid}</w:tblGrid>{rows}</w:tbl>"
     )
@@ -199,4 +217,9 @@ def placeholder_png(width: int = 630, height: int = 370, grey: int = 225) -> byt
 
     lines = (b"\0" + bytes([grey]) * width) * height
     head = struct.pack(">IIBBBBB", width, height, 8, 0, 0, 0, 0)
-    return b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", head) + chunk(b"IDAT", zlib.compress(lines)) + chunk(b"IEND", b"")
+    return (
+        b"\x89PNG\r\n\x1a\n"
+        + chunk(b"IHDR", head)
+        + chunk(b"IDAT", zlib.compress(lines))
+        + chunk(b"IEND", b"")
+    )

@@ -9,11 +9,12 @@ from typing import TYPE_CHECKING
 
 from toolkit import __version__
 from toolkit.files import sha256_bytes
+from toolkit.report.columns import UNITS
 from toolkit.report.content import Cell, ReportContent, Table, Value
 from toolkit.report.plots import build_plots, load_groups
 from toolkit.report.style import Style
 from toolkit.report.tables import build_tables
-from toolkit.report.tags import FIGURES, UNITS, catalogue, format_number
+from toolkit.report.tags import FIGURES, catalogue, format_number
 
 if TYPE_CHECKING:
     from toolkit.calibration.record import CalibrationRecord
@@ -52,15 +53,20 @@ def build_content(
     plots = build_plots(result, style, SIMULATED if info.simulated else None)
     tables = build_tables(result, record, listed, style)
     values = _values(result, record, listed, style, day)
-    values |= {f"caption.{name}": Value(kind="text", value=plots[name].caption) for name in FIGURES if name in plots}
+    values |= {
+        f"caption.{name}": Value(kind="text", value=plots[name].caption) for name in FIGURES if name in plots
+    }
     marks = []
     if info.simulated:
         marks.append(("simulated", f"{SIMULATED}: made by simulation, not a measurement of a tire."))
     if use.unverified:
         marks.append(
-            ("unverified", f"{UNVERIFIED}: {use.id} is a legacy import; its coefficients are not reproduced "
-             "from reference data.")
-        )  # fmt: skip
+            (
+                "unverified",
+                f"{UNVERIFIED}: {use.id} is a legacy import; its coefficients are not reproduced "
+                "from reference data.",
+            )
+        )
     return ReportContent(
         values=values,
         tables=tables,
@@ -99,31 +105,45 @@ def _values(
     groups = load_groups(used)
     force, factor = style.unit("N")
     texts: dict[str, str | None] = {
-        "test.name": info.name, "test.operator": info.operator, "test.requestor": info.requestor,
-        "test.special": info.special, "test.surface": info.surface, "test.machine": info.machine,
+        "test.name": info.name,
+        "test.operator": info.operator,
+        "test.requestor": info.requestor,
+        "test.special": info.special,
+        "test.surface": info.surface,
+        "test.machine": info.machine,
         "test.pressure": None if pressure is None or psi is None else _pressure(psi, pressure, style),
         "test.loads": ", ".join(format_number(load * factor, ".0f") for load, _ in groups) + f" {force}"
-        if groups else None,
+        if groups
+        else None,
         "test.slip_angles": _angles([c.step_SA for c in used]),
-        "test.directions": " and ".join(r for r in ("forward", "reverse") if any(c.rotation == r for c in used)),
+        "test.directions": " and ".join(
+            r for r in ("forward", "reverse") if any(c.rotation == r for c in used)
+        ),
         "test.axes": "SAE J670" if reduced.axes == "SAE" else reduced.axes,
         "test.averaging": reduced.averaging,
         "test.tare": "no tare was subtracted" if reduced.tare.source == "none" else reduced.tare.source,
-        "tire.size": info.tire_size, "tire.company": info.tire_company, "tire.DOT": info.tire_DOT,
-        "tire.series": info.tire_series, "tire.construction": info.tire_construction, "tire.rim": info.tire_rim,
-        "calibration.id": use.id, "calibration.hash": use.sha256,
+        "tire.size": info.tire_size,
+        "tire.company": info.tire_company,
+        "tire.DOT": info.tire_DOT,
+        "tire.series": info.tire_series,
+        "tire.construction": info.tire_construction,
+        "tire.rim": info.tire_rim,
+        "calibration.id": use.id,
+        "calibration.hash": use.sha256,
         "calibration.instrument": record.instrument if record else info.machine,
         "calibration.status": "unverified (legacy import)" if use.unverified else "verified",
         "report.id": report_id(result),
         "report.title": "Tire force and moment test" + (f" {info.tire_size}" if info.tire_size else ""),
-        "software.name": "toolkit", "software.version": __version__,
-        "laboratory.name": style.laboratory, "laboratory.address": style.address,
+        "software.name": "toolkit",
+        "software.version": __version__,
+        "laboratory.name": style.laboratory,
+        "laboratory.address": style.address,
         "simulated": "simulated data" if info.simulated else "measured data",
         **{
             f"unit.{name.replace('/', '_per_')}": str(style.unit(unit)[0]).replace("*", "·")
             for name, unit in UNITS.items()
         },
-    }  # fmt: skip
+    }
     numbers: dict[str, float | None] = {
         "test.pressure.psi": psi,
         "test.pressure.bar": None if pressure is None else pressure / 1e5,
@@ -178,7 +198,9 @@ def _summary(result: TestResult) -> dict[str, float | None]:
     rated = info.rated_load_N
     load = min(loads, key=lambda one: abs(one - rated)) if rated else loads[len(loads) // 2]
     near = 0.04 * load
-    stiff = next((s for s in chars.stiffness if s.rotation == "forward" and abs(s.load_N - load) <= near), None)
+    stiff = next(
+        (s for s in chars.stiffness if s.rotation == "forward" and abs(s.load_N - load) <= near), None
+    )
     pull = next((p for p in chars.pull if abs(p.load_N - load) <= near), None)
 
     def pick(owner: object, name: str, factor: float = 1.0) -> float | None:
@@ -201,7 +223,9 @@ def _conditions(
 ) -> dict[str, bool]:
     info, chars = result.reduced.info, result.characteristics
     pull = any(
-        getattr(one, name) is not None for one in chars.pull for name in ("conicity", "plysteer", "CRAT", "PRAT")
+        getattr(one, name) is not None
+        for one in chars.pull
+        for name in ("conicity", "plysteer", "CRAT", "PRAT")
     )
     made = {path: not value.missing for path, value in values.items()}
     made |= {name: bool(table.rows) for name, table in tables.items()}

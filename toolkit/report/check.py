@@ -8,10 +8,11 @@ from __future__ import annotations
 
 import io
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Literal
 
+from toolkit.report.columns import TABLES
 from toolkit.report.fonts import missing_fonts
 from toolkit.report.package import Template
 from toolkit.report.scan import (
@@ -27,13 +28,24 @@ from toolkit.report.scan import (
 from toolkit.report.style import Style
 from toolkit.report.tags import (
     FIGURES,
-    TABLES,
     condition_names,
     format_problem,
     known_value,
     value_spec,
 )
-from toolkit.report.xml import SDT_CONTENT, W_P, W_SDT, W_TC, W_TR, Element, Story, ancestor, q, stories, walk_fields
+from toolkit.report.xml import (
+    SDT_CONTENT,
+    W_P,
+    W_SDT,
+    W_TC,
+    W_TR,
+    Element,
+    Story,
+    ancestor,
+    q,
+    stories,
+    walk_fields,
+)
 
 RULES = {
     "no-tags": "the template has no tag of the toolkit",
@@ -71,8 +83,13 @@ class LintFinding:
 
     def as_dict(self) -> dict[str, str]:
         """Return the finding as a JSON-ready dict."""
-        return {"rule": self.rule, "level": self.level, "part": self.part, "place": self.place,
-                "message": self.message}  # fmt: skip
+        return {
+            "rule": self.rule,
+            "level": self.level,
+            "part": self.part,
+            "place": self.place,
+            "message": self.message,
+        }
 
 
 def check_template(template: Template, style: Style, *, fonts: bool = True) -> tuple[LintFinding, ...]:
@@ -98,16 +115,26 @@ def check_stories(
     sites = scan(parts)
     found = [*_tags(sites, style), *_tables(sites), *_broken(parts), *_surroundings(package, parts, style)]
     found += [
-        LintFinding(rule="attached-template", level="warning", part="word/settings.xml", place="part",
-                    message=f"attached template {target} is dropped")
+        LintFinding(
+            rule="attached-template",
+            level="warning",
+            part="word/settings.xml",
+            place="part",
+            message=f"attached template {target} is dropped",
+        )
         for target in template.dropped
-    ]  # fmt: skip
+    ]
     if fonts:
         found += [
-            LintFinding(rule="font-unavailable", level="warning", part="word/styles.xml", place=name,
-                        message=f"font {name!r} is not installed and will be replaced: check the layout of the PDF")
+            LintFinding(
+                rule="font-unavailable",
+                level="warning",
+                part="word/styles.xml",
+                place=name,
+                message=f"font {name!r} is not installed and will be replaced: check the layout of the PDF",
+            )
             for name in missing_fonts(package, parts)
-        ]  # fmt: skip
+        ]
     return tuple(sorted(found, key=lambda one: one.level != "error"))
 
 
@@ -118,29 +145,43 @@ def _at(site: Site, rule: str, message: str) -> LintFinding:
 def _tags(sites: list[Site], style: Style) -> Iterator[LintFinding]:
     main = sites[0].story.name if sites else "word/document.xml"
     if not sites:
-        yield LintFinding(rule="no-tags", level="error", part=main, place="part",
-                          message="the template has no tag: neither a content control tagged tk:... nor {{tk:...}}")  # fmt: skip
+        yield LintFinding(
+            rule="no-tags",
+            level="error",
+            part=main,
+            place="part",
+            message="the template has no tag: neither a content control tagged tk:... nor {{tk:...}}",
+        )
     present = {f"tk:{site.tag.path}" for site in sites}
     for required in style.required:
         if required not in present:
-            yield LintFinding(rule="missing-required", level="error", part=main, place="part",
-                              message=f"the template lacks the required tag {required}")  # fmt: skip
+            yield LintFinding(
+                rule="missing-required",
+                level="error",
+                part=main,
+                place="part",
+                message=f"the template lacks the required tag {required}",
+            )
     counted: dict[str, int] = {}
     for site in sites:
         yield from _one(site)
         if site.tag.family in ("figure", "table") and site.story.body and not site.fallback:
             counted[site.tag.path] = counted.get(site.tag.path, 0) + 1
             if counted[site.tag.path] == 2:
-                yield _at(site, "doubled-tag", f"tk:{site.tag.path} stands twice in the body; once is allowed")
+                yield _at(
+                    site, "doubled-tag", f"tk:{site.tag.path} stands twice in the body; once is allowed"
+                )
 
 
 def _one(site: Site) -> Iterator[LintFinding]:
     tag, family = site.tag, site.tag.family
-    known = {"figure": FIGURES, "table": TABLES, "if": condition_names()}
+    known: dict[str, Mapping[str, object]] = {"figure": FIGURES, "table": TABLES, "if": condition_names()}
     if not tag.path or re.search(r"[\s|{}]", tag.path):
         yield _at(site, "malformed-tag", f"'{tag}' has no path, or white space in it")
         return
-    if (family == "value" and not known_value(tag.path)) or (family in known and tag.name not in known[family]):
+    if (family == "value" and not known_value(tag.path)) or (
+        tag.name not in known.get(family, {tag.name: ""})
+    ):
         yield _at(site, "unknown-tag", f"{tag} is not known: {_near(tag.path)}")
         return
     kind = family
@@ -159,10 +200,18 @@ def _one(site: Site) -> Iterator[LintFinding]:
             yield _at(site, "wrong-place", f"{tag}: the control has no content")
         elif family not in ("if", "table") and content.find(W_TR) is not None:
             yield _at(site, "wrong-place", f"{tag}: a value or figure cannot stand around a table row")
-        outer = next((s for s in site.element.iterancestors(W_SDT)
-                      if (t := control_tag(s)) and t.family in ("value", "figure", "row")), None)  # fmt: skip
+        outer = next(
+            (
+                s
+                for s in site.element.iterancestors(W_SDT)
+                if (t := control_tag(s)) and t.family in ("value", "figure", "row")
+            ),
+            None,
+        )
         if outer is not None:
-            yield _at(site, "overlapping-tags", f"{tag} stands inside {control_tag(outer)}, which replaces it")
+            yield _at(
+                site, "overlapping-tags", f"{tag} stands inside {control_tag(outer)}, which replaces it"
+            )
 
 
 def _near(path: str) -> str:
@@ -175,9 +224,15 @@ def _near(path: str) -> str:
 
 
 def _in_heading(site: Site) -> bool:
-    first = site.element if site.element.tag == W_P else (
-        ancestor(site.element, W_P) if ancestor(site.element, W_P) is not None else next(site.element.iter(W_P), None)
-    )  # fmt: skip
+    first = (
+        site.element
+        if site.element.tag == W_P
+        else (
+            ancestor(site.element, W_P)
+            if ancestor(site.element, W_P) is not None
+            else next(site.element.iter(W_P), None)
+        )
+    )
     if first is None:
         return False
     style = first.find(f"{q('w:pPr')}/{q('w:pStyle')}")
@@ -204,7 +259,9 @@ def _tables(sites: list[Site]) -> Iterator[LintFinding]:
             continue
         table = table_of(site)
         if table is None:
-            yield _at(site, "no-table", f"{site.tag}: no table inside the control, nor right after its paragraph")
+            yield _at(
+                site, "no-table", f"{site.tag}: no table inside the control, nor right after its paragraph"
+            )
             continue
         columns = [one.name for one in TABLES[site.tag.name][1]]
         rows: list[Element] = []
@@ -217,8 +274,11 @@ def _tables(sites: list[Site]) -> Iterator[LintFinding]:
                 if row not in rows:
                     rows.append(row)
                 if other.tag.name not in columns:
-                    yield _at(other, "unknown-column",
-                              f"{other.tag} is no column of {site.tag}; it has {', '.join(columns)}")  # fmt: skip
+                    yield _at(
+                        other,
+                        "unknown-column",
+                        f"{other.tag} is no column of {site.tag}; it has {', '.join(columns)}",
+                    )
                 else:
                     kind = next(c.kind for c in TABLES[site.tag.name][1] if c.name == other.tag.name)
                     if problem := format_problem(kind, other.tag.spec):
@@ -226,7 +286,11 @@ def _tables(sites: list[Site]) -> Iterator[LintFinding]:
             elif other.tag.family == "table" and other is not site:
                 yield _at(other, "overlapping-tags", f"{other.tag} stands inside {site.tag}")
         if len(rows) > 1:
-            yield _at(site, "prototype", f"{site.tag}: {len(rows)} rows hold tk:row tags; one prototype row is expected")
+            yield _at(
+                site,
+                "prototype",
+                f"{site.tag}: {len(rows)} rows hold tk:row tags; one prototype row is expected",
+            )
         if not rows:
             yield from _untagged(site, table, columns)
         elif any(o.tag.family == "figure" and row_in(table, o.element) is rows[0] for o in sites):
@@ -239,21 +303,32 @@ def _tables(sites: list[Site]) -> Iterator[LintFinding]:
 def _untagged(site: Site, table: Element, columns: list[str]) -> Iterator[LintFinding]:
     rows = own_rows(table)
     if len(rows) < 2:
-        yield _at(site, "prototype",
-                  f"{site.tag}: the table has {len(rows)} rows; a header and a prototype row are expected")  # fmt: skip
+        yield _at(
+            site,
+            "prototype",
+            f"{site.tag}: the table has {len(rows)} rows; a header and a prototype row are expected",
+        )
         return
     cells = [cell for cell in rows[-1].iter(W_TC) if ancestor(cell, W_TR) is rows[-1]]
     if len(cells) != len(columns):
-        yield _at(site, "column-count",
-                  f"{site.tag}: the prototype row has {len(cells)} cells and no tags, the table has "
-                  f"{len(columns)} columns: {', '.join(columns)}")  # fmt: skip
+        yield _at(
+            site,
+            "column-count",
+            f"{site.tag}: the prototype row has {len(cells)} cells and no tags, the table has "
+            f"{len(columns)} columns: {', '.join(columns)}",
+        )
 
 
 def _broken(parts: list[Story]) -> Iterator[LintFinding]:
     for story in parts:
         for paragraph in broken_literals(story):
-            yield LintFinding(rule="malformed-tag", level="error", part=story.name, place=place_of(paragraph, story),
-                              message="a literal {{tk: is not closed by }} in the same paragraph")  # fmt: skip
+            yield LintFinding(
+                rule="malformed-tag",
+                level="error",
+                part=story.name,
+                place=place_of(paragraph, story),
+                message="a literal {{tk: is not closed by }} in the same paragraph",
+            )
 
 
 _TRACKED = tuple(q(f"w:{one}") for one in ("ins", "del", "moveFrom", "moveTo", "rPrChange", "pPrChange"))
@@ -261,7 +336,9 @@ _TRACKED = tuple(q(f"w:{one}") for one in ("ins", "del", "moveFrom", "moveTo", "
 
 def _surroundings(package: object, parts: list[Story], style: Style) -> Iterator[LintFinding]:
     def warn(rule: str, story: Story, element: Element, message: str) -> LintFinding:
-        return LintFinding(rule=rule, level="warning", part=story.name, place=place_of(element, story), message=message)
+        return LintFinding(
+            rule=rule, level="warning", part=story.name, place=place_of(element, story), message=message
+        )
 
     for story in parts:
         for element in story.root.iter(*_TRACKED):
@@ -273,16 +350,28 @@ def _surroundings(package: object, parts: list[Story], style: Style) -> Iterator
         for element, code in walk_fields(story.root):
             word = code.split()[0].upper() if code.split() else ""
             if word in ("DATE", "TIME"):
-                yield warn("date-field", story, element, f"{word} becomes the day of printing; use tk:report.date")
+                yield warn(
+                    "date-field", story, element, f"{word} becomes the day of printing; use tk:report.date"
+                )
             elif word == "IF":
                 yield warn("if-field", story, element, "an IF field is not evaluated; use a tk:if control")
             elif word == "TOC":
-                yield warn("contents", story, element, "a table of contents is updated by Word, not by the PDF's maker")
+                yield warn(
+                    "contents",
+                    story,
+                    element,
+                    "a table of contents is updated by Word, not by the PDF's maker",
+                )
     names = _style_names(package)
     for use, name in style.styles:
         if name.lower() not in names:
-            yield LintFinding(rule="missing-style", level="warning", part="word/styles.xml", place=name,
-                              message=f"the style file names {name!r} for {use}; the template has no such style")  # fmt: skip
+            yield LintFinding(
+                rule="missing-style",
+                level="warning",
+                part="word/styles.xml",
+                place=name,
+                message=f"the style file names {name!r} for {use}; the template has no such style",
+            )
 
 
 def _style_names(package: object) -> set[str]:

@@ -6,8 +6,9 @@ import math
 from dataclasses import dataclass, field
 from typing import Literal
 
+from toolkit.report.columns import Column
 from toolkit.report.style import Style
-from toolkit.report.tags import Column, format_number
+from toolkit.report.tags import format_number
 
 Cell = str | float | None
 

@@ -82,7 +82,7 @@ def ancestor_paragraph(element: Element) -> bool:
 
 
 def run_properties(sdt: Element) -> Element | None:
-    """Return the run properties that a control's text keeps: its first run's, without the placeholder style."""
+    """Return the run properties that a control's text keeps: its first run's, no placeholder style."""
     properties = sdt.find(SDT_PR)
     showing = properties.find(q("w:showingPlcHdr")) is not None
     first = next(sdt.find(SDT_CONTENT).iter(W_R), None)

@@ -36,7 +36,9 @@ class Delivered:
         said = [f"{one.rule}: {one.message}" for one in self.filled.lint]
         said += [f"{one.name}: {one.message}" for one in self.checks if not one.ok]
         said += [f"missing-value: {tag} prints a visible mark" for tag in self.filled.missing]
-        said += [f"mark-added: the template has no place for the mark {name!r}" for name in self.filled.marks_added]
+        said += [
+            f"mark-added: the template has no place for the mark {name!r}" for name in self.filled.marks_added
+        ]
         return tuple(said)
 
 
@@ -89,20 +91,26 @@ def deliver(
             raise
         targets = _hand_over([docx, pdf], out)
     return Delivered(
-        docx=targets[0], pdf=targets[1], pages=pages, checks=tuple(checks), filled=filled,
+        docx=targets[0],
+        pdf=targets[1],
+        pages=pages,
+        checks=tuple(checks),
+        filled=filled,
         template_sha256=template.sha256,
-    )  # fmt: skip
+    )
 
 
 def _demand(checks: list[Check]) -> None:
     failed = [one for one in checks if not one.ok and not one.warning]
     if failed:
         raise RenderError(
-            "the report was not verified and is not delivered", where="PDF",
+            "the report was not verified and is not delivered",
+            where="PDF",
             got="; ".join(f"{one.name}: {one.message}" for one in failed),
-            expected="every value, figure and font of the report in its PDF", rule="not-verified",
+            expected="every value, figure and font of the report in its PDF",
+            rule="not-verified",
             next_step="look at the rejected files with --keep and correct the template at that place",
-        )  # fmt: skip
+        )
 
 
 @contextlib.contextmanager
@@ -117,9 +125,12 @@ def _staging(out: Path) -> Iterator[Path]:
         stage = Path(tempfile.mkdtemp(prefix=".report-", dir=parent))
     except OSError as error:
         raise OutputError(
-            "the output folder cannot be written", where=out, got=error.strerror or str(error),
-            expected="a folder with write permission and free space", next_step="choose another folder with --out",
-        ) from error  # fmt: skip
+            "the output folder cannot be written",
+            where=out,
+            got=error.strerror or str(error),
+            expected="a folder with write permission and free space",
+            next_step="choose another folder with --out",
+        ) from error
     try:
         yield stage
     except BaseException:
@@ -142,9 +153,12 @@ def _hand_over(files: list[Path], out: Path) -> list[Path]:
         sync_folder(out)
     except OSError as error:
         raise OutputError(
-            "the report cannot be written", where=out, got=error.strerror or str(error),
-            expected="a folder with write permission and free space", next_step="choose another folder with --out",
-        ) from error  # fmt: skip
+            "the report cannot be written",
+            where=out,
+            got=error.strerror or str(error),
+            expected="a folder with write permission and free space",
+            next_step="choose another folder with --out",
+        ) from error
     return targets
 
 

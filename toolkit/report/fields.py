@@ -66,9 +66,7 @@ def _fields(body: Element) -> list[_Field]:
     stack: list[_Field] = []
     for element in body.iter(q("w:fldSimple"), q("w:fldChar"), q("w:instrText"), W_T):
         if element.tag == q("w:fldSimple"):
-            found.append(
-                _Field(element.get(q("w:instr")) or "", list(element.iter(W_T)), None, None)
-            )
+            found.append(_Field(element.get(q("w:instr")) or "", list(element.iter(W_T)), None, None))
             if not found[-1].results:
                 run = etree.SubElement(element, W_R)
                 found[-1].results = [etree.SubElement(run, W_T)]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from toolkit.report.content import Curve, Plot
 
@@ -40,24 +40,38 @@ def draw(plot: Plot) -> Picture:
 
     with mpl.rc_context(_RC):
         figure = Figure(figsize=SIZE_IN, dpi=DPI)
-        canvas = FigureCanvasAgg(figure)
-        axes = figure.add_axes((0.115, 0.135, 0.70, 0.835))
+        canvas: Any = FigureCanvasAgg(figure)
+        named = {(c.label, c.group) for c in plot.curves if c.label}
+        aside = bool(plot.legend_title) or len(named) > 1
+        axes = figure.add_axes((0.115, 0.135, 0.70 if aside else 0.86, 0.835))
         _furnish(axes, plot)
         for curve in plot.curves:
             _curve(axes, curve)
         _legend(figure, plot)
         if plot.watermark:
             axes.text(
-                0.5, 0.5, plot.watermark, transform=axes.transAxes, ha="center", va="center",
-                rotation=24, fontsize=30, color="#000000", alpha=0.10, fontweight="bold", zorder=0,
-            )  # fmt: skip
+                0.5,
+                0.5,
+                plot.watermark,
+                transform=axes.transAxes,
+                ha="center",
+                va="center",
+                rotation=24,
+                fontsize=30,
+                color="#000000",
+                alpha=0.10,
+                fontweight="bold",
+                zorder=0,
+            )
         stream = io.BytesIO()
-        canvas.print_png(stream, pil_kwargs={"compress_level": 3, "dpi": (DPI, DPI)}, metadata={"Software": None})
+        canvas.print_png(
+            stream, pil_kwargs={"compress_level": 3, "dpi": (DPI, DPI)}, metadata={"Software": None}
+        )
     width, height = canvas.get_width_height()
     return Picture(png=stream.getvalue(), width_px=width, height_px=height)
 
 
-_RC = {
+_RC: Any = {
     "font.family": "sans-serif",
     "font.sans-serif": ["Carlito", "Calibri", "Liberation Sans", "DejaVu Sans"],
     "font.size": 10.0,
@@ -82,7 +96,9 @@ def _furnish(axes: Axes, plot: Plot) -> None:
         axes.spines[side].set_visible(False)
     round_steps = [1, 2, 2.5, 5, 10]
     axes.yaxis.set_major_locator(MaxNLocator(nbins=8, steps=round_steps))
-    axes.xaxis.set_major_locator(MultipleLocator(2) if plot.zero_x else MaxNLocator(nbins=9, steps=round_steps))
+    axes.xaxis.set_major_locator(
+        MultipleLocator(2) if plot.zero_x else MaxNLocator(nbins=9, steps=round_steps)
+    )
 
 
 def _curve(axes: Axes, curve: Curve) -> None:
@@ -94,10 +110,16 @@ def _curve(axes: Axes, curve: Curve) -> None:
         axes.plot(curve.x, curve.y, color=_GREY, linewidth=0.7, zorder=2)
         if curve.note:
             axes.annotate(
-                curve.note, (curve.x[-1], curve.y[-1]), textcoords="offset points",
-                xytext=(9 if curve.x[-1] >= 0 else -9, 7 if curve.y[-1] >= 0 else -7), ha="center", va="center",
-                fontsize=7.5, color="#303030", zorder=6,
-            )  # fmt: skip
+                curve.note,
+                (curve.x[-1], curve.y[-1]),
+                textcoords="offset points",
+                xytext=(9 if curve.x[-1] >= 0 else -9, 7 if curve.y[-1] >= 0 else -7),
+                ha="center",
+                va="center",
+                fontsize=7.5,
+                color="#303030",
+                zorder=6,
+            )
         return
     if curve.style == "line":
         axes.plot(curve.x, curve.y, color=colour, linewidth=1.3, linestyle=dashes, zorder=3)
@@ -105,13 +127,22 @@ def _curve(axes: Axes, curve: Curve) -> None:
     line = {"linestyle": "none"} if curve.style == "points" else {"linestyle": dashes, "linewidth": 1.2}
     if curve.error is not None and any(curve.error):
         axes.errorbar(
-            curve.x, curve.y, yerr=curve.error, color=colour, marker=marker, markersize=5, mfc=face,
-            capsize=3, elinewidth=1.0, zorder=4, **line,
-        )  # fmt: skip
+            curve.x,
+            curve.y,
+            yerr=curve.error,
+            color=colour,
+            marker=marker,
+            markersize=5,
+            mfc=face,
+            capsize=3,
+            elinewidth=1.0,
+            zorder=4,
+            **line,
+        )
         return
     axes.plot(
         curve.x, curve.y, color=colour, marker=marker, markersize=4.5, mfc=face, mew=1.0, zorder=4, **line
-    )  # fmt: skip
+    )
 
 
 def _legend(figure: Figure, plot: Plot) -> None:
@@ -128,14 +159,27 @@ def _legend(figure: Figure, plot: Plot) -> None:
         alone = curve.open and curve.style == "both" and not plot.legend_title
         handles.append(
             Line2D(
-                [], [], color=colour, marker=MARKERS[curve.group % len(MARKERS)], markersize=5, linewidth=1.2,
-                label=curve.label.replace(", ", ",\n"), mfc="white" if alone else colour,
+                [],
+                [],
+                color=colour,
+                marker=MARKERS[curve.group % len(MARKERS)],
+                markersize=5,
+                linewidth=1.2,
+                label=curve.label.replace(", ", ",\n"),
+                mfc="white" if alone else colour,
                 linestyle=(0, (4, 2)) if alone else "solid",
-            )  # fmt: skip
+            )
         )
     if len(handles) > 1 or plot.legend_title:
         figure.legend(
-            handles=handles, title=plot.legend_title, loc="upper left", bbox_to_anchor=(0.825, 0.975),
-            frameon=False, fontsize=8.5, title_fontsize=8.5, borderaxespad=0.0, handlelength=1.8,
+            handles=handles,
+            title=plot.legend_title,
+            loc="upper left",
+            bbox_to_anchor=(0.825, 0.975),
+            frameon=False,
+            fontsize=8.5,
+            title_fontsize=8.5,
+            borderaxespad=0.0,
+            handlelength=1.8,
             alignment="left",
-        )  # fmt: skip
+        )

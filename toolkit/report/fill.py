@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import datetime as dt
 import io
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -10,7 +9,6 @@ from typing import Any
 
 from lxml import etree
 
-from toolkit import __version__
 from toolkit.errors import TemplateError
 from toolkit.report.check import LintFinding, check_stories
 from toolkit.report.content import ReportContent, Table
@@ -25,6 +23,7 @@ from toolkit.report.fields import number_captions
 from toolkit.report.figures import Picture
 from toolkit.report.package import Template
 from toolkit.report.pictures import Ids, free_height, insert_at_mark, picture_run
+from toolkit.report.properties import set_properties
 from toolkit.report.rows import fill_table
 from toolkit.report.scan import Site, row_in, scan, table_of
 from toolkit.report.tags import Tag
@@ -142,9 +141,14 @@ class _Log:
 
 class _Filler:
     def __init__(
-        self, package: Any, parts: list[Story], template: Template, content: ReportContent,
-        pictures: Mapping[str, Picture], allow_missing: bool,
-    ) -> None:  # fmt: skip
+        self,
+        package: Any,
+        parts: list[Story],
+        template: Template,
+        content: ReportContent,
+        pictures: Mapping[str, Picture],
+        allow_missing: bool,
+    ) -> None:
         self.package, self.parts, self.template, self.content = package, parts, template, content
         self.pictures, self.allow_missing = pictures, allow_missing
         self.ids, self.log = Ids.of(parts), _Log()
@@ -157,9 +161,11 @@ class _Filler:
         # Everything is located before anything is written: a value that reads like a tag stays a value.
         tables = [(site, table_of(site)) for site in sites if site.tag.family == "table"]
         inside = [
-            site for site in sites for _, table in tables
+            site
+            for site in sites
+            for _, table in tables
             if table is not None and site.tag.family != "table" and self._in_prototype(site, table, sites)
-        ]  # fmt: skip
+        ]
         kept = {id(site) for site in inside}
         outside = [site for site in sites if id(site) not in kept]
         for site, table in tables:
@@ -169,7 +175,9 @@ class _Filler:
             if site.form == "control" and site.tag.family == "value":
                 free_height(ancestor(site.element, W_P))
                 date = self.content.values.get(site.tag.path)
-                iso = str(date.value) if date is not None and date.kind == "date" and not date.missing else None
+                iso = (
+                    str(date.value) if date is not None and date.kind == "date" and not date.missing else None
+                )
                 fill_control(site.element, self._value(site.tag, site), iso_date=iso)
         for site in outside:
             if site.form == "control" and site.tag.family == "figure":
@@ -177,17 +185,23 @@ class _Filler:
         added = self._marks(used)
         number_captions(self.parts[0].root)
         cells = tuple(
-            tuple(_cell_text(cell) for cell in row.iter(W_TC) if ancestor(cell, W_TR) is row) for row in self.log.rows
+            tuple(_cell_text(cell) for cell in row.iter(W_TC) if ancestor(cell, W_TR) is row)
+            for row in self.log.rows
         )
         for story in self.parts:
             write_back(story)
-        _set_properties(self.package, self.content)
+        set_properties(self.package, self.content)
         stream = io.BytesIO()
         self.package.save(stream)
         return Filled(
-            docx=stream.getvalue(), manifest=tuple(self.log.manifest), figures=tuple(self.log.figures),
-            cells=cells, missing=tuple(dict.fromkeys(self.log.missing)), lint=lint, marks_added=added,
-        )  # fmt: skip
+            docx=stream.getvalue(),
+            manifest=tuple(self.log.manifest),
+            figures=tuple(self.log.figures),
+            cells=cells,
+            missing=tuple(dict.fromkeys(self.log.missing)),
+            lint=lint,
+            marks_added=added,
+        )
 
     def _conditions(self) -> None:
         for site in scan(self.parts):
@@ -225,8 +239,10 @@ class _Filler:
     def _in_prototype(self, site: Site, table: Element, sites: list[Site]) -> bool:
         row = row_in(table, site.element)
         return row is not None and any(
-            other.tag.family == "row" and row_in(table, other.element) is row for other in sites if other.story is site.story
-        )  # fmt: skip
+            other.tag.family == "row" and row_in(table, other.element) is row
+            for other in sites
+            if other.story is site.story
+        )
 
     def _value(self, tag: Tag, site: Site | None, part: str | None = None) -> str:
         value = self.content.values.get(tag.path)
@@ -253,10 +269,17 @@ class _Filler:
 
         def said(column: str, text: str) -> None:
             if not site.fallback:
-                self.log.manifest.append(Entry(tag=f"tk:{site.tag.path}.{column}", text=text, part=site.story.name))
+                self.log.manifest.append(
+                    Entry(tag=f"tk:{site.tag.path}.{column}", text=text, part=site.story.name)
+                )
 
         made = fill_table(
-            element, table, lambda tag: self._value(tag, None, site.story.name), said, self.content.style, self.ids
+            element,
+            table,
+            lambda tag: self._value(tag, None, site.story.name),
+            said,
+            self.content.style,
+            self.ids,
         )
         if not site.fallback:
             self.log.rows += made
@@ -310,8 +333,15 @@ class _Filler:
         if not site.fallback:
             self.log.figures.append((f"tk:{tag.path}", alt))
         return picture_run(
-            site.story, self.package, site.element, self.pictures[tag.name], alt, tag.name, width_emu(tag.spec), self.ids
-        )  # fmt: skip
+            site.story,
+            self.package,
+            site.element,
+            self.pictures[tag.name],
+            alt,
+            tag.name,
+            width_emu(tag.spec),
+            self.ids,
+        )
 
     def _marks(self, used: set[str]) -> tuple[str, ...]:
         """Say that data are simulated or a record unverified where the template has no place for it."""
@@ -337,7 +367,11 @@ class _Filler:
 def _drop_if_empty(paragraph: Element) -> None:
     # The paragraph that only named a table goes with its tag.
     parent = paragraph.getparent()
-    if parent is not None and not paragraph_text(paragraph).strip() and len(list(paragraph.iter(q("w:drawing")))) == 0:
+    if (
+        parent is not None
+        and not paragraph_text(paragraph).strip()
+        and len(list(paragraph.iter(q("w:drawing")))) == 0
+    ):
         parent.remove(paragraph)
 
 
@@ -353,17 +387,3 @@ def _unprintable(table: Table | None) -> str:
 
 def _cell_text(cell: Element) -> str:
     return "".join(paragraph_text(p) for p in cell.iter(W_P) if ancestor(p, W_TBL) is ancestor(cell, W_TBL))
-
-
-def _set_properties(package: Any, content: ReportContent) -> None:
-    from toolkit.report.xml import clean
-
-    core = package.core_properties
-    day = dt.datetime.combine(dt.date.fromisoformat(content.issued), dt.time(), tzinfo=dt.UTC).replace(tzinfo=None)
-    core.title, core.author = clean(content.title)[:255], clean(content.author)[:255]
-    core.last_modified_by = f"toolkit {__version__}"
-    core.subject = "Tire force and moment"
-    core.identifier = str(content.values["report.id"].value)
-    core.comments = ""
-    core.created = core.modified = day
-    core.revision = 1

@@ -39,16 +39,21 @@ def missing_fonts(package: object, parts: list[Story]) -> list[str]:
         return []
     wanted = {name for name in _wanted(package, parts) if name}
     return sorted(
-        name for name in wanted
+        name
+        for name in wanted
         if name.lower() not in have and _EQUAL.get(name.lower()) not in have and name.lower() not in _SYMBOLS
-    )  # fmt: skip
+    )
 
 
 def _wanted(package: object, parts: list[Story]) -> Iterator[str]:
     main = package.main_document_part  # type: ignore[attr-defined]
     theme = _theme(main)
-    used = {e.get(q("w:val")) for story in parts for tag in ("pStyle", "rStyle", "tblStyle")
-            for e in story.root.iter(q(f"w:{tag}"))}  # fmt: skip
+    used = {
+        e.get(q("w:val"))
+        for story in parts
+        for tag in ("pStyle", "rStyle", "tblStyle")
+        for e in story.root.iter(q(f"w:{tag}"))
+    }
     for story in parts:
         for fonts in story.root.iter(q("w:rFonts")):
             yield from _names(fonts, theme)

@@ -1,5 +1,6 @@
 """Open a template: a zip that is a Word file, that cannot explode, run, or fetch anything."""
 
+# ruff: noqa: TRY301  a refusal raised while the archive is open is the plainest reading
 from __future__ import annotations
 
 import io
@@ -8,12 +9,13 @@ import re
 import zipfile
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from lxml import etree
 
 from toolkit.errors import TemplateError
 from toolkit.files import sha256_bytes
-from toolkit.report.xml import parser, q, walk_fields
+from toolkit.report.xml import Element, parser, q, walk_fields
 
 _MAIN = "application/vnd.openxmlformats-officedocument.wordprocessingml.{}.main+xml"
 DOCUMENT, TEMPLATE = _MAIN.format("document"), _MAIN.format("template")
@@ -42,8 +44,12 @@ _FORBIDDEN_TAGS = {
     q("w:control"): ("ole-object", "an ActiveX control"),
     q("o:OLEObject"): ("ole-object", "an OLE object"),
 }
-_FIELDS = re.compile(r"(?:^|[\s{}\"])(INCLUDE\w*|DDE\w*|IMPORT)\b|^\s*[{\"]*\s*(LINK|EMBED|RD|DATABASE)\b", re.IGNORECASE)
-_REMOTE = re.compile(rb"(?:href|src|url)\s*(?:=\s*[\"']|\()\s*[\"']?\s*(?:[a-z][a-z0-9+.-]*:)?//|file:", re.IGNORECASE)
+_FIELDS = re.compile(
+    r"(?:^|[\s{}\"])(INCLUDE\w*|DDE\w*|IMPORT)\b|^\s*[{\"]*\s*(LINK|EMBED|RD|DATABASE)\b", re.IGNORECASE
+)
+_REMOTE = re.compile(
+    rb"(?:href|src|url)\s*(?:=\s*[\"']|\()\s*[\"']?\s*(?:[a-z][a-z0-9+.-]*:)?//|file:", re.IGNORECASE
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -68,9 +74,13 @@ def read_template(path: Path) -> Template:
         raw = path.read_bytes()
     except OSError as error:
         raise TemplateError(
-            "the template cannot be read", where=path, got=error.strerror, expected="a Word file (.docx or .dotx)",
-            next_step="check --template, or make one with 'toolkit template new'", rule="no-template",
-        ) from error  # fmt: skip
+            "the template cannot be read",
+            where=path,
+            got=error.strerror,
+            expected="a Word file (.docx or .dotx)",
+            next_step="check --template, or make one with 'toolkit template new'",
+            rule="no-template",
+        ) from error
     members = _members(path, raw)
     main, kind = _main_part(path, members)
     dropped = _check_relationships(path, members)
@@ -83,29 +93,53 @@ def read_template(path: Path) -> Template:
     )
 
 
-def _refuse(path: Path, rule: str, what: str, *, got: object = None, expected: str = "a Word template without it",
-            where: str = "") -> TemplateError:  # fmt: skip
+def _refuse(
+    path: Path,
+    rule: str,
+    what: str,
+    *,
+    got: object = None,
+    expected: str = "a Word template without it",
+    where: str = "",
+) -> TemplateError:
     return TemplateError(
-        what, where=f"{path}: {where}" if where else path, got=got, expected=expected, rule=rule,
+        what,
+        where=f"{path}: {where}" if where else path,
+        got=got,
+        expected=expected,
+        rule=rule,
         next_step="remove it in Word and save the template as .docx or .dotx",
-    )  # fmt: skip
+    )
 
 
 def _members(path: Path, raw: bytes) -> dict[str, bytes]:
     word = "a Word file (.docx or .dotx)"
     if not raw.startswith(b"PK"):
-        raise _refuse(path, "not-word", "the template is not a Word file", got=f"{raw[:8]!r}...", expected=word)
+        raise _refuse(
+            path, "not-word", "the template is not a Word file", got=f"{raw[:8]!r}...", expected=word
+        )
     total, members = 0, {}
     try:
         with zipfile.ZipFile(io.BytesIO(raw)) as archive:
             entries = archive.infolist()
             if len(entries) > MEMBERS:
-                raise _refuse(path, "too-large", "the template has too many parts", got=len(entries),
-                              expected=f"at most {MEMBERS}")  # fmt: skip
+                raise _refuse(
+                    path,
+                    "too-large",
+                    "the template has too many parts",
+                    got=len(entries),
+                    expected=f"at most {MEMBERS}",
+                )
             for entry in entries:
                 name = entry.filename
                 if name.startswith(("/", "\\")) or ".." in re.split(r"[/\\]", name) or name in members:
-                    raise _refuse(path, "not-word", "a part's name is doubled or leaves the file", got=name, expected=word)
+                    raise _refuse(
+                        path,
+                        "not-word",
+                        "a part's name is doubled or leaves the file",
+                        got=name,
+                        expected=word,
+                    )
                 if entry.is_dir():
                     continue
                 # Declared sizes lie: read at most what is allowed and no more.
@@ -113,11 +147,24 @@ def _members(path: Path, raw: bytes) -> dict[str, bytes]:
                 with archive.open(entry) as stream:
                     data = stream.read(limit + 1)
                 if len(data) > limit:
-                    raise _refuse(path, "too-large", "a part inflates without measure", where=name,
-                                  expected=f"at most {TOTAL // 2**20} MB in all, {RATIO} times its packed size")  # fmt: skip
+                    raise _refuse(
+                        path,
+                        "too-large",
+                        "a part inflates without measure",
+                        where=name,
+                        expected=f"at most {TOTAL // 2**20} MB in all, {RATIO} times its packed size",
+                    )
                 total += len(data)
                 members[name] = data
-    except (zipfile.BadZipFile, zipfile.LargeZipFile, EOFError, OSError, NotImplementedError, RuntimeError, ValueError) as error:
+    except (
+        zipfile.BadZipFile,
+        zipfile.LargeZipFile,
+        EOFError,
+        OSError,
+        NotImplementedError,
+        RuntimeError,
+        ValueError,
+    ) as error:
         raise _refuse(path, "zip-damaged", "the template is damaged", got=error, expected=word) from error
     except Exception as error:
         if isinstance(error, TemplateError):
@@ -127,23 +174,38 @@ def _members(path: Path, raw: bytes) -> dict[str, bytes]:
     return members
 
 
-def _xml(path: Path, name: str, data: bytes) -> etree._Element:
+def _xml(path: Path, name: str, data: bytes) -> Element:
     try:
         root = etree.fromstring(data, parser())
     except etree.XMLSyntaxError as error:
-        raise _refuse(path, "zip-damaged", "a part of the template is not XML", where=name, got=error,
-                      expected="a whole Word file") from error  # fmt: skip
-    if root.getroottree().docinfo.internalDTD is not None or root.getroottree().docinfo.doctype:
+        raise _refuse(
+            path,
+            "zip-damaged",
+            "a part of the template is not XML",
+            where=name,
+            got=error,
+            expected="a whole Word file",
+        ) from error
+    info: Any = root.getroottree().docinfo
+    if info.internalDTD is not None or info.doctype:
         raise _refuse(path, "dtd", "a part declares a document type (DTD)", where=name, got="<!DOCTYPE")
     return root
 
 
 def _main_part(path: Path, members: dict[str, bytes]) -> tuple[str, str]:
     if "[Content_Types].xml" not in members or "_rels/.rels" not in members:
-        raise _refuse(path, "not-word", "the template is not a Word file", got="a zip without Word's parts",
-                      expected="a Word file (.docx or .dotx)")  # fmt: skip
+        raise _refuse(
+            path,
+            "not-word",
+            "the template is not a Word file",
+            got="a zip without Word's parts",
+            expected="a Word file (.docx or .dotx)",
+        )
     types = _xml(path, "[Content_Types].xml", members["[Content_Types].xml"])
-    overrides = {(one.get("PartName") or "").lstrip("/"): one.get("ContentType") or "" for one in types.iter(f"{_CT}Override")}
+    overrides = {
+        (one.get("PartName") or "").lstrip("/"): one.get("ContentType") or ""
+        for one in types.iter(f"{_CT}Override")
+    }
     every = [*overrides.values(), *(one.get("ContentType") or "" for one in types.iter(f"{_CT}Default"))]
     for kind in every:
         if "macroEnabled" in kind or "vbaProject" in kind or "vbaData" in kind:
@@ -154,9 +216,16 @@ def _main_part(path: Path, members: dict[str, bytes]) -> tuple[str, str]:
             kind = overrides.get(name, "")
             if kind in (DOCUMENT, TEMPLATE) and name in members:
                 return name, kind
-            raise _refuse(path, "not-word", "the template is not a Word document", got=kind or name,
-                          expected=f"{DOCUMENT} or {TEMPLATE}")  # fmt: skip
-    raise _refuse(path, "not-word", "the template has no main document", expected="a Word file (.docx or .dotx)")
+            raise _refuse(
+                path,
+                "not-word",
+                "the template is not a Word document",
+                got=kind or name,
+                expected=f"{DOCUMENT} or {TEMPLATE}",
+            )
+    raise _refuse(
+        path, "not-word", "the template has no main document", expected="a Word file (.docx or .dotx)"
+    )
 
 
 def _check_relationships(path: Path, members: dict[str, bytes]) -> list[tuple[str, str, str]]:
@@ -176,16 +245,28 @@ def _check_relationships(path: Path, members: dict[str, bytes]) -> list[tuple[st
                 continue
             if kind == "attachedTemplate":
                 if re.match(r"\s*(?!file:|[a-z]:[\\/])[a-z][a-z0-9+.-]*:", target, re.IGNORECASE):
-                    raise _refuse(path, "attached-template", "the template is attached to one on a network", where=name, got=target)
+                    raise _refuse(
+                        path,
+                        "attached-template",
+                        "the template is attached to one on a network",
+                        where=name,
+                        got=target,
+                    )
                 dropped.append((name, rel.get("Id") or "", target))
                 continue
-            raise _refuse(path, "external-content", f"the template fetches external content ({kind})", where=name, got=target)
+            raise _refuse(
+                path,
+                "external-content",
+                f"the template fetches external content ({kind})",
+                where=name,
+                got=target,
+            )
     return dropped
 
 
 def _check_member(path: Path, name: str, data: bytes) -> None:
     low = posixpath.basename(name).lower()
-    if low.startswith("vbaproject") or low.startswith("vbadata"):
+    if low.startswith(("vbaproject", "vbadata")):
         raise _refuse(path, "macros", "the template holds a macro project", where=name)
     if re.search(r"(^|/)(embeddings|activex)/", name, re.IGNORECASE):
         raise _refuse(path, "ole-object", "the template holds an embedded object", where=name)
@@ -198,34 +279,48 @@ def _check_member(path: Path, name: str, data: bytes) -> None:
         return
     for element in root.iter(*_FORBIDDEN_TAGS):
         rule, what = _FORBIDDEN_TAGS[element.tag]
-        raise _refuse(path, rule, f"the template holds {what}", where=name, got=element.tag.rpartition("}")[2])
+        raise _refuse(
+            path, rule, f"the template holds {what}", where=name, got=element.tag.rpartition("}")[2]
+        )
     for element in root.iter("{urn:schemas-microsoft-com:vml}*"):
         for key in ("src", "href", q("r:href"), q("r:link"), q("o:href")):
             source = element.get(key)
             is_link = key == "href"
             if source and not is_link and not source.startswith(("#", "rId")):
-                raise _refuse(path, "external-content", "a drawing names external content", where=name, got=source)
+                raise _refuse(
+                    path, "external-content", "a drawing names external content", where=name, got=source
+                )
     for _, code in walk_fields(root):
         if _FIELDS.search(code.strip()):
-            raise _refuse(path, "unsafe-field", "a field reads another file or program", where=name, got=code.strip()[:80])
+            raise _refuse(
+                path,
+                "unsafe-field",
+                "a field reads another file or program",
+                where=name,
+                got=code.strip()[:80],
+            )
 
 
 def _rewritten(members: dict[str, bytes], main: str | None, dropped: list[tuple[str, str, str]]) -> bytes:
     """Return the package with its main type made a document and the dropped relations left out."""
     changed = dict(members)
     if main is not None:
-        changed["[Content_Types].xml"] = members["[Content_Types].xml"].replace(TEMPLATE.encode(), DOCUMENT.encode())
+        changed["[Content_Types].xml"] = members["[Content_Types].xml"].replace(
+            TEMPLATE.encode(), DOCUMENT.encode()
+        )
     for name, identity, _ in dropped:
         root = etree.fromstring(changed[name], parser())
         for rel in list(root.iter(_REL)):
             if rel.get("Id") == identity:
                 root.remove(rel)
         changed[name] = etree.tostring(root, xml_declaration=True, encoding="UTF-8", standalone=True)
-        settings = posixpath.join(posixpath.dirname(posixpath.dirname(name)), posixpath.basename(name)[: -len(".rels")])
+        settings = posixpath.join(
+            posixpath.dirname(posixpath.dirname(name)), posixpath.basename(name)[: -len(".rels")]
+        )
         if settings in changed:
             tree = etree.fromstring(changed[settings], parser())
             for element in list(tree.iter(q("w:attachedTemplate"))):
-                element.getparent().remove(element)  # type: ignore[union-attr]
+                element.getparent().remove(element)
             changed[settings] = etree.tostring(tree, xml_declaration=True, encoding="UTF-8", standalone=True)
     stream = io.BytesIO()
     with zipfile.ZipFile(stream, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive:

@@ -1,7 +1,9 @@
 """Word to PDF by LibreOffice: a profile of its own per job, a time limit, and no trust in exit codes."""
 
+# ruff: noqa: E501  the profile is written as LibreOffice writes it
 from __future__ import annotations
 
+import contextlib
 import os
 import shutil
 import signal
@@ -91,25 +93,37 @@ class Office:
         for old in wanted:
             old.unlink(missing_ok=True)
         process = self._start(
-            [f"--infilter={_FILTER}", "--convert-to", _OPTIONS, "--outdir", str(out), *(str(one) for one in documents)]
+            [
+                f"--infilter={_FILTER}",
+                "--convert-to",
+                _OPTIONS,
+                "--outdir",
+                str(out),
+                *(str(one) for one in documents),
+            ]
         )
         try:
             _, said = process.communicate(timeout=self.timeout_s)
         except subprocess.TimeoutExpired as error:
             _kill(process)
             raise RenderError(
-                "LibreOffice took too long", where=documents[0].name, got=f"no end after {self.timeout_s:g} s",
-                expected="a PDF within the time limit", rule="render-timeout",
+                "LibreOffice took too long",
+                where=documents[0].name,
+                got=f"no end after {self.timeout_s:g} s",
+                expected="a PDF within the time limit",
+                rule="render-timeout",
                 next_step="run 'toolkit doctor'; convert the document by hand to see what stops it",
-            ) from error  # fmt: skip
+            ) from error
         for pdf in wanted:
             if not pdf.is_file() or not pdf.read_bytes()[:5] == b"%PDF-":
                 raise RenderError(
-                    "LibreOffice made no PDF", where=pdf.name,
+                    "LibreOffice made no PDF",
+                    where=pdf.name,
                     got=said.decode("utf-8", "replace").strip()[-300:] or f"exit code {process.returncode}",
-                    expected="a PDF of the filled report", rule="render-failed",
+                    expected="a PDF of the filled report",
+                    rule="render-failed",
                     next_step="run 'toolkit doctor'; open the .docx in LibreOffice to see why",
-                )  # fmt: skip
+                )
         return wanted
 
     def _start(self, arguments: list[str]) -> subprocess.Popen[bytes]:
@@ -119,11 +133,22 @@ class Office:
         if not os.access(environment.get("HOME") or "/", os.W_OK):
             environment["HOME"] = str(self.folder)
         return subprocess.Popen(
-            [self.program, f"-env:UserInstallation={(self.folder / 'profile').as_uri()}", "--headless", "--norestore",
-             "--nologo", "--nodefault", "--nolockcheck", *arguments],
-            stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE,
-            start_new_session=True, env=environment,
-        )  # fmt: skip
+            [
+                self.program,
+                f"-env:UserInstallation={(self.folder / 'profile').as_uri()}",
+                "--headless",
+                "--norestore",
+                "--nologo",
+                "--nodefault",
+                "--nolockcheck",
+                *arguments,
+            ],
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.PIPE,
+            start_new_session=True,
+            env=environment,
+        )
 
 
 def find_soffice() -> str:
@@ -138,16 +163,17 @@ def find_soffice() -> str:
     if found and (Path(found).is_file() or shutil.which(found)):
         return found
     raise RenderError(
-        "LibreOffice is not installed", where="soffice", got="no program of that name on the PATH",
+        "LibreOffice is not installed",
+        where="soffice",
+        got="no program of that name on the PATH",
         expected="LibreOffice Writer, with its fonts",
-        next_step="run 'toolkit doctor': it prints the command that installs it", rule="no-soffice",
-    )  # fmt: skip
+        next_step="run 'toolkit doctor': it prints the command that installs it",
+        rule="no-soffice",
+    )
 
 
 def _kill(process: subprocess.Popen[bytes]) -> None:
     """End soffice and its children: the launcher's own end leaves soffice.bin behind."""
-    try:
+    with contextlib.suppress(ProcessLookupError, PermissionError):
         os.killpg(process.pid, signal.SIGKILL)
-    except (ProcessLookupError, PermissionError):
-        pass
     process.communicate()

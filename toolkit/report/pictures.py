@@ -44,7 +44,14 @@ class Ids:
 
 
 def picture_run(
-    story: Story, package: Any, at: Element, picture: Picture, alt: str, name: str, width: int | None, ids: Ids
+    story: Story,
+    package: Any,
+    at: Element,
+    picture: Picture,
+    alt: str,
+    name: str,
+    width: int | None,
+    ids: Ids,
 ) -> Element:
     """Return a run with the picture, as wide as asked, as the placeholder, or as the place allows."""
     from docx.opc.constants import RELATIONSHIP_TYPE
@@ -174,7 +181,9 @@ def _section(at: Element, story: Story) -> tuple[int, int]:
         sections = list(story.root.iter(q("w:sectPr")))
         order = {id(e): i for i, e in enumerate(story.root.iter())} if len(sections) > 1 else {}
         here = order.get(id(at), 0)
-        section = next((s for s in sections if order.get(id(s), 1) > here), sections[-1] if sections else None)
+        section = next(
+            (s for s in sections if order.get(id(s), 1) > here), sections[-1] if sections else None
+        )
     else:
         section = None
     if section is None:
@@ -185,7 +194,15 @@ def _section(at: Element, story: Story) -> tuple[int, int]:
         text = None if element is None else element.get(q(f"w:{name}"))
         return abs(int(text)) if text and text.lstrip("-").isdigit() else default
 
-    width = number(size, "w", _LETTER[0]) - number(margin, "left", _LETTER[2]) - number(margin, "right", _LETTER[2])
-    height = number(size, "h", _LETTER[1]) - number(margin, "top", _LETTER[2]) - number(margin, "bottom", _LETTER[2])
+    width = (
+        number(size, "w", _LETTER[0])
+        - number(margin, "left", _LETTER[2])
+        - number(margin, "right", _LETTER[2])
+    )
+    height = (
+        number(size, "h", _LETTER[1])
+        - number(margin, "top", _LETTER[2])
+        - number(margin, "bottom", _LETTER[2])
+    )
     count = max(number(columns, "num", 1), 1)
     return (width - (count - 1) * number(columns, "space", 720)) // count, int(height * 0.92)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
@@ -48,9 +48,14 @@ def build_plots(result: TestResult, style: Style, watermark: str | None) -> dict
     """Return every figure that the test has data for, by name."""
     maker = _Plots(result, style, watermark)
     plots = (
-        maker.against_slip("FY"), maker.against_slip("MZ"), maker.against_load("FY"), maker.against_load("MZ"),
-        maker.gough(), *maker.pull(), *maker.stiffness(),
-    )  # fmt: skip
+        maker.against_slip("FY"),
+        maker.against_slip("MZ"),
+        maker.against_load("FY"),
+        maker.against_load("MZ"),
+        maker.gough(),
+        *maker.pull(),
+        *maker.stiffness(),
+    )
     return {plot.name: plot for plot in plots if plot is not None}
 
 
@@ -95,10 +100,16 @@ class _Plots:
             return None
         mark = f"{self.watermark}. " if self.watermark else ""
         return Plot(
-            name=name, x_label=x, y_label=y, curves=tuple(curves), caption=f"{caption}.",
-            alt=f"{mark}{alt} Axis system: SAE J670.", watermark=self.watermark,
-            zero_x=bool(more.get("zero_x", False)), legend_title=str(more["legend"]) if "legend" in more else None,
-        )  # fmt: skip
+            name=name,
+            x_label=x,
+            y_label=y,
+            curves=tuple(curves),
+            caption=f"{caption}.",
+            alt=f"{mark}{alt} Axis system: SAE J670.",
+            watermark=self.watermark,
+            zero_x=bool(more.get("zero_x", False)),
+            legend_title=str(more["legend"]) if "legend" in more else None,
+        )
 
     def against_slip(self, channel: str) -> Plot | None:
         """Measured means and fitted curves against slip angle, one colour a load."""
@@ -129,12 +140,17 @@ class _Plots:
         both = "; filled: drum forward, open and dashed: reversed" if len(self._rotations()) > 1 else ""
         curves_text = ", fitted curves as lines" if lines else ""
         return self._plot(
-            f"{channel.lower()}_vs_slip", "slip angle SA [deg]", f"{what} [{unit}]", curves,
+            f"{channel.lower()}_vs_slip",
+            "slip angle SA [deg]",
+            f"{what} [{unit}]",
+            curves,
             f"{_upper(what)} against slip angle at {len(self.groups)} loads, measured means as symbols"
             f"{curves_text}{both}. {_AXES_NOTE}",
-            f"{_upper(what)} [{unit}] against slip angle [deg] at {len(self.groups)} loads. {'; '.join(said)}.",
-            legend="load FZ", zero_x=True,
-        )  # fmt: skip
+            f"{_upper(what)} [{unit}] against slip angle [deg] at {len(self.groups)} loads. "
+            f"{'; '.join(said)}.",
+            legend="load FZ",
+            zero_x=True,
+        )
 
     def _at_angle(self, channel: str, load: float, group: Sequence[Condition], angle: float) -> float | None:
         fit = self._fit("forward", load, channel) or self._fit("reverse", load, channel)
@@ -163,19 +179,23 @@ class _Plots:
                 said.append(f"{angle:+d} deg: {self._number(y[0])} to {self._number(y[-1])} {unit}")
         what = _SYMBOLS[channel]
         return self._plot(
-            f"{channel.lower()}_vs_load", f"load FZ [{load_unit}]", f"{what} [{unit}]", curves,
+            f"{channel.lower()}_vs_load",
+            f"load FZ [{load_unit}]",
+            f"{what} [{unit}]",
+            curves,
             f"{_upper(what)} against load at constant slip angles, from the curves fitted to the means; "
             f"filled: positive, open and dashed: negative slip angle. {_AXES_NOTE}",
             f"{_upper(what)} [{unit}] against load [{load_unit}] at constant slip angles of plus and minus "
             f"{', '.join(str(a) for a in ANGLES_DEG)} deg. {'; '.join(said)}.",
             legend="slip angle",
-        )  # fmt: skip
+        )
 
     def gough(self) -> Plot | None:
         """FY against MZ: lines of constant load and of constant slip angle."""
         fy_unit, fy = self._scale("FY")
         mz_unit, mz = self._scale("MZ")
-        curves, at = [], {}
+        curves: list[Curve] = []
+        at: dict[int, list[tuple[float, float]]] = {}
         for index, (load, group) in enumerate(self.groups):
             points = sorted((c for c in group if c.rotation == self._rotations()[0]), key=lambda c: c.SA)
             x, y = [c.MZ_common * mz for c in points], [c.FY_common * fy for c in points]
@@ -191,20 +211,23 @@ class _Plots:
                     one = np.radians([angle])
                     xx, yy = curve_values(fits[1], one), curve_values(fits[0], one)
                     at.setdefault(angle, []).append((float(xx[0]) * mz, float(yy[0]) * fy))
-        for angle in sorted(at):
-            if len(at[angle]) > 1:
-                x, y = zip(*at[angle], strict=True)
-                curves.append(_curve("", x, y, 0, "grid", note=f"{angle:+d}°"))
+        for line in sorted(at):
+            if len(at[line]) > 1:
+                xs, ys = zip(*at[line], strict=True)
+                curves.append(_curve("", xs, ys, 0, "grid", note=f"{line:+d}°"))
         loads = ", ".join(self._load_text(load) for load in self.loads)
         return self._plot(
-            "gough", f"aligning moment MZ [{mz_unit}]", f"lateral force FY [{fy_unit}]", curves,
+            "gough",
+            f"aligning moment MZ [{mz_unit}]",
+            f"lateral force FY [{fy_unit}]",
+            curves,
             "Gough plot: lateral force against aligning moment; coloured: constant load, grey: constant slip "
             f"angle. {_AXES_NOTE}",
             f"Gough plot, lateral force FY [{fy_unit}] against aligning moment MZ [{mz_unit}], with lines of "
             f"constant load ({loads}) and of constant slip angle"
             + (f" ({', '.join(f'{a:+d}' for a in sorted(at))} deg)." if at else "."),
             legend="load FZ",
-        )  # fmt: skip
+        )
 
     def _series(
         self, items: Sequence[object], pick: Callable[[object], Estimate | None], factor: float
@@ -232,9 +255,7 @@ class _Plots:
             x, y, u = self._series(items, lambda one, a=attribute: getattr(one, a), factor)  # type: ignore[misc]
             if not x:
                 continue
-            curves.append(
-                _curve(label, x, y, index, "both", error=u, open_="reverse" in label)
-            )
+            curves.append(_curve(label, x, y, index, "both", error=u, open_="reverse" in label))
             spec = ".1f" if quantity == "FY" else ".2f"
             listed = ", ".join(
                 f"{self._number(b, spec)} ± {self._number(c, spec)} at {self._number(a)}"
@@ -242,10 +263,14 @@ class _Plots:
             )
             said.append(f"{label}: {listed} {load_unit}")
         return self._plot(
-            name, f"load FZ [{load_unit}]", f"{what} [{unit}]", curves,
+            name,
+            f"load FZ [{load_unit}]",
+            f"{what} [{unit}]",
+            curves,
             f"{_upper(what)} against load; bars: expanded uncertainty (95 %). {_AXES_NOTE}",
-            f"{_upper(what)} [{unit}] against load [{load_unit}] with expanded uncertainty. {'; '.join(said)}.",
-        )  # fmt: skip
+            f"{_upper(what)} [{unit}] against load [{load_unit}] with expanded uncertainty. "
+            f"{'; '.join(said)}.",
+        )
 
     def pull(self) -> list[Plot | None]:
         """Conicity, plysteer, CRAT and PRAT against load."""
@@ -253,12 +278,17 @@ class _Plots:
         return [
             self._against("conicity", "conicity", "FY", [("conicity", "conicity", items)], False),
             self._against("plysteer", "plysteer", "FY", [("plysteer", "plysteer", items)], False),
-            self._against("crat", "conicity residual aligning torque", "MZ", [("CRAT", "CRAT", items)], False),
             self._against(
-                "prat", "plysteer residual aligning torque", "MZ",
-                [("PRAT at 0 deg", "PRAT", items), ("PRAT at FY = 0", "PRAT_at_FY_zero", items)], False,
+                "crat", "conicity residual aligning torque", "MZ", [("CRAT", "CRAT", items)], False
             ),
-        ]  # fmt: skip
+            self._against(
+                "prat",
+                "plysteer residual aligning torque",
+                "MZ",
+                [("PRAT at 0 deg", "PRAT", items), ("PRAT at FY = 0", "PRAT_at_FY_zero", items)],
+                False,
+            ),
+        ]
 
     def stiffness(self) -> list[Plot | None]:
         """Cornering and aligning stiffness against load, by secant and by slope."""
@@ -284,13 +314,26 @@ def _covers(group: Sequence[Condition], angle: float) -> bool:
 
 
 def _curve(
-    label: str, x: Sequence[float] | np.ndarray, y: Sequence[float] | np.ndarray, group: int, style: str, *,
-    open_: bool = False, error: Sequence[float] | None = None, note: str | None = None,
-) -> Curve:  # fmt: skip
+    label: str,
+    x: Sequence[float] | np.ndarray,
+    y: Sequence[float] | np.ndarray,
+    group: int,
+    style: Literal["points", "line", "both", "grid"],
+    *,
+    open_: bool = False,
+    error: Sequence[float] | None = None,
+    note: str | None = None,
+) -> Curve:
     return Curve(
-        label=label, x=tuple(float(v) for v in x), y=tuple(float(v) for v in y), group=group,
-        style=style, open=open_, note=note, error=tuple(error) if error is not None else None,  # type: ignore[arg-type]
-    )  # fmt: skip
+        label=label,
+        x=tuple(float(v) for v in x),
+        y=tuple(float(v) for v in y),
+        group=group,
+        style=style,
+        open=open_,
+        note=note,
+        error=tuple(error) if error is not None else None,
+    )
 
 
 def _upper(text: str) -> str:

@@ -93,7 +93,11 @@ def table_of(site: Site) -> Element | None:
     if site.form == "control":
         return next(site.element.iter(W_TBL), None)
     following = site.element.getnext()
-    while following is not None and following.tag in (q("w:bookmarkStart"), q("w:bookmarkEnd"), q("w:proofErr")):
+    while following is not None and following.tag in (
+        q("w:bookmarkStart"),
+        q("w:bookmarkEnd"),
+        q("w:proofErr"),
+    ):
         following = following.getnext()
     return following if following is not None and following.tag == W_TBL else None
 

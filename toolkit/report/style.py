@@ -108,7 +108,8 @@ def read_style(path: Path | None) -> Style:
 
 
 def _text(table: dict[str, Any], key: str, path: Path) -> str | None:
-    return _typed(table, key, str, None, path)
+    text: str | None = _typed(table, key, str, None, path)
+    return text
 
 
 def _typed(table: dict[str, Any], key: str, kind: type, default: Any, path: Path) -> Any:
@@ -121,6 +122,9 @@ def _typed(table: dict[str, Any], key: str, kind: type, default: Any, path: Path
 
 def _wrong(path: Path, key: str, got: object, expected: str) -> ConfigError:
     return ConfigError(
-        f"the style file has a wrong value for {key!r}", where=path, got=got, expected=expected,
+        f"the style file has a wrong value for {key!r}",
+        where=path,
+        got=got,
+        expected=expected,
         next_step="correct it in the style file beside the template",
-    )  # fmt: skip
+    )

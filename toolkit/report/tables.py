@@ -7,9 +7,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
+from toolkit.report.columns import TABLES, Column
 from toolkit.report.content import Cell, Table
 from toolkit.report.style import Style
-from toolkit.report.tags import TABLES, Column
 
 if TYPE_CHECKING:
     from toolkit.calibration.record import CalibrationRecord
@@ -67,11 +67,17 @@ def _put(row: Row, name: str, estimate: Estimate | None, factor: float = 1.0) ->
 def _results(result: TestResult) -> list[Row]:
     return [
         {
-            "rotation": c.rotation, "SA": c.SA / _DEG, "FZ": c.FZ, "FY": c.FY, "U_FY": 2 * c.u_FY, "MZ": c.MZ,
-            "U_MZ": 2 * c.u_MZ, "file": c.file,
+            "rotation": c.rotation,
+            "SA": c.SA / _DEG,
+            "FZ": c.FZ,
+            "FY": c.FY,
+            "U_FY": 2 * c.u_FY,
+            "MZ": c.MZ,
+            "U_MZ": 2 * c.u_MZ,
+            "file": c.file,
         }
         for c in result.reduced.used()
-    ]  # fmt: skip
+    ]
 
 
 _STIFFNESS = ("cornering_secant", "cornering_slope", "aligning_secant", "aligning_slope")
@@ -134,11 +140,15 @@ def _characteristics(result: TestResult, style: Style) -> list[Row]:
             scale = factor * (_DEG if stiff else 1.0)
             rows.append(
                 {
-                    "quantity": text, "rotation": one.rotation if stiff else "both", "load": one.load_N,
-                    "value": found.value * scale, "U": U * scale if math.isfinite(U) else None,
-                    "k": k if math.isfinite(k) else None, "unit": str(shown).replace("*", "·"),
+                    "quantity": text,
+                    "rotation": one.rotation if stiff else "both",
+                    "load": one.load_N,
+                    "value": found.value * scale,
+                    "U": U * scale if math.isfinite(U) else None,
+                    "k": k if math.isfinite(k) else None,
+                    "unit": str(shown).replace("*", "·"),
                 }
-            )  # fmt: skip
+            )
     return rows
 
 
@@ -151,9 +161,12 @@ def _fits(result: TestResult, style: Style) -> list[Row]:
             if fit is None:
                 continue
             row: Row = {
-                "channel": channel, "rotation": one.rotation, "load": one.load_N, "error": fit.error_percent,
+                "channel": channel,
+                "rotation": one.rotation,
+                "load": one.load_N,
+                "error": fit.error_percent,
                 "floor": fit.scatter_floor_percent,
-            }  # fmt: skip
+            }
             for p in fit.parameters:
                 scale = factor if p.name in ("D", "Sv") else 1 / _DEG if p.name == "Sh" else 1.0
                 row[p.name] = p.value * scale
@@ -170,12 +183,14 @@ def _calibration(record: CalibrationRecord | None) -> list[Row]:
             unit = units.get(term)
             rows.append(
                 {
-                    "load": load.load, "term": term, "coefficient": load.coefficients[i],
+                    "load": load.load,
+                    "term": term,
+                    "coefficient": load.coefficients[i],
                     "issued": load.issued[i] if i < len(load.issued) else None,
                     "standard_error": math.sqrt(load.covariance[i][i]) if i < len(load.covariance) else None,
                     "unit": (f"{load.unit} per {unit}" if unit else load.unit).replace("*", "·"),
                 }
-            )  # fmt: skip
+            )
     return rows
 
 

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from toolkit.errors import TemplateError
+from toolkit.report.columns import TABLES, UNITS, Column
 
 Kind = Literal["text", "number", "date", "figure", "table", "if", "row"]
 
@@ -57,18 +58,6 @@ def parse_tag(text: str) -> Tag | None:
 def _canonical(path: str) -> str:
     # practice and thesis write Fy and Mz; the channels are FY and MZ.
     return re.sub(r"^calibration\.([FM])([xyz])\.", lambda m: f"calibration.{m[1]}{m[2].upper()}.", path)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Column:
-    """A column of a report table; ``unit`` is the SI-side default, shown in the heading."""
-
-    name: str
-    kind: Literal["text", "number"]
-    description: str
-    unit: str | None = None
-    spec: str = "g"
-    quantity: str | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -150,7 +139,6 @@ _SUMMARY = (
     ("PRAT", "moment", ".2f", "plysteer residual aligning torque there, at 0 deg"),
 )
 
-UNITS = {"force": "N", "moment": "N*m", "force/angle": "N/deg", "moment/angle": "N*m/deg"}
 
 FIGURES = {
     "fy_vs_slip": "lateral force against slip angle, all loads",
@@ -179,142 +167,6 @@ CONDITIONS = {
 }
 
 
-def _text(name: str, description: str) -> Column:
-    return Column(name=name, kind="text", description=description)
-
-
-def _number(name: str, description: str, spec: str, *, unit: str | None = None, quantity: str | None = None) -> Column:
-    return Column(
-        name=name, kind="number", description=description, spec=spec, quantity=quantity,
-        unit=UNITS[quantity] if quantity else unit,
-    )  # fmt: skip
-
-
-def _with_u(name: str, description: str, spec: str, quantity: str) -> list[Column]:
-    return [
-        _number(name, description, spec, quantity=quantity),
-        _number(f"U_{name}", f"expanded uncertainty (95 %) of {name}", spec, quantity=quantity),
-    ]
-
-
-def _fit_columns() -> list[Column]:
-    shown = (("B", "1/rad", ".3f"), ("C", "1", ".3f"), ("D", None, ".1f"), ("E", "1", ".3f"),
-             ("Sh", "deg", ".3f"), ("Sv", None, ".2f"))  # fmt: skip
-    columns = []
-    for name, unit, spec in shown:
-        note = " in the channel's unit" if unit is None else ""
-        columns.append(_number(name, f"Magic Formula {name}{note}", spec, unit=unit))
-        columns.append(_number(f"u_{name}", f"standard error of {name}{note}", spec, unit=unit))
-    return columns
-
-
-TABLES: dict[str, tuple[str, tuple[Column, ...]]] = {
-    "results": (
-        "one row a condition, as measured, SAE J670",
-        (
-            _text("rotation", "direction of rotation"),
-            _number("SA", "measured slip angle", ".2f", unit="deg"),
-            _number("FZ", "measured load", ".0f", quantity="force"),
-            _number("FY", "lateral force", ".1f", quantity="force"),
-            _number("U_FY", "repeatability of FY, k = 2", ".1f", quantity="force"),
-            _number("MZ", "aligning moment", ".2f", quantity="moment"),
-            _number("U_MZ", "repeatability of MZ, k = 2", ".2f", quantity="moment"),
-            _text("file", "recording"),
-        ),
-    ),
-    "stiffness": (
-        "cornering and aligning stiffness, one row a load and direction",
-        (
-            _number("load", "load", ".0f", quantity="force"),
-            _text("rotation", "direction of rotation"),
-            *_with_u("cornering_secant", "cornering stiffness, +-1 deg secant", ".1f", "force/angle"),
-            *_with_u("cornering_slope", "cornering stiffness, slope of the curve at 0 deg", ".1f", "force/angle"),
-            *_with_u("aligning_secant", "aligning stiffness, +-1 deg secant", ".2f", "moment/angle"),
-            *_with_u("aligning_slope", "aligning stiffness, slope of the curve at 0 deg", ".2f", "moment/angle"),
-        ),
-    ),
-    "pull": (
-        "pull characteristics by symmetry, one row a load",
-        (
-            _number("load", "load", ".0f", quantity="force"),
-            *_with_u("conicity", "conicity", ".1f", "force"),
-            *_with_u("plysteer", "plysteer", ".1f", "force"),
-            *_with_u("CRAT", "conicity residual aligning torque", ".2f", "moment"),
-            *_with_u("PRAT", "plysteer residual aligning torque at 0 deg", ".2f", "moment"),
-            *_with_u("PRAT_at_FY_zero", "the same at FY = 0", ".2f", "moment"),
-        ),
-    ),
-    "pull_thesis": (
-        "the same by the thesis's formulas, and the single-direction residual moments",
-        (
-            _number("load", "load", ".0f", quantity="force"),
-            *_with_u("thesis_CRAT", "CRAT by the thesis's formula", ".2f", "moment"),
-            *_with_u("thesis_PRAT", "PRAT by the thesis's formula", ".2f", "moment"),
-            *_with_u("residual_forward", "residual aligning torque, forward, MZ at FY = 0", ".2f", "moment"),
-            *_with_u("residual_reverse", "residual aligning torque, reverse, MZ at FY = 0", ".2f", "moment"),
-        ),
-    ),
-    "characteristics": (
-        "every characteristic, one row each",
-        (
-            _text("quantity", "name of the characteristic"),
-            _text("rotation", "direction of rotation, or both"),
-            _number("load", "load", ".0f", quantity="force"),
-            _number("value", "value in the row's unit", ".2f"),
-            _number("U", "expanded uncertainty (95 %) in the row's unit", ".2f"),
-            _number("k", "coverage factor", ".2f", unit="1"),
-            _text("unit", "unit of the row"),
-        ),
-    ),
-    "fits": (
-        "Magic Formula per load, channel and direction",
-        (
-            _text("channel", "FY or MZ"),
-            _text("rotation", "direction of rotation"),
-            _number("load", "mean load of the block", ".0f", quantity="force"),
-            *_fit_columns(),
-            _number("error", "error of the fit", ".2f", unit="%"),
-            _number("floor", "scatter of the measurements about their bin means", ".2f", unit="%"),
-        ),
-    ),
-    "calibration": (
-        "coefficients of the calibration record",
-        (
-            _text("load", "computed load"),
-            _text("term", "term"),
-            _number("coefficient", "full-precision coefficient", ".6g"),
-            _number("issued", "coefficient as issued on the certificate", ".6g"),
-            _number("standard_error", "standard error", ".2g"),
-            _text("unit", "unit of load and indication"),
-        ),
-    ),
-    "acquisition": (
-        "the acquisition program's own FY and MZ against the report's, one row a file",
-        (
-            _text("file", "recording"),
-            _number("FY_difference", "largest |FY of the file - FY|", ".2f", quantity="force"),
-            _number("MZ_difference", "largest |MZ of the file - MZ|", ".3f", quantity="moment"),
-        ),
-    ),
-    "findings": (
-        "departures from what was expected",
-        (
-            _text("rule", "rule"),
-            _text("level", "error, warning or note"),
-            _text("where", "file, block or channel"),
-            _text("message", "what was found"),
-        ),
-    ),
-    "files": (
-        "the recordings and their hashes",
-        (
-            _text("file", "recording"),
-            _text("rotation", "direction of rotation"),
-            _text("sha256", "SHA-256 of the file"),
-        ),
-    ),
-}  # fmt: skip
-
 _LOADS = ("FY", "MZ", "MX", "FX", "FZ")
 _TERM = re.compile(rf"calibration\.(?:{'|'.join(_LOADS)})\.[A-Za-z0-9_^*()]+")
 
@@ -322,11 +174,15 @@ _TERM = re.compile(rf"calibration\.(?:{'|'.join(_LOADS)})\.[A-Za-z0-9_^*()]+")
 def catalogue() -> tuple[Spec, ...]:
     """Return every tag in the order of the manual; coefficients of the M-15's cells stand for all."""
     coefficients = [
-        Spec(path=f"calibration.{load}.{term}", kind="number", spec=".6g",
-             description=f"coefficient of {term} in {load}, in the record's units")
+        Spec(
+            path=f"calibration.{load}.{term}",
+            kind="number",
+            spec=".6g",
+            description=f"coefficient of {term} in {load}, in the record's units",
+        )
         for load in ("FY", "MZ")
         for term in ("D51", "D52", "E5", "intercept")
-    ]  # fmt: skip
+    ]
     summary = [
         Spec(path=f"summary.{name}", kind="number", unit=UNITS[quantity], spec=spec, description=text)
         for name, quantity, spec, text in _SUMMARY
@@ -341,11 +197,16 @@ def catalogue() -> tuple[Spec, ...]:
         for name, (text, columns) in TABLES.items()
     ]
     rows = [
-        Spec(path=f"row.{column.name}", kind="row", unit=column.unit, spec=column.spec,
-             description=f"{column.description} (in the prototype row of tk:table.{name})")
+        Spec(
+            path=f"row.{column.name}",
+            kind="row",
+            unit=column.unit,
+            spec=column.spec,
+            description=f"{column.description} (in the prototype row of tk:table.{name})",
+        )
         for name, (_, columns) in TABLES.items()
         for column in columns
-    ]  # fmt: skip
+    ]
     conditions = [
         Spec(path=f"if.{name}", kind="if", description=f"kept when {text}")
         for name, text in condition_names().items()
@@ -416,7 +277,7 @@ def format_number(value: float, spec: str, *, decimal_comma: bool = False) -> st
     try:
         if spec.endswith("d"):
             if value != round(value):
-                raise ValueError("a whole-number format for a number that is not whole")
+                raise ValueError("a whole-number format for a number that is not whole")  # noqa: TRY301
             text = format(round(value), spec)
         else:
             text = format(float(value), spec)
@@ -425,7 +286,9 @@ def format_number(value: float, spec: str, *, decimal_comma: bool = False) -> st
     except ValueError as error:
         raise TemplateError(
             "a number cannot be printed in the format of its tag",
-            got=f"|{spec}: {error}", expected="one Python format spec such as .2f or .5g",
-            next_step="correct the tag in the template", rule="bad-format",
-        ) from error  # fmt: skip
+            got=f"|{spec}: {error}",
+            expected="one Python format spec such as .2f or .5g",
+            next_step="correct the tag in the template",
+            rule="bad-format",
+        ) from error
     return text.translate(str.maketrans(".,", ",.")) if decimal_comma else text

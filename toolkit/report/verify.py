@@ -57,17 +57,24 @@ def verify_docx(filled: Filled) -> tuple[Check, ...]:
                 left.append(text[:40])
         for sdt in story.root.iter(W_SDT):
             tag = control_tag(sdt)
-            if tag is not None and (tag.family == "if" or sdt.find(f"{SDT_PR}/{q('w:showingPlcHdr')}") is not None):
+            if tag is not None and (
+                tag.family == "if" or sdt.find(f"{SDT_PR}/{q('w:showingPlcHdr')}") is not None
+            ):
                 left.append(str(tag))
         alts += [p.get("descr") or "" for p in story.root.iter(q("wp:docPr")) if not in_fallback(p)]
-    absent = [tag for tag, alt in filled.figures if " ".join(alt.split()) not in {" ".join(one.split()) for one in alts}]
+    absent = [
+        tag
+        for tag, alt in filled.figures
+        if " ".join(alt.split()) not in {" ".join(one.split()) for one in alts}
+    ]
     return (
         Check(name="placeholders", ok=not left, message=", ".join(left[:5]) or "none left"),
         Check(
-            name="alt-text", ok=not absent and all(alt for _, alt in filled.figures),
+            name="alt-text",
+            ok=not absent and all(alt for _, alt in filled.figures),
             message=", ".join(absent) or f"{len(filled.figures)} figures with alternative text",
         ),
-    )  # fmt: skip
+    )
 
 
 def verify_pdf(pdf: Path, filled: Filled) -> tuple[tuple[Check, ...], int]:
@@ -97,16 +104,18 @@ def verify_pdf(pdf: Path, filled: Filled) -> tuple[tuple[Check, ...], int]:
             _fonts(fonts),
             Check(name="pages", ok=pages > 0 and printed == pages, message=f"{pages} pages"),
             Check(
-                name="figures", ok=pictures >= len(filled.figures),
+                name="figures",
+                ok=pictures >= len(filled.figures),
                 message=f"{pictures} pictures in the PDF, {len(filled.figures)} figures in the report",
             ),
             Check(
-                name="archive", ok=b"pdfaid" in data and "yes" in _line(info, "Tagged"),
+                name="archive",
+                ok=b"pdfaid" in data and "yes" in _line(info, "Tagged"),
                 message="PDF/A-2 and tagged" if b"pdfaid" in data else "not PDF/A",
             ),
         ),
         pages,
-    )  # fmt: skip
+    )
 
 
 def _texts(text: str, filled: Filled) -> list[Check]:
@@ -124,20 +133,26 @@ def _texts(text: str, filled: Filled) -> list[Check]:
             lost.append(f"{entry.tag} {entry.text[:40]!r}")
     checks = [
         Check(
-            name="values", ok=not lost,
+            name="values",
+            ok=not lost,
             message="; ".join(lost[:5]) or f"{len(filled.manifest)} values found in the PDF",
         ),
         Check(
-            name="cells", ok=not rows_left,
+            name="cells",
+            ok=not rows_left,
             message="; ".join(rows_left[:5]) or f"{sum(map(len, filled.cells))} table cells found in the PDF",
         ),
-    ]  # fmt: skip
+    ]
     if unreadable:
         checks.append(
-            Check(name="script", ok=False, warning=True,
-                  message=f"{', '.join(unreadable[:5])}: characters that no installed font shows, or that run from "
-                  "right to left, could not be read back from the PDF")
-        )  # fmt: skip
+            Check(
+                name="script",
+                ok=False,
+                warning=True,
+                message=f"{', '.join(unreadable[:5])}: characters that no installed font shows, "
+                "or that run from right to left, could not be read back from the PDF",
+            )
+        )
     return checks
 
 
@@ -153,7 +168,11 @@ def _absent_rows(page: str, rows: Sequence[Sequence[str]]) -> list[str]:
         # A row that breaks over a page, or whose cells the PDF paints in another order: cell by cell.
         for cell in row:
             wanted = squeeze(cell)
-            if wanted not in page and not _in_pieces(wanted, page, cell) and not any(map(_hard_to_extract, wanted)):
+            if (
+                wanted not in page
+                and not _in_pieces(wanted, page, cell)
+                and not any(map(_hard_to_extract, wanted))
+            ):
                 lost.append(cell[:60])
     return lost
 
@@ -165,9 +184,20 @@ def _in_pieces(wanted: str, page: str, original: str) -> bool:
 
 
 def _hard_to_extract(character: str) -> bool:
-    return unicodedata.bidirectional(character) in ("R", "AL", "AN") or unicodedata.category(character) in (
-        "So", "Sk", "Cn", "Co", "Mn", "Me", "Cf",
-    ) or ord(character) > 0xFFFF  # fmt: skip
+    return (
+        unicodedata.bidirectional(character) in ("R", "AL", "AN")
+        or unicodedata.category(character)
+        in (
+            "So",
+            "Sk",
+            "Cn",
+            "Co",
+            "Mn",
+            "Me",
+            "Cf",
+        )
+        or ord(character) > 0xFFFF
+    )
 
 
 def _plain_words(text: str) -> list[str]:
@@ -193,13 +223,20 @@ def _run(command: list[str]) -> str:
         done = subprocess.run(command, capture_output=True, timeout=120, check=False)
     except FileNotFoundError as error:
         raise RenderError(
-            "the PDF cannot be verified", where=command[0], got="no program of that name on the PATH",
+            "the PDF cannot be verified",
+            where=command[0],
+            got="no program of that name on the PATH",
             expected="poppler's pdftotext, pdffonts, pdfinfo and pdfimages",
-            next_step="run 'toolkit doctor': it prints the command that installs poppler-utils", rule="no-poppler",
-        ) from error  # fmt: skip
+            next_step="run 'toolkit doctor': it prints the command that installs poppler-utils",
+            rule="no-poppler",
+        ) from error
     except subprocess.TimeoutExpired as error:
         raise RenderError(
-            "the PDF cannot be verified in time", where=command[0], got="no end after 120 s", expected="an answer",
-            next_step="open the PDF; try again with --keep", rule="render-timeout",
-        ) from error  # fmt: skip
+            "the PDF cannot be verified in time",
+            where=command[0],
+            got="no end after 120 s",
+            expected="an answer",
+            next_step="open the PDF; try again with --keep",
+            rule="render-timeout",
+        ) from error
     return done.stdout.decode("utf-8", "replace")

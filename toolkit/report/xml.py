@@ -92,7 +92,7 @@ def _name(part: Any) -> str:
     return str(part.partname).lstrip("/")
 
 
-def ancestor(element: Element, tag: str) -> Element | None:
+def ancestor(element: Element, tag: str) -> Any:
     """Return the nearest ancestor with a tag."""
     return next(element.iterancestors(tag), None)
 

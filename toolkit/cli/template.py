@@ -1,0 +1,115 @@
+"""`toolkit template`: the template contract: check a template, list the tags, make a new one."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from toolkit.cli.console import Calibrations, Home, Json, Quiet, answer, table
+
+app = typer.Typer(help="The contract of report templates.", no_args_is_help=True, rich_markup_mode=None)
+
+
+@app.command("check")
+def check(
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="Word template, .docx or .dotx.")],
+    json: Json = False,
+    quiet: Quiet = False,
+) -> int:
+    """Tell what is wrong with a template: 0 clean, 1 findings, 2 not a Word file or not safe to open.
+
+    Example: toolkit template check report_templates/org.docx
+    """
+    from toolkit.report.check import check_template
+    from toolkit.report.package import read_template
+    from toolkit.report.style import read_style, style_file
+
+    template = read_template(file)
+    found = check_template(template, read_style(style_file(file)))
+    text = "\n".join(f"{one.level:<8}{one.rule:<18}{one.part}, {one.place}: {one.message}" for one in found)
+    payload = {"template_sha256": template.sha256, "findings": [one.as_dict() for one in found]}
+    answer(payload, text or f"{file}: no findings", as_json=json, quiet=quiet)
+    return 1 if found else 0
+
+
+@app.command("tags")
+def tags(
+    test: Annotated[
+        Path | None, typer.Option("--test", help="Show which tags this test has, and their values.")
+    ] = None,
+    template: Annotated[
+        Path | None, typer.Option("--template", help="Take units and required tags from its style file.")
+    ] = None,
+    calibration: Annotated[str | None, typer.Option("--calibration", help="Record id.")] = None,
+    calibrations: Calibrations = None,
+    home: Home = None,
+    json: Json = False,
+    quiet: Quiet = False,
+) -> int:
+    """List every tag that a template may use.
+
+    Example: toolkit template tags --test tests/2019-06-04
+    """
+    from toolkit.report.build import build_content
+    from toolkit.report.listing import list_tags
+    from toolkit.report.style import read_style, style_file
+
+    style = read_style(style_file(template)) if template else read_style(None)
+    content = None
+    if test is not None:
+        from toolkit.cli.resolve import resolve_test
+
+        resolved = resolve_test(test, calibration=calibration, calibrations=calibrations, home=home)
+        content = build_content(resolved.result, resolved.record, findings=resolved.findings, style=style)
+    listed = list_tags(content, style)
+    answer({"tags": listed}, _text(listed), as_json=json, quiet=quiet)
+    return 0
+
+
+@app.command("new")
+def new(
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="Where to write it: NAME.docx.")],
+    force: Annotated[bool, typer.Option("--force", help="Overwrite an existing file.")] = False,
+    json: Json = False,
+    quiet: Quiet = False,
+) -> int:
+    """Write a fresh copy of the default template and its style file, to be changed in Word.
+
+    Example: toolkit template new report_templates/ours.docx
+    """
+    from toolkit.errors import OutputError
+    from toolkit.files import write_atomic
+    from toolkit.report.default_template import STYLE_FILE, build_default
+
+    if file.suffix.lower() != ".docx":
+        raise OutputError(
+            "a template is a Word file",
+            where=file,
+            got=file.suffix or "no suffix",
+            expected=".docx",
+            next_step="name it NAME.docx",
+        )
+    style = file.with_suffix(".toml")
+    for target in (file, style):
+        if target.exists() and not force:
+            raise OutputError(
+                "the file exists",
+                where=target,
+                got="a file of that name",
+                expected="a new name",
+                next_step="choose another name, or overwrite with --force",
+            )
+    write_atomic(file, build_default())
+    write_atomic(style, STYLE_FILE)
+    answer({"template": file, "style": style}, f"{file}\n{style}", as_json=json, quiet=quiet)
+    return 0
+
+
+def _text(listed: list[dict[str, Any]]) -> str:
+    rows = [
+        [one["tag"], one["kind"], one["unit"] or "", str(one["value"] or "")[:40], one["description"]]
+        for one in listed
+    ]
+    return table(["tag", "kind", "unit", "value", "description"], rows, align="<<<<<")

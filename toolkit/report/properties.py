@@ -1,0 +1,25 @@
+"""Document properties: the report's own title, author and dates in place of python-docx's of 2013."""
+
+from __future__ import annotations
+
+import datetime as dt
+from typing import Any
+
+from toolkit import __version__
+from toolkit.report.content import ReportContent
+from toolkit.report.xml import clean
+
+
+def set_properties(package: Any, content: ReportContent) -> None:
+    """Set title, author and dates; the dates are the day of issue, so that the content is reproducible."""
+    core = package.core_properties
+    day = dt.datetime.combine(dt.date.fromisoformat(content.issued), dt.time(), tzinfo=dt.UTC).replace(
+        tzinfo=None
+    )
+    core.title, core.author = clean(content.title)[:255], clean(content.author)[:255]
+    core.last_modified_by = f"toolkit {__version__}"
+    core.subject = "Tire force and moment"
+    core.identifier = str(content.values["report.id"].value)
+    core.comments = ""
+    core.created = core.modified = day
+    core.revision = 1

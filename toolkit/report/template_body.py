@@ -1,0 +1,353 @@
+"""The default template's title page and chapters."""
+
+# ruff: noqa: E501  lines of a template's text read best whole
+from __future__ import annotations
+
+from toolkit.report.blocks import Pieces, literal, paragraph, run
+
+
+def title_page(p: Pieces) -> list[str]:
+    """Return the title page: the source document's Figure 5.3, calibration, summary and report id."""
+    quarter = (31.0, 52.0, 31.0, 52.0)
+    return [
+        paragraph(p.inline("tk:laboratory.name", "laboratory"), style="Laboratory"),
+        paragraph(run("M-15 Tire Test"), style="Title"),
+        paragraph(run("Force and Moment"), style="Subtitle"),
+        p.block(
+            "tk:if.simulated",
+            paragraph(
+                run("SIMULATED DATA: made by simulation, not a measurement of a tire."), style="Notice"
+            ),
+        ),
+        p.block(
+            "tk:if.unverified",
+            paragraph(
+                run(
+                    "UNVERIFIED CALIBRATION: the record is a legacy import; its coefficients are not reproduced from "
+                    "reference data."
+                ),
+                style="Notice",
+            ),
+        ),
+        p.facts(
+            [
+                [("TIRE SIZE", "tire.size"), ("COMPANY", "tire.company")],
+                [("DOT", "tire.DOT"), ("SERIES", "tire.series")],
+                [("TEST PRESSURE", "test.pressure"), ("OPERATOR", "test.operator")],
+                [("REQUESTOR", "test.requestor"), ("TEST DATE", "test.date")],
+                [("SPECIAL?", "test.special")],
+            ],
+            quarter,
+        ),
+        paragraph("", style="Gap"),
+        paragraph(run("Calibration"), style="BoxTitle"),
+        p.facts(
+            [
+                [("RECORD", "calibration.id"), ("STATUS", "calibration.status")],
+                [("SHA-256", "calibration.hash")],
+            ],
+            quarter,
+        ),
+        paragraph("", style="Gap"),
+        p.block(
+            "tk:if.summary.load",
+            paragraph(
+                run("Results at ") + p.inline("tk:summary.load", "load") + literal(" {{tk:unit.force}}"),
+                style="BoxTitle",
+            )
+            + _summary(p, quarter),
+        ),
+        paragraph("", style="Gap"),
+        paragraph(run("Report"), style="BoxTitle"),
+        p.facts(
+            [
+                [("REPORT ID", "report.id"), ("ISSUED", "report.date")],
+                [("TEST", "test.name"), ("DATA", "simulated")],
+            ],
+            quarter,
+        ),
+        paragraph(
+            run(
+                "The results relate only to the item tested, as received. The report may be reproduced only as a whole. "
+                "Expanded uncertainties have a coverage probability of about 95 %."
+            ),
+            style="Small",
+        ),
+    ]
+
+
+def _summary(p: Pieces, widths: tuple[float, ...]) -> str:
+    def fact(label: str, name: str, unit: str) -> tuple[str, str]:
+        return label, f"{{{{tk:summary.{name}}}}} {{{{tk:unit.{unit}}}}}"
+
+    rows = [
+        p.block(
+            "tk:if.summary.cornering_stiffness",
+            _rows(
+                p,
+                [
+                    [
+                        fact("CORNERING", "cornering_stiffness", "force_per_angle"),
+                        fact("ALIGNING", "aligning_stiffness", "moment_per_angle"),
+                    ]
+                ],
+                widths,
+            ),
+        ),
+        p.block(
+            "tk:if.summary.conicity",
+            _rows(
+                p,
+                [
+                    [fact("CONICITY", "conicity", "force"), fact("PLYSTEER", "plysteer", "force")],
+                    [fact("CRAT", "CRAT", "moment"), fact("PRAT", "PRAT", "moment")],
+                ],
+                widths,
+            ),
+        ),
+    ]
+    outer = p.facts([], widths)
+    return outer.replace("</w:tblGrid>", "</w:tblGrid>" + "".join(rows))
+
+
+def _rows(p: Pieces, rows: list[list[tuple[str, str]]], widths: tuple[float, ...]) -> str:
+    made = p.facts([list(row) for row in rows], widths)
+    return made.partition("</w:tblGrid>")[2].removesuffix("</w:tbl>")
+
+
+def chapters(p: Pieces) -> list[str]:
+    """Return the chapters, from the test's facts to the end mark."""
+
+    def heading(text: str, *, fresh: bool = False) -> str:
+        return paragraph(run(text), style="Heading1").replace(
+            "</w:pPr>", "<w:pageBreakBefore/></w:pPr>" if fresh else "</w:pPr>", 1
+        )
+
+    def text(words: str) -> str:
+        return paragraph(literal(words))
+
+    force, moment = "{{tk:unit.force}}", "{{tk:unit.moment}}"
+    stiff = "{{tk:unit.force_per_angle}}", "{{tk:unit.moment_per_angle}}"
+    return [
+        heading("1  Test", fresh=True),
+        p.facts(
+            [
+                [("MACHINE", "test.machine")],
+                [("SURFACE?", "test.surface")],
+                [("RIM?", "tire.rim")],
+                [("CONSTRUCTION?", "tire.construction")],
+                [("LOADS", "test.loads")],
+                [("SLIP ANGLES?", "test.slip_angles")],
+                [("DIRECTIONS", "test.directions")],
+                [("AVERAGING", "test.averaging")],
+                [("TARE", "test.tare")],
+                [("AXES", "test.axes")],
+            ],
+            (38.0, 128.0),
+        ),
+        paragraph("", style="Gap"),
+        p.block("tk:if.test.speed", text("The drum's surface ran at {{tk:test.speed}} km/h.")),
+        text(
+            "{{tk:test.files}} recordings gave {{tk:test.conditions}} conditions. Every force and moment was computed from "
+            "the load cells by calibration record {{tk:calibration.id}}; all results are in {{tk:test.axes}} axes: z down, "
+            "y to the right, a positive slip angle gives a negative lateral force and a positive aligning moment."
+        ),
+        heading("2  Lateral force and aligning moment"),
+        p.figure("fy_vs_slip", 160),
+        p.figure("mz_vs_slip", 160),
+        p.figure("fy_vs_load", 160),
+        p.figure("mz_vs_load", 160),
+        p.figure("gough", 160),
+        p.block(
+            "tk:if.stiffness",
+            heading("3  Cornering and aligning stiffness")
+            + text(
+                "Both are positive in SAE axes. The secant runs through the ±1 deg steps, as the source standard has it; "
+                "the slope is that of the fitted curve at 0 deg."
+            )
+            + p.figure("cornering_stiffness", 160)
+            + p.figure("aligning_stiffness", 160)
+            + p.table(
+                "stiffness",
+                "Cornering and aligning stiffness with expanded uncertainties (95 %).",
+                [
+                    f"load [{force}]",
+                    "direction",
+                    f"cornering, secant [{stiff[0]}]",
+                    f"cornering, slope [{stiff[0]}]",
+                    f"aligning, secant [{stiff[1]}]",
+                    f"aligning, slope [{stiff[1]}]",
+                ],
+                [
+                    "load",
+                    "rotation",
+                    "cornering_secant ± U_cornering_secant",
+                    "cornering_slope ± U_cornering_slope",
+                    "aligning_secant ± U_aligning_secant",
+                    "aligning_slope ± U_aligning_slope",
+                ],
+                [20, 22, 31, 31, 31, 31],
+                "rlrrrr",
+            ),
+        ),
+        heading("4  Pull"),
+        p.block(
+            "tk:if.no_pull",
+            text("The test has no pull characteristics: they need a forward and a reversed run."),
+        ),
+        p.block(
+            "tk:if.pull",
+            text(
+                "From the forward and the reversed run at slip angle zero, read off each direction's own curve at a common "
+                "load. Conicity keeps its sign when the drum is reversed; plysteer changes it."
+            )
+            + p.figure("conicity", 160)
+            + p.figure("plysteer", 160)
+            + p.figure("crat", 160)
+            + p.figure("prat", 160)
+            + p.table(
+                "pull",
+                "Pull characteristics by symmetry with expanded uncertainties (95 %).",
+                [
+                    f"load [{force}]",
+                    f"conicity [{force}]",
+                    f"plysteer [{force}]",
+                    f"CRAT [{moment}]",
+                    f"PRAT at 0 deg [{moment}]",
+                    f"PRAT at FY = 0 [{moment}]",
+                ],
+                [
+                    "load",
+                    "conicity ± U_conicity",
+                    "plysteer ± U_plysteer",
+                    "CRAT ± U_CRAT",
+                    "PRAT ± U_PRAT",
+                    "PRAT_at_FY_zero ± U_PRAT_at_FY_zero",
+                ],
+                [22, 28, 28, 28, 30, 30],
+                "rrrrrr",
+            )
+            + p.table(
+                "pull_thesis",
+                "CRAT and PRAT by the formulas of the machine's source document, which pair the directions "
+                "the other way round, and the moment at zero lateral force of each direction by itself.",
+                [
+                    f"load [{force}]",
+                    f"CRAT, source [{moment}]",
+                    f"PRAT, source [{moment}]",
+                    f"residual, forward [{moment}]",
+                    f"residual, reverse [{moment}]",
+                ],
+                [
+                    "load",
+                    "thesis_CRAT ± U_thesis_CRAT",
+                    "thesis_PRAT ± U_thesis_PRAT",
+                    "residual_forward ± U_residual_forward",
+                    "residual_reverse ± U_residual_reverse",
+                ],
+                [22, 36, 36, 36, 36],
+                "rrrrr",
+            ),
+        ),
+        p.block(
+            "tk:if.fits",
+            heading("5  Fitted curves")
+            + text(
+                "Magic Formula y = D sin(C arctan(Bx - E(Bx - arctan Bx))) + Sv with x = SA + Sh, one curve a load. D and Sv "
+                "are in the channel's unit; below each parameter stands its standard error, n/a where the data do not "
+                "determine it. The error is 100 √(Σ(model - measured)² / Σ measured²); the floor is the same for the "
+                "measurements about their means."
+            )
+            + p.table(
+                "fits",
+                "Parameters of the fitted curves.",
+                [
+                    "",
+                    "direction",
+                    f"load [{force}]",
+                    "B [1/rad]",
+                    "C",
+                    "D",
+                    "E",
+                    "Sh [deg]",
+                    "Sv",
+                    "error [%]",
+                    "floor [%]",
+                ],
+                [
+                    "channel",
+                    "rotation",
+                    "load",
+                    "B ± u_B",
+                    "C ± u_C",
+                    "D ± u_D",
+                    "E ± u_E",
+                    "Sh ± u_Sh",
+                    "Sv ± u_Sv",
+                    "error",
+                    "floor",
+                ],
+                [9, 17, 16, 17, 14.5, 18.5, 15, 15, 16, 14, 14],
+                "llrrrrrrrrr",
+            ),
+        ),
+        heading("6  Calibration"),
+        p.table(
+            "calibration",
+            "Coefficients of the calibration record.",
+            ["load", "term", "coefficient", "as issued", "standard error", "unit"],
+            ["load", "term", "coefficient", "issued", "standard_error", "unit"],
+            [16, 26, 30, 30, 30, 34],
+            "llrrrl",
+        ),
+        p.table(
+            "acquisition",
+            "The acquisition program's own values against this report's: largest differences a file.",
+            ["recording", f"FY [{force}]", f"MZ [{moment}]"],
+            ["file", "FY_difference", "MZ_difference"],
+            [90, 38, 38],
+            "lrr",
+        ),
+        heading("7  Findings"),
+        p.block("tk:if.no_findings", text("There are no findings.")),
+        p.table(
+            "findings",
+            "Departures from what was expected.",
+            ["rule", "level", "where", "finding"],
+            ["rule", "level", "where", "message"],
+            [30, 16, 36, 84],
+            "llll",
+        ),
+        heading("8  Measured conditions"),
+        p.table(
+            "results",
+            "Means of the load blocks as measured; U is the repeatability of the mean, k = 2.",
+            [
+                "direction",
+                "SA [deg]",
+                f"FZ [{force}]",
+                f"FY [{force}]",
+                f"U [{force}]",
+                f"MZ [{moment}]",
+                f"U [{moment}]",
+                "recording",
+            ],
+            ["rotation", "SA", "FZ", "FY", "U_FY", "MZ", "U_MZ", "file"],
+            [19, 17, 19, 20, 17, 20, 17, 37],
+            "lrrrrrrl",
+        ),
+        heading("9  Provenance"),
+        text(
+            "Made by {{tk:software.name}} {{tk:software.version}} from the recordings below and calibration record "
+            "{{tk:calibration.id}}, SHA-256 {{tk:calibration.hash}}."
+        ),
+        p.table(
+            "files",
+            "Recordings and their SHA-256.",
+            ["recording", "direction", "SHA-256"],
+            ["file", "rotation", "sha256"],
+            [36, 20, 110],
+            "lll",
+        ),
+        paragraph(run("End of report ") + p.inline("tk:report.id", "report id"), style="EndMark"),
+    ]
