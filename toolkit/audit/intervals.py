@@ -46,11 +46,11 @@ def coefficient_intervals(columns: Columns, load: str) -> tuple[Interval, ...]:
     >>> import numpy as np
     >>> from toolkit.audit.columns import Columns
     >>> x = np.array([[1.0], [2.0], [3.0]])
-    >>> y = np.array([2.01, 4.02, 6.01])
+    >>> y = np.array([3.01, 5.01, 7.01])
     >>> columns = Columns(names=("A",), units=("N",), x=x, half_x=0 * x, y={"FY": y},
     ...                   half_y={"FY": np.full(3, 0.005)}, y_units={"FY": "N"})
     >>> [(i.name, round(i.low, 4), round(i.high, 4), i.sign) for i in coefficient_intervals(columns, "FY")]
-    [('A', 1.995, 2.005, 1), ('constant', -0.005, 0.02, 0)]
+    [('A', 1.995, 2.005, 1), ('constant', 1.0, 1.02, 1)]
     """
     bounds = interval_bounds(
         columns.x,

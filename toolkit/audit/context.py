@@ -1,0 +1,68 @@
+"""Context: which machine wrote a file, and when, as the nearest test.toml or the file itself says."""
+
+from __future__ import annotations
+
+import datetime as dt
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+from toolkit.errors import ConfigError
+from toolkit.files import read_toml
+from toolkit.machine import Machine, load_machine
+from toolkit.recording.folder import nearest_test_toml
+from toolkit.recording.marks import machine_of
+
+MachineSource = Literal["option", "test.toml", "file", "default"]
+DEFAULT_MACHINE = "m15"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Context:
+    """The machine and how it is known; the test's date and its test.toml, None where there is none."""
+
+    machine: Machine
+    machine_source: MachineSource
+    date: dt.date | None
+    test_toml: Path | None
+
+
+def context_of(path: Path, *, machine: str | None = None) -> Context:
+    """Return a file's context: ``machine`` where it is named, else test.toml, else the file, else m15.
+
+    Raises
+    ------
+    ConfigError
+        the test.toml is no TOML, its date is no date, or the machine is unknown
+    """
+    toml = nearest_test_toml(path)
+    table = {} if toml is None else read_toml(toml)
+    date = None if toml is None or "date" not in table else _date(table["date"], toml)
+    source: MachineSource
+    if machine is not None:
+        name, source = machine, "option"
+    elif toml is not None and "machine" in table:
+        name, source = str(table["machine"]), "test.toml"
+        name = str(toml.parent / name) if name.endswith(".toml") else name
+    else:
+        own = machine_of(path)
+        name, source = (own, "file") if own is not None else (DEFAULT_MACHINE, "default")
+    return Context(machine=load_machine(name), machine_source=source, date=date, test_toml=toml)
+
+
+def _date(value: object, toml: Path) -> dt.date:
+    if isinstance(value, dt.datetime):
+        return value.date()
+    if isinstance(value, dt.date):
+        return value
+    try:
+        return dt.date.fromisoformat(str(value))
+    except ValueError as error:
+        raise ConfigError(
+            "the test's date is no date",
+            where=toml,
+            got=value,
+            expected="a date such as 2026-03-31",
+            next_step="correct the line",
+            rule="wrong-value",
+        ) from error

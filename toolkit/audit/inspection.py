@@ -1,0 +1,241 @@
+"""Inspection: what one recording holds, which calibration computed it, and what would be right."""
+
+from __future__ import annotations
+
+import datetime as dt
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from toolkit.audit.columns import Columns, columns_of
+from toolkit.audit.context import Context, context_of
+from toolkit.audit.identify import identify_columns, recompute
+from toolkit.audit.model import TELLS, Identification
+from toolkit.errors import RecordError, RegistryError
+from toolkit.findings import Finding
+from toolkit.recording.read import read_recording
+from toolkit.reduction.blocks import find_blocks, is_tare
+from toolkit.units import si_scale
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from toolkit.calibration.record import CalibrationRecord
+    from toolkit.calibration.registry import Refused, Registry
+    from toolkit.calibration.status import RecordStatus
+    from toolkit.recording.model import Recording
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LoadBlock:
+    """Rows at one load (from 1 at the first data row) and their means; own and corrected FY [N], MZ [N·m].
+
+    None where the file has no own column or no record corrects it.
+    """
+
+    first_row: int
+    last_row: int
+    tare: bool
+    FZ_N: float
+    SA_rad: float
+    FY_file_N: float | None
+    MZ_file_Nm: float | None
+    FY_N: float | None
+    MZ_Nm: float | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Choice:
+    """What the registry offers for an instrument and a day."""
+
+    records: tuple[CalibrationRecord, ...]
+    refused: tuple[Refused, ...]
+    statuses: tuple[RecordStatus, ...]
+    in_force: CalibrationRecord | None
+    today: CalibrationRecord | None
+    trouble: str | None
+
+    @property
+    def void(self) -> tuple[str, ...]:
+        """Ids of the records that are void on every day."""
+        return tuple(status.id for status in self.statuses if status.void_always)
+
+    def status(self, record_id: str | None) -> RecordStatus | None:
+        """Return a record's status, None where it is not known."""
+        return next((status for status in self.statuses if status.id == record_id), None)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Inspection:
+    """One inspected file. ``corrected_by`` is the record in force on the test's date, else in force today."""
+
+    recording: Recording
+    context: Context
+    blocks: tuple[LoadBlock, ...]
+    first_row: LoadBlock
+    slip_angle_rad: float
+    identification: Identification | None
+    columns: Columns
+    corrected_by: str | None
+    choice: Choice | None
+    findings: tuple[Finding, ...]
+
+
+def choose(
+    registry: Registry, instrument: str, *, on: dt.date | None, known_at: dt.date | None = None
+) -> Choice:
+    """Return the records that may have computed a file, and the one in force on the test's day."""
+    from toolkit.calibration.registry import today
+
+    records, refused = registry.usable(instrument)
+    now = known_at or today()
+    trouble: str | None = None
+    statuses: list[RecordStatus] = []
+    force: dict[dt.date, CalibrationRecord | None] = {}
+    try:
+        statuses = [registry.status(record.id, known_at=now) for record in records]
+        for day in {now, on or now}:
+            force[day] = _in_force(registry, instrument, day, now)
+    except RegistryError as error:
+        trouble = f"{error.what}: {error.got}" if error.got else error.what
+    return Choice(
+        records=records,
+        refused=refused,
+        statuses=tuple(statuses),
+        in_force=None if on is None else force.get(on),
+        today=force.get(now),
+        trouble=trouble,
+    )
+
+
+def _in_force(
+    registry: Registry, instrument: str, on: dt.date, known_at: dt.date
+) -> CalibrationRecord | None:
+    try:
+        return registry.in_force(instrument, on=on, known_at=known_at)
+    except RecordError:
+        return None  # it fails a gate: `usable` has refused it already, with the reason
+    except RegistryError as error:
+        if error.rule == "no-record-in-force":
+            return None
+        raise
+
+
+def inspect_file(
+    path: Path, registry: Registry | None, *, machine: str | None = None, known_at: dt.date | None = None
+) -> Inspection:
+    """Inspect one recording.
+
+    Parameters
+    ----------
+    path : the recording
+    registry : None where there is no laboratory home; then nothing is identified
+    machine : name of the machine where neither test.toml nor the file should decide
+    known_at : the day of knowledge, default today
+
+    Raises
+    ------
+    RecordingError, ConfigError, UnitError
+        the file or its test.toml cannot be used
+    """
+    context = context_of(path, machine=machine)
+    recording = read_recording(path, context.machine)
+    columns = columns_of(recording)
+    choice = (
+        None
+        if registry is None
+        else choose(registry, context.machine.name, on=context.date, known_at=known_at)
+    )
+    identification, corrector, corrected = None, None, None
+    if choice is not None:
+        if columns.loads:
+            identification = identify_columns(
+                columns, choice.records, on=context.date, in_force=choice.in_force, void=choice.void
+            )
+        corrector = choice.in_force or choice.today
+        corrected = None if corrector is None else _corrected(columns, corrector)
+    blocks = _blocks(recording, corrected)
+    loaded = [block for block in blocks if not block.tare] or list(blocks)
+    rows = sum(block.last_row - block.first_row + 1 for block in loaded)
+    return Inspection(
+        recording=recording,
+        context=context,
+        blocks=blocks,
+        first_row=_means(recording, corrected, 0, 1),
+        slip_angle_rad=sum(b.SA_rad * (b.last_row - b.first_row + 1) for b in loaded) / rows,
+        identification=identification,
+        columns=columns,
+        corrected_by=corrector.id if corrector is not None and corrected else None,
+        choice=choice,
+        findings=_findings(path, identification, choice),
+    )
+
+
+def withdrawal(inspection: Inspection) -> RecordStatus | None:
+    """Return the status of the record that computed a file where it was withdrawn, else None."""
+    found, choice = inspection.identification, inspection.choice
+    status = choice.status(found.record) if found is not None and choice is not None else None
+    return status if status is not None and status.state == "withdrawn" else None
+
+
+def _corrected(columns: Columns, record: CalibrationRecord) -> dict[str, NDArray[np.float64]] | None:
+    from toolkit.audit.candidates import unfit
+
+    return None if unfit(record, columns) is not None else recompute(columns, record)
+
+
+def _blocks(recording: Recording, corrected: dict[str, NDArray[np.float64]] | None) -> tuple[LoadBlock, ...]:
+    return tuple(
+        _means(recording, corrected, block.start, block.stop) for block in find_blocks(recording["FZ"].si)
+    )
+
+
+def _means(
+    recording: Recording, corrected: dict[str, NDArray[np.float64]] | None, start: int, stop: int
+) -> LoadBlock:
+    from toolkit.reduction.blocks import Block
+
+    def own(symbol: str) -> float | None:
+        if not recording.has(symbol):
+            return None
+        series = recording[symbol]
+        return float(series.values[start:stop].mean()) * si_scale(series.unit)
+
+    def right(symbol: str) -> float | None:
+        if corrected is None or symbol not in corrected:
+            return None
+        return float(corrected[symbol][start:stop].mean())
+
+    FZ = float(recording["FZ"].si[start:stop].mean())
+    smallest = min(recording.machine.protocol.loads_N, default=0.0)
+    return LoadBlock(
+        first_row=start + 1,
+        last_row=stop,
+        tare=is_tare(Block(start=start, stop=stop, mean_FZ=FZ), smallest_load=smallest),
+        FZ_N=FZ,
+        SA_rad=float(recording["SA"].si[start:stop].mean()) if recording.has("SA") else math.nan,
+        FY_file_N=own("FY"),
+        MZ_file_Nm=own("MZ"),
+        FY_N=right("FY"),
+        MZ_Nm=right("MZ"),
+    )
+
+
+def _findings(path: Path, found: Identification | None, choice: Choice | None) -> tuple[Finding, ...]:
+    where = path.name
+    if choice is None:
+        text = "no laboratory home was found, so nobody can say which calibration computed the file"
+        return (Finding(rule="no-home", where=where, message=text),)
+    made = [
+        Finding(rule="refused-record", where=one.id, message=f"left out as a candidate: {one.reason}")
+        for one in choice.refused
+    ]
+    if choice.trouble is not None:
+        made.append(Finding(rule="registry-damaged", where=where, message=choice.trouble))
+    if found is not None and found.grade not in ("exact", "rounding"):
+        who = f" ({found.record}{', ' + found.variant if found.variant else ''})" if found.record else ""
+        text = f"Fy and Mz were computed {TELLS[found.grade]}{who}"
+        made.append(Finding(rule=f"identified-{found.grade}", where=where, message=text))
+    return tuple(made)
