@@ -1,0 +1,241 @@
+"""From a fitted session to a candidate record in the registry."""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from toolkit.calibration.checks import history_findings, session_findings
+from toolkit.calibration.exact import golden_inputs, predict_exactly, solve_exactly
+from toolkit.calibration.fitting import LoadResult, SessionFit, fit_session, load_uncertainty
+from toolkit.calibration.issue import issued_value
+from toolkit.calibration.ledger import Ledger
+from toolkit.calibration.record import (
+    CalibrationRecord,
+    DataFile,
+    Golden,
+    Indication,
+    LoadFit,
+    sealed,
+    to_bytes,
+)
+from toolkit.calibration.refit import check_reproduces, polarity
+from toolkit.calibration.registry import ID, Registry, load_checked
+from toolkit.calibration.session import Session, read_session
+from toolkit.calibration.store import Change, commit
+from toolkit.calibration.terms import term_matrix
+from toolkit.errors import ToolkitError
+from toolkit.files import sha256_bytes
+from toolkit.findings import Finding
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Candidate:
+    """What `calibrate` made, or found: ``existing`` where the session was already recorded."""
+
+    record: CalibrationRecord
+    path: Path
+    existing: bool
+    fit: SessionFit
+    findings: tuple[Finding, ...]
+
+
+def calibrate(session_file: Path, registry: Registry) -> Candidate:
+    """Fit a session and enter its record as a candidate.
+
+    The findings never change the fit. A session whose data and settings are already recorded returns that
+    record and writes nothing.
+
+    Raises
+    ------
+    ConfigError, SessionError, UnitError
+        the session cannot be used; nothing is written
+    RegistryError
+        the ledger is damaged; nothing is written
+    """
+    session = read_session(session_file)
+    folder = registry.folder / session.instrument
+    fit = fit_session(session)
+    existing = _recorded(folder, session, registry.ledger(session.instrument))
+    findings = session_findings(fit)
+    if existing is not None:
+        path = folder / f"{existing.id}.json"
+        return Candidate(record=existing, path=path, existing=True, fit=fit, findings=findings)
+    made: list[CalibrationRecord] = []
+    unnumbered = _record(fit)
+
+    def build(ledger: Ledger) -> Change | None:
+        # Under the lock: another writer may have recorded this very session meanwhile.
+        twin = _recorded(folder, session, ledger)
+        if twin is not None:
+            made.append(twin)
+            return None
+        record = _numbered(unnumbered, next_id(folder, session.instrument, ledger), session)
+        check_reproduces(record, session.table)
+        made.append(record)
+        return entering(record, _contents(session, record), by=session.operator)
+
+    written = commit(folder, build)
+    record = made[0]
+    if written:
+        findings += history_findings(record, last_approved(registry, session.instrument, but=record.id))
+    return Candidate(
+        record=record, path=folder / f"{record.id}.json", existing=not written, fit=fit, findings=findings
+    )
+
+
+def entering(record: CalibrationRecord, contents: Mapping[str, bytes], *, by: str) -> Change:
+    """Return the transaction that enters a sealed record with its data files (by file name)."""
+    data = to_bytes(record)
+    return Change(
+        files={**contents, f"{record.id}.json": data},
+        event={
+            "event": "entered",
+            "id": record.id,
+            "time": now(),
+            "by": by,
+            "record": record.sha256,
+            "file": sha256_bytes(data),
+        },
+    )
+
+
+def next_id(folder: Path, instrument: str, ledger: Ledger) -> str:
+    """Return the next free id: after every number in the ledger and in the names of the folder's files."""
+    names = {entry.id for entry in ledger.entries}
+    names |= {path.name.split(".json")[0] for path in folder.glob(f"{instrument}-r*.json")}
+    numbers = [int(m["number"]) for m in map(ID.match, names) if m and m["instrument"] == instrument]
+    return f"{instrument}-r{max(numbers, default=0) + 1}"
+
+
+def last_approved(registry: Registry, instrument: str, *, but: str) -> CalibrationRecord | None:
+    """Return the newest approved record that is not withdrawn and can be used; None where there is none."""
+    best = None
+    ledger = registry.ledger(instrument)
+    for record_id in ledger.entered():
+        status = registry.status(record_id)
+        if record_id != but and status.state == "approved" and status.in_force_from is not None:
+            rank = (status.in_force_from, max(e.seq for e in ledger.of(record_id)), record_id)
+            best = rank if best is None else max(best, rank)
+    return None if best is None else load_checked(registry.folder / instrument, best[2], ledger)
+
+
+def now() -> str:
+    """Return the time of an entry, UTC to the second."""
+    return datetime.now(tz=UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
+
+
+def _recorded(folder: Path, session: Session, ledger: Ledger) -> CalibrationRecord | None:
+    for record_id in ledger.entered():
+        try:
+            record = load_checked(folder, record_id, ledger)
+        except ToolkitError:
+            continue
+        if record.inputs_sha256 == session.inputs_sha256:
+            return record
+    return None
+
+
+def _contents(session: Session, record: CalibrationRecord) -> dict[str, bytes]:
+    by_role = {"loads": session.data_bytes, "check": session.check_bytes, "session": session.session_bytes}
+    return {one.file: by_role[one.role] or b"" for one in record.data}
+
+
+def _record(fit: SessionFit) -> CalibrationRecord:
+    session = fit.session
+    columns = session.table.columns(session.indications)
+    ranges = [(float(columns[n].min()), float(columns[n].max())) for n in session.indications]
+    return CalibrationRecord(
+        id="",
+        instrument=session.instrument,
+        kind="fit",
+        date=session.date.isoformat(),
+        entered_by=session.operator,
+        zero=session.zero,
+        cells=tuple(
+            Indication(name=c.name, unit=c.unit, minimum=low, maximum=high, serial=c.serial)
+            for c, (low, high) in zip(session.cells, ranges, strict=True)
+        ),
+        loads=tuple(_load_fit(session, one) for one in fit.loads),
+        golden=_golden(session, ranges),
+        data=(),
+        settings=session.settings,
+        inputs_sha256=session.inputs_sha256,
+        software=_software(),
+    )
+
+
+def _numbered(record: CalibrationRecord, record_id: str, session: Session) -> CalibrationRecord:
+    files = [("loads", "loads.csv", session.data_bytes), ("session", "session.toml", session.session_bytes)]
+    if session.check_bytes is not None:
+        files.insert(1, ("check", "check.csv", session.check_bytes))
+    data = tuple(
+        DataFile(role=role, file=f"{record_id}.{name}", sha256=sha256_bytes(content))
+        for role, name, content in files
+    )
+    return sealed(dataclasses.replace(record, id=record_id, data=data))
+
+
+def _load_fit(session: Session, one: LoadResult) -> LoadFit:
+    values = session.table.column(one.setting.name)
+    largest = float(np.abs(values).max())
+    terms = term_matrix(session.terms, session.table.columns(session.indications))
+    extent = np.abs(terms).max(axis=0).tolist()
+    c = one.fit.coefficients
+    return LoadFit(
+        load=one.setting.name,
+        unit=one.setting.unit,
+        terms=one.fit.terms,
+        coefficients=c,
+        issued=tuple(issued_value(value, e, largest) for value, e in zip(c, extent, strict=True)),
+        polarity=polarity(c),
+        covariance=tuple(tuple(row) for row in one.fit.covariance.tolist()),
+        method=session.method,
+        n=len(values),
+        dof=one.fit.dof,
+        residual_sd=one.fit.residual_sd,
+        minimum=float(values.min()),
+        maximum=float(values.max()),
+        tolerance=one.setting.tolerance,
+    )
+
+
+def _golden(session: Session, ranges: list[tuple[float, float]]) -> Golden:
+    columns = {n: values.tolist() for n, values in session.table.columns(session.indications).items()}
+    inputs = golden_inputs(ranges)
+    outputs = []
+    for setting in session.loads:
+        u = load_uncertainty(session, setting)
+        exact = solve_exactly(
+            terms=session.terms,
+            columns=columns,
+            load=session.table.column(setting.name).tolist(),
+            weights=None if u is None else (1.0 / u**2).tolist(),
+        )
+        outputs.append(
+            tuple(
+                predict_exactly(
+                    terms=session.terms, coefficients=exact, names=session.indications, point=point
+                )
+                for point in inputs
+            )
+        )
+    return Golden(inputs=inputs, outputs=tuple(outputs))
+
+
+def _software() -> tuple[tuple[str, str], ...]:
+    import platform
+    from importlib.metadata import version
+
+    import toolkit
+
+    packages = tuple((name, version(name)) for name in ("numpy", "scipy", "statsmodels"))
+    return tuple(sorted((*packages, ("python", platform.python_version()), ("toolkit", toolkit.__version__))))

@@ -1,0 +1,117 @@
+"""`toolkit calibrate SESSION.toml`: fit a session's reference-load data."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from toolkit.cli.console import Calibrations, Home, Json, Quiet, answer, exit_code, finding_lines, table
+from toolkit.cli.home import calibrations_folder
+
+if TYPE_CHECKING:
+    from toolkit.calibration.candidate import Candidate
+
+NAME = "calibrate"
+
+
+def command(
+    session: Annotated[Path, typer.Argument(help="SESSION.toml, with its CSV files beside it.")],
+    calibrations: Calibrations = None,
+    out: Annotated[Path | None, typer.Option("--out", help="Another name for --calibrations.")] = None,
+    home: Home = None,
+    as_json: Json = False,
+    quiet: Quiet = False,
+) -> int:
+    """Fit a session: a candidate record and its diagnostics."""
+    from toolkit.calibration.candidate import calibrate
+    from toolkit.calibration.registry import Registry
+
+    folder = calibrations or out
+    if folder is not None and not folder.exists() and folder.parent.is_dir():
+        registry = Registry(folder)
+    else:
+        registry = Registry(calibrations_folder(folder, home))
+    made = calibrate(session, registry)
+    status = registry.status(made.record.id).state
+    answer(_payload(made, status), _text(made, status), as_json=as_json, quiet=quiet)
+    return 0 if made.existing else exit_code(made.findings)
+
+
+def _payload(made: Candidate, status: str) -> dict[str, Any]:
+    record = made.record
+    loads = {}
+    for one in made.fit.loads:
+        fit, more = one.fit, one.diagnostics
+        loads[one.setting.name] = {
+            "unit": one.setting.unit,
+            "indication_units": dict(zip(record.indications, record.indication_units, strict=True)),
+            "coefficients": dict(zip(fit.terms, fit.coefficients, strict=True)),
+            "issued": dict(zip(fit.terms, record.load(one.setting.name).issued, strict=True)),
+            "standard_errors": dict(zip(fit.terms, fit.standard_errors.tolist(), strict=True)),
+            "residual_sd": fit.residual_sd,
+            "dof": fit.dof,
+            "condition_number": made.fit.condition_number,
+            "condition_number_terms": made.fit.condition_number_terms,
+            "vif": dict(zip(record.indications, made.fit.vif, strict=True)),
+            "llf": one.llf,
+            "check_max_percent_fs": one.check_max_percent_fs,
+            "press": more.press,
+            "reversibility": more.reversibility,
+            "outlier_rows": list(more.outliers),
+        }
+    return {
+        "record": {
+            "id": record.id,
+            "sha256": record.sha256,
+            "status": status,
+            "existing": made.existing,
+            "path": str(made.path),
+        },
+        "findings": [finding.as_dict() for finding in made.findings],
+        "loads": loads,
+    }
+
+
+def _text(made: Candidate, status: str) -> str:
+    record = made.record
+    lines = [
+        f"{record.id}  {status}" + ("  (already recorded; nothing was written)" if made.existing else ""),
+        f"sha256 {record.sha256}",
+        f"file   {made.path}",
+    ]
+    for one in made.fit.loads:
+        issued = record.load(one.setting.name).issued
+        units = dict(zip(record.indications, record.indication_units, strict=True))
+        rows = [
+            [term, f"{c:.10g}", f"{i:.8g}", f"{u:.2g}", _per(term, one.setting.unit, units)]
+            for term, c, i, u in zip(
+                one.fit.terms, one.fit.coefficients, issued, one.fit.standard_errors, strict=True
+            )
+        ]
+        check = "no check loads" if one.check_max_percent_fs is None else (
+            f"check loads within {one.check_max_percent_fs:.3g} % of full scale"
+        )  # fmt: skip
+        lines += [
+            "",
+            f"{one.setting.name} [{one.setting.unit}]",
+            table(["term", "coefficient", "issued", "std error", "unit"], rows, align="<>>><"),
+            f"residual sd {one.fit.residual_sd:.3g} {one.setting.unit}, {one.fit.dof} degrees of freedom, "
+            f"lower limit factor {one.llf:.3g} {one.setting.unit}; {check}",
+        ]
+    lines += ["", f"condition number of the indications {made.fit.condition_number:.3g}"]
+    if made.findings:
+        lines += ["findings:", *finding_lines(made.findings)]
+    if status == "candidate":
+        lines += [
+            "",
+            f"next: toolkit calibration approve {record.id} --in-force-from {record.date} --checked-by NAME",
+        ]
+    return "\n".join(lines)
+
+
+def _per(term: str, load_unit: str, units: dict[str, str]) -> str:
+    if term == "intercept":
+        return load_unit
+    return f"{load_unit}/({units[term]})" if term in units else f"{load_unit} per unit of {term}"
