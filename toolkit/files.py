@@ -120,7 +120,12 @@ def check_keys(table: Mapping[str, Any], known: Iterable[str], *, where: object)
     names = sorted(known)
     for key in table:
         if key not in names:
-            near = difflib.get_close_matches(key, names, n=1, cutoff=0.5)
+            # Without regard to case: "dot" is DOT.
+            lowered = {name.lower(): name for name in names}
+            near = [
+                lowered[match]
+                for match in difflib.get_close_matches(key.lower(), list(lowered), n=1, cutoff=0.5)
+            ]
             raise ConfigError(
                 f"unknown key {key!r}",
                 where=where,

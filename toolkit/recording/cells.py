@@ -23,8 +23,10 @@ _SPARE_CELLS = 200_000
 _SPREAD = 16
 _REFERENCE = re.compile(r"([A-Za-z]{1,3})([0-9]{1,7})")
 _PREFIXED_CELL = re.compile(rb"<[\w.-]+:c[\s/>]")
+# Every repetition stops at the next tag or cell, so that no text makes the search quadratic.
 _ERROR_CELL = re.compile(
-    rb"""<(?:\w+:)?c\s[^>]*?\bt\s*=\s*["']e["'][^>]*>(?:(?!</(?:\w+:)?c>).)*?<(?:\w+:)?v>([^<]*)<""",
+    rb"""<(?:\w+:)?c\s[^<>]*?\bt\s*=\s*["']e["'][^<>]*(?<!/)>"""
+    rb"""(?:(?!</?(?:\w+:)?c[\s>/]).)*?<(?:\w+:)?v>([^<]*)<""",
     re.DOTALL,
 )
 _OWN_REFERENCE = re.compile(rb"""\sr\s*=\s*["']([A-Za-z]+[0-9]+)["']""")

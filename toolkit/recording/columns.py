@@ -20,6 +20,7 @@ from toolkit.units import unit
 
 _WITH_UNIT = re.compile(r"(.*?)\s*\[([^\[\]]*)\]\s*")
 _EXTRA_ROLES: dict[str, Role] = {"t": "time", "TIRE_ANGLE": "angle", "DRUM_ANGLE": "angle"}
+_LONGEST = 200
 _OPTIONAL: tuple[Role, ...] = ("acquired",)
 
 
@@ -74,7 +75,7 @@ def _assign(index: int, header: str, machine: Machine, where: object) -> Assigne
     if printed is None:
         # Without a printed unit only the machine's own header has one: a bare symbol could be anything.
         if column is None or _plain(name) != _plain(column.header):
-            _no_unit(header, name, column, machine, where)
+            _no_unit(header[:_LONGEST], name, column, machine, where)
         return Assigned(index=index, symbol=column.symbol, header=header, unit=column.unit, role=column.role)
     try:
         read = unit(printed, where=where)
@@ -96,6 +97,8 @@ def _assign(index: int, header: str, machine: Machine, where: object) -> Assigne
 
 
 def _split(header: str) -> tuple[str, str | None]:
+    if len(header) > _LONGEST:
+        return header[:_LONGEST], None
     match = _WITH_UNIT.fullmatch(header.strip())
     if match is None or not match.group(1).strip():
         return header.strip(), None

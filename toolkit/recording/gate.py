@@ -23,7 +23,6 @@ _FOREIGN = "find out where the file comes from; the machine does not write such 
 _RELATIONSHIP = "{http://schemas.openxmlformats.org/package/2006/relationships}Relationship"
 _ENCODING = re.compile(rb"""^\s*<\?xml[^>]*?encoding\s*=\s*["']([^"']*)["']""")
 _ENCODINGS = (b"utf-8", b"us-ascii", b"ascii")
-_PARTS_READ = ("xl/", "_rels/", "[content_types].xml")
 _MACRO_PARTS = ("vbaproject.bin", "xl/macrosheets/", "xl/dialogsheets/", "vbadata.xml")
 _LINK_PARTS = ("xl/externallinks/", "xl/connections.xml", "xl/querytables/", "xl/model/", "customui/")
 _OBJECT_PARTS = ("xl/embeddings/", "xl/activex/", "xl/ctrlprops/", "xl/webextensions/")
@@ -126,7 +125,7 @@ def check_members(members: Mapping[str, bytes], *, where: Path) -> None:
 
 def _check_xml(name: str, xml: bytes, where: Path) -> None:
     # UTF-16 would hide everything from the searches below; Office writes UTF-8 only.
-    declared = _ENCODING.match(xml.removeprefix(b"\xef\xbb\xbf")[:256])
+    declared = _ENCODING.match(xml[: xml.find(b"?>") + 2].removeprefix(b"\xef\xbb\xbf"))
     if b"\x00" in xml or (declared and declared.group(1).lower() not in _ENCODINGS):
         _refuse("encoding", "a part of the workbook is not in UTF-8", where, name, "UTF-8", _FOREIGN)
     if b"!" in xml and (b"<!DOCTYPE" in xml or b"<!ENTITY" in xml):

@@ -28,7 +28,7 @@ SIMULATED = "simulated"
 """Keyword of everything that comes from the virtual machine."""
 
 _HEAD = 4096
-_KEYWORDS = re.compile(rb"<(?:\w+:)?keywords[^>]*>([^<]*)<")
+_KEYWORDS = re.compile(rb"<(?:\w+:)?keywords[^<>]{0,500}>([^<]{0,4000})<")
 
 
 def recording_keywords(*, machine: str, simulated: bool) -> str:

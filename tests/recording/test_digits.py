@@ -1,0 +1,83 @@
+"""Printed digits against a reading of the decimal texts themselves."""
+
+from __future__ import annotations
+
+from decimal import Decimal
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from toolkit.examples.fig4_4 import ROWS, SYMBOLS
+from toolkit.recording.digits import half_last_place
+
+
+def by_text(values: list[float]) -> list[float]:
+    """The rule in its own words: the finest place among values of the same decade, from their texts."""
+    places: dict[int, int] = {}
+    full: set[int] = set()
+    for value in values:
+        if value == 0:
+            continue
+        number = Decimal(repr(value)).normalize()
+        _, digits, exponent = number.as_tuple()
+        decade = number.adjusted()
+        places[decade] = max(places.get(decade, -10_000), -min(exponent, 0) if decade >= -8 else -exponent)
+        if len(digits) >= 15 or (decade >= 14):
+            full.add(decade)
+    half = {d: 0.0 if d in full else float(Decimal(5).scaleb(-p - 1)) for d, p in places.items()}
+    zero = min(half.values(), default=0.0)
+    return [zero if v == 0 else half[Decimal(repr(v)).adjusted()] for v in values]
+
+
+def test_figure_4_4():
+    # Seven significant digits for forces, five decimals for the angle, six digits for E5.
+    half = dict(zip(SYMBOLS, half_last_place(np.array(ROWS)).T, strict=True))
+    assert half["D52"].tolist() == [5e-6] * 2 + [5e-5] * 8
+    assert half["E5"].tolist() == [5e-4] * 10
+    assert half["SA"].tolist() == [5e-6] * 10
+    assert half["FZ"].tolist() == [5e-5] * 6 + [5e-4] * 4
+    assert half["MZ"].tolist() == [5e-6] * 6 + [5e-5] * 4
+
+
+def test_zeros_full_doubles_and_extremes():
+    assert half_last_place([0.0, 0.0]).tolist() == [0, 0]
+    assert half_last_place([0.0, 1.25, 10.5]).tolist() == [0.005, 0.005, 0.05]
+    assert half_last_place([1 / 3, 0.5, 2.0]).tolist() == [0, 0, 0.5]
+    assert half_last_place([1e300, 5e-324, 1e-20]).tolist() == [0, 0, 5e-21]
+    assert half_last_place([]).shape == (0,)
+    assert half_last_place([1000.0, 999.9]).tolist() == [0.5, 0.05]
+
+
+def test_a_table_is_its_columns():
+    table = np.array(ROWS)
+    np.testing.assert_array_equal(
+        half_last_place(table), np.column_stack([half_last_place(column) for column in table.T])
+    )
+
+
+@given(
+    st.lists(
+        st.one_of(
+            st.floats(-2000, 2000).map(lambda v: float(f"{v:.7g}")),
+            st.floats(-2000, 2000).map(lambda v: round(v, 5)),
+            st.floats(-1e9, 1e9),
+            st.integers(-(10**6), 10**6).map(float),
+            st.just(0.0),
+        ),
+        min_size=1,
+        max_size=12,
+    )
+)
+def test_agrees_with_the_texts(values):
+    assert half_last_place(values).tolist() == pytest.approx(by_text(values), rel=1e-12, abs=1e-300)
+
+
+@given(st.lists(st.floats(1, 999).map(lambda v: float(f"{v:.6g}")), min_size=1, max_size=20))
+def test_the_true_value_lies_within_the_bound(values):
+    shifted = np.array([float(f"{v:.4g}") for v in values])
+    half = half_last_place(shifted)
+    # Only where the finest place really occurs in the decade can it be known: never too large by a decade.
+    assert np.all(half <= 0.5)
+    assert np.all(half > 0)
