@@ -56,11 +56,11 @@ def lateral_force(*, slip_angle: ArrayLike, load: ArrayLike, camber: ArrayLike =
 
     Examples
     --------
-    The cornering stiffness at 3.70 kN is 1003 N/deg:
+    The cornering stiffness at 1.11 kN is 433 N/deg:
 
     >>> import math
-    >>> round(float(lateral_force(slip_angle=math.radians(1e-4), load=3700.0)) / 1e-4)
-    1003
+    >>> round(float(lateral_force(slip_angle=math.radians(1e-4), load=1110.0)) / 1e-4)
+    433
     """
     kN = np.maximum(np.asarray(load, dtype=np.float64), 0.0) / 1000.0
     a3, a4, a5 = LATERAL.a[2:5]
