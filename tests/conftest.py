@@ -1,0 +1,92 @@
+"""Fixtures that more than one stage needs: the virtual machine's truth as a record, and a virtual test."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from toolkit.calibration.record import CalibrationRecord, Golden, Indication, LoadFit
+from toolkit.simulation.plan import Plan, read_plan
+
+EXAMPLES = Path(__file__).resolve().parents[1] / "toolkit" / "examples"
+SHARED_DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
+
+
+def record_of(
+    loads: dict[str, tuple[str, tuple[float, ...]]], *, unit: str, zero: str = "tared"
+) -> CalibrationRecord:
+    """Return a linear record with the coefficients given (D51, D52, E5, intercept)."""
+    terms = ("D51", "D52", "E5", "intercept")
+    return CalibrationRecord(
+        id="bench-r1",
+        instrument="bench",
+        kind="fit",
+        date="2026-01-01",
+        entered_by="a test",
+        zero=zero,  # type: ignore[arg-type]
+        cells=tuple(Indication(name=name, unit=unit) for name in terms[:3]),
+        loads=tuple(
+            LoadFit(load=load, unit=text, terms=terms, coefficients=c, issued=c, polarity=(0, 0, 0, 0))
+            for load, (text, c) in loads.items()
+        ),
+        golden=Golden(),
+        data=(),
+        settings="{}",
+        inputs_sha256="",
+        sha256="0" * 64,
+    )
+
+
+@pytest.fixture(scope="session")
+def published_record() -> CalibrationRecord:
+    """The coefficients that the source document prints in its section 4.1 (lbf, lbf·ft)."""
+    return record_of(
+        {
+            "FY": ("lbf", (0.99719, 0.99718, 1.0228, 0.6473)),
+            "MZ": ("lbf*ft", (-0.15688, 0.16197, 0.0026666, 0.68759)),
+        },
+        unit="lbf",
+        zero="included",
+    )
+
+
+@pytest.fixture(scope="session")
+def virtual_plan() -> Plan:
+    """The packaged plan of a virtual test."""
+    return read_plan(EXAMPLES / "virtual" / "test_plan.toml")
+
+
+@pytest.fixture(scope="session")
+def virtual_record(virtual_plan: Plan) -> CalibrationRecord:
+    """What a perfect reference-load session on the virtual machine finds (no covariance)."""
+    from toolkit.simulation.cells import true_coefficients
+
+    per_V_per_V = true_coefficients(virtual_plan.cells)
+    return record_of(
+        {
+            "FY": ("N", (*(c * 1e-3 for c in per_V_per_V["FY"]), 0.0)),
+            "MZ": ("N*m", (*(c * 1e-3 for c in per_V_per_V["MZ"]), 0.0)),
+        },
+        unit="mV/V",
+    )
+
+
+@pytest.fixture(scope="session")
+def virtual_test(tmp_path_factory: pytest.TempPathFactory, virtual_plan: Plan) -> Path:
+    """A virtual test as files; read it, never write into it."""
+    from toolkit.simulation.run import simulate
+    from toolkit.simulation.write import write_test
+
+    folder = tmp_path_factory.mktemp("virtual") / "test"
+    write_test(simulate(virtual_plan), folder)
+    return folder
+
+
+@pytest.fixture(scope="session")
+def virtual_truth(virtual_test: Path) -> dict[str, Any]:
+    """The truth that the virtual machine stored beside its test."""
+    found: dict[str, Any] = json.loads((virtual_test / "truth.json").read_text())
+    return found

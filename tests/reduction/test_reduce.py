@@ -1,0 +1,193 @@
+"""The reduction as a whole: real rows, the virtual machine's truth, and departures from the protocol."""
+
+from __future__ import annotations
+
+import dataclasses
+import shutil
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from toolkit.calibration.record import CalibrationRecord, Indication
+from toolkit.errors import RecordError, RecordingError
+from toolkit.machine import load_machine
+from toolkit.pipeline import declared_tare, process, read_test
+from toolkit.recording.folder import read_test_folder
+from toolkit.recording.labview import write_labview
+from toolkit.recording.read import read_recording
+from toolkit.reduction.model import ReducedTest
+from toolkit.reduction.reduce import reduce_test
+from toolkit.units import from_si
+
+FIG = Path(__file__).resolve().parents[2] / "toolkit" / "examples" / "fig4_4" / "M15_fig4_4.xlsx"
+
+
+def folder_with(tmp_path: Path, *names: str, toml: str = "") -> Path:
+    folder = tmp_path / "test"
+    folder.mkdir()
+    (folder / "test.toml").write_text(f'schema = 1\nmachine = "m15"\n{toml}')
+    for name in names:
+        shutil.copy(FIG, folder / name)
+    return folder
+
+
+def reduce_folder(folder: Path, record: CalibrationRecord) -> ReducedTest:
+    test = read_test_folder(folder)
+    return process(test, read_test(test), record).reduced
+
+
+def rules(reduced: ReducedTest) -> set[str]:
+    return {finding.rule for finding in reduced.findings}
+
+
+def test_figure_4_4_corrected_by_hand(tmp_path: Path, published_record: CalibrationRecord) -> None:
+    reduced = reduce_folder(folder_with(tmp_path, "a"), published_record)
+    assert [round(float(from_si(c.FZ, "lbf"))) for c in reduced.conditions] == [249, 587, 835, 1112, 1376]
+    # Two rows a block, by hand: 0.99719 D51 + 0.99718 D52 + 1.0228 E5 + 0.6473 on the printed digits.
+    D51, D52, E5 = (98.59261 + 98.59098) / 2, (86.06072 + 86.05929) / 2, (-182.415 - 182.414) / 2
+    by_hand = 0.99719 * D51 + 0.99718 * D52 + 1.0228 * E5 + 0.6473
+    assert from_si(reduced.conditions[0].FY, "lbf") == pytest.approx(by_hand, abs=1e-9)
+    # physics.md: the corrected trail -MZ/FY is 14, 18, 24, 32 mm from 587 to 1377 lbf.
+    trail = [-1000 * c.MZ / c.FY for c in reduced.conditions[1:]]
+    assert trail == pytest.approx([14, 18, 24, 32], abs=0.6)
+    assert {c.step_SA for c in reduced.conditions} == {0.0}
+    assert all(np.degrees(c.SA) == pytest.approx(-0.303, abs=0.006) for c in reduced.conditions)
+
+
+def test_figure_4_4_says_what_is_wrong_with_it(tmp_path: Path, published_record: CalibrationRecord) -> None:
+    reduced = reduce_folder(folder_with(tmp_path, "a"), published_record)
+    assert {"no-tare", "acquired-differs", "missing"} <= rules(reduced)
+    assert "slip-angle-tolerance" not in rules(reduced)
+    missing = [f for f in reduced.findings if f.rule == "missing"]
+    assert {f.where for f in missing} == {"drum forward", "drum reverse"}
+
+
+def test_tare_by_an_included_intercept(tmp_path: Path, published_record: CalibrationRecord) -> None:
+    toml = "[tare]\nvalues = { D51 = 1.0, D52 = 2.0, E5 = -3.0 }"
+    for name in ("a", "b"):
+        (tmp_path / name).mkdir()
+    bare = reduce_folder(folder_with(tmp_path / "a", "f"), published_record)
+    tared = reduce_folder(folder_with(tmp_path / "b", "f", toml=toml), published_record)
+    # The record's zero is included: load = f(x) - f(tare), and its intercept goes with the tare.
+    shift = 0.99719 * 1.0 + 0.99718 * 2.0 - 1.0228 * 3.0 + 0.6473
+    moved = from_si(bare.conditions[2].FY - tared.conditions[2].FY, "lbf")
+    assert moved == pytest.approx(shift, abs=1e-9)
+    assert "no-tare" not in rules(tared)
+
+
+def test_a_doubled_condition_leaves_the_later_file_unused(
+    tmp_path: Path, published_record: CalibrationRecord
+) -> None:
+    reduced = reduce_folder(folder_with(tmp_path, "b.xlsx", "a.xlsx"), published_record)
+    assert "doubled" in rules(reduced)
+    assert {c.file for c in reduced.used()} == {"a.xlsx"}
+    assert {c.file for c in reduced.conditions if not c.used} == {"b.xlsx"}
+
+
+def test_out_of_tolerance_is_a_finding(tmp_path: Path, published_record: CalibrationRecord) -> None:
+    machine = load_machine("m15")
+    rows = read_recording(FIG, machine)
+    columns = {s.symbol: s.values.copy() for s in rows.series}
+    columns["SA"] += 0.9
+    columns["FZ"] *= 1.08
+    folder = folder_with(tmp_path)
+    write_labview(folder / "x.xlsx", machine, columns, simulated=False)
+    found = rules(reduce_folder(folder, published_record))
+    assert {"load-tolerance"} <= found
+    # 0.6 deg: nearest to +1, 0.4 away, within the 0.5 deg of the protocol.
+    assert "slip-angle-tolerance" not in found
+    columns["SA"] += 2.4
+    write_labview(folder / "x.xlsx", machine, columns, simulated=False)
+    assert "slip-angle-tolerance" in rules(reduce_folder(folder, published_record))
+
+
+def test_no_load_block(tmp_path: Path, published_record: CalibrationRecord) -> None:
+    machine = load_machine("m15")
+    columns = {s.symbol: s.values.copy() for s in read_recording(FIG, machine).series}
+    columns["FZ"] = np.full(10, 1.5)
+    folder = folder_with(tmp_path)
+    write_labview(folder / "x.xlsx", machine, columns, simulated=False)
+    with pytest.raises(RecordingError) as caught:
+        reduce_folder(folder, published_record)
+    assert caught.value.rule == "no-load-block"
+
+
+def test_a_record_in_other_units_is_refused(tmp_path: Path, published_record: CalibrationRecord) -> None:
+    other = dataclasses.replace(
+        published_record, cells=tuple(Indication(name=c.name, unit="mV/V") for c in published_record.cells)
+    )
+    with pytest.raises(RecordError) as caught:
+        reduce_folder(folder_with(tmp_path, "a"), other)
+    assert caught.value.rule == "record-units"
+
+
+def test_names_and_order_of_files_do_not_matter(
+    tmp_path: Path, virtual_test: Path, virtual_record: CalibrationRecord
+) -> None:
+    first = reduce_folder(virtual_test, virtual_record)
+    other = tmp_path / "renamed"
+    other.mkdir()
+    files = sorted(virtual_test.glob("*.xlsx"))
+    names = {path.name: f"{(i * 7) % len(files):02d} any name" for i, path in enumerate(files)}
+    for path in files:
+        shutil.copy(path, other / names[path.name])
+    text = (virtual_test / "test.toml").read_text()
+    for old, new in names.items():
+        text = text.replace(f'"{old}"', f'"{new}"')
+    (other / "test.toml").write_text(text)
+    second = reduce_folder(other, virtual_record)
+
+    def without_names(reduced: ReducedTest) -> list[Any]:
+        return [dataclasses.replace(c, file="", file_sha256="") for c in reduced.conditions]
+
+    assert without_names(first) == without_names(second)
+
+
+def test_the_virtual_machines_truth(
+    virtual_test: Path, virtual_record: CalibrationRecord, virtual_truth: dict[str, Any]
+) -> None:
+    reduced = reduce_folder(virtual_test, virtual_record)
+    assert len(reduced.used()) == 130
+    assert reduced.info.simulated
+    true = {
+        (c["file"], c["first_row"]): c
+        for c in virtual_truth["conditions"]
+    }  # fmt: skip
+    for c in reduced.conditions:
+        truth = true[c.file, c.first_row]
+        sign = 1 if c.rotation == "forward" else -1
+        # Rounding to seven digits, cell noise, filter and drum run-out: no more than 0.1 % of full scale.
+        assert sign * c.FY == pytest.approx(truth["FY_N"], abs=6.0)
+        assert c.MZ == pytest.approx(truth["MZ_Nm"], abs=0.4)
+        assert c.FZ == pytest.approx(truth["FZ_N"], abs=30.0)
+
+
+def test_declared_tare_is_read(virtual_test: Path) -> None:
+    tare = declared_tare(read_test_folder(virtual_test), load_machine("m15-virtual"))
+    assert tare is not None
+    assert dict(tare.values).keys() == {"D51", "D52", "E5"}
+    assert tare.unit == "mV/V"
+
+
+def test_scaling_the_loads_scales_the_result(virtual_test: Path, virtual_record: CalibrationRecord) -> None:
+    twice = dataclasses.replace(
+        virtual_record,
+        loads=tuple(
+            dataclasses.replace(one, coefficients=tuple(2 * c for c in one.coefficients))
+            for one in virtual_record.loads
+        ),
+    )
+    test = read_test_folder(virtual_test)
+    recordings = read_test(test)[:3]
+    machine = load_machine("m15-virtual")
+
+    def reduced(record: CalibrationRecord) -> ReducedTest:
+        pairs = [(one, test.rotation_of(one.path)) for one in recordings]
+        return reduce_test(info=test.info, machine=machine, record=record, recordings=pairs,
+                           tare=declared_tare(test, machine))  # fmt: skip
+
+    for one, other in zip(reduced(virtual_record).conditions, reduced(twice).conditions, strict=True):
+        assert other.FY_common == pytest.approx(2 * one.FY_common, rel=1e-12)
+        assert other.u_MZ_common == pytest.approx(2 * one.u_MZ_common, rel=1e-12)
