@@ -25,8 +25,9 @@ from toolkit.calibration.record import (
     to_bytes,
 )
 from toolkit.calibration.refit import check_reproduces, polarity
-from toolkit.calibration.registry import ID, Registry, load_checked
+from toolkit.calibration.registry import ID, Registry, load_checked, today
 from toolkit.calibration.session import Session, read_session
+from toolkit.calibration.status import status_of
 from toolkit.calibration.store import Change, commit
 from toolkit.calibration.terms import term_matrix
 from toolkit.errors import ToolkitError
@@ -83,10 +84,13 @@ def calibrate(session_file: Path, registry: Registry) -> Candidate:
         made.append(record)
         return entering(record, _contents(session, record), by=session.operator)
 
+    # Before the write: a last approved record that fails its gates must stop this, not follow it.
+    ledger = registry.ledger(session.instrument)
+    last = last_approved(registry, session.instrument, but="", ledger=ledger)
     written = commit(folder, build)
     record = made[0]
     if written:
-        findings += history_findings(record, last_approved(registry, session.instrument, but=record.id))
+        findings += history_findings(record, last)
     return Candidate(
         record=record, path=folder / f"{record.id}.json", existing=not written, fit=fit, findings=findings
     )
@@ -116,12 +120,19 @@ def next_id(folder: Path, instrument: str, ledger: Ledger) -> str:
     return f"{instrument}-r{max(numbers, default=0) + 1}"
 
 
-def last_approved(registry: Registry, instrument: str, *, but: str) -> CalibrationRecord | None:
-    """Return the newest approved record that is not withdrawn and can be used; None where there is none."""
+def last_approved(
+    registry: Registry, instrument: str, *, but: str, ledger: Ledger
+) -> CalibrationRecord | None:
+    """Return the newest approved record that is not withdrawn; None where there is none.
+
+    Raises
+    ------
+    RecordError
+        that record fails a gate
+    """
     best = None
-    ledger = registry.ledger(instrument)
     for record_id in ledger.entered():
-        status = registry.status(record_id)
+        status = status_of(record_id, ledger.of(record_id), today())
         if record_id != but and status.state == "approved" and status.in_force_from is not None:
             rank = (status.in_force_from, max(e.seq for e in ledger.of(record_id)), record_id)
             best = rank if best is None else max(best, rank)

@@ -191,21 +191,7 @@ def _check_table(
     where = path.parent / name
     check = read_table(data, where=where, required=[*indications, *loads], runs=False)
     # The check file may be in other units of the same dimension; it is brought to those of the fit.
-    factors = [
-        si_scale(check.unit(n), unit(table.unit(n)).dimension, where=f"{where}, column {n}")
-        / unit(table.unit(n)).factor
-        if check.unit(n) != table.unit(n)
-        else 1.0
-        for n in check.names
-    ]
-    return Table(
-        names=check.names,
-        units=tuple(table.unit(n) for n in check.names),
-        values=check.values * factors,
-        run=None,
-        direction=None,
-        rotation=None,
-    )
+    return check.in_units({name: table.unit(name) for name in check.names})
 
 
 def _check_other(raw: Mapping[str, Any], indications: list[str], loads: list[str], path: Path) -> None:

@@ -7,18 +7,19 @@ what was fitted; it needs numpy alone.
 from __future__ import annotations
 
 import csv
+import dataclasses
 import difflib
 import io
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from toolkit.errors import SessionError
-from toolkit.units import unit
+from toolkit.units import si_scale, unit
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -60,6 +61,18 @@ class Table:
     def columns(self, names: Sequence[str]) -> dict[str, NDArray[np.float64]]:
         """Return columns by name."""
         return {name: self.column(name) for name in names}
+
+    def in_units(self, wanted: Mapping[str, str]) -> Table:
+        """Return the table with columns brought to other units of the same dimension; UnitError otherwise."""
+        factors = [
+            1.0
+            if text == wanted.get(name, text)
+            else si_scale(text, unit(wanted[name]).dimension, where=f"column {name}")
+            / unit(wanted[name]).factor
+            for name, text in zip(self.names, self.units, strict=True)
+        ]
+        units = tuple(wanted.get(name, text) for name, text in zip(self.names, self.units, strict=True))
+        return dataclasses.replace(self, units=units, values=self.values * factors)
 
     def matrix(self, names: Sequence[str]) -> NDArray[np.float64]:
         """Return columns side by side (rows, names)."""

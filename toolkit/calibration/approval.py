@@ -1,0 +1,192 @@
+"""What people decide about a record: approval behind its gates, and withdrawal.
+
+Both only add a line to the ledger.
+"""
+
+from __future__ import annotations
+
+import datetime as dt
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from toolkit.calibration import gates
+from toolkit.calibration.candidate import last_approved, now
+from toolkit.calibration.registry import Registry, instrument_of, today
+from toolkit.calibration.status import RecordStatus, status_of
+from toolkit.calibration.store import Change, commit
+from toolkit.calibration.table import Table, read_table
+from toolkit.errors import RegistryError
+from toolkit.findings import Finding
+
+if TYPE_CHECKING:
+    from toolkit.calibration.ledger import Ledger
+    from toolkit.calibration.record import CalibrationRecord
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Decision:
+    """The outcome of an approval: ``done`` is False where a gate blocked, and then nothing was changed."""
+
+    id: str
+    done: bool
+    failed: tuple[gates.GateResult, ...]
+    unverifiable: tuple[str, ...]
+    findings: tuple[Finding, ...]
+
+
+def approve(
+    registry: Registry,
+    record_id: str,
+    *,
+    in_force_from: dt.date,
+    checked_by: str,
+    approved_by: str | None = None,
+    reason: str | None = None,
+    known_on: dt.date | None = None,
+) -> Decision:
+    """Put a record in force, where its gates let it through.
+
+    ``known_on`` is the day of the decision (default today). A second approval of a record moves its
+    in-force date, with a reason.
+
+    Raises
+    ------
+    RegistryError
+        names that do not differ, a past date without a reason, a record that is withdrawn or refused
+    """
+    folder = registry.folder / instrument_of(record_id)
+    day = known_on or today()
+    record = registry.load(record_id)
+    _check_names(record, checked_by, approved_by)
+    if in_force_from < day and not reason and in_force_from < dt.date.fromisoformat(record.date):
+        raise _refused(
+            record_id, "an in-force date in the past needs a reason", in_force_from.isoformat(),
+            "--reason TEXT, as it stands in the ledger", "approval",
+        )  # fmt: skip
+    check = _check_table(registry, record)
+    decided: list[Decision] = []
+
+    def build(ledger: Ledger) -> Change | None:
+        status = status_of(record_id, ledger.of(record_id), dt.date.max)
+        if status.state == "withdrawn":
+            raise _refused(
+                record_id, "a withdrawn record cannot be approved", "withdrawn", "a new session", "approval"
+            )
+        if status.in_force_from is not None and (not reason or status.in_force_from == in_force_from):
+            raise _refused(
+                record_id, "the record is approved already",
+                f"in force from {status.in_force_from.isoformat()}",
+                "another in-force date, with --reason TEXT", "approval",
+            )  # fmt: skip
+        last = last_approved(registry, record.instrument, but=record_id, ledger=ledger)
+        failed = () if last is None else gates.sign_and_span(record, last)
+        if check is not None:
+            failed += gates.check_loads(record, check)
+        terms = gates.unverifiable(record, check)
+        findings = tuple(Finding(rule=one.rule, where=one.where, message=one.message) for one in failed)
+        decided.append(
+            Decision(id=record_id, done=not failed, failed=failed, unverifiable=terms, findings=findings)
+        )
+        if failed:
+            return None
+        event: dict[str, Any] = {
+            "event": "approved",
+            "id": record_id,
+            "time": now(),
+            "by": checked_by,
+            "known_on": day.isoformat(),
+            "since": in_force_from.isoformat(),
+            "unverifiable": list(terms),
+        }
+        event |= {k: v for k, v in (("approved_by", approved_by), ("reason", reason)) if v}
+        return Change(files={}, event=event)
+
+    commit(folder, build)
+    return decided[0]
+
+
+def withdraw(
+    registry: Registry,
+    record_id: str,
+    *,
+    on: dt.date,
+    void_from: dt.date | None = None,
+    reason: str,
+    by: str = "not stated",
+) -> RecordStatus:
+    """Withdraw a record: ``on`` is when the fault became known, ``void_from`` the first void day.
+
+    Without ``void_from`` the record is void from its in-force date, hence on every day.
+
+    Raises
+    ------
+    RegistryError
+        no such record, no reason, or withdrawn already
+    """
+    folder = registry.folder / instrument_of(record_id)
+    if not reason.strip():
+        raise _refused(record_id, "a withdrawal needs a reason", "nothing", "--reason TEXT", "withdrawal")
+
+    def build(ledger: Ledger) -> Change:
+        if record_id not in ledger.entered():
+            raise _refused(record_id, "no such record", record_id, ", ".join(ledger.entered()), "missing")
+        if any(entry.event == "withdrawn" for entry in ledger.of(record_id)):
+            raise _refused(
+                record_id,
+                "the record is withdrawn already",
+                "withdrawn",
+                "a record that stands",
+                "withdrawal",
+            )
+        event: dict[str, Any] = {
+            "event": "withdrawn",
+            "id": record_id,
+            "time": now(),
+            "by": by,
+            "known_on": on.isoformat(),
+            "reason": reason,
+        }
+        return Change(files={}, event=event | ({"since": void_from.isoformat()} if void_from else {}))
+
+    if not folder.is_dir():
+        raise _refused(record_id, "no such record", record_id, ", ".join(registry.instruments()), "missing")
+    commit(folder, build)
+    return registry.status(record_id, known_at=max(on, today()))
+
+
+def _check_names(record: CalibrationRecord, checked_by: str, approved_by: str | None) -> None:
+    names = [("entered by", record.entered_by), ("checked by", checked_by)]
+    names += [("approved by", approved_by)] if approved_by is not None else []
+    seen: dict[str, str] = {}
+    for role, name in names:
+        key = " ".join(name.split()).casefold()
+        if not key or key in seen:
+            raise _refused(
+                record.id, "entered, checked and approved must be different names",
+                f"{role} {name!r}" + (f", also {seen[key]}" if key in seen else ""),
+                f"a name that is not {record.entered_by!r}", "names",
+            )  # fmt: skip
+        seen[key] = role
+
+
+def _check_table(registry: Registry, record: CalibrationRecord) -> Table | None:
+    entry = record.data_file("check")
+    if entry is None:
+        return None
+    path = registry.folder / record.instrument / entry.file
+    table = read_table(
+        path.read_bytes(),
+        where=path,
+        required=[*record.indications, *(one.load for one in record.loads)],
+        runs=False,
+    )
+    units = dict(zip(record.indications, record.indication_units, strict=True))
+    units |= {one.load: one.unit for one in record.loads}
+    return table.in_units(units)
+
+
+def _refused(record_id: str, what: str, got: str, expected: str, rule: str) -> RegistryError:
+    return RegistryError(
+        what, where=record_id, got=got, expected=expected,
+        next_step="nothing was changed; see 'toolkit calibration show " + record_id + "'", rule=rule,
+    )  # fmt: skip

@@ -1,0 +1,325 @@
+"""`toolkit calibration ...`: the registry."""
+
+from __future__ import annotations
+
+import datetime as dt
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from toolkit.cli.console import Calibrations, Home, Json, Quiet, answer, exit_code, finding_lines, table
+from toolkit.cli.home import calibrations_folder
+from toolkit.errors import ConfigError
+
+if TYPE_CHECKING:
+    from toolkit.calibration.record import CalibrationRecord
+    from toolkit.calibration.registry import Registry
+    from toolkit.calibration.status import RecordStatus
+
+app = typer.Typer(help="Calibration records: what is in force, and why.", no_args_is_help=True)
+
+Id = Annotated[str, typer.Argument(help="Record id, such as m15-r2.")]
+KnownAt = Annotated[str | None, typer.Option("--known-at", help="What was known on this day (YYYY-MM-DD).")]
+
+
+@app.command("list")
+def list_records(
+    instrument: Annotated[str | None, typer.Argument(help="One instrument; default: all.")] = None,
+    known_at: KnownAt = None,
+    calibrations: Calibrations = None,
+    home: Home = None,
+    as_json: Json = False,
+    quiet: Quiet = False,
+) -> int:
+    """List the records with their state, and the head of each ledger."""
+    registry = _registry(calibrations, home)
+    known = _day(known_at, "--known-at")
+    rows, heads, bad = [], {}, 0
+    for name in [instrument] if instrument else registry.instruments():
+        ledger = registry.ledger(name)
+        heads[name] = {"count": len(ledger.entries), "sha256": ledger.head, "damage": ledger.damage}
+        good, refused = registry.usable(name)
+        bad += len(refused) + (ledger.damage is not None)
+        rows += [_row(record, registry.status(record.id, known_at=known)) for record in good]
+        rows += [
+            {"id": one.id, "status": "refused", "rule": one.rule, "reason": one.reason} for one in refused
+        ]
+    lines = table(
+        ["id", "state", "in force from", "void from", "verified", "sha256", "note"],
+        [
+            [r["id"], r["status"], r.get("in_force_from") or "", r.get("void_from") or "",
+             "yes" if r.get("verified") else "no", r.get("sha256", "")[:12], r.get("reason") or ""]
+            for r in rows
+        ],
+        align="<" * 7,
+    )  # fmt: skip
+    text = "\n".join([lines or "no records", "", *(f"head of {n}: {h['sha256']}" for n, h in heads.items())])
+    answer({"records": rows, "heads": heads}, text, as_json=as_json, quiet=quiet)
+    return 1 if bad else 0
+
+
+@app.command()
+def show(
+    record_id: Id,
+    known_at: KnownAt = None,
+    calibrations: Calibrations = None,
+    home: Home = None,
+    as_json: Json = False,
+    quiet: Quiet = False,
+) -> int:
+    """Show one record: coefficients, issued digits, standard errors, state."""
+    registry = _registry(calibrations, home)
+    record = registry.load(record_id)
+    row = _row(record, registry.status(record_id, known_at=_day(known_at, "--known-at")))
+    lines = [f"{key:<14}{value}" for key, value in row.items() if value not in (None, "", [])]
+    loads = {}
+    for one in record.loads:
+        errors = one.standard_errors or (None,) * len(one.terms)
+        loads[one.load] = {
+            "unit": one.unit,
+            "coefficients": dict(zip(one.terms, one.coefficients, strict=True)),
+            "issued": dict(zip(one.terms, one.issued, strict=True)),
+            "standard_errors": dict(zip(one.terms, errors, strict=True)) if one.covariance else None,
+            "residual_sd": one.residual_sd,
+            "dof": one.dof,
+        }
+        rows = [
+            [term, repr(c), repr(i), "-" if u is None else f"{u:.2g}"]
+            for term, c, i, u in zip(one.terms, one.coefficients, one.issued, errors, strict=True)
+        ]
+        lines += ["", f"{one.load} [{one.unit}]", table(["term", "coefficient", "issued", "std error"], rows)]
+    payload = {
+        "record": row,
+        "zero": record.zero,
+        "indication_units": dict(zip(record.indications, record.indication_units, strict=True)),
+        "loads": loads,
+        "data": [{"role": d.role, "file": d.file, "sha256": d.sha256} for d in record.data],
+    }
+    answer(payload, "\n".join(lines), as_json=as_json, quiet=quiet)
+    return 0
+
+
+@app.command()
+def verify(
+    head: Annotated[str | None, typer.Option("--head", help="A ledger hash printed earlier.")] = None,
+    calibrations: Calibrations = None,
+    home: Home = None,
+    as_json: Json = False,
+    quiet: Quiet = False,
+) -> int:
+    """Refit every record from its stored data, and name every file that is not as it was entered."""
+    rows = _registry(calibrations, home).verify(head)
+    payload = [{"id": r.id, "ok": r.ok, "verified": r.verified, "reason": r.reason} for r in rows]
+    text = table(
+        ["id", "result", "verified", "reason"],
+        [[r.id, "ok" if r.ok else "NOT OK", "yes" if r.verified else "no", r.reason or ""] for r in rows],
+        align="<<<<",
+    )
+    answer({"records": payload}, text or "no records", as_json=as_json, quiet=quiet)
+    return 0 if all(row.ok for row in rows) else 1
+
+
+@app.command()
+def diff(
+    one: Id,
+    other: Id,
+    calibrations: Calibrations = None,
+    home: Home = None,
+    as_json: Json = False,
+    quiet: Quiet = False,
+) -> int:
+    """Compare two records term by term; exit code 1 where they differ."""
+    registry = _registry(calibrations, home)
+    first, second = registry.load(one), registry.load(other)
+    rows: list[dict[str, Any]] = []
+    for load in dict.fromkeys([o.load for o in first.loads] + [o.load for o in second.loads]):
+        before, after = _named(first, load), _named(second, load)
+        for term in dict.fromkeys([*before, *after]):
+            a, b = before.get(term), after.get(term)
+            change = None if a is None or b is None else b - a
+            rows.append({"load": load, "term": term, one: a, other: b, "change": change, "differs": a != b})
+    text = table(
+        ["load", "term", one, other, "change"],
+        [[r["load"], r["term"], _digits(r[one]), _digits(r[other]), _digits(r["change"])] for r in rows],
+        align="<<>>>",
+    )  # fmt: skip
+    differs = any(row["differs"] for row in rows)
+    answer({"records": [one, other], "terms": rows}, text, as_json=as_json, quiet=quiet)
+    return 1 if differs else 0
+
+
+@app.command()
+def history(
+    name: Annotated[str, typer.Argument(help="An instrument, or a record id.")],
+    calibrations: Calibrations = None,
+    home: Home = None,
+    as_json: Json = False,
+    quiet: Quiet = False,
+) -> int:
+    """Tell what happened to an instrument's records, from its ledger."""
+    registry = _registry(calibrations, home)
+    instrument = name if name in registry.instruments() else _instrument_of(name)
+    ledger = registry.ledger(instrument)
+    events = [
+        {
+            "seq": e.seq, "id": e.id, "event": e.event, "time": e.time, "by": e.by,
+            "approved_by": e.approved_by,
+            "known_on": e.known_on and e.known_on.isoformat(), "since": e.since and e.since.isoformat(),
+            "reason": e.reason, "unverifiable": list(e.unverifiable), "sha256": e.sha256,
+        }
+        for e in ledger.entries
+        if name in (instrument, e.id)
+    ]  # fmt: skip
+    lines = [
+        f"{e['seq']:>3}  {e['time']}  {e['id']}  {e['event']:<10}by {e['by']}"
+        + (f", since {e['since']}" if e["since"] else "")
+        + (f", known on {e['known_on']}" if e["known_on"] else "")
+        + (f"\n     {e['reason']}" if e["reason"] else "")
+        for e in events
+    ]
+    lines += [f"head {ledger.head}", *([f"DAMAGED: {ledger.damage}"] if ledger.damage else [])]
+    payload = {"events": events, "head": ledger.head, "damage": ledger.damage}
+    answer(payload, "\n".join(lines), as_json=as_json, quiet=quiet)
+    return 1 if ledger.damage else 0
+
+
+@app.command("import")
+def import_record(
+    file: Annotated[Path, typer.Argument(help="TOML with the coefficients and the source that names them.")],
+    calibrations: Calibrations = None,
+    home: Home = None,
+    as_json: Json = False,
+    quiet: Quiet = False,
+) -> int:
+    """Enter a legacy record: coefficients without their data, marked unverified for ever."""
+    from toolkit.calibration.legacy import import_legacy
+
+    registry = _registry(calibrations, home)
+    record, existing = import_legacy(file, registry)
+    path = registry.folder / record.instrument / f"{record.id}.json"
+    payload = {**_row(record, registry.status(record.id)), "existing": existing, "path": str(path)}
+    text = (
+        f"{record.id}  unverified legacy import" + ("  (already entered)" if existing else "") + f"\n"
+        f"sha256 {record.sha256}\nnext: toolkit calibration approve {record.id} --in-force-from DATE "
+        "--checked-by NAME --reason TEXT"
+    )
+    answer({"ok": True, "verified": False, "record": payload}, text, as_json=as_json, quiet=quiet)
+    return 0
+
+
+@app.command()
+def approve(
+    record_id: Id,
+    in_force_from: Annotated[str, typer.Option("--in-force-from", help="First day in force (YYYY-MM-DD).")],
+    checked_by: Annotated[str, typer.Option("--checked-by", help="Who checked; not who entered.")],
+    approved_by: Annotated[str | None, typer.Option("--approved-by", help="Who approved.")] = None,
+    reason: Annotated[
+        str | None, typer.Option("--reason", help="Why, where the date lies in the past.")
+    ] = None,
+    on: Annotated[str | None, typer.Option("--on", help="Day of the decision; default: today.")] = None,
+    calibrations: Calibrations = None,
+    home: Home = None,
+    as_json: Json = False,
+    quiet: Quiet = False,
+) -> int:
+    """Put a record in force; a failed sign, span or check load blocks and changes nothing."""
+    from toolkit.calibration.approval import approve as decide
+
+    registry = _registry(calibrations, home)
+    since = _day(in_force_from, "--in-force-from")
+    decision = decide(
+        registry, record_id, in_force_from=since or dt.date.max, checked_by=checked_by,
+        approved_by=approved_by, reason=reason, known_on=_day(on, "--on"),
+    )  # fmt: skip
+    lines = [f"{record_id}  " + (f"approved, in force from {since}" if decision.done else "NOT approved")]
+    lines += ["failed gates:", *finding_lines(decision.findings)] if decision.findings else []
+    if decision.unverifiable:
+        lines += ["terms that the check loads cannot verify:", *(f"  {t}" for t in decision.unverifiable)]
+    payload = {
+        "id": record_id,
+        "approved": decision.done,
+        "in_force_from": since and since.isoformat(),
+        "findings": [finding.as_dict() for finding in decision.findings],
+        "unverifiable": list(decision.unverifiable),
+        "head": registry.head(_instrument_of(record_id)),
+    }
+    answer(payload, "\n".join(lines), as_json=as_json, quiet=quiet)
+    return exit_code(decision.findings)
+
+
+@app.command()
+def withdraw(
+    record_id: Id,
+    on: Annotated[str, typer.Option("--on", help="Day on which the fault became known (YYYY-MM-DD).")],
+    reason: Annotated[str, typer.Option("--reason", help="Why; printed wherever the record is named.")],
+    void_from: Annotated[
+        str | None, typer.Option("--from", help="First void day; default: the record's in-force date.")
+    ] = None,
+    by: Annotated[str, typer.Option("--by", help="Who withdraws.")] = "not stated",
+    calibrations: Calibrations = None,
+    home: Home = None,
+    as_json: Json = False,
+    quiet: Quiet = False,
+) -> int:
+    """Withdraw a record; the ledger keeps it and says why."""
+    from toolkit.calibration.approval import withdraw as decide
+
+    registry = _registry(calibrations, home)
+    known = _day(on, "--on") or dt.date.max
+    status = decide(registry, record_id, on=known, void_from=_day(void_from, "--from"), reason=reason, by=by)
+    void = status.void_from.isoformat() if status.void_from and not status.void_always else None
+    text = f"{record_id}  withdrawn, void " + (f"from {void}" if void else "on every day")
+    payload = {"id": record_id, "status": status.state, "void_from": void, "void_always": status.void_always}
+    payload["head"] = registry.head(_instrument_of(record_id))
+    answer(payload, text, as_json=as_json, quiet=quiet)
+    return 0
+
+
+def _registry(calibrations: Path | None, home: Path | None) -> Registry:
+    from toolkit.calibration.registry import Registry
+
+    return Registry(calibrations_folder(calibrations, home))
+
+
+def _instrument_of(record_id: str) -> str:
+    from toolkit.calibration.registry import instrument_of
+
+    return instrument_of(record_id)
+
+
+def _day(text: str | None, option: str) -> dt.date | None:
+    try:
+        return None if text is None else dt.date.fromisoformat(text)
+    except ValueError as error:
+        raise ConfigError(
+            f"{option} is no date", where=option, got=text, expected="YYYY-MM-DD",
+            next_step="write it as in 2026-03-31", rule="usage",
+        ) from error  # fmt: skip
+
+
+def _digits(value: float | None) -> str:
+    return "-" if value is None else f"{value:.10g}"
+
+
+def _named(record: CalibrationRecord, load: str) -> dict[str, float]:
+    return next((dict(zip(o.terms, o.coefficients, strict=True)) for o in record.loads if o.load == load), {})
+
+
+def _row(record: CalibrationRecord, status: RecordStatus) -> dict[str, Any]:
+    return {
+        "id": record.id,
+        "instrument": record.instrument,
+        "sha256": record.sha256,
+        "status": status.state,
+        "verified": record.verified,
+        "date": record.date,
+        "in_force_from": status.in_force_from and status.in_force_from.isoformat(),
+        "void_from": status.void_from.isoformat() if status.void_from and not status.void_always else None,
+        "void_always": status.void_always,
+        "entered_by": status.entered_by,
+        "checked_by": status.checked_by,
+        "approved_by": status.approved_by,
+        "reason": status.reason,
+        "unverifiable": list(status.unverifiable),
+    }
