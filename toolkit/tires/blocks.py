@@ -9,7 +9,7 @@ import numpy as np
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-_SEPARATE = 0.02  # of the largest load: a smaller gap never parts two blocks
+_SEPARATE = 0.04  # of the load above it: a smaller gap never parts two blocks
 _CONTRAST = 2.5  # between the smallest gap that parts blocks and the largest within one
 _RESOLVED = 0.004  # of the largest load: gaps below this are all alike
 
@@ -24,13 +24,15 @@ def load_blocks(load: NDArray[np.float64]) -> tuple[NDArray[np.intp], ...]:
     [[0, 2], [1, 3]]
     """
     order = np.argsort(load, kind="stable")
-    gaps = np.diff(load[order])
+    rising = load[order]
+    gaps = np.diff(rising)
     top = float(load.max(initial=0.0))
     if not len(gaps) or top <= 0:
         return (np.arange(len(load)),)
-    falling = np.sort(gaps)[::-1]
+    down = np.argsort(-gaps, kind="stable")
+    falling, wide = gaps[down], gaps[down] >= _SEPARATE * rising[1:][down]
     following = np.maximum(np.append(falling[1:], 0.0), _RESOLVED * top)
-    contrast = np.where(falling >= _SEPARATE * top, falling / following, 0.0)
+    contrast = np.where(wide, falling / following, 0.0)
     best = int(np.argmax(contrast))
     if contrast[best] < _CONTRAST:
         return (np.arange(len(load)),)

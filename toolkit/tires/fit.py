@@ -166,8 +166,8 @@ def _normalise(curves: Sequence[Curve]) -> tuple[Problems, _Scale]:
         y[i, :n] = curve.y / top[i]
         sw[i, :n] = 1.0
         if curve.sigma is not None and (curve.sigma > 0).any():
-            # A stated zero would be an infinite weight: no row counts more than ten typical ones in sigma.
-            sigma = np.maximum(curve.sigma, 0.1 * np.median(curve.sigma[curve.sigma > 0]))
+            # A stated zero would be an infinite weight: no sigma below a hundredth of the typical one.
+            sigma = np.maximum(curve.sigma, 0.01 * np.median(curve.sigma[curve.sigma > 0]))
             unit = 1.0 / np.sqrt(np.mean(1.0 / sigma**2))
             sw[i, :n] = unit / sigma
             known[i] = (unit / top[i]) ** 2

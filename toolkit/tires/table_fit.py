@@ -128,7 +128,7 @@ def _axes_findings(table: TireTable, fits: list[CurveFit]) -> list[Finding]:
                     rule="axes-contradiction",
                     where=f"{table.path.name}, {channel}",
                     message=f"{channel} {word} with SA at small angles in {against} of {len(votes)} load "
-                    f"blocks: that contradicts the declared axes {table.axes}; nothing was flipped, check --axes",
+                    f"blocks: that contradicts the declared axes {table.axes}; nothing was flipped",
                 )
             )
     return found

@@ -68,8 +68,8 @@ def value(values: ArrayLike, SA: ArrayLike) -> NDArray[np.float64]:
 
     Each parameter may be an array; they broadcast with SA.
 
-    >>> float(value((10.0, 1.3, -4000.0, 0.0, 0.0, 0.0), 0.0))
-    -0.0
+    >>> float(value((10.0, 1.3, -4000.0, 0.0, 0.0, 25.0), 0.0))
+    25.0
     """
     B, C, D, E, Sh, Sv = np.asarray(values)
     z = B * (np.asarray(SA) + Sh)

@@ -1,0 +1,124 @@
+"""`toolkit fit` on tables: the JSON contract, exit codes, what is refused."""
+
+import json
+
+import numpy as np
+import pytest
+import typer
+from typer.testing import CliRunner
+
+from toolkit.cli import fit
+from toolkit.errors import ToolkitError
+from toolkit.tires.models.magic_formula import value
+
+KEYS = (
+    "model channel load_N axes n dof parameters standard_errors not_determined at_bound error_percent "
+    "scatter_floor_percent cornering_stiffness_N_per_rad loss converged message"
+).split()
+
+
+def run(*arguments):
+    app = typer.Typer()
+    app.command()(fit.command)
+    result = CliRunner().invoke(app, [str(one) for one in arguments], standalone_mode=False)
+    if isinstance(result.exception, ToolkitError):
+        raise result.exception
+    assert result.exception is None, result.exception
+    return result.return_value, result.stdout
+
+
+@pytest.fixture
+def tire(tmp_path):
+    rng = np.random.default_rng(1)
+    lines = ["SA [deg],FZ [N],FY [N],MZ [N*m]"]
+    for FZ in (2000.0, 4000.0):
+        for degrees in np.arange(-12.0, 12.5, 1.0):
+            SA = np.radians(degrees)
+            FY = value((11.0, 1.3, -FZ, -0.5, 0.002, 10.0), SA) + rng.normal(0, 0.004 * FZ)
+            MZ = value((10.0, 2.3, 0.03 * FZ, -1.0, 0.002, 1.0), SA) + rng.normal(0, 2e-4 * FZ)
+            lines.append(f"{degrees},{FZ},{FY:.4f},{MZ:.5f}")
+    path = tmp_path / "tire.csv"
+    path.write_text("\n".join(lines) + "\n")
+    return path
+
+
+def test_json_is_the_contract(tire):
+    code, out = run(tire, "--json")
+    answer = json.loads(out)
+    assert code == 0
+    assert answer["schema"] == 1
+    assert len(answer["fits"]) == 4
+    for one in answer["fits"]:
+        assert set(KEYS) <= set(one)
+        assert set(one["parameters"]) == set(one["standard_errors"]) == {"B", "C", "D", "E", "Sh", "Sv"}
+        assert (one["n"], one["dof"], one["axes"], one["loss"]) == (25, 19, "SAE", "linear")
+        missing = {name for name, error in one["standard_errors"].items() if error is None}
+        assert missing == set(one["not_determined"])
+    lateral, aligning = answer["fits"][:2]
+    assert lateral["cornering_stiffness_N_per_rad"]["value"] == pytest.approx(11 * 1.3 * 2000, rel=0.1)
+    assert aligning["cornering_stiffness_N_per_rad"] is None
+    assert aligning["aligning_stiffness_Nm_per_rad"]["value"] > 0
+
+
+def test_stiffness_is_positive_in_every_right_axis_system(tire):
+    mirrored = tire.read_text().splitlines()
+    turned = [mirrored[0]]
+    for line in mirrored[1:]:
+        SA, rest = line.split(",", 1)
+        turned.append(f"{-float(SA)},{rest}")
+    tire.write_text("\n".join(turned) + "\n")
+    code, out = run(tire, "--axes", "adapted-SAE", "--json")
+    assert code == 0
+    assert all(
+        (one["cornering_stiffness_N_per_rad"] or one["aligning_stiffness_Nm_per_rad"])["value"] > 0
+        for one in json.loads(out)["fits"]
+    )
+
+
+def test_contradicted_axes_end_with_one(tire):
+    code, out = run(tire, "--axes", "adapted-SAE", "--json")
+    assert code == 1
+    assert {finding["rule"] for finding in json.loads(out)["findings"]} >= {"axes-contradiction"}
+
+
+def test_text_names_loads_errors_and_axes(tire):
+    code, out = run(tire)
+    assert code == 0
+    assert "2000" in out
+    assert "4000" in out
+    assert "error %" in out
+    assert "axes SAE" in out
+
+
+def test_quiet_prints_nothing_and_the_same_run_gives_the_same_answer(tire):
+    assert run(tire, "--quiet") == (0, "")
+    first, second = (json.loads(run(tire, "--json")[1]) for _ in range(2))
+    first.pop("timing")
+    second.pop("timing")
+    assert first == second
+
+
+@pytest.mark.parametrize(
+    ("arguments", "rule"),
+    [
+        (["--model", "no_such_model"], "unknown-model"),
+        (["--tir", "out.tir"], "tir-needs-global"),
+        (["--loss", "huber"], "unknown-loss"),
+        (["--axes", "ISO"], "unknown-axes"),
+    ],
+)
+def test_wrong_options_are_bad_input(tire, arguments, rule):
+    with pytest.raises(ToolkitError) as caught:
+        run(tire, *arguments)
+    assert caught.value.rule == rule
+    assert caught.value.exit_code == 2
+    assert caught.value.next_step
+
+
+def test_three_points_are_bad_input(tmp_path):
+    path = tmp_path / "short.csv"
+    path.write_text("SA [deg],FZ [N],FY [N]\n-1,2000,300\n0,2000,5\n1,2000,-290\n")
+    with pytest.raises(ToolkitError) as caught:
+        run(path)
+    assert caught.value.rule == "too-few-points"
+    assert str(path) in caught.value.where
