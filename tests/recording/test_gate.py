@@ -31,9 +31,14 @@ from toolkit.recording.gate import check_workbook, gate
 from toolkit.recording.sniff import office_kind, sniff
 
 
-def refused(tmp_path: Path, data: bytes) -> UnreadableError:
+def written(tmp_path: Path, data: bytes) -> Path:
     path = tmp_path / "file"
     path.write_bytes(data)
+    return path
+
+
+def refused(tmp_path: Path, data: bytes) -> UnreadableError:
+    path = written(tmp_path, data)
     with pytest.raises(UnreadableError) as caught:
         check_workbook(path)
     error = caught.value
@@ -131,6 +136,11 @@ def test_no_file_and_a_folder(tmp_path):
 )
 def test_member_names(tmp_path, name):
     assert refused(tmp_path, packed({**members(), name: b"x"})).rule == "member-path"
+
+
+def test_a_member_without_a_name(tmp_path):
+    # Found by mutation: the standard library's ZipInfo cannot say whether such a member is a folder.
+    assert refused(tmp_path, stored_archive({**members(), "": b""})).rule == "member-path"
 
 
 def test_too_many_members(tmp_path):

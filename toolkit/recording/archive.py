@@ -101,7 +101,7 @@ def _check_names(names: list[str], where: object) -> None:
     seen: set[str] = set()
     for name in names:
         parts = name.replace("\\", "/").split("/")
-        if ".." in parts or name.startswith(("/", "\\")) or ":" in name or not name.isprintable():
+        if not name or ".." in parts or name.startswith(("/", "\\")) or ":" in name or not name.isprintable():
             _refuse(
                 "member-path",
                 "a member of the archive names a place outside of it",
