@@ -1,0 +1,87 @@
+import json
+
+import pytest
+from click.testing import Result
+from typer.testing import CliRunner
+
+from toolkit.cli import inspect
+from toolkit.errors import ToolkitError
+from toolkit.examples.fig4_4 import packaged_fig4_4
+
+
+@pytest.fixture
+def run():
+    import typer
+
+    app = typer.Typer()
+    app.command("inspect")(inspect.command)
+    app.command("other")(lambda: None)
+
+    def call(*arguments) -> Result:
+        return CliRunner().invoke(app, ["inspect", *map(str, arguments)], standalone_mode=False)
+
+    return call
+
+
+def test_figure_4_4_in_an_empty_registry(run, tmp_path):
+    found = run(packaged_fig4_4()[1], "--calibrations", tmp_path, "--json", "--prove")
+    assert found.return_value == 1
+    answer = json.loads(found.stdout)
+    assert answer["schema"] == 1
+    assert [(c["symbol"], c["unit"]) for c in answer["channels"]] == [
+        ("FZ", "lbf"), ("D52", "lbf"), ("D51", "lbf"), ("E5", "lbf"), ("SA", "deg"), ("FY", "lbf"),
+        ("MZ", "lbf*ft"),
+    ]  # fmt: skip
+    assert (answer["rows"], len(answer["blocks"]), answer["simulated"]) == (10, 5, False)
+    assert round(answer["slip_angle_deg"], 2) == -0.30
+    # the loads of the figure, two rows each
+    assert [round(b["load_lbf"]) for b in answer["blocks"]] == [249, 587, 835, 1112, 1376]
+    assert answer["calibration"]["grade"] == "unknown"
+    assert {(i["load"], i["sign"]) for i in answer["intervals"] if i["name"] == "E5"} == {
+        ("FY", -1),
+        ("MZ", -1),
+    }
+    assert answer["files"][0]["sha256"] == answer["sha256"]
+
+
+def test_text_is_one_screen(run, tmp_path):
+    found = run(packaged_fig4_4()[0], "--calibrations", tmp_path)
+    lines = found.stdout.splitlines()
+    assert len(lines) <= 30
+    assert max(map(len, lines)) <= 110
+    assert "slip angle -0.30 deg" in found.stdout
+
+
+def test_several_files(run, tmp_path):
+    found = run(*packaged_fig4_4(), "--calibrations", tmp_path, "--json")
+    answer = json.loads(found.stdout)
+    assert len(answer["files"]) == 2
+    assert "sha256" not in answer
+
+
+def test_without_a_home_the_file_is_still_shown(run, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.delenv("TOOLKIT_HOME", raising=False)
+    found = run(packaged_fig4_4()[0], "--json")
+    assert found.return_value == 1
+    answer = json.loads(found.stdout)
+    assert answer["calibration"] is None
+    assert answer["findings"][0]["rule"] == "no-home"
+
+
+def test_quiet_says_nothing(run, tmp_path):
+    assert run(packaged_fig4_4()[0], "--calibrations", tmp_path, "--quiet").stdout == ""
+
+
+@pytest.mark.parametrize("content", [b"", b"not a workbook", b"PK\x03\x04 cut off"])
+def test_bad_files_are_errors_with_a_next_step(run, tmp_path, content):
+    (tmp_path / "bad").write_bytes(content)
+    found = run(tmp_path / "bad", "--calibrations", tmp_path)
+    assert isinstance(found.exception, ToolkitError)
+    assert found.exception.exit_code == 2
+    assert found.exception.next_step
+
+
+def test_a_registry_that_is_named_must_exist(run, tmp_path):
+    found = run(packaged_fig4_4()[0], "--calibrations", tmp_path / "none")
+    assert isinstance(found.exception, ToolkitError)
