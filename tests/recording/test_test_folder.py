@@ -8,6 +8,7 @@ import pytest
 from workbook_factory import members, packed, workbook
 
 from toolkit.errors import ConfigError, RecordingError, ToolkitError
+from toolkit.machine import load_machine
 from toolkit.recording.folder import nearest_test_toml, read_test_folder
 from toolkit.recording.marks import is_own_output, machine_of, mark_workbook, output_keywords
 
@@ -96,6 +97,16 @@ def test_a_minimal_test(folder):
     info = read_test_folder(folder / "other test").info
     assert info.simulated
     assert info.date == "2020-02-29"
+
+
+def test_a_machine_definition_of_the_laboratorys_own(folder):
+    (folder / "own.toml").write_text(
+        'schema = 1\nname = "own"\nextends = "m15"\ntitle = "Own"\nkind = "real"'
+    )
+    edited(folder, 'machine = "m15"', 'machine = "own.toml"')
+    test = read_test_folder(folder)
+    assert load_machine(test.info.machine).name == "own"
+    assert folder / "own.toml" not in test.files
 
 
 def test_a_recording_belongs_to_the_nearest_test_toml(folder):

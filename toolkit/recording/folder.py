@@ -106,7 +106,8 @@ def read_test_folder(folder: Path) -> TestFolder:
     if table.get("schema", 1) != 1:
         raise _wrong(toml, "schema", table["schema"], "1")
     machine = _machine(table, toml)
-    files = tuple(sorted(_recordings(folder)))
+    definition = Path(_machine_name(table, toml))
+    files = tuple(sorted(path for path in _recordings(folder) if path != definition))
     tare_file, tare_values = _tare(table.get("tare", {}), machine, folder, toml)
     found = tuple(path for path in files if path != tare_file)
     if not found:
@@ -157,10 +158,13 @@ def _machine(table: Mapping[str, Any], toml: Path) -> Machine:
             next_step="add the line",
             rule="missing-key",
         )
+    return load_machine(_machine_name(table, toml))
+
+
+def _machine_name(table: Mapping[str, Any], toml: Path) -> str:
+    # A definition by path is meant relative to the test, whatever folder the command runs in.
     name = _text(table["machine"], "machine", toml)
-    if name.endswith(".toml"):
-        name = str(toml.parent / name)
-    return load_machine(name)
+    return str(toml.parent / name) if name.endswith(".toml") else name
 
 
 def _info(table: Mapping[str, Any], machine: Machine, folder: Path, toml: Path) -> TestInfo:
@@ -173,7 +177,7 @@ def _info(table: Mapping[str, Any], machine: Machine, folder: Path, toml: Path) 
     tires = {f"tire_{key}": _text(value, f"tire.{key}", toml) for key, value in tire.items()}
     return TestInfo(
         name=folder.resolve().name,
-        machine=str(table["machine"]) if not str(table["machine"]).endswith(".toml") else machine.name,
+        machine=_machine_name(table, toml),
         date=_date(table["date"], toml) if "date" in table else None,
         speed_m_s=_positive(table, "speed", "speed", toml),
         pressure_Pa=_positive(table, "pressure", "pressure", toml),
