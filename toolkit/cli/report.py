@@ -15,6 +15,8 @@ from toolkit.cli.console import Calibrations, Home, Json, Quiet, answer, exit_co
 if TYPE_CHECKING:
     from toolkit.cli.resolve import Resolved
     from toolkit.report.deliver import Delivered
+    from toolkit.report.drawer import Drawer
+    from toolkit.report.pdf import Office
 
 NAME = "report"
 
@@ -57,6 +59,7 @@ def command(
     Example: toolkit report tests/2019-06-04 --template report_templates/org.docx --out reports/89
     """
     from toolkit.cli.resolve import resolve_test
+    from toolkit.report.drawer import Drawer
     from toolkit.report.package import read_template
     from toolkit.report.pdf import Office
 
@@ -65,7 +68,7 @@ def command(
     started = time.perf_counter()
     # The template is judged before anything is read: its error must not wait for a long reduction.
     opened = read_template(template or default_template(home))
-    with Office() as office, progress(None, "report", show=not (json or quiet)) as step:
+    with Office() as office, Drawer() as drawer, progress(None, "report", show=not (json or quiet)) as step:
         resolved = resolve_test(
             test,
             calibration=calibration,
@@ -77,7 +80,14 @@ def command(
         )
         target = out or Path.cwd() / f"report-{_file_name(resolved.result.reduced.info.name)}"
         made = make_report(
-            resolved, opened.path, target, allow_missing=allow_missing, keep=keep, office=office, step=step
+            resolved,
+            opened.path,
+            target,
+            allow_missing=allow_missing,
+            keep=keep,
+            office=office,
+            drawer=drawer,
+            step=step,
         )
     payload = report_payload(made, resolved) | {"timing": {"seconds": time.perf_counter() - started}}
     answer(payload, _text(made, resolved), as_json=json, quiet=quiet)
@@ -91,7 +101,8 @@ def make_report(
     *,
     allow_missing: bool = False,
     keep: bool = False,
-    office: Any = None,
+    office: Office | None = None,
+    drawer: Drawer | None = None,
     step: Any = lambda _text: None,
 ) -> Delivered:
     """Return the delivered report of a resolved test."""
@@ -108,6 +119,7 @@ def make_report(
         content,
         out,
         office=office,
+        drawer=drawer,
         allow_missing=allow_missing,
         keep=keep,
         step=step,

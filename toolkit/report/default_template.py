@@ -4,7 +4,6 @@
 organisation to make its own in Word.
 """
 
-
 from __future__ import annotations
 
 import datetime as dt

@@ -11,6 +11,7 @@ from pathlib import Path
 
 from toolkit.errors import OutputError, RenderError
 from toolkit.report.content import ReportContent
+from toolkit.report.drawer import Drawer
 from toolkit.report.fill import Filled, fill, needed_figures
 from toolkit.report.package import Template
 from toolkit.report.pdf import Office
@@ -48,6 +49,7 @@ def deliver(
     out: Path,
     *,
     office: Office | None = None,
+    drawer: Drawer | None = None,
     name: str = "report",
     allow_missing: bool = False,
     keep: bool = False,
@@ -59,7 +61,8 @@ def deliver(
     ----------
     template, content : the safe template and the report's content
     out : output folder; made where it does not exist
-    office : LibreOffice prepared by the caller; default: one of its own
+    office, drawer : LibreOffice and the figures' workers prepared by the caller; default: LibreOffice of
+        its own, figures drawn here
     keep : on failure leave what was made in ``rejected/`` of the folder
 
     Raises
@@ -72,7 +75,8 @@ def deliver(
     office = office or Office()
     with office, _staging(out) as stage:
         step("figures")
-        pictures = {figure: draw(content.plots[figure]) for figure in needed_figures(template, content)}
+        plots = {figure: content.plots[figure] for figure in needed_figures(template, content)}
+        pictures = drawer.pictures(plots) if drawer else {one: draw(plot) for one, plot in plots.items()}
         step("document")
         filled = fill(template, content, pictures, allow_missing=allow_missing, fonts=True)
         docx = stage / f"{name}.docx"

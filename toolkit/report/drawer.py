@@ -1,0 +1,104 @@
+"""Draw a report's figures in processes of their own, while the document is read and filled.
+
+matplotlib's import and its drawing are half of what a report costs in Python; started first, they run
+beside the reduction of the test and the preparation of LibreOffice.
+"""
+
+from __future__ import annotations
+
+import os
+import pickle
+import subprocess
+import sys
+from collections.abc import Iterator, Mapping
+from concurrent.futures import Future, ThreadPoolExecutor
+from types import TracebackType
+
+from toolkit.report.content import Plot
+from toolkit.report.figures import Picture, draw
+
+
+class Drawer:
+    """Workers that import matplotlib at once and draw when they are asked to. A context manager."""
+
+    def __init__(self, *, workers: int | None = None) -> None:
+        """Start the workers; by default one a core, two at most."""
+        count = min(2, os.cpu_count() or 1) if workers is None else workers
+        command = [sys.executable, "-m", "toolkit.report.drawer"]
+        self._workers = [
+            subprocess.Popen(
+                command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL
+            )
+            for _ in range(count)
+        ]
+        self._pool = ThreadPoolExecutor(max_workers=max(1, count))
+
+    def __enter__(self) -> Drawer:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """End the workers."""
+        for worker in self._workers:
+            worker.kill()
+        self._pool.shutdown()
+        for worker in self._workers:
+            worker.wait()
+            for stream in (worker.stdin, worker.stdout):
+                if stream is not None and not stream.closed:
+                    stream.close()
+        self._workers = []
+
+    def pictures(self, plots: Mapping[str, Plot]) -> Mapping[str, Picture]:
+        """Return the drawn figures by name; a look-up waits until its figure is there."""
+        waiting: dict[str, Future[dict[str, Picture]]] = {}
+        shares = [dict(list(plots.items())[i :: len(self._workers)]) for i in range(len(self._workers))]
+        for worker, share in zip(self._workers, shares, strict=True):
+            job = self._pool.submit(_ask, worker, share)
+            waiting |= dict.fromkeys(share, job)
+        return _Waiting(waiting)
+
+
+class _Waiting(Mapping[str, Picture]):
+    def __init__(self, jobs: dict[str, Future[dict[str, Picture]]]) -> None:
+        self._jobs = jobs
+
+    def __getitem__(self, name: str) -> Picture:
+        return self._jobs[name].result()[name]
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._jobs
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._jobs)
+
+    def __len__(self) -> int:
+        return len(self._jobs)
+
+
+def _ask(worker: subprocess.Popen[bytes], share: dict[str, Plot]) -> dict[str, Picture]:
+    out, _ = worker.communicate(pickle.dumps(share))
+    if worker.returncode == 0 and out:
+        drawn: dict[str, Picture] = pickle.loads(out)  # noqa: S301  our own child wrote it
+        return drawn
+    # A worker that could not start or was killed costs time, not the report.
+    return {name: draw(plot) for name, plot in share.items()}
+
+
+def _work() -> None:
+    import matplotlib.backends.backend_agg
+    import matplotlib.figure
+    import matplotlib.ticker  # noqa: F401  imported before the order comes
+
+    order = sys.stdin.buffer.read()
+    if order:
+        share: dict[str, Plot] = pickle.loads(order)  # noqa: S301  our own parent wrote it
+        sys.stdout.buffer.write(pickle.dumps({name: draw(plot) for name, plot in share.items()}))
+
+
+if __name__ == "__main__":
+    _work()
