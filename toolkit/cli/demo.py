@@ -1,0 +1,259 @@
+"""`toolkit demo`: the whole path on the packaged example, each step by its own command."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import json as jsonlib
+import shutil
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from toolkit.cli.console import Json, Quiet, answer
+from toolkit.cli.home import packaged_home
+
+if TYPE_CHECKING:
+    from toolkit.cli.resolve import Resolved
+
+NAME = "demo"
+
+_MARK = "demo.json"
+
+Payload = dict[str, Any]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Step:
+    """One command of the demonstration and the sentence that tells its outcome."""
+
+    title: str
+    words: tuple[str, ...]
+    told: Callable[[Payload], str]
+
+
+def command(
+    out: Annotated[
+        Path, typer.Option("--out", help="Output folder; one that an earlier demo made is replaced.")
+    ] = Path("demo-out"),
+    json: Json = False,
+    quiet: Quiet = False,
+) -> int:
+    """Run the whole path on the packaged example: strain gauges to a Word and PDF report.
+
+    Makes report.docx, report.pdf, test.xlsx (the whole test in one file), tire.tir and figures/.
+    """
+    started = time.perf_counter()
+    say = _silent if json or quiet else typer.echo
+    done: list[Payload] = []
+    with _stage(out) as stage:
+        steps = _steps(stage)
+        say(f"The virtual M-15 from raw strain gauges to a report, in {len(steps) + 1} steps.\n")
+        for number, step in enumerate(steps, start=1):
+            say(f"[{number}/{len(steps) + 1}] {step.title}")
+            say(f"      $ toolkit {' '.join(_shown(step.words, stage, out))}")
+            code, payload = _run(step.words)
+            told = step.told(payload)
+            say(f"      {told}\n")
+            done.append({"title": step.title, "exit_code": code, "told": told})
+        say(f"[{len(steps) + 1}/{len(steps) + 1}] the figures of the report, one file each")
+        figures = _figures(stage)
+        say(f"      {len(figures)} figures\n")
+        report = done[-1]
+        (stage / _MARK).write_text(
+            jsonlib.dumps({"generator": "toolkit", "content": "demo", "steps": done}, indent=2)
+        )
+    say(f"The report: {out / 'report.pdf'}  ({out / 'report.docx'})")
+    say(f"The whole test in one file: {out / 'test.xlsx'}")
+    say("Everything here is simulated, except Figure 4.4 in step 1.")
+    say(f"Took {time.perf_counter() - started:.0f} s.")
+    names = ("report.docx", "report.pdf", "test.xlsx", "tire.tir")
+    payload = {
+        "out": out,
+        "files": [str(out / name) for name in names] + [str(out / "figures" / name) for name in figures],
+        "steps": done,
+        "report": report["told"],
+        "timing": {"seconds": time.perf_counter() - started},
+    }
+    answer(payload, "", as_json=json, quiet=quiet)
+    return 0
+
+
+def _silent(_text: str) -> None:
+    pass
+
+
+@contextlib.contextmanager
+def _stage(out: Path) -> Iterator[Path]:
+    """Yield a fresh folder beside ``out`` that takes its place when every step has succeeded."""
+    from toolkit.errors import OutputError
+
+    if out.exists() and not (out.is_dir() and (not any(out.iterdir()) or (out / _MARK).is_file())):
+        raise OutputError(
+            "the output folder holds other files",
+            where=out,
+            got="a folder that no demo made",
+            expected="a new or empty folder, or one of an earlier demo",
+            next_step="choose another folder with --out",
+            rule="not-empty",
+        )
+    stage = out.parent / f".{out.name}.part"
+    try:
+        shutil.rmtree(stage, ignore_errors=True)
+        stage.mkdir(parents=True)
+        yield stage
+        shutil.rmtree(out, ignore_errors=True)
+        stage.replace(out)
+    except OSError as error:
+        raise OutputError(
+            "the demo cannot write its output",
+            where=out,
+            got=error.strerror or error,
+            expected="a folder with write permission and free space",
+            next_step="choose another folder with --out",
+        ) from error
+    finally:
+        shutil.rmtree(stage, ignore_errors=True)
+
+
+def _steps(stage: Path) -> list[Step]:
+    from toolkit.examples.fig4_4 import packaged_fig4_4
+
+    home = stage / "home"
+    for name in ("calibrations", "report_templates"):
+        shutil.copytree(packaged_home() / name, home / name)
+    plans = Path(__file__).parents[1] / "examples" / "virtual"
+    at = ("--home", str(home))
+    test, whole = str(stage / "test"), str(stage / "test.xlsx")
+    return [
+        Step(
+            title="a real recording: which calibration computed its Fy and Mz?",
+            words=("inspect", str(packaged_fig4_4()[0]), *at),
+            told=_told_inspect,
+        ),
+        Step(
+            title="a reference-load session on the virtual machine: bridge outputs in mV/V",
+            words=("simulate", str(plans / "session_plan.toml"), "--out", str(stage / "session")),
+            told=lambda p: f"{len(p['files'])} files in session/",
+        ),
+        Step(
+            title="fit the load cells' calibration",
+            words=("calibrate", str(stage / "session" / "SESSION.toml"), *at),
+            told=_told_calibrate,
+        ),
+        Step(
+            title="refit every record of the registry from its stored data",
+            words=("calibration", "verify", *at),
+            told=_told_verify,
+        ),
+        Step(
+            title="a whole test on the virtual machine, drum forward and reversed",
+            words=("simulate", str(plans / "test_plan.toml"), "--out", test, *at),
+            told=lambda p: f"{len(p['files'])} files in test/, with a steering zero, a tare, drum run-out "
+            "and an acquisition program that takes E5 with the wrong sign",
+        ),
+        Step(
+            title="recordings to one reduced test",
+            words=("process", test, "--out", whole, *at),
+            told=_told_process,
+        ),
+        Step(
+            title="tire model: the Magic Formula at each load, no start values",
+            words=("fit", whole, *at),
+            told=_told_fit,
+        ),
+        Step(
+            title="tire model over all loads, as a tire property file",
+            words=("fit", whole, "--model", "mf61", "--tir", str(stage / "tire.tir"), *at),
+            told=_told_fit,
+        ),
+        Step(
+            title="the report in the organisation's Word template, and its verified PDF",
+            words=("report", whole, "--template", str(home / "report_templates" / "org.docx"), "--out",
+                   str(stage), *at),
+            told=lambda p: f"{p['pages']} pages, {len(p['figures'])} figures, {len(p['manifest'])} values, "
+            f"verified: {p['verified']}",
+        ),
+    ]  # fmt: skip
+
+
+def _shown(words: tuple[str, ...], stage: Path, out: Path) -> list[str]:
+    """Return a command as the user would type it, with the paths as they will be."""
+    package = str(Path(__file__).parents[1])
+    return [word.replace(str(stage), str(out)).replace(package, "toolkit") for word in words]
+
+
+def _run(words: tuple[str, ...]) -> tuple[int, Payload]:
+    from toolkit.cli.main import app
+
+    caught = io.StringIO()
+    with contextlib.redirect_stdout(caught):
+        code = app(args=[*words, "--json"], prog_name="toolkit", standalone_mode=False)
+    payload: Payload = jsonlib.loads(caught.getvalue())
+    return int(code or 0), payload
+
+
+def _told_inspect(payload: Payload) -> str:
+    one = payload["files"][0] if "files" in payload else payload
+    first, calibration = one["corrected_first_row"], one["calibration"]
+    words = f"{calibration['record']}" + (f", {calibration['variant']}" if calibration["variant"] else "")
+    withdrawn = f", withdrawn: {calibration['withdrawn']}" if calibration["withdrawn"] else ""
+    return (
+        f"{calibration['grade']}: {words}{withdrawn}\n      first row: Fy {first['FY_lbf']:.2f} lbf "
+        f"against {first['FY_file_lbf']:.2f} in the file"
+    )
+
+
+def _told_calibrate(payload: Payload) -> str:
+    record, FY = payload["record"], payload["loads"]["FY"]
+    state = "reproduced, already recorded" if record["existing"] else record["status"]
+    E5, error = FY["coefficients"]["E5"], FY["standard_errors"]["E5"]
+    return (
+        f"{record['id']} ({state}): E5 in FY {E5:+.4f} ± {error:.1g} {FY['unit']} per "
+        f"{FY['indication_units']['E5']}, its sign sure by {abs(E5) / error:.0f} standard errors"
+    )
+
+
+def _told_verify(payload: Payload) -> str:
+    rows = payload["records"]
+    verified = sum(row["verified"] for row in rows)
+    return (
+        f"{sum(row['ok'] for row in rows)} of {len(rows)} records ok, {verified} of them verified from data"
+    )
+
+
+def _told_process(payload: Payload) -> str:
+    used = sum(one["used"] for one in payload["conditions"])
+    findings = ", ".join(dict.fromkeys(one["rule"] for one in payload["findings"])) or "none"
+    return f"{used} conditions by {payload['calibration']['id']}; findings: {findings}"
+
+
+def _told_fit(payload: Payload) -> str:
+    found = []
+    for channel in ("FY", "MZ"):
+        errors = [one["error_percent"] for one in payload["fits"] if one["channel"] == channel]
+        if errors:
+            found.append(f"{channel} {min(errors):.2f} to {max(errors):.2f} %")
+    return f"{len(payload['fits'])} curves, error {', '.join(found)}"
+
+
+def _figures(stage: Path) -> list[str]:
+    from toolkit.cli.resolve import resolve_test
+    from toolkit.report.build import build_content
+    from toolkit.report.figures import draw
+    from toolkit.report.style import read_style, style_file
+
+    resolved: Resolved = resolve_test(stage / "test.xlsx", home=stage / "home")
+    style = read_style(style_file(stage / "home" / "report_templates" / "org.docx"))
+    content = build_content(resolved.result, resolved.record, findings=resolved.findings, style=style)
+    folder = stage / "figures"
+    folder.mkdir()
+    names = []
+    for name, plot in content.plots.items():
+        (folder / f"{name}.png").write_bytes(draw(plot).png)
+        names.append(f"{name}.png")
+    return names
