@@ -1,0 +1,95 @@
+"""Small Word templates for the report's tests, built part by part."""
+
+from __future__ import annotations
+
+import io
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+
+import docx
+
+from toolkit.report.blocks import elements
+from toolkit.report.package import Template, read_template
+
+HASH = "{{tk:calibration.hash}}"
+FOOTNOTES = (
+    "http://schemas.openxmlformats.org/officeDocument/2006/relationships/footnotes",
+    "application/vnd.openxmlformats-officedocument.wordprocessingml.footnotes+xml",
+)
+W = "http://schemas.openxmlformats.org/wordprocessingml/2006/main"
+
+
+def p(*runs: str) -> str:
+    """Return a paragraph of runs; a run that begins with ``<`` is taken as it is."""
+    inner = "".join(
+        r if r.startswith("<") else f'<w:r><w:t xml:space="preserve">{r}</w:t></w:r>' for r in runs
+    )
+    return f"<w:p>{inner}</w:p>"
+
+
+def sdt(tag: str, content: str, more: str = "") -> str:
+    return f'<w:sdt><w:sdtPr><w:tag w:val="{tag}"/>{more}</w:sdtPr><w:sdtContent>{content}</w:sdtContent></w:sdt>'
+
+
+def run(text: str) -> str:
+    return f"<w:r><w:t>{text}</w:t></w:r>"
+
+
+def tbl(*rows: list[str]) -> str:
+    made = "".join(
+        "<w:tr>" + "".join(f"<w:tc>{c if c.startswith('<w:p') else p(c)}</w:tc>" for c in row) + "</w:tr>" for row in rows
+    )
+    grid = "<w:gridCol/>" * len(rows[0])
+    return f"<w:tbl><w:tblPr/><w:tblGrid>{grid}</w:tblGrid>{made}</w:tbl>"
+
+
+def make(
+    folder: Path, body: str, *, header: str = "", footnote: str = "", hash_: bool = True, name: str = "t.docx",
+    edit: Callable[[dict[str, bytes]], None] | None = None,
+) -> Path:
+    """Write a template; ``edit`` may change the members of the package afterwards."""
+    document = docx.Document()
+    for element in elements(body + (p(HASH) if hash_ else "")):
+        document.element.body.insert(len(document.element.body) - 1, element)
+    if header:
+        root = document.sections[0].header._element
+        for child in list(root):
+            root.remove(child)
+        for element in elements(header):
+            root.append(element)
+    if footnote:
+        from docx.opc.packuri import PackURI
+        from docx.opc.part import Part
+
+        blob = f'<w:footnotes xmlns:w="{W}"><w:footnote w:id="2">{footnote}</w:footnote></w:footnotes>'.encode()
+        part = Part(PackURI("/word/footnotes.xml"), FOOTNOTES[1], blob, document.part.package)
+        document.part.relate_to(part, FOOTNOTES[0])
+    stream = io.BytesIO()
+    document.save(stream)
+    data = stream.getvalue()
+    if edit is not None:
+        with zipfile.ZipFile(io.BytesIO(data)) as archive:
+            members = {one: archive.read(one) for one in archive.namelist()}
+        edit(members)
+        stream = io.BytesIO()
+        with zipfile.ZipFile(stream, "w") as archive:
+            for one, content in members.items():
+                archive.writestr(one, content)
+        data = stream.getvalue()
+    path = folder / name
+    path.write_bytes(data)
+    return path
+
+
+def opened(folder: Path, body: str, **more: object) -> Template:
+    return read_template(make(folder, body, **more))  # type: ignore[arg-type]
+
+
+def texts(data: bytes, part: str = "word/document.xml") -> str:
+    """Return the text of a part, paragraphs by line."""
+    from lxml import etree
+
+    with zipfile.ZipFile(io.BytesIO(data)) as archive:
+        root = etree.fromstring(archive.read(part))
+    return "\n".join("".join(t.text or "" for t in para.iter(f"{{{W}}}t")) for para in root.iter(f"{{{W}}}p"))
