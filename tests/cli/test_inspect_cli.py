@@ -1,4 +1,5 @@
 import json
+from pathlib import Path
 
 import pytest
 from click.testing import Result
@@ -85,3 +86,37 @@ def test_bad_files_are_errors_with_a_next_step(run, tmp_path, content):
 def test_a_registry_that_is_named_must_exist(run, tmp_path):
     found = run(packaged_fig4_4()[0], "--calibrations", tmp_path / "none")
     assert isinstance(found.exception, ToolkitError)
+
+
+class TestFigure44InThisRegistry:
+    """With the project's own records of the machine: what the issue of the accident demands."""
+
+    @pytest.fixture
+    def calibrations(self):
+        folder = Path(__file__).resolve().parents[2] / "calibrations"
+        if not (folder / "m15" / "ledger.jsonl").is_file():
+            pytest.skip("the registry of the checkout is not here")
+        return folder
+
+    def test_withdrawn_record_is_named_with_its_fault(self, run, calibrations):
+        found = run(packaged_fig4_4()[1], "--calibrations", calibrations, "--json")
+        answer = json.loads(found.stdout)
+        one = answer["calibration"]
+        assert (found.return_value, one["grade"], one["record"], one["variant"]) == (
+            1,
+            "stale",
+            "m15-r1",
+            None,
+        )
+        assert one["void_always"] is True
+        assert one["against_corrected_by"] == "E5 negative in FY, MZ"
+        first = answer["corrected_first_row"]
+        assert (round(first["FY_lbf"], 2), round(first["FY_file_lbf"], 2)) == (-1.79, 371.36)
+        assert answer["corrected_by"] == "m15-r2"
+        assert answer["refused_records"] == []
+
+    def test_in_words(self, run, calibrations):
+        text = run(packaged_fig4_4()[0], "--calibrations", calibrations).stdout
+        assert "withdrawn calibration: E5 negative in FY, MZ against m15-r2" in text
+        assert "first row: Fy -1.79 lbf where the file has 371.36" in text
+        assert max(map(len, text.splitlines())) <= 110

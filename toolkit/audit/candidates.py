@@ -194,6 +194,24 @@ def describe(
     return "; ".join(told) or None
 
 
+def turned_against(record: CalibrationRecord, other: CalibrationRecord, loads: tuple[str, ...]) -> str | None:
+    """Return which signs a record has otherwise than another of the same magnitudes; None where it has not.
+
+    It tells in one line what was wrong with a withdrawn record: ``E5 negative in FY, MZ``.
+    """
+    signs: dict[str, tuple[int, ...]] = {}
+    for load in loads:
+        mine, theirs = record.load(load), other.load(load)
+        if mine.terms != theirs.terms or record.indications != other.indications:
+            return None
+        if not np.allclose(np.abs(mine.coefficients), np.abs(theirs.coefficients), rtol=1e-9, atol=0.0):
+            return None
+        pairs = zip(mine.coefficients, theirs.coefficients, strict=True)
+        factor = dict(zip(mine.terms, (1 if a * b >= 0 else -1 for a, b in pairs), strict=True))
+        signs[load] = tuple(factor.get(name, 1) for name in (*record.indications, INTERCEPT))
+    return describe(other, tuple(range(len(record.indications))), signs)
+
+
 def _sign_in_file(fit: LoadFit, name: str) -> str:
     term = INTERCEPT if name == CONSTANT else name
     plain = dict(zip(fit.terms, fit.coefficients, strict=True)).get(term)

@@ -19,12 +19,16 @@ DEFAULT_MACHINE = "m15"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Context:
-    """The machine and how it is known; the test's date and its test.toml, None where there is none."""
+    """The machine and how it is known; the test's date and its test.toml, None where there is none.
+
+    ``tare`` tells whether test.toml gives a tare, which `toolkit process` subtracts.
+    """
 
     machine: Machine
     machine_source: MachineSource
     date: dt.date | None
     test_toml: Path | None
+    tare: bool = False
 
 
 def context_of(path: Path, *, machine: str | None = None) -> Context:
@@ -47,7 +51,9 @@ def context_of(path: Path, *, machine: str | None = None) -> Context:
     else:
         own = machine_of(path)
         name, source = (own, "file") if own is not None else (DEFAULT_MACHINE, "default")
-    return Context(machine=load_machine(name), machine_source=source, date=date, test_toml=toml)
+    return Context(
+        machine=load_machine(name), machine_source=source, date=date, test_toml=toml, tare="tare" in table
+    )
 
 
 def _date(value: object, toml: Path) -> dt.date:

@@ -180,6 +180,20 @@ def withdrawal(inspection: Inspection) -> RecordStatus | None:
     return status if status is not None and status.state == "withdrawn" else None
 
 
+def wrong_signs(inspection: Inspection) -> str | None:
+    """Return how the record that computed a file differs in sign from the one that corrects it, in words."""
+    from toolkit.audit.candidates import turned_against
+
+    found, choice = inspection.identification, inspection.choice
+    if found is None or choice is None or found.variant is not None or inspection.corrected_by is None:
+        return None
+    by_id = {record.id: record for record in choice.records}
+    mine, right = by_id.get(found.record or ""), by_id.get(inspection.corrected_by)
+    if mine is None or right is None:
+        return None
+    return turned_against(mine, right, inspection.columns.loads)
+
+
 def _corrected(columns: Columns, record: CalibrationRecord) -> dict[str, NDArray[np.float64]] | None:
     from toolkit.audit.candidates import unfit
 

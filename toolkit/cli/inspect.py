@@ -98,6 +98,7 @@ def _payload(found: Inspection, intervals: tuple[Interval, ...]) -> dict[str, An
         "slip_angle_deg": math.degrees(found.slip_angle_rad),
         "calibration": _calibration(found),
         "corrected_by": found.corrected_by,
+        "corrected_tared": False,
         "corrected": [_values(block) for block in found.blocks],
         "corrected_first_row": _values(found.first_row),
         "intervals": [
@@ -139,7 +140,7 @@ def _values(block: LoadBlock) -> dict[str, Any]:
 
 
 def _calibration(found: Inspection) -> dict[str, Any] | None:
-    from toolkit.audit.inspection import withdrawal
+    from toolkit.audit.inspection import withdrawal, wrong_signs
 
     one = found.identification
     if one is None:
@@ -152,6 +153,7 @@ def _calibration(found: Inspection) -> dict[str, Any] | None:
         "issued_digits": one.issued,
         "candidates": one.candidates,
         "withdrawn": None if withdrawn is None else withdrawn.reason,
+        "against_corrected_by": wrong_signs(found),
         "void_always": None if withdrawn is None else withdrawn.void_always,
         "segments": [
             {
@@ -213,7 +215,9 @@ def _block_table(found: Inspection) -> str:
 
 
 def _calibration_lines(found: Inspection) -> list[str]:
-    from toolkit.audit.inspection import withdrawal
+    import textwrap
+
+    from toolkit.audit.inspection import withdrawal, wrong_signs
     from toolkit.audit.model import TELLS
 
     one = found.identification
@@ -223,15 +227,21 @@ def _calibration_lines(found: Inspection) -> list[str]:
     record = f"{one.record}{', ' + one.variant if one.variant else ''}" if one.record else "-"
     if one.candidates:
         record = " or ".join(one.candidates)
-    lines = [
-        f"  Fy and Mz  computed {TELLS[one.grade]}",
-        f"    record   {record}",
-        f"    grade    {one.grade}",
-    ]
-    withdrawn = withdrawal(found)
+    withdrawn, signs = withdrawal(found), wrong_signs(found)
+    how = TELLS[one.grade]
+    if one.grade == "stale" and withdrawn is not None:
+        how = "by a withdrawn calibration"
+    if signs is not None:
+        how += f": {signs} against {found.corrected_by}"
+    lines = [f"  Fy and Mz  computed {how}", f"    record   {record}", f"    grade    {one.grade}"]
     if withdrawn is not None:
         void = "void on every day" if withdrawn.void_always else f"void from {withdrawn.void_from}"
-        lines.append(f"    withdrawn, {void}: {withdrawn.reason}")
+        lines += textwrap.wrap(
+            f"withdrawn, {void}: {withdrawn.reason}",
+            106,
+            initial_indent="    ",
+            subsequent_indent="      ",
+        )
     if len(one.segments) > 1:
         lines += [
             f"    rows {s.first_row}-{s.last_row}: {s.record or '-'}"
@@ -241,7 +251,8 @@ def _calibration_lines(found: Inspection) -> list[str]:
     if found.corrected_by is not None:
         first = found.first_row
         when = "in force on the test's date" if one.in_force else "in force today"
-        lines.append(f"    corrected by {found.corrected_by}, {when}")
+        tare = "; tare not subtracted ('toolkit process' does)" if found.context.tare else ""
+        lines.append(f"    corrected by {found.corrected_by}, {when}{tare}")
         if first.FY_N is not None and first.FY_file_N is not None:
             lines.append(
                 f"    first row: Fy {_lbf(first.FY_N):.2f} lbf where the file has {_lbf(first.FY_file_N):.2f}"
