@@ -59,7 +59,10 @@ def process(folder: TestFolder, recordings: tuple[Recording, ...], record: Calib
         info=folder.info,
         machine=machine,
         record=record,
-        recordings=[(one, folder.rotation_of(one.path)) for one in recordings],
+        recordings=[
+            (one.path.relative_to(folder.folder).as_posix(), one, folder.rotation_of(one.path))
+            for one in recordings
+        ],
         tare=declared_tare(folder, machine),
     )
     return TestResult(reduced=reduced, characteristics=characterise(reduced, machine=machine, record=record))

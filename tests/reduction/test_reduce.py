@@ -184,10 +184,25 @@ def test_scaling_the_loads_scales_the_result(virtual_test: Path, virtual_record:
     machine = load_machine("m15-virtual")
 
     def reduced(record: CalibrationRecord) -> ReducedTest:
-        pairs = [(one, test.rotation_of(one.path)) for one in recordings]
+        pairs = [(one.name, one, test.rotation_of(one.path)) for one in recordings]
         return reduce_test(info=test.info, machine=machine, record=record, recordings=pairs,
                            tare=declared_tare(test, machine))  # fmt: skip
 
     for one, other in zip(reduced(virtual_record).conditions, reduced(twice).conditions, strict=True):
         assert other.FY_common == pytest.approx(2 * one.FY_common, rel=1e-12)
         assert other.u_MZ_common == pytest.approx(2 * one.u_MZ_common, rel=1e-12)
+
+
+def test_files_of_one_name_in_two_folders_stay_apart(
+    tmp_path: Path, published_record: CalibrationRecord
+) -> None:
+    toml = '[rotations]\n"back/a" = "reverse"'
+    folder = folder_with(tmp_path)
+    for name in ("ahead", "back"):
+        (folder / name).mkdir()
+        shutil.copy(FIG, folder / name / "a")
+    with (folder / "test.toml").open("a") as stream:
+        stream.write(toml)
+    reduced = reduce_folder(folder, published_record)
+    assert {(c.file, c.rotation) for c in reduced.used()} == {("ahead/a", "forward"), ("back/a", "reverse")}
+    assert len(reduced.used()) == 10

@@ -69,7 +69,7 @@ def command(
             reader="both" if reader == "both" else "calamine",
             step=step,
         )
-    digest = write_test_file(out, resolved.result, resolved.recordings) if out else None
+    digest = write_test_file(out, resolved.result, dict(resolved.recordings)) if out else None
     payload = test_payload(resolved)
     payload |= {
         "out": out,

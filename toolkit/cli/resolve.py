@@ -21,12 +21,12 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Resolved:
-    """A test's result, the record that made it, every finding, and the recordings where they were read."""
+    """A test's result, the record that made it, every finding, and the recordings (by path) where they were read."""
 
     result: TestResult
     record: CalibrationRecord
     findings: tuple[Finding, ...]
-    recordings: tuple[Recording, ...] = ()
+    recordings: tuple[tuple[str, Recording], ...] = ()
 
 
 def resolve_test(
@@ -95,7 +95,10 @@ def _from_folder(
     recordings = read_test(folder, reader=reader, step=step)
     result = process(folder, recordings, record)
     return Resolved(
-        result=result, record=record, findings=(*findings, *result.findings), recordings=recordings
+        result=result,
+        record=record,
+        findings=(*findings, *result.findings),
+        recordings=tuple((one.path.relative_to(test).as_posix(), one) for one in recordings),
     )
 
 

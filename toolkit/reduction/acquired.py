@@ -38,6 +38,7 @@ def compare(
     recording: Recording,
     record: CalibrationRecord,
     *,
+    file: str,
     indications: Mapping[str, NDArray[np.float64]],
     units: Mapping[str, str],
     tare: Mapping[str, float] | None,
@@ -67,7 +68,7 @@ def compare(
         misses = [np.abs(reading[one.symbol] - one.si) for reading in readings]
         found.append(
             Difference(
-                file=recording.name,
+                file=file,
                 channel=one.symbol,
                 largest=float(np.max(misses[0])),
                 explained=any(bool(np.all(miss <= bound)) for miss in misses),

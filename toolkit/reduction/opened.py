@@ -30,11 +30,12 @@ if TYPE_CHECKING:
 class OpenedFile:
     """One recording on its way to conditions.
 
-    ``channels`` (4, rows) SI: SA, FZ, and the corrected FY and MZ, in machine axes; ``indications`` minus
+    ``name`` is its path inside the test's folder, which tells it from every other file; ``channels`` (4, rows) SI: SA, FZ, and the corrected FY and MZ, in machine axes; ``indications`` minus
     tare, in the record's order and units; ``blocks`` its load blocks and ``windows`` the rows of each that
     are averaged; ``differences`` what the acquisition program computed otherwise.
     """
 
+    name: str
     recording: Recording
     rotation: Rotation
     indications: NDArray[np.float64]
@@ -71,6 +72,7 @@ def check_record(record: CalibrationRecord, machine: Machine) -> None:
 
 
 def open_file(
+    name: str,
     recording: Recording,
     rotation: Rotation,
     *,
@@ -116,6 +118,7 @@ def open_file(
         for block in blocks
     )
     return OpenedFile(
+        name=name,
         recording=recording,
         rotation=rotation,
         indications=np.stack(
@@ -124,7 +127,7 @@ def open_file(
         channels=np.stack([recording["SA"].si, FZ, loads["FY"], loads["MZ"]]),
         blocks=blocks,
         windows=windows,
-        differences=compare(recording, record, indications=indications, units=units, tare=offsets),
+        differences=compare(recording, record, file=name, indications=indications, units=units, tare=offsets),
         tare=tare,
     )
 

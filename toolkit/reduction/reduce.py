@@ -28,7 +28,7 @@ def reduce_test(
     info: TestInfo,
     machine: Machine,
     record: CalibrationRecord,
-    recordings: Sequence[tuple[Recording, Rotation]],
+    recordings: Sequence[tuple[str, Recording, Rotation]],
     tare: Tare | None = None,
 ) -> ReducedTest:
     """Reduce the recordings of one test.
@@ -37,7 +37,7 @@ def reduce_test(
     ----------
     info, machine : what the test and the machine say of themselves
     record : the calibration record that applies
-    recordings : each file with its direction of rotation, in the order of their names
+    recordings : each file by its path inside the test, with its direction of rotation; in that order
     tare : the declared tare; without it, a tare block in a file serves that file
 
     Raises
@@ -49,8 +49,8 @@ def reduce_test(
     """
     check_record(record, machine)
     files = [
-        open_file(recording, rotation, info=info, machine=machine, record=record, declared=tare)
-        for recording, rotation in recordings
+        open_file(name, recording, rotation, info=info, machine=machine, record=record, declared=tare)
+        for name, recording, rotation in recordings
     ]
     conditions, placed, later = _conditions(files, machine=machine, record=record)
     findings = [
@@ -84,7 +84,7 @@ def _conditions(
             conditions.append(dataclasses.replace(one, step_FZ=plan.nearest_load(one.FZ, machine.protocol)))
             placed.append(
                 plan.Placed(
-                    file=file.recording.name,
+                    file=file.name,
                     file_order=order,
                     rotation=file.rotation,
                     SA=one.SA,
@@ -106,7 +106,7 @@ def _condition(
     sign = signs(machine.axes, "SAE", file.rotation)
     SA, FZ, FY, MZ = means(file.channels[:, rows])
     return Condition(
-        file=recording.name,
+        file=file.name,
         file_sha256=recording.sha256,
         rotation=file.rotation,
         first_row=rows.start + 1,

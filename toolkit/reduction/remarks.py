@@ -31,7 +31,7 @@ def machine_findings(info: TestInfo, machine: Machine) -> list[Finding]:
 
 def tare_findings(files: Sequence[OpenedFile], record: CalibrationRecord) -> list[Finding]:
     """Name the files that have no tare."""
-    bare = [file.recording.name for file in files if file.tare.source == "none"]
+    bare = [file.name for file in files if file.tare.source == "none"]
     if not bare:
         return []
     return [
@@ -46,7 +46,7 @@ def tare_findings(files: Sequence[OpenedFile], record: CalibrationRecord) -> lis
 
 def window_findings(files: Sequence[OpenedFile]) -> list[Finding]:
     """Name the files whose blocks end too early."""
-    short = [file.recording.name for file in files if any(w.short for w in file.windows)]
+    short = [file.name for file in files if any(w.short for w in file.windows)]
     if not short:
         return []
     message = "a block ends before settling and averaging are complete; its last revolution was averaged"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -21,10 +21,11 @@ if TYPE_CHECKING:
 Rows = Iterable[Sequence[Any]]
 
 
-def write_test_file(path: Path, result: TestResult, recordings: Sequence[Recording] = ()) -> str:
+def write_test_file(path: Path, result: TestResult, recordings: Mapping[str, Recording] | None = None) -> str:
     """Write the file whole or not at all and return the content's SHA-256.
 
-    ``recordings`` fill the sheet ``raw`` (every row of every file, in the file's own units).
+    ``recordings`` (by their path inside the test) fill the sheet ``raw``: every row of every file, in the
+    file's own units.
     """
     from openpyxl import Workbook
 
@@ -41,7 +42,7 @@ def write_test_file(path: Path, result: TestResult, recordings: Sequence[Recordi
         ("characteristics", _characteristics(result)),
         ("characteristic_findings", _findings(result.characteristics.findings)),
         ("findings", _findings(result.reduced.findings)),
-        ("raw", _raw(recordings)),
+        ("raw", _raw(recordings or {})),
     ):
         _sheet(book, name, rows)
     with atomic_path(path) as temporary:
@@ -187,14 +188,14 @@ def _findings(findings: Sequence[Finding]) -> Rows:
         yield (one.level, one.rule, one.where, one.message)
 
 
-def _raw(recordings: Sequence[Recording]) -> Rows:
+def _raw(recordings: Mapping[str, Recording]) -> Rows:
     if not recordings:
         yield ("file", "row")
         return
-    columns = list(dict.fromkeys((s.symbol, s.unit) for one in recordings for s in one.series))
+    columns = list(dict.fromkeys((s.symbol, s.unit) for one in recordings.values() for s in one.series))
     yield ["file", "row", *(f"{symbol} [{unit}]" for symbol, unit in columns)]
-    for one in recordings:
+    for name, one in recordings.items():
         mine = {(s.symbol, s.unit): s.values.tolist() for s in one.series}
         lists = [mine.get(key, [None] * one.rows) for key in columns]
         for row, values in enumerate(zip(*lists, strict=True), start=1):
-            yield [one.name, row, *values]
+            yield [name, row, *values]

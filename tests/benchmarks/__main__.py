@@ -1,0 +1,49 @@
+"""`make bench`: medians and ratios, each against a named peer in the same run.
+
+Machines are shared and noisy: a peer is timed in turn with ours, pair by pair, and the ratio of a pair is
+what counts. Nothing here asserts.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+
+from tests.benchmarks import help_time, process_time, report_time
+
+BENCHES: dict[str, Callable[[Path, int], list[dict[str, object]]]] = {
+    "help": help_time.run,
+    "process": process_time.run,
+    "report": report_time.run,
+}
+
+
+def main() -> None:
+    """Run the benchmarks that are named, or all."""
+    parser = argparse.ArgumentParser(prog="make bench", description=__doc__)
+    parser.add_argument("names", nargs="*", choices=[[], *BENCHES], help="which; default: all")
+    parser.add_argument("--pairs", type=int, default=7, help="pairs of runs (default 7)")
+    parser.add_argument("--json", action="store_true")
+    given = parser.parse_args()
+    rows: list[dict[str, object]] = []
+    with tempfile.TemporaryDirectory() as folder:
+        for name in given.names or BENCHES:
+            rows += BENCHES[name](Path(folder), given.pairs)
+    if given.json:
+        json.dump({"schema": 1, "benchmarks": rows}, sys.stdout, indent=2)
+        return
+    print(f"{'what':<52}{'ours':>10}{'peer':>10}{'ratio':>8}{'aim':>8}   peer")  # noqa: T201
+    for row in rows:
+        peer = "" if row["peer_s"] is None else f"{row['peer_s']:.3f} s"
+        ratio = "" if row["ratio"] is None else f"{row['ratio']:.2f}"
+        print(  # noqa: T201
+            f"{row['what']:<52}{row['ours_s']:>8.3f} s{peer:>10}{ratio:>8}{row['aim']:>8}   {row['peer']}"
+        )
+
+
+if __name__ == "__main__":
+    main()
