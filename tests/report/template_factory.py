@@ -38,14 +38,21 @@ def run(text: str) -> str:
 
 def tbl(*rows: list[str]) -> str:
     made = "".join(
-        "<w:tr>" + "".join(f"<w:tc>{c if c.startswith('<w:p') else p(c)}</w:tc>" for c in row) + "</w:tr>" for row in rows
+        "<w:tr>" + "".join(f"<w:tc>{c if c.startswith('<w:p') else p(c)}</w:tc>" for c in row) + "</w:tr>"
+        for row in rows
     )
     grid = "<w:gridCol/>" * len(rows[0])
     return f"<w:tbl><w:tblPr/><w:tblGrid>{grid}</w:tblGrid>{made}</w:tbl>"
 
 
 def make(
-    folder: Path, body: str, *, header: str = "", footnote: str = "", hash_: bool = True, name: str = "t.docx",
+    folder: Path,
+    body: str,
+    *,
+    header: str = "",
+    footnote: str = "",
+    hash_: bool = True,
+    name: str = "t.docx",
     edit: Callable[[dict[str, bytes]], None] | None = None,
 ) -> Path:
     """Write a template; ``edit`` may change the members of the package afterwards."""
@@ -62,7 +69,9 @@ def make(
         from docx.opc.packuri import PackURI
         from docx.opc.part import Part
 
-        blob = f'<w:footnotes xmlns:w="{W}"><w:footnote w:id="2">{footnote}</w:footnote></w:footnotes>'.encode()
+        blob = (
+            f'<w:footnotes xmlns:w="{W}"><w:footnote w:id="2">{footnote}</w:footnote></w:footnotes>'.encode()
+        )
         part = Part(PackURI("/word/footnotes.xml"), FOOTNOTES[1], blob, document.part.package)
         document.part.relate_to(part, FOOTNOTES[0])
     stream = io.BytesIO()

@@ -36,7 +36,9 @@ def test_title_page_values_of_the_source_document() -> None:
 def test_every_value_and_table_is_in_the_catalogue_and_the_other_way_round() -> None:
     made, listed = content(), {one.path: one for one in catalogue()}
     assert all(known_value(path) for path in made.values)
-    assert {path for path, one in listed.items() if one.kind in ("text", "number", "date")} <= set(made.values)
+    assert {path for path, one in listed.items() if one.kind in ("text", "number", "date")} <= set(
+        made.values
+    )
     assert set(made.tables) == set(TABLES)
     for path, one in made.values.items():
         if path in listed:
@@ -48,7 +50,9 @@ def test_every_value_and_table_is_in_the_catalogue_and_the_other_way_round() -> 
 
 def test_stiffness_is_per_degree_with_student_t() -> None:
     # secant = 18 x 1112 - 1e-3 x 1112^2 N/rad; U = t(12, 95 %) x 900 with t = 2.179 (GUM table G.2)
-    row = dict(zip((c.name for c in TABLES["stiffness"][1]), content().tables["stiffness"].rows[0], strict=True))
+    row = dict(
+        zip((c.name for c in TABLES["stiffness"][1]), content().tables["stiffness"].rows[0], strict=True)
+    )
     assert row["cornering_secant"] == pytest.approx((18 * 1112 - 1e-3 * 1112**2) * math.pi / 180)
     assert row["U_cornering_secant"] == pytest.approx(2.179 * 900 * math.pi / 180, rel=1e-3)
 
@@ -141,7 +145,9 @@ def test_decimal_comma_swaps_both_marks() -> None:
 
 def test_style_file(tmp_path) -> None:
     path = tmp_path / "org.toml"
-    path.write_text('decimal_comma = true\ndates = "%d.%m.%Y"\nrequired = ["tk:report.id"]\n[decimals]\nN = 0\n')
+    path.write_text(
+        'decimal_comma = true\ndates = "%d.%m.%Y"\nrequired = ["tk:report.id"]\n[decimals]\nN = 0\n'
+    )
     style = read_style(path)
     assert style.date("2019-06-04") == "04.06.2019"
     assert style.required == ("tk:calibration.hash", "tk:report.id")

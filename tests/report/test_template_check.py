@@ -29,7 +29,9 @@ def test_the_default_template_is_clean_and_is_what_its_builder_makes() -> None:
 
 FIELD = (
     '<w:r><w:fldChar w:fldCharType="begin"/></w:r><w:r><w:instrText>{}</w:instrText></w:r>'
-    '<w:r><w:fldChar w:fldCharType="separate"/></w:r>' + run("x") + '<w:r><w:fldChar w:fldCharType="end"/></w:r>'
+    '<w:r><w:fldChar w:fldCharType="separate"/></w:r>'
+    + run("x")
+    + '<w:r><w:fldChar w:fldCharType="end"/></w:r>'
 )
 
 
@@ -90,7 +92,9 @@ def add_rel(kind: str, target: str, mode: str = EXTERNAL, rels: str = "word/_rel
     def edit(members: dict[str, bytes]) -> None:
         blank = b'<Relationships xmlns="http://schemas.openxmlformats.org/package/2006/relationships"></Relationships>'
         old = members.get(rels, blank)
-        members[rels] = old.replace(b"</Relationships>", REL.format(kind, target, mode).encode() + b"</Relationships>")
+        members[rels] = old.replace(
+            b"</Relationships>", REL.format(kind, target, mode).encode() + b"</Relationships>"
+        )
 
     return edit
 
@@ -148,7 +152,13 @@ def test_unsafe_files_are_refused(tmp_path: Path, edit, rule: str) -> None:
 
 @pytest.mark.parametrize(
     "code",
-    ['INCLUDETEXT "/etc/passwd"', " includepicture http://x ", "DDEAUTO cmd", 'LINK Excel.Sheet "x"', "DDE a b"],
+    [
+        'INCLUDETEXT "/etc/passwd"',
+        " includepicture http://x ",
+        "DDEAUTO cmd",
+        'LINK Excel.Sheet "x"',
+        "DDE a b",
+    ],
 )
 def test_fields_that_read_other_files_are_refused(tmp_path: Path, code: str) -> None:
     half = len(code) // 2
@@ -167,8 +177,14 @@ def test_elements_that_import_are_refused(tmp_path: Path, tag: str) -> None:
 
 
 def test_hyperlinks_are_allowed_and_a_file_template_is_dropped(tmp_path: Path) -> None:
-    assert read_template(make(tmp_path, p("x"), edit=add_rel("hyperlink", "http://example.org"))).dropped == ()
-    path = make(tmp_path, p("x"), edit=add_rel("attachedTemplate", "file:///C:/x.dotx", rels="word/_rels/settings.xml.rels"))
+    assert (
+        read_template(make(tmp_path, p("x"), edit=add_rel("hyperlink", "http://example.org"))).dropped == ()
+    )
+    path = make(
+        tmp_path,
+        p("x"),
+        edit=add_rel("attachedTemplate", "file:///C:/x.dotx", rels="word/_rels/settings.xml.rels"),
+    )
     template = read_template(path)
     assert template.dropped == ("file:///C:/x.dotx",)
     assert b"x.dotx" not in template.data
@@ -191,7 +207,9 @@ WHOLE = build_default()
 
 @settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.integers(0, len(WHOLE) - 1), st.binary(min_size=1, max_size=40), st.booleans())
-def test_mutated_files_give_findings_or_a_clear_error(tmp_path: Path, at: int, junk: bytes, cut: bool) -> None:
+def test_mutated_files_give_findings_or_a_clear_error(
+    tmp_path: Path, at: int, junk: bytes, cut: bool
+) -> None:
     path = tmp_path / "t.docx"
     path.write_bytes(WHOLE[:at] if cut else WHOLE[:at] + junk + WHOLE[at + len(junk) :])
     try:

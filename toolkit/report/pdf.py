@@ -85,7 +85,7 @@ class Office:
         """
         if self._warm is not None:
             try:
-                self._warm.wait(timeout=self.timeout_s)
+                self._warm.communicate(timeout=self.timeout_s)
             except subprocess.TimeoutExpired:
                 _kill(self._warm)
             self._warm = None

@@ -1,0 +1,180 @@
+"""Real conversions by LibreOffice: few, because each takes seconds."""
+
+from __future__ import annotations
+
+import datetime as dt
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+from report_factory import make_record, make_result
+from template_factory import opened, p, run, sdt, tbl
+
+from toolkit.errors import RenderError, TemplateError
+from toolkit.report import verify
+from toolkit.report.build import build_content
+from toolkit.report.deliver import deliver
+from toolkit.report.drawer import Drawer
+from toolkit.report.fill import Entry, Filled
+from toolkit.report.package import read_template
+from toolkit.report.pdf import Office
+from toolkit.report.style import read_style
+
+CHECKOUT = Path(__file__).resolve().parents[2]
+DAY = dt.date(2026, 11, 21)
+office_needed = pytest.mark.skipif(
+    not (shutil.which("soffice") and shutil.which("pdftotext")),
+    reason="LibreOffice or poppler is not installed",
+)
+
+
+def content(**changes: object):
+    return build_content(make_result(**changes), make_record(), issued=DAY)
+
+
+def pdf_text(pdf: Path) -> str:
+    done = subprocess.run(["pdftotext", "-layout", str(pdf), "-"], capture_output=True, check=True, text=True)
+    return done.stdout
+
+
+@office_needed
+def test_the_default_template_becomes_a_verified_report(tmp_path: Path) -> None:
+    path = CHECKOUT / "report_templates" / "org.docx"
+    style = read_style(path.with_suffix(".toml"))
+    made = build_content(make_result(simulated=True), make_record(), style=style, issued=DAY)
+    with Drawer() as drawer:
+        done = deliver(read_template(path), made, tmp_path / "out", drawer=drawer)
+    assert sorted(one.name for one in (tmp_path / "out").iterdir()) == ["report.docx", "report.pdf"]
+    assert [one.name for one in tmp_path.iterdir()] == ["out"]
+    assert all(check.ok for check in done.checks)
+    assert done.warnings == ()
+    assert len(done.filled.figures) == 11
+    page = pdf_text(done.pdf)
+    # The title page of the source document's Figure 5.3, the record's hash, and the mark on every page.
+    for words in ("M-15 Tire Test", "265/35 ZR 18", "34 psi, 2.34 bar", "c0ffee" + "0" * 58):
+        assert words in page
+    assert page.count("SIMULATED DATA") >= done.pages
+    assert f"page 1 of {done.pages}" in page
+    assert b"/Lang" in done.pdf.read_bytes()
+
+
+@office_needed
+def test_hostile_metadata_reaches_the_pdf(tmp_path: Path) -> None:
+    made = content(
+        special="a < b & c = {{tk:test.date}}", operator="سمير اختبار", requestor="smile 😀",
+        tire_series="x" * 70, tire_company="=1+1",
+    )  # fmt: skip
+    body = p("{{tk:test.special}} ", sdt("tk:test.operator", run("x"))) + p("{{tk:test.requestor}}")
+    narrow = '<w:tc><w:tcPr><w:tcW w:w="900" w:type="dxa"/></w:tcPr>{}</w:tc>'
+    table = (
+        '<w:tbl><w:tblPr><w:tblW w:w="1800" w:type="dxa"/><w:tblLayout w:type="fixed"/></w:tblPr>'
+        '<w:tblGrid><w:gridCol w:w="900"/><w:gridCol w:w="900"/></w:tblGrid><w:tr>'
+        + narrow.format(p("{{tk:tire.series}}")) + narrow.format(p("{{tk:tire.company}} {{tk:calibration.hash}}")) + "</w:tr></w:tbl>"
+    )  # fmt: skip
+    results = p("{{tk:table.results}}") + tbl(["SA", "FY"], ["{{tk:row.SA}}", "{{tk:row.FY|.3f}}"])
+    done = deliver(opened(tmp_path, body + table + results), made, tmp_path / "out")
+    assert "a < b & c = {{tk:test.date}}" in pdf_text(done.pdf)
+    assert all(check.ok or check.warning for check in done.checks)
+
+
+def filled(*entries: tuple[str, str], cells: tuple[tuple[str, ...], ...] = ()) -> Filled:
+    manifest = tuple(Entry(tag=tag, text=text, part="word/document.xml") for tag, text in entries)
+    return Filled(docx=b"", manifest=manifest, figures=(), cells=cells, missing=(), lint=(), marks_added=())
+
+
+def names(checks: list[verify.Check]) -> set[str]:
+    return {one.name for one in checks if not one.ok}
+
+
+def test_values_are_compared_without_white_space_and_soft_hyphens() -> None:
+    page = "Cornering stiff\u00adness\n12\u00a0345.6 N 0.2\n5\f"
+    assert names(verify._texts(page, filled(("a", "stiffness 12345.6"), ("b", "0.25")))) == set()
+    assert names(verify._texts(page, filled(("a", "12345.7")))) == {"values"}
+
+
+def test_cells_are_compared_in_their_order() -> None:
+    rows = (("-0.30", "371.4"), ("0.70", "-12.0"))
+    assert names(verify._texts("SA FY -0.30 371.4 0.70 -12.0", filled(cells=rows))) == set()
+    assert names(verify._texts("SA FY -0.30 371.4 0.70 -12.1", filled(cells=rows))) == {"cells"}
+
+
+def test_a_script_that_cannot_be_read_back_is_a_warning_and_a_number_beside_it_is_not() -> None:
+    checks = verify._texts("smile 5.0", filled(("a", "smile 😀"), ("b", "5.0")))
+    assert [(one.name, one.warning) for one in checks if not one.ok] == [("script", True)]
+    assert "values" in names(verify._texts("smile", filled(("b", "5.0"))))
+
+
+@pytest.mark.parametrize(("start", "pages"), [(1, 1), (7, 2), (14, 5)])
+def test_page_ranges_cover_every_page_once(start: int, pages: int) -> None:
+    covered = [n for first, last in verify._ranges(start, pages) for n in range(first, last + 1)]
+    assert covered == list(range(1, start + 1))
+
+
+def test_loose_fonts_are_found() -> None:
+    listing = (
+        "name                                 type              encoding         emb sub uni object ID\n"
+        "------------------------------------ ----------------- ---------------- --- --- --- ---------\n"
+        "BAAAAA+Carlito                       TrueType          WinAnsi          yes yes yes     10  0\n"
+        "Helvetica                            Type 1            WinAnsi          no  no  no      12  0\n"
+    )
+    assert verify._fonts(listing).message == "Helvetica"
+
+
+def fake(folder: Path, script: str) -> Path:
+    path = folder / "soffice"
+    path.write_text(f"#!/bin/sh\n{script}\n")
+    path.chmod(0o755)
+    return path
+
+
+@pytest.mark.parametrize(
+    ("script", "rule"),
+    [
+        ("exit 0", "render-failed"),
+        ('case "$*" in *terminate*) exit 0;; esac; exec sleep 30', "render-timeout"),
+        ('case "$*" in *terminate*) exit 0;; esac; for a in "$@"; do last=$a; done; '
+         'echo "no pdf" > "${last%.docx}.pdf"', "render-failed"),
+    ],
+)  # fmt: skip
+def test_a_failed_conversion_leaves_nothing(tmp_path: Path, monkeypatch, script: str, rule: str) -> None:
+    monkeypatch.setenv("TOOLKIT_SOFFICE", str(fake(tmp_path, script)))
+    template = opened(tmp_path, p("x"))
+    before = sorted(tmp_path.iterdir())
+    out = tmp_path / "a" / "b"
+    office = Office(timeout_s=0.5)
+    with pytest.raises(RenderError) as caught:
+        deliver(template, content(), out, office=office)
+    assert caught.value.rule == rule
+    assert "doctor" in str(caught.value.next_step)
+    assert sorted(tmp_path.iterdir()) == before
+    assert not office.folder.exists()
+
+
+def test_keep_puts_what_was_made_into_rejected(tmp_path: Path, monkeypatch) -> None:
+    monkeypatch.setenv("TOOLKIT_SOFFICE", str(fake(tmp_path, "exit 0")))
+    out = tmp_path / "out"
+    with pytest.raises(RenderError):
+        deliver(opened(tmp_path, p("x")), content(), out, keep=True)
+    assert [one.name for one in out.iterdir()] == ["rejected"]
+    assert sorted(one.name for one in (out / "rejected").iterdir()) == ["reason.txt", "report.docx"]
+
+
+def test_no_soffice(monkeypatch) -> None:
+    monkeypatch.delenv("TOOLKIT_SOFFICE", raising=False)
+    monkeypatch.setenv("PATH", "/nonexistent")
+    with pytest.raises(RenderError) as caught:
+        Office()
+    assert caught.value.rule == "no-soffice"
+    assert "toolkit doctor" in str(caught.value.next_step)
+
+
+def test_a_missing_value_leaves_the_old_report_alone(tmp_path: Path, monkeypatch) -> None:
+    monkeypatch.setenv("TOOLKIT_SOFFICE", str(fake(tmp_path, "exit 0")))
+    out = tmp_path / "out"
+    out.mkdir()
+    (out / "report.pdf").write_bytes(b"old")
+    with pytest.raises(TemplateError):
+        deliver(opened(tmp_path, p("{{tk:test.operator}}")), content(operator=None), out)
+    assert [one.name for one in out.iterdir()] == ["report.pdf"]
+    assert (out / "report.pdf").read_bytes() == b"old"
