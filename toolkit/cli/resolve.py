@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Resolved:
-    """A test's result, the record that made it, every finding, and the recordings (by path) where they were read."""
+    """A test's result, the record that made it, every finding; the recordings by path if they were read."""
 
     result: TestResult
     record: CalibrationRecord
@@ -69,7 +69,6 @@ def _from_folder(
     reader: Literal["calamine", "both"],
     step: Callable[[str], None],
 ) -> Resolved:
-    from toolkit.findings import Finding
     from toolkit.machine import load_machine
     from toolkit.pipeline import process, read_test
     from toolkit.recording.folder import read_test_folder
@@ -144,8 +143,8 @@ def _from_file(test: Path, registry: Registry, *, calibration: str | None) -> Re
             "a single recording is not a test",
             where=test,
             got="a file",
-            expected="a folder with test.toml and the recordings, or a reduced test made by 'toolkit process'",
-            next_step="put the recording into a folder with a test.toml; 'toolkit inspect' reads single files",
+            expected="a folder with test.toml and recordings, or a reduced test of 'toolkit process'",
+            next_step="put it into a folder with a test.toml; 'toolkit inspect' reads single files",
             rule="not-a-test",
         )
     result = read_test_file(test)

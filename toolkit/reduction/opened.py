@@ -30,9 +30,10 @@ if TYPE_CHECKING:
 class OpenedFile:
     """One recording on its way to conditions.
 
-    ``name`` is its path inside the test's folder, which tells it from every other file; ``channels`` (4, rows) SI: SA, FZ, and the corrected FY and MZ, in machine axes; ``indications`` minus
-    tare, in the record's order and units; ``blocks`` its load blocks and ``windows`` the rows of each that
-    are averaged; ``differences`` what the acquisition program computed otherwise.
+    ``name`` is its path inside the test's folder, which tells it from every other file; ``channels``
+    (4, rows) SI: SA, FZ, and the corrected FY and MZ, in machine axes; ``indications`` minus tare, in the
+    record's order and units; ``blocks`` its load blocks and ``windows`` the rows of each that are
+    averaged; ``differences`` what the acquisition program computed otherwise.
     """
 
     name: str
