@@ -268,8 +268,8 @@ def withdraw(
     registry = _registry(calibrations, home)
     known = _day(on, "--on") or dt.date.max
     status = decide(registry, record_id, on=known, void_from=_day(void_from, "--from"), reason=reason, by=by)
-    void = status.void_from.isoformat() if status.void_from and not status.void_always else None
-    text = f"{record_id}  withdrawn, void " + (f"from {void}" if void else "on every day")
+    void = _void(status)
+    text = f"{record_id}  withdrawn, void " + ("on every day" if status.void_always else f"from {void}")
     payload = {"id": record_id, "status": status.state, "void_from": void, "void_always": status.void_always}
     payload["head"] = registry.head(_instrument_of(record_id))
     answer(payload, text, as_json=as_json, quiet=quiet)
@@ -298,6 +298,13 @@ def _day(text: str | None, option: str) -> dt.date | None:
         ) from error  # fmt: skip
 
 
+def _void(status: RecordStatus) -> str | None:
+    # A record that was never in force is void from the beginning of time: no date to print.
+    if status.void_from is None or status.void_from == dt.date.min:
+        return None
+    return status.void_from.isoformat()
+
+
 def _digits(value: float | None) -> str:
     return "-" if value is None else f"{value:.10g}"
 
@@ -315,7 +322,7 @@ def _row(record: CalibrationRecord, status: RecordStatus) -> dict[str, Any]:
         "verified": record.verified,
         "date": record.date,
         "in_force_from": status.in_force_from and status.in_force_from.isoformat(),
-        "void_from": status.void_from.isoformat() if status.void_from and not status.void_always else None,
+        "void_from": _void(status),
         "void_always": status.void_always,
         "entered_by": status.entered_by,
         "checked_by": status.checked_by,

@@ -1,0 +1,50 @@
+"""Sessions of known truth: three cells to FY, MZ and MX."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+# Rows: D51, D52, E5 in mV/V per 100 units of FY, MZ, MX. A plausible hub, not a measured one.
+SENSITIVITY = np.array([[0.20, 0.30, 0.10], [0.25, -0.30, 0.15], [0.10, 0.05, -0.30]]) / 100
+ZERO = np.array([0.012, -0.008, 0.02])
+CELLS = ("D51", "D52", "E5")
+LOADS = ("FY", "MZ", "MX")
+UNITS = {"FY": "lbf", "MZ": "lbf*ft", "MX": "lbf*ft"}
+
+
+def csv_text(names: list[str], values: NDArray[np.float64], *, runs: bool, digits: int = 7) -> str:
+    header = names + (["run", "direction"] if runs else [])
+    lines = [",".join(header)]
+    for number, row in enumerate(values.tolist()):
+        cells = [repr(round(value, digits)) for value in row]
+        if runs:
+            cells += [str(number // 20 + 1), "up" if number % 20 < 10 else "down"]
+        lines.append(",".join(cells))
+    return "\n".join(lines) + "\n"
+
+
+def hub_data(rows: int, seed: int, noise: float = 2e-5) -> NDArray[np.float64]:
+    rng = np.random.default_rng(seed)
+    loads = rng.uniform(-1, 1, (rows, 3)) * [500.0, 100.0, 150.0]
+    cells = (
+        loads @ SENSITIVITY.T + ZERO + rng.normal(0, noise, (rows, 3))
+        if noise
+        else loads @ SENSITIVITY.T + ZERO
+    )
+    return np.column_stack([cells, loads])
+
+
+def session_text(**changes: str) -> str:
+    entries = {
+        "schema": "1",
+        "instrument": '"hub"',
+        "date": "2026-01-05",
+        "operator": '"operator one"',
+        "temperature": '{ value = 20.0, unit = "degC" }',
+        "indications": '["D51", "D52", "E5"]',
+        "loads": '["FY", "MZ", "MX"]',
+        "data": '"loads.csv"',
+        "check": '"check.csv"',
+    } | changes
+    return "\n".join(f"{key} = {value}" for key, value in entries.items() if value != "-") + "\n"

@@ -1,0 +1,154 @@
+"""Which record applies to a test's day, as known on another day; approval and withdrawal."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from datetime import date
+from pathlib import Path
+
+import pytest
+from calibration_factory import hub_data
+
+from toolkit.calibration.approval import approve, withdraw
+from toolkit.calibration.candidate import calibrate
+from toolkit.calibration.registry import Registry
+from toolkit.errors import RecordError, RegistryError
+
+PROJECT = Registry(Path(__file__).resolve().parents[2] / "calibrations")
+
+
+@pytest.fixture
+def two(registry: Registry, make_session: Callable[..., Path]) -> Registry:
+    """hub-r1 in force from 2026-02-01, hub-r2 from 2026-04-01, each decided on its day."""
+    calibrate(make_session(hub_data(60, 3), name="later"), registry)
+    for record_id, day in (("hub-r1", date(2026, 2, 1)), ("hub-r2", date(2026, 4, 1))):
+        done = approve(registry, record_id, in_force_from=day, checked_by="B", known_on=day)
+        assert done.done, done.failed
+    return registry
+
+
+def test_the_newest_record_not_after_the_day(two: Registry) -> None:
+    assert two.in_force("hub", on=date(2026, 2, 1)).id == "hub-r1"
+    assert two.in_force("hub", on=date(2026, 3, 31)).id == "hub-r1"
+    assert two.in_force("hub", on=date(2026, 4, 1)).id == "hub-r2"
+
+
+def test_before_every_record_is_an_error_that_lists_the_candidates(two: Registry) -> None:
+    with pytest.raises(RegistryError) as caught:
+        two.in_force("hub", on=date(2026, 1, 31))
+    assert "hub-r1 (in force from 2026-02-01)" in str(caught.value)
+    with pytest.raises(RegistryError):
+        two.in_force("nothing", on=date(2026, 1, 31))
+
+
+def test_a_withdrawal_counts_from_the_day_it_became_known(two: Registry) -> None:
+    withdraw(two, "hub-r2", on=date(2026, 6, 1), void_from=date(2026, 5, 1), reason="cell overloaded")
+    day = date(2026, 5, 10)
+    assert two.in_force("hub", on=day, known_at=date(2026, 5, 31)).id == "hub-r2"
+    assert two.in_force("hub", on=day, known_at=date(2026, 6, 1)).id == "hub-r1"
+    assert two.in_force("hub", on=date(2026, 4, 30), known_at=date(2026, 6, 1)).id == "hub-r2"
+    status = two.status("hub-r2", known_at=date(2026, 6, 1))
+    assert (status.state, status.void_from, status.void_always) == ("withdrawn", date(2026, 5, 1), False)
+    assert two.status("hub-r2", known_at=date(2026, 5, 31)).state == "approved"
+
+
+def test_without_a_first_void_day_a_record_is_void_on_every_day(two: Registry) -> None:
+    withdraw(two, "hub-r1", on=date(2026, 6, 1), reason="wrong sign")
+    assert two.status("hub-r1").void_always
+    with pytest.raises(RegistryError):
+        two.in_force("hub", on=date(2026, 3, 1), known_at=date(2026, 6, 1))
+    assert two.in_force("hub", on=date(2026, 3, 1), known_at=date(2026, 5, 1)).id == "hub-r1"
+
+
+def test_a_repair_in_the_past_is_known_from_its_own_day(
+    two: Registry, make_session: Callable[..., Path]
+) -> None:
+    calibrate(make_session(hub_data(60, 5), name="repair"), two)
+    with pytest.raises(RegistryError) as caught:
+        approve(two, "hub-r3", in_force_from=date(2025, 1, 1), checked_by="B")
+    assert "reason" in str(caught.value)
+    approve(
+        two, "hub-r3", in_force_from=date(2026, 1, 1), checked_by="B", reason="repairs the tests since",
+        known_on=date(2026, 7, 1),
+    )  # fmt: skip
+    withdraw(two, "hub-r1", on=date(2026, 7, 1), reason="wrong sign")
+    assert two.in_force("hub", on=date(2026, 3, 1), known_at=date(2026, 7, 1)).id == "hub-r3"
+    assert two.in_force("hub", on=date(2026, 3, 1), known_at=date(2026, 6, 30)).id == "hub-r1"
+
+
+def test_names_must_differ_and_a_decision_is_made_once(registry: Registry) -> None:
+    day = date(2026, 2, 1)
+    for checked, approved in (("Operator  ONE", None), ("B", "b"), ("B", "operator one"), ("", None)):
+        with pytest.raises(RegistryError) as caught:
+            approve(registry, "hub-r1", in_force_from=day, checked_by=checked, approved_by=approved)
+        assert caught.value.rule == "names"
+    approve(registry, "hub-r1", in_force_from=day, checked_by="B", approved_by="C")
+    with pytest.raises(RegistryError):
+        approve(registry, "hub-r1", in_force_from=day, checked_by="B")
+    withdraw(registry, "hub-r1", on=day, reason="x")
+    for again in (
+        lambda: withdraw(registry, "hub-r1", on=day, reason="x"),
+        lambda: approve(registry, "hub-r1", in_force_from=day, checked_by="B", reason="y"),
+        lambda: withdraw(registry, "hub-r9", on=day, reason="x"),
+        lambda: withdraw(registry, "other-r1", on=day, reason="x"),
+    ):
+        with pytest.raises(RegistryError):
+            again()
+    with pytest.raises(RecordError):
+        registry.load("hub-r9")
+
+
+def test_a_flipped_sign_blocks_and_changes_nothing(
+    registry: Registry, make_session: Callable[..., Path]
+) -> None:
+    approve(registry, "hub-r1", in_force_from=date(2026, 2, 1), checked_by="B")
+    flipped, check = hub_data(60, 4), hub_data(9, 6)
+    flipped[:, 2] *= -1
+    check[:, 2] *= -1
+    made = calibrate(make_session(flipped, check=check, name="flipped"), registry)
+    assert {f.rule for f in made.findings} == {"sign"}
+    head = registry.head("hub")
+    decision = approve(registry, "hub-r2", in_force_from=date(2026, 3, 1), checked_by="B")
+    assert not decision.done
+    assert {(one.rule, one.where) for one in decision.failed} == {
+        ("sign", "FY, E5"), ("sign", "MZ, E5"), ("sign", "MX, E5"),
+    }  # fmt: skip
+    assert registry.head("hub") == head
+
+
+def test_span_and_check_loads_block_too_and_another_serial_starts_anew(
+    registry: Registry, make_session: Callable[..., Path]
+) -> None:
+    approve(registry, "hub-r1", in_force_from=date(2026, 2, 1), checked_by="B")
+    scaled, check = hub_data(60, 4), hub_data(9, 6)
+    scaled[:, 0] *= 1.05
+    made = calibrate(make_session(scaled, check=check, name="span"), registry)
+    assert {f.rule for f in made.findings} == {"span", "check-load"}
+    decision = approve(registry, made.record.id, in_force_from=date(2026, 3, 1), checked_by="B")
+    assert {one.rule for one in decision.failed} == {"span", "check-load"}
+    check[:, 0] *= 1.05
+    other = make_session(scaled, check=check, name="serial", tail='[cells.D51]\nserial = "new"\n')
+    assert {f.rule for f in calibrate(other, registry).findings} == {"serial"}
+
+
+def test_terms_that_the_check_loads_cannot_verify_are_listed_and_do_not_block(
+    registry: Registry, make_session: Callable[..., Path]
+) -> None:
+    # Three check loads for four terms: nothing has full rank.
+    made = calibrate(make_session(check=hub_data(3, 8), name="few"), registry)
+    decision = approve(registry, made.record.id, in_force_from=date(2026, 2, 1), checked_by="B")
+    assert decision.done
+    assert "FY: D51" in decision.unverifiable
+    assert registry.status(made.record.id).unverifiable == decision.unverifiable
+    full = approve(registry, "hub-r1", in_force_from=date(2026, 1, 6), checked_by="B")
+    assert full.done
+    assert full.unverifiable == ()
+
+
+def test_the_projects_records_of_the_source_document() -> None:
+    # Thesis, section 4.1: E5 positive is right; the old calibration took it as negative.
+    assert PROJECT.status("m15-r1").void_always
+    record = PROJECT.in_force("m15", on=date(2019, 6, 4))
+    assert (record.id, record.verified) == ("m15-r2", False)
+    assert record.load("FY").coefficients == (0.99719, 0.99718, 1.0228, 0.6473)
+    assert record.load("MZ").coefficients == (-0.15688, 0.16197, 0.0026666, 0.68759)
