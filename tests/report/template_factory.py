@@ -1,3 +1,4 @@
+# ruff: noqa: E501  lines of WordprocessingML read best whole
 """Small Word templates for the report's tests, built part by part."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# ruff: noqa: E501  lines of WordprocessingML read best whole
 """Real conversions by LibreOffice: few, because each takes seconds."""
 
 from __future__ import annotations
