@@ -21,7 +21,7 @@ def make_session(tmp_path: Path) -> Callable[..., Path]:
     def make(
         values: NDArray[np.float64] | None = None,
         *,
-        check: NDArray[np.float64] | None = None,
+        check_rows: NDArray[np.float64] | None = None,
         tail: str = "",
         name: str = "session",
         digits: int = 7,
@@ -31,7 +31,7 @@ def make_session(tmp_path: Path) -> Callable[..., Path]:
         folder.mkdir(exist_ok=True)
         names = [f"{c} [mV/V]" for c in CELLS] + [f"{n} [{UNITS[n]}]" for n in LOADS]
         values = hub_data(60, 1) if values is None else values
-        check = hub_data(9, 2) if check is None else check
+        check = hub_data(9, 2) if check_rows is None else check_rows
         (folder / "loads.csv").write_text(csv_text(names, values, runs=True, digits=digits))
         (folder / "check.csv").write_text(csv_text(names, check, runs=False, digits=digits))
         path = folder / "SESSION.toml"

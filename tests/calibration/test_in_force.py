@@ -105,7 +105,7 @@ def test_a_flipped_sign_blocks_and_changes_nothing(
     flipped, check = hub_data(60, 4), hub_data(9, 6)
     flipped[:, 2] *= -1
     check[:, 2] *= -1
-    made = calibrate(make_session(flipped, check=check, name="flipped"), registry)
+    made = calibrate(make_session(flipped, check_rows=check, name="flipped"), registry)
     assert {f.rule for f in made.findings} == {"sign"}
     head = registry.head("hub")
     decision = approve(registry, "hub-r2", in_force_from=date(2026, 3, 1), checked_by="B")
@@ -122,12 +122,12 @@ def test_span_and_check_loads_block_too_and_another_serial_starts_anew(
     approve(registry, "hub-r1", in_force_from=date(2026, 2, 1), checked_by="B")
     scaled, check = hub_data(60, 4), hub_data(9, 6)
     scaled[:, 0] *= 1.05
-    made = calibrate(make_session(scaled, check=check, name="span"), registry)
+    made = calibrate(make_session(scaled, check_rows=check, name="span"), registry)
     assert {f.rule for f in made.findings} == {"span", "check-load"}
     decision = approve(registry, made.record.id, in_force_from=date(2026, 3, 1), checked_by="B")
     assert {one.rule for one in decision.failed} == {"span", "check-load"}
     check[:, 0] *= 1.05
-    other = make_session(scaled, check=check, name="serial", tail='[cells.D51]\nserial = "new"\n')
+    other = make_session(scaled, check_rows=check, name="serial", tail='[cells.D51]\nserial = "new"\n')
     assert {f.rule for f in calibrate(other, registry).findings} == {"serial"}
 
 
@@ -135,7 +135,7 @@ def test_terms_that_the_check_loads_cannot_verify_are_listed_and_do_not_block(
     registry: Registry, make_session: Callable[..., Path]
 ) -> None:
     # Three check loads for four terms: nothing has full rank.
-    made = calibrate(make_session(check=hub_data(3, 8), name="few"), registry)
+    made = calibrate(make_session(check_rows=hub_data(3, 8), name="few"), registry)
     decision = approve(registry, made.record.id, in_force_from=date(2026, 2, 1), checked_by="B")
     assert decision.done
     assert "FY: D51" in decision.unverifiable
