@@ -10,6 +10,7 @@ import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import date
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -48,9 +49,12 @@ class Entry:
     unverifiable: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True)
 class Ledger:
-    """What was read. ``damage`` says what is wrong, None where the chain and the head hold."""
+    """What was read. ``damage`` says what is wrong, None where the chain and the head hold.
+
+    Without slots: the two look-ups by id are made once and kept.
+    """
 
     entries: tuple[Entry, ...]
     damage: str | None
@@ -62,10 +66,21 @@ class Ledger:
 
     def of(self, record_id: str) -> tuple[Entry, ...]:
         """Return the events of one record, oldest first."""
-        return tuple(entry for entry in self.entries if entry.id == record_id)
+        return self._events.get(record_id, ())
 
-    def entered(self) -> dict[str, Entry]:
+    def entered(self) -> Mapping[str, Entry]:
         """Return each record's entry by id."""
+        return self._entered
+
+    @cached_property
+    def _events(self) -> dict[str, tuple[Entry, ...]]:
+        found: dict[str, tuple[Entry, ...]] = {}
+        for entry in self.entries:
+            found[entry.id] = (*found.get(entry.id, ()), entry)
+        return found
+
+    @cached_property
+    def _entered(self) -> dict[str, Entry]:
         return {entry.id: entry for entry in self.entries if entry.event == "entered"}
 
 

@@ -134,7 +134,9 @@ def _check_load(
     stored = np.asarray(one.covariance)
     spread = np.sqrt(np.outer(np.diag(covariance), np.diag(covariance)))
     # The covariance scales with sd^2, which noise-free data do not determine: hence the floor.
-    slack = _SPREAD + 2 * sd_floor / max(sd, 1e-300) if weights is None else _SPREAD
+    # Its rounding grows with the square of the terms' condition number.
+    slack = _SPREAD + 10 * np.finfo(float).eps * refit.condition**2
+    slack += 2 * sd_floor / max(sd, 1e-300) if weights is None else 0.0
     _demand(
         record, where, "covariance",
         stored.shape == covariance.shape and bool(np.all(np.abs(stored - covariance) <= slack * spread)),
@@ -167,6 +169,7 @@ class _Refit:
     scale: NDArray[np.float64]
     solution: NDArray[np.float64]
     constant_column: float
+    condition: float
 
     def predict(self, terms: NDArray[np.float64]) -> NDArray[np.float64]:
         k = len(self.scale)
@@ -211,6 +214,7 @@ def _svd_fit(
         scale=scale,
         solution=solution,
         constant_column=n**-0.5,
+        condition=float(values[0] / values[-1]),
     )
 
 

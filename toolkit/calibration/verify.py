@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from toolkit.calibration.ledger import HEAD, LEDGER, Ledger
-from toolkit.calibration.record import CalibrationRecord, from_bytes
+from toolkit.calibration.record import from_bytes
 from toolkit.calibration.registry import ID, VerifyRow, load_checked
 from toolkit.errors import ToolkitError
 
@@ -56,18 +56,12 @@ def _instrument(folder: Path, ledger: Ledger) -> list[VerifyRow]:
     for record_id in sorted(records, key=lambda one: (len(one), one)):
         path = folder / f"{record_id}.json"
         owned.add(path.name)
-        record: CalibrationRecord | None = None
-        try:
-            record = from_bytes(path.read_bytes(), where=path)
-        except (ToolkitError, OSError):
-            # What belongs to a record that cannot be read is told by the record's own row.
-            owned |= {one.name for one in folder.glob(f"{record_id}.*")}
-        if record is not None:
-            owned |= {one.file for one in record.data}
         try:
             checked = load_checked(folder, record_id, ledger)
+            owned |= {one.file for one in checked.data}
             rows.append(VerifyRow(id=record_id, ok=True, verified=checked.verified, reason=None))
         except ToolkitError as error:
+            owned |= _owned_by_bad(folder, record_id)
             reason = f"{error.rule or 'unreadable'}: {error.what}"
             reason += f" (got {error.got}, expected {error.expected})" if error.got else ""
             rows.append(VerifyRow(id=record_id, ok=False, verified=False, reason=reason))
@@ -78,6 +72,15 @@ def _instrument(folder: Path, ledger: Ledger) -> list[VerifyRow]:
         if (path.is_file() or path.is_symlink()) and name not in owned:
             rows.append(_stray(name))
     return rows
+
+
+def _owned_by_bad(folder: Path, record_id: str) -> set[str]:
+    path = folder / f"{record_id}.json"
+    try:
+        return {one.file for one in from_bytes(path.read_bytes(), where=path).data}
+    except (ToolkitError, OSError):
+        # What belongs to a record that cannot be read is told by the record's own row.
+        return {one.name for one in folder.glob(f"{record_id}.*")}
 
 
 def _stray(name: str) -> VerifyRow:
