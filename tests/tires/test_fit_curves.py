@@ -248,7 +248,7 @@ def test_pooled_error_on_a_real_tire_binned_by_a_quarter_degree():
     SA, FY, FZ = (np.array([float(row[key]) for row in rows]) for key in ("SA_deg", "FY_N", "FZ_N"))
     curves = []
     for block in load_blocks(-FZ):
-        place = np.rint(SA[block] / 0.25).astype(int)
+        place = np.floor(SA[block] / 0.25).astype(int)
         place -= place.min()
         count = np.bincount(place)
         mean = [np.bincount(place, one[block])[count > 0] / count[count > 0] for one in (SA, FY)]
@@ -260,4 +260,4 @@ def test_pooled_error_on_a_real_tire_binned_by_a_quarter_degree():
         (fit.error_percent / 100) ** 2 * np.sum(one.y**2) for fit, one in zip(fits, curves, strict=True)
     )
     pooled = 100 * np.sqrt(top / sum(np.sum(one.y**2) for one in curves))
-    assert pooled < 1.06
+    assert pooled < 1.05

@@ -9,13 +9,18 @@ import numpy as np
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-_SEPARATE = 0.04  # of the load above it: a smaller gap never parts two blocks
+# Gaps are taken relative to the load above them: the spread within a block grows with the load.
+_SEPARATE = 0.04  # a smaller gap never parts two blocks
 _CONTRAST = 2.5  # between the smallest gap that parts blocks and the largest within one
-_RESOLVED = 0.004  # of the largest load: gaps below this are all alike
+_RESOLVED = 0.008  # gaps below this are all alike
 
 
 def load_blocks(load: NDArray[np.float64]) -> tuple[NDArray[np.intp], ...]:
     """Return the rows of each load block, ascending in load, rows in their order.
+
+    Parameters
+    ----------
+    load : (rows,) N, not negative
 
     The sorted loads' gaps fall into large ones (between blocks) and small ones (within); the cut is where
     the ratio of neighbouring gaps is largest. Without a clear cut there is one block.
@@ -25,14 +30,12 @@ def load_blocks(load: NDArray[np.float64]) -> tuple[NDArray[np.intp], ...]:
     """
     order = np.argsort(load, kind="stable")
     rising = load[order]
-    gaps = np.diff(rising)
-    top = float(load.max(initial=0.0))
-    if not len(gaps) or top <= 0:
+    if len(load) < 2 or rising[-1] <= 0:
         return (np.arange(len(load)),)
-    down = np.argsort(-gaps, kind="stable")
-    falling, wide = gaps[down], gaps[down] >= _SEPARATE * rising[1:][down]
-    following = np.maximum(np.append(falling[1:], 0.0), _RESOLVED * top)
-    contrast = np.where(wide, falling / following, 0.0)
+    gaps = np.diff(rising) / np.maximum(rising[1:], 1e-9 * rising[-1])
+    falling = np.sort(gaps)[::-1]
+    following = np.maximum(np.append(falling[1:], 0.0), _RESOLVED)
+    contrast = np.where(falling >= _SEPARATE, falling / following, 0.0)
     best = int(np.argmax(contrast))
     if contrast[best] < _CONTRAST:
         return (np.arange(len(load)),)

@@ -59,39 +59,50 @@ class Problems:
 
 @dataclass(slots=True, kw_only=True, eq=False)
 class State:
-    """Shapes ``p`` (problems, 4) with their best ``linear`` (D, Sv), cost, gradient and curvature."""
+    """Shapes ``p`` (problems, 4) with their best ``linear`` (D, Sv), cost and gradient.
+
+    ``square`` (problems, 4, 4), ``cross`` (problems, 4, 2) and ``gram`` (problems, 2, 2) are the blocks of
+    the normal matrix of shape and linear part; ``held`` (problems, 2) says which of D and Sv a step
+    must take as constant.
+    """
 
     p: Array
     linear: Array
     cost: Array
     gradient: Array
-    curvature: Array
+    square: Array
+    cross: Array
+    gram: Array
+    held: NDArray[np.bool_]
 
     def take(self, index: NDArray[np.intp]) -> State:
         """Return the states of an index."""
-        return State(
-            p=self.p[index],
-            linear=self.linear[index],
-            cost=self.cost[index],
-            gradient=self.gradient[index],
-            curvature=self.curvature[index],
-        )
+        return State(**{name: getattr(self, name)[index] for name in _FIELDS})
 
     def put(self, where: NDArray[np.bool_], other: State) -> None:
         """Take over the other's entries where a mask is true."""
-        self.p[where] = other.p[where]
-        self.linear[where] = other.linear[where]
-        self.cost[where] = other.cost[where]
-        self.gradient[where] = other.gradient[where]
-        self.curvature[where] = other.curvature[where]
+        for name in _FIELDS:
+            getattr(self, name)[where] = getattr(other, name)[where]
 
     def put_at(self, index: NDArray[np.intp], other: State) -> None:
         """Write the other's entries to positions."""
-        self.p[index] = other.p
-        self.linear[index] = other.linear
-        self.cost[index] = other.cost
-        self.gradient[index] = other.gradient
-        self.curvature[index] = other.curvature
+        for name in _FIELDS:
+            getattr(self, name)[index] = getattr(other, name)
+
+    def curvature(self) -> Array:
+        """Return the Gauss-Newton matrix of the shape (problems, 4, 4), the linear part eliminated."""
+        free = (~self.held).astype(np.float64)
+        ss, s1, ww = self.gram[:, 0, 0], self.gram[:, 0, 1] * free[:, 0] * free[:, 1], self.gram[:, 1, 1]
+        determinant = ss * ww - s1 * s1
+        safe = np.where(determinant > 1e-13 * ss * ww + 1e-300, determinant, np.inf)
+        inverse = np.empty_like(self.gram)
+        inverse[:, 0, 0] = free[:, 0] * ww / safe
+        inverse[:, 0, 1] = inverse[:, 1, 0] = -s1 / safe
+        inverse[:, 1, 1] = free[:, 1] * np.where(np.isinf(safe), 1.0 / ww, ss / safe)
+        return np.asarray(self.square - self.cross @ inverse @ self.cross.transpose(0, 2, 1))
+
+
+_FIELDS = ("p", "linear", "cost", "gradient", "square", "cross", "gram", "held")
 
 
 def curvature_parameter(E: Array | float) -> Array:
@@ -119,7 +130,7 @@ def sine(p: Array, u: Array) -> Array:
 
 
 def assess(p: Array, problems: Problems) -> State:
-    """Return cost, gradient and Gauss-Newton curvature of shapes, D and Sv solved within their bounds."""
+    """Return cost, gradient and normal matrix of shapes, D and Sv solved within their bounds."""
     u, y, sw = problems.u, problems.y, problems.sw
     B, C, q, h = p[:, 0:1], p[:, 1:2], p[:, 2:3], p[:, 3:4]
     B, eq = np.exp(B), np.exp(q)
@@ -143,21 +154,23 @@ def assess(p: Array, problems: Problems) -> State:
     a *= sw[:, None, :]
     target = y * sw
     gram = a @ a.transpose(0, 2, 1)
-    D, Sv, inverse = solve_linear(gram[:, 4:, 4:], np.matvec(a[:, 4:], target))
+    D, Sv = solve_linear(gram[:, 4:, 4:], np.matvec(a[:, 4:], target))
     residual = target - D[:, None] * a[:, 4] - Sv[:, None] * a[:, 5]
-    cross = gram[:, :4, 4:]
-    curvature = (gram[:, :4, :4] - cross @ inverse @ cross.transpose(0, 2, 1)) * (D * D)[:, None, None]
+    scale = D[:, None, None]
     return State(
         p=p,
         linear=np.stack([D, Sv], axis=1),
         cost=np.vecdot(residual, residual),
         gradient=-D[:, None] * np.matvec(a[:, :4], residual),
-        curvature=curvature,
+        square=gram[:, :4, :4] * (scale * scale),
+        cross=gram[:, :4, 4:] * scale,
+        gram=gram[:, 4:, 4:],
+        held=np.stack([np.abs(D) >= D_LIMIT, np.abs(Sv) >= SV_LIMIT], axis=1),
     )
 
 
-def solve_linear(gram: Array, right: Array) -> tuple[Array, Array, Array]:
-    """Return the best D and Sv within their bounds, and the inverse of the free part of ``gram``.
+def solve_linear(gram: Array, right: Array) -> tuple[Array, Array]:
+    """Return the best D and Sv within their bounds.
 
     Parameters
     ----------
@@ -171,10 +184,6 @@ def solve_linear(gram: Array, right: Array) -> tuple[Array, Array, Array]:
     safe = np.where(regular, determinant, 1.0)
     D = np.where(regular, (sy * ww - wy * s1) / safe, 0.0)
     Sv = np.where(regular, (wy * ss - sy * s1) / safe, wy / ww)
-    inverse = np.zeros_like(gram)
-    inverse[:, 0, 0] = np.where(regular, ww / safe, 0.0)
-    inverse[:, 0, 1] = inverse[:, 1, 0] = np.where(regular, -s1 / safe, 0.0)
-    inverse[:, 1, 1] = np.where(regular, ss / safe, 1.0 / ww)
     outside = (np.abs(D) > D_LIMIT) | (np.abs(Sv) > SV_LIMIT)
     if outside.any():
         # The cost is a convex parabola in (D, Sv): beyond the box its minimum lies on one of the edges.
@@ -188,9 +197,5 @@ def solve_linear(gram: Array, right: Array) -> tuple[Array, Array, Array]:
         v[:2] = np.clip((wy - d[:2] * s1) / ww, -SV_LIMIT, SV_LIMIT)
         d[2:] = np.clip((sy - v[2:] * s1) / floor, -D_LIMIT, D_LIMIT)
         best = np.argmin(d * d * ss + 2 * d * v * s1 + v * v * ww - 2 * d * sy - 2 * v * wy, axis=0)
-        d, v = d[best, np.arange(len(i))], v[best, np.arange(len(i))]
-        D[i], Sv[i] = d, v
-        inverse[i] = 0.0
-        inverse[i, 0, 0] = np.where(np.abs(d) < D_LIMIT, 1.0 / floor, 0.0)
-        inverse[i, 1, 1] = np.where(np.abs(v) < SV_LIMIT, 1.0 / ww, 0.0)
-    return D, Sv, inverse
+        D[i], Sv[i] = d[best, np.arange(len(i))], v[best, np.arange(len(i))]
+    return D, Sv

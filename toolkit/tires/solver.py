@@ -23,11 +23,12 @@ if TYPE_CHECKING:
 _SAME = 1e-3  # the files contract: starts that agree in cost to this are at one minimum
 _BINS = 32
 _EXACT = 1e-20  # a cost below this share of sum(y^2) is rounding
-# Starts and, stage by stage, the steps they take and how many go on: most starts show early that they lose.
-_STARTS = 32
-_STAGES = ((5, 12), (8, 5))
-_LAST = 40
-_ENOUGH = 3  # starts at one lowest cost end the search of a curve early
+# (starts, stages, last): stage by stage the steps that starts take and how many go on, because most show
+# early that they lose; then the steps of those that are left. A curve whose minimum is not confirmed is
+# searched again, with patience.
+_SWIFT = (32, ((5, 12), (8, 5)), 40)
+_PATIENT = (80, ((14, 20), (20, 5)), 60)
+_ENOUGH = 2  # starts at one lowest cost end the search of a curve early
 _NEAR = np.array([0.02, 0.02, 0.05, 0.02])
 
 
@@ -50,16 +51,21 @@ def solve(problems: Problems) -> Solution:
     curves = np.arange(len(problems.u))
     coarse = compress(problems)
     floor = _EXACT * np.sum((coarse.sw * coarse.y) ** 2, axis=1)
-    p, count = pick(coarse, _STARTS).reshape(-1, 4), _STARTS
-    for steps, keep in _STAGES:
-        state = descend(p, coarse.take(np.repeat(curves, count)), steps=steps, tolerance=1e-7)
-        p, count = _best(state, len(curves), count, keep).reshape(-1, 4), keep
-    state = assess(p, coarse.take(np.repeat(curves, count)))
+    state, count = _search(coarse, floor, _SWIFT)
     agreeing = _agreeing(state.cost.reshape(-1, count), floor)
     if (open_ := np.flatnonzero(agreeing < _ENOUGH)).size:
-        index = (open_[:, None] * count + np.arange(count)).ravel()
-        part = coarse.take(np.repeat(open_, count))
-        state.put_at(index, descend(state.p[index], part, steps=_LAST, tolerance=1e-7))
+        again, _ = _search(coarse.take(open_), floor[open_], _PATIENT)
+        first = state.take(_rows(open_, count))
+        both = np.concatenate([first.cost.reshape(-1, count), again.cost.reshape(-1, count)], axis=1)
+        order = np.argsort(both, axis=1)[:, :count]
+        own = np.arange(len(open_))[:, None] * count
+        taken, new = (
+            np.where(order < count, order + own, 0).ravel(),
+            np.where(order < count, 0, order - count + own),
+        )
+        merged = first.take(taken)
+        merged.put((order >= count).ravel(), again.take(new.ravel()))
+        state.put_at(_rows(open_, count), merged)
         agreeing = _agreeing(state.cost.reshape(-1, count), floor)
     rivals = theta_of(state).reshape(len(curves), count, 6)
     cost = state.cost.reshape(len(curves), count)
@@ -71,6 +77,29 @@ def solve(problems: Problems) -> Solution:
     state = descend(state.p[index], problems.take(np.repeat(curves, polished)), steps=30, tolerance=1e-10)
     best = state.cost.reshape(-1, polished).argmin(axis=1) + polished * curves
     return Solution(state=state.take(best), agreeing=agreeing, rivals=rivals, excess=excess)
+
+
+def _search(
+    problems: Problems, floor: Array, plan: tuple[int, tuple[tuple[int, int], ...], int]
+) -> tuple[State, int]:
+    # Returns the starts that were left at the end, `count` a curve.
+    count, stages, last = plan
+    curves = np.arange(len(problems.u))
+    p = pick(problems, count).reshape(-1, 4)
+    for steps, keep in stages:
+        state = descend(p, problems.take(np.repeat(curves, count)), steps=steps, tolerance=1e-7)
+        p, count = _best(state, len(curves), count, keep).reshape(-1, 4), keep
+    state = assess(p, problems.take(np.repeat(curves, count)))
+    agreeing = _agreeing(state.cost.reshape(-1, count), floor)
+    if (open_ := np.flatnonzero(agreeing < _ENOUGH)).size:
+        index = _rows(open_, count)
+        part = problems.take(np.repeat(open_, count))
+        state.put_at(index, descend(state.p[index], part, steps=last, tolerance=1e-7))
+    return state, count
+
+
+def _rows(curves: NDArray[np.intp], count: int) -> NDArray[np.intp]:
+    return np.asarray((curves[:, None] * count + np.arange(count)).ravel())
 
 
 def _best(state: State, curves: int, count: int, keep: int) -> Array:
@@ -98,9 +127,9 @@ def descend(p: Array, problems: Problems, *, steps: int, tolerance: float) -> St
     final = assess(np.clip(p, low, high), problems)
     alive = np.arange(len(p))
     state, part = final, problems
-    damping, growth = np.full(len(p), 1e-2), np.full(len(p), 2.0)
+    damping, radius = np.full(len(p), 1e-2), np.ones(len(p))
     for step in range(steps):
-        delta, predicted = _step(state, part, damping)
+        delta, length, predicted = _step(state, part, damping, radius)
         done = predicted <= tolerance * state.cost + 1e-30
         if done.any():
             if step:
@@ -109,28 +138,33 @@ def descend(p: Array, problems: Problems, *, steps: int, tolerance: float) -> St
             if not len(keep):
                 return final
             alive, state, part = alive[keep], state.take(keep), part.take(keep)
-            damping, growth, delta, predicted = damping[keep], growth[keep], delta[keep], predicted[keep]
+            damping, radius, length = damping[keep], radius[keep], length[keep]
+            delta, predicted = delta[keep], predicted[keep]
         elif step == 0:
             state = state.take(np.arange(len(alive)))
         trial = assess(np.clip(state.p + delta, part.low, part.high), part)
         gain = (state.cost - trial.cost) / predicted
         better = trial.cost < state.cost
+        # A step that fails because D or Sv ran into its bound is tried again with it held: with it held the
+        # cost is never underestimated, while with it free the step would run into the bound again.
+        state.held |= trial.held & ~better[:, None]
         state.put(better, trial)
-        shrink = np.maximum(0.1, 1.0 - (2.0 * np.minimum(gain, 1.0) - 1.0) ** 3)
-        damping = np.where(better, damping * shrink, damping * growth)
-        growth = np.where(better, 2.0, growth * 2.0)
-        damping = np.clip(damping, 1e-12, 1e12)
+        radius = np.where(
+            gain > 0.7, np.maximum(radius, 4.0 * length), np.where(gain < 0.25, 0.5 * length, radius)
+        )
+        radius = np.clip(radius, 1e-6, 3.0)
+        damping = np.clip(np.where(better, 0.2 * damping, 4.0 * damping), 1e-9, 1e6)
     final.put_at(alive, state)
     return final
 
 
-def _step(state: State, problems: Problems, damping: Array) -> tuple[Array, Array]:
+def _step(state: State, problems: Problems, damping: Array, radius: Array) -> tuple[Array, Array, Array]:
     # The damped Gauss-Newton step with the bounds' active set frozen, and the decrease it predicts.
     gradient, p = state.gradient, state.p
     frozen = ((p <= problems.low) & (gradient > 0)) | ((p >= problems.high) & (gradient < 0))
     free = (~frozen).astype(np.float64)
     gradient = gradient * free
-    curvature = state.curvature * (free[:, :, None] * free[:, None, :])
+    curvature = state.curvature() * (free[:, :, None] * free[:, None, :])
     diagonal = np.einsum("pii->pi", curvature)
     scale = diagonal + 1e-10 * diagonal.max(axis=1)[:, None] + 1e-300
     matrix = curvature.copy()
@@ -140,10 +174,12 @@ def _step(state: State, problems: Problems, damping: Array) -> tuple[Array, Arra
     matrix *= unit[:, :, None] * unit[:, None, :]
     np.einsum("pii->pi", matrix)[...] += frozen
     delta = -np.linalg.solve(matrix, (gradient * unit)[..., None])[..., 0] * unit * free
-    # Scaled back as a whole: cut in one component alone, a step may predict a rise.
-    delta /= np.maximum(1.0, np.max(np.abs(delta) / _REACH, axis=1))[:, None]
+    # Scaled back as a whole to the trust radius: more damping instead would stop all progress along the
+    # flat valleys that these curves have.
+    length = np.max(np.abs(delta) / _REACH, axis=1)
+    delta *= np.minimum(1.0, radius / np.maximum(length, 1e-300))[:, None]
     predicted = -2.0 * np.vecdot(gradient, delta) - np.vecdot(delta, np.matvec(curvature, delta))
-    return delta, np.maximum(predicted, 0.0)
+    return delta, np.minimum(length, radius), np.maximum(predicted, 0.0)
 
 
 _REACH = np.array([1.5, 1.0, 1.5, 1.0])
@@ -179,8 +215,9 @@ def solve_robust(problems: Problems) -> tuple[Solution, Problems, Array]:
     """
     curves = len(problems.u)
     coarse = problems
-    starts = pick(coarse, _STARTS)
-    owner = np.repeat(np.arange(curves), _STARTS)
+    many_starts = _SWIFT[0]
+    starts = pick(coarse, many_starts)
+    owner = np.repeat(np.arange(curves), many_starts)
     many = coarse.take(owner)
     state = descend(starts.reshape(-1, 4), many, steps=6, tolerance=1e-3)
     for _ in range(8):
@@ -188,9 +225,9 @@ def solve_robust(problems: Problems) -> tuple[Solution, Problems, Array]:
         width = 0.1 * _mad(residual, many.sw) + 1e-12
         part = many.weighted(many.sw / np.sqrt(np.sqrt(residual**2 + width[:, None] ** 2)))
         state = descend(state.p, part, steps=4, tolerance=1e-4)
-    size = np.sum(np.abs(_residual(state, many)) * many.sw, axis=1).reshape(curves, _STARTS)
+    size = np.sum(np.abs(_residual(state, many)) * many.sw, axis=1).reshape(curves, many_starts)
     agreeing = np.sum(size <= size.min(axis=1)[:, None] * 1.02 + 1e-12, axis=1)
-    state = state.take(size.argmin(axis=1) + _STARTS * np.arange(curves))
+    state = state.take(size.argmin(axis=1) + many_starts * np.arange(curves))
     scale = _mad(np.abs(_residual(state, problems)), problems.sw) / 0.6745 + 1e-12
     part, share = problems, np.zeros_like(problems.sw)
     for _ in range(25):
