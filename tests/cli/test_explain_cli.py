@@ -1,0 +1,56 @@
+"""Every rule that the code can print is explained, and explained rules exist."""
+
+from __future__ import annotations
+
+import ast
+from pathlib import Path
+
+import pytest
+
+import toolkit
+from toolkit.audit.model import Grade
+from toolkit.cli.explain import rules_catalogue
+from toolkit.cli.main import run
+from toolkit.report.check import RULES
+
+SOURCES = sorted(Path(toolkit.__file__).parent.rglob("*.py"))
+REFUSERS = {"_refuse", "refuse_cell", "problem"}
+
+
+def rules_in(path: Path) -> set[str]:
+    """Return the constants given as ``rule=...``, or as the first argument of a function that refuses."""
+    found = set()
+    for node in ast.walk(ast.parse(path.read_text())):
+        if not isinstance(node, ast.Call):
+            continue
+        named = [k.value for k in node.keywords if k.arg == "rule"]
+        if getattr(node.func, "id", None) in REFUSERS and path.parts[-2] in ("recording", "tires"):
+            named += node.args[:1]
+        found |= {n.value for n in named if isinstance(n, ast.Constant) and isinstance(n.value, str)}
+    return found
+
+
+@pytest.mark.parametrize("path", SOURCES, ids=lambda p: p.name)
+def test_every_rule_of_a_module_is_explained(path: Path) -> None:
+    assert rules_in(path) <= rules_catalogue().keys()
+
+
+def test_the_template_lint_and_the_grades_are_explained() -> None:
+    assert RULES.keys() <= rules_catalogue().keys()
+    assert {f"identified-{g}" for g in Grade.__args__ if g not in ("exact", "rounding", "unreadable")} <= (
+        rules_catalogue().keys()
+    )
+
+
+def test_explain_one(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as caught:
+        run(["explain", "no-tare"])
+    assert caught.value.code == 0
+    assert "zero of the cells" in capsys.readouterr().out
+
+
+def test_explain_an_unknown_rule_names_the_nearest(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as caught:
+        run(["explain", "no-tar"])
+    assert caught.value.code == 2
+    assert "no-tare" in capsys.readouterr().err
