@@ -106,12 +106,6 @@ def test_a_script_that_cannot_be_read_back_is_a_warning_and_a_number_beside_it_i
     assert "values" in names(verify._texts("smile", filled(("b", "5.0"))))
 
 
-@pytest.mark.parametrize(("start", "pages"), [(1, 1), (7, 2), (14, 5)])
-def test_page_ranges_cover_every_page_once(start: int, pages: int) -> None:
-    covered = [n for first, last in verify._ranges(start, pages) for n in range(first, last + 1)]
-    assert covered == list(range(1, start + 1))
-
-
 def test_loose_fonts_are_found() -> None:
     listing = (
         "name                                 type              encoding         emb sub uni object ID\n"
