@@ -24,7 +24,8 @@ class Drawer:
     def __init__(self, *, workers: int | None = None) -> None:
         """Start the workers; by default one a core, two at most."""
         count = min(2, os.cpu_count() or 1) if workers is None else workers
-        command = [sys.executable, "-m", "toolkit.report.drawer"]
+        # -P: a folder named toolkit where the user happens to stand must not be imported.
+        command = [sys.executable, "-P", "-m", "toolkit.report.drawer"]
         self._workers = [
             subprocess.Popen(
                 command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL
