@@ -10,7 +10,6 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import click
 import typer
 
 if TYPE_CHECKING:
@@ -72,10 +71,13 @@ def print_error(error: ToolkitError, *, as_json: bool) -> None:
         typer.echo(f"error: {error}", err=True)
 
 
-def print_usage_error(error: click.ClickException, *, as_json: bool) -> None:
+def print_usage_error(error: Exception, *, as_json: bool) -> None:
     """Print what was wrong with the command's words."""
     hint = "see 'toolkit --help' or 'toolkit COMMAND --help'"
-    message = error.format_message()
+    message = str(getattr(error, "format_message", error.__str__)()).strip()
+    if message.startswith("Usage:"):  # no words at all: the help is the answer
+        typer.echo(message, err=not as_json)
+        return
     if as_json:
         parts = {"rule": "usage", "what": message, "next_step": hint}
         typer.echo(json.dumps({"schema": 1, "error": parts}, ensure_ascii=False, indent=2))

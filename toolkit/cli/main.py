@@ -6,12 +6,14 @@ import sys
 import traceback
 from typing import Annotated, NoReturn
 
-import click
 import typer
 
 from toolkit import __version__
 from toolkit.cli.console import print_error, print_usage_error
 from toolkit.errors import ToolkitError
+
+# typer carries a copy of click whose exceptions it does not export: the root of its usage errors.
+_UsageError: type[Exception] = typer.BadParameter.__mro__[2]
 
 app = typer.Typer(
     name="toolkit",
@@ -76,13 +78,10 @@ def run(arguments: list[str] | None = None) -> NoReturn:
     except ToolkitError as error:
         print_error(error, as_json=as_json)
         code = error.exit_code
-    except click.exceptions.NoArgsIsHelpError as error:
-        typer.echo(error.format_message())
-        code = 2
-    except click.ClickException as error:
+    except _UsageError as error:
         print_usage_error(error, as_json=as_json)
         code = 2
-    except (click.Abort, KeyboardInterrupt):
+    except (typer.Abort, KeyboardInterrupt):
         typer.echo("interrupted; nothing was left half-written", err=True)
         code = 130
     except BrokenPipeError:

@@ -1,0 +1,90 @@
+"""Homes, `init`, `doctor`, and the command's own manners."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from toolkit.cli import doctor
+from toolkit.cli.home import calibrations_folder, find_home
+from toolkit.cli.main import run
+from toolkit.errors import ConfigError
+
+
+def code_of(*words: object) -> int:
+    with pytest.raises(SystemExit) as caught:
+        run([str(word) for word in words])
+    return int(caught.value.code or 0)
+
+
+def test_the_nearest_folder_upward_is_the_home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("TOOLKIT_HOME", raising=False)
+    (tmp_path / "calibrations").mkdir()
+    deep = tmp_path / "a" / "b"
+    deep.mkdir(parents=True)
+    monkeypatch.chdir(deep)
+    assert find_home() == tmp_path
+
+
+def test_a_named_home_wins_over_the_environment(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("one", "two"):
+        (tmp_path / name / "calibrations").mkdir(parents=True)
+    monkeypatch.setenv("TOOLKIT_HOME", str(tmp_path / "one"))
+    assert find_home() == tmp_path / "one"
+    assert find_home(tmp_path / "two") == tmp_path / "two"
+    assert calibrations_folder(tmp_path / "two" / "calibrations") == tmp_path / "two" / "calibrations"
+
+
+def test_no_home_is_an_error_that_names_init(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("TOOLKIT_HOME", raising=False)
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(ConfigError, match="no laboratory home"):
+        find_home()
+    with pytest.raises(ConfigError):
+        find_home(tmp_path)
+    with pytest.raises(ConfigError):
+        calibrations_folder(tmp_path / "nothing")
+
+
+def test_init_makes_a_home_and_leaves_what_is_there(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    home = tmp_path / "laboratory"
+    assert code_of("init", home, "--json") == 0
+    assert "report_templates/org.docx" in json.loads(capsys.readouterr().out)["written"]
+    (home / "report_templates" / "org.docx").write_text("our own")
+    assert code_of("init", home) == 0
+    assert (home / "report_templates" / "org.docx").read_text() == "our own"
+    assert list((home / "calibrations").iterdir()) == []
+
+
+def test_doctor_names_the_command_that_mends(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("PATH", "/nonexistent")
+    assert code_of("doctor", "--json") == 1
+    answer = json.loads(capsys.readouterr().out)
+    assert doctor.PACKAGES in answer["mend"]
+    assert {c["name"] for c in answer["checks"] if not c["ok"]} >= {"soffice", "pdftotext"}
+
+
+def test_doctor_finds_nothing_missing_after_set_up(capsys: pytest.CaptureFixture[str]) -> None:
+    assert code_of("doctor", "--json") == 0
+    assert json.loads(capsys.readouterr().out)["mend"] is None
+
+
+def test_wrong_words_end_with_2(capsys: pytest.CaptureFixture[str]) -> None:
+    assert code_of("process") == 2
+    assert code_of("nonsense") == 2
+    assert code_of("process", "--nonsense", "--json", ".") == 2
+    out = capsys.readouterr()
+    assert json.loads(out.out)["error"]["rule"] == "usage"
+
+
+def test_a_bug_ends_with_101(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    monkeypatch.setattr(doctor, "mending_command", lambda: 1 / 0)
+    monkeypatch.setenv("PATH", "/nonexistent")
+    assert code_of("doctor") == 101
+    assert "this is a bug" in capsys.readouterr().err

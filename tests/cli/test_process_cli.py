@@ -1,0 +1,115 @@
+"""`toolkit process`, and that TEST arguments fail with what, where, got, expected and the next step."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from toolkit.cli.home import packaged_home
+from toolkit.cli.main import run
+
+CALIBRATIONS = packaged_home() / "calibrations"
+FIG = packaged_home() / "toolkit" / "examples" / "fig4_4" / "M15_fig4_4.xlsx"
+
+
+def toolkit(capsys: pytest.CaptureFixture[str], *words: object) -> tuple[int, dict[str, Any]]:
+    with pytest.raises(SystemExit) as caught:
+        run([str(word) for word in words] + ["--json", "--calibrations", str(CALIBRATIONS)])
+    answer: dict[str, Any] = json.loads(capsys.readouterr().out)
+    assert answer["schema"] == 1
+    return int(caught.value.code or 0), answer
+
+
+def fig_test(tmp_path: Path, toml: str) -> Path:
+    folder = tmp_path / "test"
+    folder.mkdir()
+    (folder / "test.toml").write_text(f"schema = 1\n{toml}")
+    shutil.copy(FIG, folder / "M15_0001")
+    return folder
+
+
+def test_a_real_file_is_corrected_by_the_record_in_force(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    test = fig_test(tmp_path, 'machine = "m15"\ndate = 2019-05-31')
+    code, answer = toolkit(capsys, "process", test, "--out", tmp_path / "test.xlsx")
+    assert code == 1
+    assert answer["calibration"]["id"] == "m15-r2"
+    assert answer["calibration"]["unverified"] is True
+    rules = {finding["rule"] for finding in answer["findings"]}
+    assert {"unverified", "acquired-differs", "no-tare", "missing"} <= rules
+    first = answer["conditions"][0]
+    assert first["FY_N"] / 4.4482216152605 == pytest.approx(-1.79, abs=0.01)
+    assert first["FY_file_N"] / 4.4482216152605 == pytest.approx(371.353, abs=0.001)
+    assert (tmp_path / "test.xlsx").is_file()
+
+
+def test_a_reduced_test_is_a_test(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    test = fig_test(tmp_path, 'machine = "m15"\ndate = 2019-05-31')
+    _, first = toolkit(capsys, "process", test, "--out", tmp_path / "test.xlsx")
+    code, again = toolkit(capsys, "process", tmp_path / "test.xlsx")
+    assert code == 1
+    assert again["conditions"] == first["conditions"]
+
+
+def test_the_withdrawn_record_was_in_force_for_who_did_not_know(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    test = fig_test(tmp_path, 'machine = "m15"\ndate = 2019-05-31')
+    _, answer = toolkit(capsys, "process", test, "--known-at", "2019-06-30")
+    assert answer["calibration"]["id"] == "m15-r1"
+    assert "acquired-differs" not in {finding["rule"] for finding in answer["findings"]}
+
+
+@pytest.mark.parametrize(
+    ("toml", "words", "rule"),
+    [
+        ('machine = "m15"', (), "no-date"),
+        ('machine = "m16"\ndate = 2019-05-31', (), "unknown-machine"),
+        ('machine = "m15"\ndate = 1950-01-01', (), "no-record-in-force"),
+        ('machine = "m15"\ndate = 2019-05-31\noperater = "x"', (), "unknown-key"),
+        ('machine = "m15"\ndate = 2019-05-31', ("--calibration", "m15-r9"), None),
+        ('machine = "m15"\ndate = 2019-05-31', ("--calibration", "m15-virtual-r1"), "record-units"),
+        ('machine = "m15"\ndate = 2019-05-31\n[rotations]\n"nobody" = "reverse"', (), "no-file"),
+    ],
+)
+def test_bad_input_ends_with_2_and_writes_nothing(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], toml: str, words: tuple[str, ...], rule: str | None
+) -> None:
+    test = fig_test(tmp_path, toml)
+    code, answer = toolkit(capsys, "process", test, "--out", tmp_path / "out.xlsx", *words)
+    assert code == 2
+    error = answer["error"]
+    assert all(error[part] for part in ("what", "got", "expected", "next_step"))
+    assert rule is None or error["rule"] == rule
+    assert not (tmp_path / "out.xlsx").exists()
+
+
+def test_not_a_test(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    code, answer = toolkit(capsys, "process", FIG)
+    assert (code, answer["error"]["rule"]) == (2, "not-a-test")
+    code, answer = toolkit(capsys, "process", tmp_path / "nothing")
+    assert (code, answer["error"]["rule"]) == (2, "no-test")
+
+
+def test_a_file_that_is_no_recording_stops_the_test(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    test = fig_test(tmp_path, 'machine = "m15"\ndate = 2019-05-31')
+    (test / "photo.png").write_bytes(b"\x89PNG\r\n\x1a\n" + bytes(100))
+    code, answer = toolkit(capsys, "process", test)
+    assert code == 2
+    assert answer["error"]["rule"] == "not-a-workbook"
+    assert "photo.png" in answer["error"]["where"]
+
+
+def test_an_output_that_cannot_be_written(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    test = fig_test(tmp_path, 'machine = "m15"\ndate = 2019-05-31')
+    (tmp_path / "file").write_text("")
+    code, answer = toolkit(capsys, "process", test, "--out", tmp_path / "file" / "out.xlsx")
+    assert code == 2
+    assert "written" in answer["error"]["what"]

@@ -1,0 +1,122 @@
+"""The whole test in one file: the same result back, numbers as numbers, and edits told."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import openpyxl
+import pytest
+
+from toolkit.errors import RecordingError, ToolkitError
+from toolkit.findings import Finding
+from toolkit.pipeline import TestResult, process, read_test
+from toolkit.recording.folder import read_test_folder
+from toolkit.testfile import is_test_file, read_test_file, write_test_file
+from toolkit.testfile.layout import content_hash
+
+if TYPE_CHECKING:
+    from toolkit.calibration.record import CalibrationRecord
+    from toolkit.recording.model import Recording
+
+Made = tuple[TestResult, dict[str, "Recording"]]
+
+
+@pytest.fixture(scope="module")
+def made(virtual_test: Path, virtual_record: CalibrationRecord) -> Made:
+    test = read_test_folder(virtual_test)
+    recordings = read_test(test)
+    return process(test, recordings, virtual_record), {one.name: one for one in recordings}
+
+
+@pytest.fixture(scope="module")
+def file(made: Made, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("file") / "test.xlsx"
+    write_test_file(path, *made)
+    return path
+
+
+def test_it_reads_back_to_the_same_result(made: Made, file: Path) -> None:
+    assert read_test_file(file) == made[0]
+
+
+def test_it_reads_back_whatever_is_missing(tmp_path: Path, made: Made) -> None:
+    result = made[0]
+    reduced = dataclasses.replace(
+        result.reduced,
+        conditions=tuple(
+            dataclasses.replace(c, FY_file=None, step_FZ=None) for c in result.reduced.conditions
+        ),
+        findings=(Finding(rule="no-tare", where="=1+1", message="+cmd|' /C calc'!A0 <&> ёж 🛞"),),
+        info=dataclasses.replace(result.reduced.info, special="=HYPERLINK(0)", date=None, operator="12"),
+    )
+    pull = dataclasses.replace(result.characteristics.pull[0], conicity=None)
+    fits = (dataclasses.replace(result.characteristics.fits[0], MZ=None), *result.characteristics.fits[1:])
+    changed = TestResult(
+        reduced=reduced,
+        characteristics=dataclasses.replace(
+            result.characteristics, pull=(pull, *result.characteristics.pull[1:]), fits=fits
+        ),
+    )
+    path = tmp_path / "x.xlsx"
+    write_test_file(path, changed)
+    assert read_test_file(path) == changed
+
+
+def test_numbers_are_numbers_and_texts_are_never_formulas(tmp_path: Path, made: Made) -> None:
+    info = dataclasses.replace(made[0].reduced.info, special="=1+1", operator="@SUM(A1)")
+    result = dataclasses.replace(made[0], reduced=dataclasses.replace(made[0].reduced, info=info))
+    path = tmp_path / "x.xlsx"
+    write_test_file(path, result, made[1])
+    book = openpyxl.load_workbook(path)
+    kinds = {cell.data_type for sheet in book for row in sheet.iter_rows() for cell in row}
+    assert "f" not in kinds
+    reduced = book["reduced"]
+    heads = [cell.value for cell in reduced[1]]
+    assert reduced.cell(2, heads.index("FY [N]") + 1).value == made[0].reduced.conditions[0].FY
+    assert book["raw"].max_row == 1 + sum(one.rows for one in made[1].values())
+
+
+def test_it_says_that_it_is_simulated(file: Path) -> None:
+    book = openpyxl.load_workbook(file, read_only=True)
+    assert any(row[0] == "SIMULATED" for row in book["provenance"].iter_rows(values_only=True))
+
+
+def test_an_edited_number_is_told(tmp_path: Path, file: Path) -> None:
+    book = openpyxl.load_workbook(file)
+    heads = [cell.value for cell in book["reduced"][1]]
+    cell = book["reduced"].cell(5, heads.index("FY_common [N]") + 1)
+    cell.value = float(str(cell.value)) * 1.0001
+    path = tmp_path / "edited.xlsx"
+    book.save(path)
+    with pytest.raises(RecordingError) as caught:
+        read_test_file(path)
+    assert caught.value.rule == "test-file-changed"
+
+
+@pytest.mark.parametrize("sheet", ["provenance", "reduced", "characteristics"])
+def test_a_lost_sheet_is_told(tmp_path: Path, file: Path, sheet: str) -> None:
+    book = openpyxl.load_workbook(file)
+    del book[sheet]
+    book.save(tmp_path / "x.xlsx")
+    assert not is_test_file(tmp_path / "x.xlsx")
+    with pytest.raises(RecordingError) as caught:
+        read_test_file(tmp_path / "x.xlsx")
+    assert caught.value.rule == "not-a-test-file"
+
+
+def test_a_lost_column_is_told(tmp_path: Path, file: Path) -> None:
+    book = openpyxl.load_workbook(file)
+    book["reduced"].delete_cols(4)
+    book.save(tmp_path / "x.xlsx")
+    with pytest.raises(ToolkitError):
+        read_test_file(tmp_path / "x.xlsx")
+
+
+def test_the_hash_is_that_of_the_content(made: Made) -> None:
+    result = made[0]
+    again = dataclasses.replace(result, reduced=dataclasses.replace(result.reduced))
+    assert content_hash(again) == content_hash(result)
+    other = dataclasses.replace(result, reduced=dataclasses.replace(result.reduced, code_version="x"))
+    assert content_hash(other) != content_hash(result)
