@@ -77,7 +77,10 @@ def test_units_that_only_pint_knows() -> None:
     assert unit("degF").offset == pytest.approx(459.67 * 5 / 9)
 
 
-@pytest.mark.parametrize("text", ["furlongs per lunch", "N;drop", "??", "import os", "__class__", "N**", "9**9**9**9", "(9)**9", "m" * 60])
+@pytest.mark.parametrize(
+    "text",
+    ["furlongs per lunch", "N;drop", "??", "import os", "__class__", "N**", "9**9**9**9", "(9)**9", "m" * 60],
+)
 def test_unknown_unit_is_an_error_that_says_where(text: str) -> None:
     with pytest.raises(UnitError) as caught:
         unit(text, where="file.xlsx, column FZ")

@@ -45,7 +45,7 @@ def exit_code(findings: Sequence[Finding]) -> int:
 
 def finding_lines(findings: Sequence[Finding]) -> list[str]:
     """Return findings as lines for people."""
-    return [f"  {one.level:<8}{one.rule:<18}{one.where}: {one.message}" for one in findings]
+    return [f"  {one.level:<8}{one.rule:<20} {one.where}: {one.message}" for one in findings]
 
 
 def table(header: Sequence[str], rows: Sequence[Sequence[str]], *, align: str = "") -> str:

@@ -60,9 +60,11 @@ def command(
             told = step.told(payload)
             say(f"      {told}\n")
             done.append({"title": step.title, "exit_code": code, "told": told})
-        say(f"[{len(steps) + 1}/{len(steps) + 1}] the figures of the report, one file each")
-        figures = _figures(stage)
-        say(f"      {len(figures)} figures\n")
+        say(f"[{len(steps) + 1}/{len(steps) + 1}] for other programs: a tire property file and the figures")
+        resolved = _resolved(stage)
+        told = _tire_file(resolved, stage / "tire.tir")
+        figures = _figures(resolved, stage)
+        say(f"      {told}\n      {len(figures)} figures\n")
         report = done[-1]
         (stage / _MARK).write_text(
             jsonlib.dumps({"generator": "toolkit", "content": "demo", "steps": done}, indent=2)
@@ -167,11 +169,6 @@ def _steps(stage: Path) -> list[Step]:
             told=_told_fit,
         ),
         Step(
-            title="tire model over all loads, as a tire property file",
-            words=("fit", whole, "--model", "mf61", "--tir", str(stage / "tire.tir"), *at),
-            told=_told_fit,
-        ),
-        Step(
             title="the report in the organisation's Word template, and its verified PDF",
             words=("report", whole, "--template", str(home / "report_templates" / "org.docx"), "--out",
                    str(stage), *at),
@@ -213,7 +210,7 @@ def _told_calibrate(payload: Payload) -> str:
     state = "reproduced, already recorded" if record["existing"] else record["status"]
     E5, error = FY["coefficients"]["E5"], FY["standard_errors"]["E5"]
     return (
-        f"{record['id']} ({state}): E5 in FY {E5:+.4f} ± {error:.1g} {FY['unit']} per "
+        f"{record['id']} ({state}): E5 in FY {E5:+.2f} ± {error:.1g} {FY['unit']} per "
         f"{FY['indication_units']['E5']}, its sign sure by {abs(E5) / error:.0f} standard errors"
     )
 
@@ -241,13 +238,43 @@ def _told_fit(payload: Payload) -> str:
     return f"{len(payload['fits'])} curves, error {', '.join(found)}"
 
 
-def _figures(stage: Path) -> list[str]:
+def _resolved(stage: Path) -> Resolved:
     from toolkit.cli.resolve import resolve_test
+
+    return resolve_test(stage / "test.xlsx", home=stage / "home")
+
+
+def _tire_file(resolved: Resolved, path: Path) -> str:
+    """Write MF 6.1 over all loads of the forward run, and tell how well it fits."""
+    from toolkit.characteristics.groups import group
+    from toolkit.reduction.averaging import free_radius_m
+    from toolkit.tires.mf61_fit import fit_mf61
+    from toolkit.tires.model import Curve
+    from toolkit.tires.tir import write_tir
+
+    reduced = resolved.result.reduced
+    curves = [
+        Curve(SA=one.SA, y=one.values(channel), channel=channel, load_N=one.load_N)
+        for one in group(reduced)
+        if one.rotation == "forward"
+        for channel in ("FY", "MZ")
+    ]
+    radius = free_radius_m(reduced.info.tire_size)
+    if radius is None:
+        raise ValueError("the packaged plan names a tire size that gives its radius")
+    fit = fit_mf61(curves, unloaded_radius_m=radius)
+    write_tir(path, fit, comments=["simulated: the virtual M-15, drum forward"])
+    return (
+        f"tire.tir: MF 6.1 over all loads, error FY {fit.error_percent_FY:.2f} %, "
+        f"MZ {fit.error_percent_MZ or 0.0:.2f} %"
+    )
+
+
+def _figures(resolved: Resolved, stage: Path) -> list[str]:
     from toolkit.report.build import build_content
     from toolkit.report.figures import draw
     from toolkit.report.style import read_style, style_file
 
-    resolved: Resolved = resolve_test(stage / "test.xlsx", home=stage / "home")
     style = read_style(style_file(stage / "home" / "report_templates" / "org.docx"))
     content = build_content(resolved.result, resolved.record, findings=resolved.findings, style=style)
     folder = stage / "figures"

@@ -44,7 +44,8 @@ def command(
             next_step="choose another folder",
         ) from error
     text = (
-        f"home: {folder}\n  calibrations/       fill it with: toolkit calibrate SESSION.toml --home {folder}\n"
+        f"home: {folder}\n"
+        f"  calibrations/       fill it with: toolkit calibrate SESSION.toml --home {folder}\n"
         f"  report_templates/   {', '.join(p.name for p in sorted(templates.glob('*.docx')))}"
     )
     answer({"home": folder.resolve(), "written": made}, text, as_json=json, quiet=quiet)
