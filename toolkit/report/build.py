@@ -5,6 +5,7 @@ from __future__ import annotations
 import datetime as dt
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from toolkit import __version__
@@ -144,6 +145,7 @@ def _values(
             for name, unit in UNITS.items()
         },
     }
+    summary_load, summary = _summary(result)
     numbers: dict[str, float | None] = {
         "test.pressure.psi": psi,
         "test.pressure.bar": None if pressure is None else pressure / 1e5,
@@ -153,7 +155,8 @@ def _values(
         "test.files": len({c.file for c in reduced.conditions}),
         "test.conditions": len(used),
         "test.findings": len(findings),
-        **_summary(result),
+        "summary.load": summary_load,
+        **{f"summary.{name}": one.value if one else None for name, one in summary.items()},
     }
     made = {path: Value(kind="text", value=text) for path, text in texts.items()}
     made |= {
@@ -163,6 +166,9 @@ def _values(
     entries = {one.path: one for one in catalogue() if one.kind == "number"}
     for path, number in numbers.items():
         made[path] = _number(number, path, entries[path].unit, entries[path].spec, style)
+    for name, estimate in summary.items():
+        text = _with_U(estimate, made[f"summary.{name}"], style) if summary_load else None
+        made[f"summary.{name}.with_U"] = Value(kind="text", value=text)
     if record is not None:
         for load in record.loads:
             for term, coefficient in zip(load.terms, load.coefficients, strict=True):
@@ -190,11 +196,12 @@ def _angles(steps: Sequence[float | None]) -> str | None:
     return ", ".join(f"{angle:g}" for angle in found) + " deg" if found else None
 
 
-def _summary(result: TestResult) -> dict[str, float | None]:
+def _summary(result: TestResult) -> tuple[float | None, dict[str, Estimate | None]]:
+    """Return the load of the summary [N] and its estimates: N, N·m, per degree."""
     chars, info = result.characteristics, result.reduced.info
     loads = sorted({one.load_N for one in chars.stiffness} | {one.load_N for one in chars.pull})
     if not loads:
-        return {f"summary.{name}": None for name in _SUMMARY_NAMES}
+        return None, dict.fromkeys(_SUMMARY_NAMES)
     rated = info.rated_load_N
     load = min(loads, key=lambda one: abs(one - rated)) if rated else loads[len(loads) // 2]
     near = 0.04 * load
@@ -203,19 +210,29 @@ def _summary(result: TestResult) -> dict[str, float | None]:
     )
     pull = next((p for p in chars.pull if abs(p.load_N - load) <= near), None)
 
-    def pick(owner: object, name: str, factor: float = 1.0) -> float | None:
+    def pick(owner: object, name: str, factor: float = 1.0) -> Estimate | None:
         found: Estimate | None = getattr(owner, name, None)
-        return None if found is None else found.value * factor
+        return None if found is None else found.scaled(factor, "")
 
-    return {
-        "summary.load": load,
-        "summary.cornering_stiffness": pick(stiff, "secant_cornering", math.pi / 180),
-        "summary.aligning_stiffness": pick(stiff, "secant_aligning", math.pi / 180),
-        **{f"summary.{name}": pick(pull, name) for name in ("conicity", "plysteer", "CRAT", "PRAT")},
+    return load, {
+        "cornering_stiffness": pick(stiff, "secant_cornering", math.pi / 180),
+        "aligning_stiffness": pick(stiff, "secant_aligning", math.pi / 180),
+        **{name: pick(pull, name) for name in ("conicity", "plysteer", "CRAT", "PRAT")},
     }
 
 
-_SUMMARY_NAMES = "load cornering_stiffness aligning_stiffness conicity plysteer CRAT PRAT".split()
+_SUMMARY_NAMES = ("cornering_stiffness", "aligning_stiffness", "conicity", "plysteer", "CRAT", "PRAT")
+
+
+def _with_U(estimate: Estimate | None, number: Value, style: Style) -> str:
+    """Return ``45.0 ± 0.6``, both with the digits of the value, in the organisation's unit."""
+    if estimate is None or number.value is None or number.missing:
+        return "n/a"
+    U, _ = estimate.expanded()
+    factor = float(number.value) / estimate.value if estimate.value else 1.0
+    if not math.isfinite(U):
+        return number.text(None, style)
+    return f"{number.text(None, style)} ± {replace(number, value=U * abs(factor)).text(None, style)}"
 
 
 def _conditions(

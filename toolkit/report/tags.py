@@ -186,6 +186,13 @@ def catalogue() -> tuple[Spec, ...]:
     summary = [
         Spec(path=f"summary.{name}", kind="number", unit=UNITS[quantity], spec=spec, description=text)
         for name, quantity, spec, text in _SUMMARY
+    ] + [
+        Spec(
+            path=f"summary.{name}.with_U",
+            kind="text",
+            description=f"{text}, with its expanded uncertainty; n/a where there is none",
+        )
+        for name, _, _, text in _SUMMARY[1:]
     ]
     captions = [
         Spec(path=f"caption.{name}", kind="text", description=f"caption of the figure: {text}")
@@ -241,6 +248,7 @@ def _value_paths() -> frozenset[str]:
     return frozenset(
         [one.path for one in _VALUES]
         + [f"summary.{name}" for name, *_ in _SUMMARY]
+        + [f"summary.{name}.with_U" for name, *_ in _SUMMARY[1:]]
         + [f"caption.{name}" for name in FIGURES]
     )
 

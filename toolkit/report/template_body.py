@@ -78,7 +78,7 @@ def title_page(p: Pieces) -> list[str]:
 
 def _summary(p: Pieces, widths: tuple[float, ...]) -> str:
     def fact(label: str, name: str, unit: str) -> tuple[str, str]:
-        return label, f"{{{{tk:summary.{name}}}}} {{{{tk:unit.{unit}}}}}"
+        return label, f"{{{{tk:summary.{name}.with_U}}}} {{{{tk:unit.{unit}}}}}"
 
     rows = [
         p.block(
