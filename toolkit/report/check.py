@@ -6,7 +6,6 @@ earlier, by `toolkit.report.package`.
 
 from __future__ import annotations
 
-import io
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -14,7 +13,7 @@ from typing import Literal
 
 from toolkit.report.columns import TABLES
 from toolkit.report.fonts import missing_fonts
-from toolkit.report.package import Template
+from toolkit.report.package import Template, open_package
 from toolkit.report.scan import (
     Site,
     broken_literals,
@@ -101,10 +100,7 @@ def check_template(template: Template, style: Style, *, fonts: bool = True) -> t
     style : its style file, for required tags and style names
     fonts : also ask the system which fonts it has
     """
-    from docx.opc.package import OpcPackage
-    from docx.package import Package
-
-    package: OpcPackage = Package.open(io.BytesIO(template.data))
+    package = open_package(template)
     return check_stories(package, stories(package), template, style, fonts=fonts)
 
 

@@ -21,7 +21,7 @@ from toolkit.report.controls import (
 )
 from toolkit.report.fields import number_captions
 from toolkit.report.figures import Picture
-from toolkit.report.package import Template
+from toolkit.report.package import Template, open_package
 from toolkit.report.pictures import Ids, free_height, insert_at_mark, picture_run
 from toolkit.report.properties import set_properties
 from toolkit.report.rows import fill_table
@@ -77,9 +77,7 @@ class Filled:
 
 def needed_figures(template: Template, content: ReportContent) -> tuple[str, ...]:
     """Return the names of the figures that the template will show for this content."""
-    from docx.package import Package
-
-    sites = scan(stories(Package.open(io.BytesIO(template.data))))
+    sites = scan(stories(open_package(template)))
     names = [site.tag.name for site in sites if site.tag.family == "figure"]
     return tuple(dict.fromkeys(name for name in names if name in content.plots))
 
@@ -107,9 +105,7 @@ def fill(
     TemplateError
         the lint finds an error, or a value, figure or table of the template is not in this test
     """
-    from docx.package import Package
-
-    package: Any = Package.open(io.BytesIO(template.data))
+    package: Any = open_package(template)
     parts = stories(package)
     lint = check_stories(package, parts, template, content.style, fonts=fonts)
     errors = [one for one in lint if one.level == "error"]

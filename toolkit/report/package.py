@@ -93,6 +93,29 @@ def read_template(path: Path) -> Template:
     )
 
 
+def open_package(template: Template) -> Any:
+    """Open a template's parts with python-docx.
+
+    Raises
+    ------
+    TemplateError
+        a part is missing that another one refers to, or the package cannot be put together
+    """
+    from docx.package import Package
+    from lxml import etree
+
+    try:
+        return Package.open(io.BytesIO(template.data))
+    except (KeyError, ValueError, TypeError, AttributeError, etree.LxmlError) as error:
+        raise _refuse(
+            template.path,
+            "zip-damaged",
+            "the template's parts do not fit together",
+            got=error,
+            expected="a file as Word saves it",
+        ) from error
+
+
 def _refuse(
     path: Path,
     rule: str,
