@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Iterable, Mapping, Sequence
+from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from toolkit.estimate import Estimate
-from toolkit.files import atomic_path
+from toolkit.files import write_atomic
 from toolkit.recording.marks import GENERATOR, output_keywords
 from toolkit.testfile.layout import CONDITION_FIELDS, KIND, SCHEMA, cell, content_hash, header
 
@@ -27,9 +28,15 @@ def write_test_file(path: Path, result: TestResult, recordings: Mapping[str, Rec
     ``recordings`` (by their path inside the test) fill the sheet ``raw``: every row of every file, in the
     file's own units.
     """
+    digest = content_hash(result)
+    write_atomic(path, _workbook(result, digest, recordings or {}))
+    return digest
+
+
+def _workbook(result: TestResult, digest: str, recordings: Mapping[str, Recording]) -> bytes:
+    """Return the file's bytes, made in memory: what cannot be made never touches the target."""
     from openpyxl import Workbook
 
-    digest = content_hash(result)
     book = Workbook(write_only=True)
     book.properties.creator = GENERATOR
     book.properties.keywords = output_keywords(simulated=result.reduced.info.simulated)
@@ -42,12 +49,12 @@ def write_test_file(path: Path, result: TestResult, recordings: Mapping[str, Rec
         ("characteristics", _characteristics(result)),
         ("characteristic_findings", _findings(result.characteristics.findings)),
         ("findings", _findings(result.reduced.findings)),
-        ("raw", _raw(recordings or {})),
+        ("raw", _raw(recordings)),
     ):
         _sheet(book, name, rows)
-    with atomic_path(path) as temporary:
-        book.save(temporary)
-    return digest
+    made = BytesIO()
+    book.save(made)
+    return made.getvalue()
 
 
 def _sheet(book: Any, name: str, rows: Rows) -> None:
