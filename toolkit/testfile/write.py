@@ -8,6 +8,7 @@ from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from toolkit.errors import OutputError
 from toolkit.estimate import Estimate
 from toolkit.files import write_atomic
 from toolkit.recording.marks import GENERATOR, output_keywords
@@ -29,7 +30,17 @@ def write_test_file(path: Path, result: TestResult, recordings: Mapping[str, Rec
     file's own units.
     """
     digest = content_hash(result)
-    write_atomic(path, _workbook(result, digest, recordings or {}))
+    try:
+        data = _workbook(result, digest, recordings or {})
+    except OSError as error:
+        raise OutputError(
+            "the reduced test cannot be put together",
+            where="the folder for temporary files",
+            got=error.strerror or error,
+            expected="free space for temporary files",
+            next_step="free space, or name another folder in TMPDIR; nothing was changed",
+        ) from error
+    write_atomic(path, data)
     return digest
 
 
