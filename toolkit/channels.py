@@ -58,8 +58,20 @@ _ALL = (
     Channel(symbol="P", name="inflation pressure", si="Pa", dimension="pressure", tydex="INFLPRES"),
     Channel(symbol="V", name="speed", si="m/s", dimension="speed", tydex="LONGVEL"),
     Channel(symbol="T", name="temperature", si="K", dimension="temperature"),
-    Channel(symbol="TIRE_ANGLE", name="tire revolution angle", si="rad", dimension="angle"),
-    Channel(symbol="DRUM_ANGLE", name="drum revolution angle", si="rad", dimension="angle"),
+    Channel(
+        symbol="TIRE_ANGLE",
+        name="tire revolution angle",
+        si="rad",
+        dimension="angle",
+        aliases=("tire angle", "tire rotation angle", "wheel angle"),
+    ),
+    Channel(
+        symbol="DRUM_ANGLE",
+        name="drum revolution angle",
+        si="rad",
+        dimension="angle",
+        aliases=("drum angle", "drum rotation angle"),
+    ),
 )
 
 CHANNELS: dict[str, Channel] = {channel.symbol: channel for channel in _ALL}

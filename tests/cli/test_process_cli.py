@@ -113,3 +113,46 @@ def test_an_output_that_cannot_be_written(tmp_path: Path, capsys: pytest.Capture
     code, answer = toolkit(capsys, "process", test, "--out", tmp_path / "file" / "out.xlsx")
     assert code == 2
     assert "written" in answer["error"]["what"]
+
+
+@pytest.mark.parametrize("name", ["M15_0001", "test.toml", "notes.docx"])
+def test_originals_are_never_written_to(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], name: str
+) -> None:
+    test = fig_test(tmp_path, 'machine = "m15"\ndate = 2019-05-31')
+    before = {path.name: path.read_bytes() for path in test.iterdir()}
+    code, _ = toolkit(capsys, "process", test, "--out", test / name)
+    assert code == 2
+    assert {path.name: path.read_bytes() for path in test.iterdir()} == before
+
+
+def test_a_recording_with_the_right_ending_is_an_original_too(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    test = fig_test(tmp_path, 'machine = "m15"\ndate = 2019-05-31')
+    original = test / "copy.xlsx"
+    shutil.move(test / "M15_0001", original)
+    before = original.read_bytes()
+    code, answer = toolkit(capsys, "process", test, "--out", original)
+    assert (code, answer["error"]["rule"]) == (2, "original")
+    assert original.read_bytes() == before
+
+
+def test_an_earlier_result_may_be_replaced_and_may_lie_in_the_test(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    test = fig_test(tmp_path, 'machine = "m15"\ndate = 2019-05-31')
+    for _ in range(2):
+        code, answer = toolkit(capsys, "process", test, "--out", test / "test.xlsx")
+        assert code == 1
+        assert len(answer["conditions"]) == 5
+
+
+def test_a_withdrawn_record_that_is_named_is_called_withdrawn(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    test = fig_test(tmp_path, 'machine = "m15"\ndate = 2019-05-31')
+    code, answer = toolkit(capsys, "process", test, "--calibration", "m15-r1")
+    assert code == 1
+    (told,) = [f for f in answer["findings"] if f["rule"] == "withdrawn-record"]
+    assert "wrong sign" in told["message"]

@@ -35,7 +35,7 @@ rim = "16x6.5"
 "b" = "reverse"
 "sub/c.xlsx" = "reverse"
 [tare]
-values = { D51 = { value = 4.4482216152605, unit = "N" }, E5 = -2 }
+values = { D51 = { value = 4.4482216152605, unit = "N" }, D52 = 0.5, E5 = -2 }
 """
 
 
@@ -76,7 +76,7 @@ def test_everything(folder):
     assert [path.relative_to(folder).as_posix() for path in test.files] == ["a.xlsx", "b", "sub/c.xlsx"]
     assert [test.rotation_of(path) for path in test.files] == ["forward", "reverse", "reverse"]
     assert test.tare_file is None
-    assert test.tare_values == (("D51", pytest.approx(1.0), "lbf"), ("E5", -2.0, "lbf"))
+    assert test.tare_values == (("D51", pytest.approx(1.0), "lbf"), ("D52", 0.5, "lbf"), ("E5", -2.0, "lbf"))
 
 
 def test_a_bare_name_may_stand_for_a_file_in_a_sub_folder(folder):
@@ -232,3 +232,12 @@ def test_missing_things(folder, tmp_path):
     empty.mkdir()
     (empty / "test.toml").write_text('machine = "m15"')
     assert refused(empty, RecordingError).rule == "no-recordings"
+
+
+def test_a_tare_that_lacks_a_cell_is_refused(folder):
+    toml = folder / "test.toml"
+    toml.write_text(toml.read_text().replace("D52 = 0.5, ", ""))
+    with pytest.raises(ConfigError) as caught:
+        read_test_folder(folder)
+    assert caught.value.rule == "tare-incomplete"
+    assert caught.value.got == "D51, E5"

@@ -206,3 +206,90 @@ def test_files_of_one_name_in_two_folders_stay_apart(
     reduced = reduce_folder(folder, published_record)
     assert {(c.file, c.rotation) for c in reduced.used()} == {("ahead/a", "forward"), ("back/a", "reverse")}
     assert len(reduced.used()) == 10
+
+
+def with_tare_rows(source: Path, target: Path, machine_name: str, tare: dict[str, float]) -> None:
+    """Copy a recording with 20 unloaded rows before its blocks."""
+    machine = load_machine(machine_name)
+    rows = read_recording(source, machine)
+    columns = {
+        s.symbol: np.concatenate([np.full(20, tare.get(s.symbol, 1.0)), s.values]) for s in rows.series
+    }
+    write_labview(target, machine, columns, simulated=machine.simulated)
+
+
+def untared(virtual_test: Path, target: Path) -> tuple[Path, dict[str, float]]:
+    """Copy a virtual test without its declared tare, and return that tare."""
+    tare = declared_tare(read_test_folder(virtual_test), load_machine("m15-virtual"))
+    assert tare is not None
+    shutil.copytree(virtual_test, target)
+    text = (target / "test.toml").read_text()
+    (target / "test.toml").write_text(text[: text.index("[tare]")] + text[text.index("[rotations]") :]
+                                      if text.index("[rotations]") > text.index("[tare]")
+                                      else text[: text.index("[tare]")])  # fmt: skip
+    return target, dict(tare.values)
+
+
+def test_tare_blocks_in_every_file_do_what_the_declared_tare_does(
+    tmp_path: Path, virtual_test: Path, virtual_record: CalibrationRecord
+) -> None:
+    declared = reduce_folder(virtual_test, virtual_record)
+    folder, tare = untared(virtual_test, tmp_path / "t")
+    for path in sorted(folder.glob("*.xlsx")):
+        with_tare_rows(path, path, "m15-virtual", tare)
+    found = reduce_folder(folder, virtual_record)
+    assert found.tare.source == "block"
+    for one, other in zip(declared.conditions, found.conditions, strict=True):
+        assert other.FY == pytest.approx(one.FY, rel=1e-9, abs=1e-6)
+        assert (other.first_row, other.last_row) == (one.first_row + 20, one.last_row + 20)
+
+
+def test_a_tare_block_in_one_file_serves_all(
+    tmp_path: Path, virtual_test: Path, virtual_record: CalibrationRecord
+) -> None:
+    declared = reduce_folder(virtual_test, virtual_record)
+    folder, tare = untared(virtual_test, tmp_path / "t")
+    first = min(folder.glob("*.xlsx"))
+    with_tare_rows(first, first, "m15-virtual", tare)
+    found = reduce_folder(folder, virtual_record)
+    assert "tare-shared" in rules(found)
+    assert "no-tare" not in rules(found)
+    FY = [c.FY for c in found.conditions]
+    assert FY == pytest.approx([c.FY for c in declared.conditions], rel=1e-9, abs=1e-6)
+
+
+def test_without_a_tare_the_zero_of_the_cells_is_in_the_uncertainty(
+    tmp_path: Path, virtual_test: Path, virtual_record: CalibrationRecord
+) -> None:
+    declared = reduce_folder(virtual_test, virtual_record)
+    folder, _ = untared(virtual_test, tmp_path / "t")
+    bare = reduce_folder(folder, virtual_record)
+    assert "no-tare" in rules(bare)
+    for one, other in zip(declared.conditions, bare.conditions, strict=True):
+        assert one.u_FY_zero == 0.0
+        # What the tare removed is within two standard uncertainties of the stated zero.
+        assert 0 < abs(other.FY - one.FY) < 2 * other.u_FY_total
+        assert other.u_MZ_total > one.u_MZ_total
+
+
+def test_a_drum_angle_counts_tire_revolutions(tmp_path: Path, published_record: CalibrationRecord) -> None:
+    # 8.5 m of drum over a tire of 2 pi 0.97 x 0.31595 m: one drum turn is 4.414 tire turns.
+    machine = load_machine("m15")
+    rows = read_recording(FIG, machine)
+    columns = {s.symbol: np.repeat(s.values[::2], 200) for s in rows.series}
+    columns["DRUM_ANGLE [deg]"] = np.arange(1000.0) * 2.0
+    folder = folder_with(tmp_path, toml='[tire]\nsize = "205/55R16"')
+    write_labview(folder / "x.xlsx", machine, columns, simulated=False)
+    first = reduce_folder(folder, published_record).conditions[0]
+    per_row = 2.0 / 360 * 8.5 / (2 * np.pi * 0.97 * 0.31595)
+    assert first.first_row - 1 == pytest.approx(2.5 / per_row, abs=1)
+    assert first.last_row - first.first_row + 1 == pytest.approx(1.0 / per_row, abs=1)
+
+
+def test_an_angle_of_no_known_name_is_told(tmp_path: Path, published_record: CalibrationRecord) -> None:
+    machine = load_machine("m15")
+    rows = read_recording(FIG, machine)
+    columns = {s.symbol: s.values for s in rows.series} | {"Theta [deg]": np.arange(10.0)}
+    folder = folder_with(tmp_path)
+    write_labview(folder / "x.xlsx", machine, columns, simulated=False)
+    assert "unknown-angle" in rules(reduce_folder(folder, published_record))

@@ -130,6 +130,8 @@ def make_result(
                         MZ_common=mz,
                         u_FY_common=0.9,
                         u_MZ_common=0.05,
+                        u_FY_zero=0.0,
+                        u_MZ_zero=0.0,
                         used=True,
                         calibration_sha256=SHA,
                     )

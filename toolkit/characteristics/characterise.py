@@ -38,6 +38,7 @@ def characterise(
         machine_axes=machine.axes,
         tared=reduced.tare.source != "none",
         u_SA_zero=machine.stated_uncertainty("SA").u,
+        u_cell_zero=tuple(u for _, u in reduced.tare.u),
     )
     pulls = []
     for load in sorted({d.group.load_N for d in directions}):

@@ -83,7 +83,7 @@ def _half(
     F, R = estimate_at(one, 0.0), estimate_at(other, 0.0)
     parts = [(c, w / 2) for c, w in weights_at_zero(forward.group)]
     parts += [(c, sign * w / 2) for c, w in weights_at_zero(reverse.group)]
-    common = shared.calibration_u(channel, parts)
+    common = shared.common_u(channel, parts)
     slope = slope_estimate_at(one, 0.0).value + sign * slope_estimate_at(other, 0.0).value
     zero = abs(slope) / 2 * shared.u_SA_zero
     contributions = [(F.u / 2, F.dof), (R.u / 2, R.dof), (common, np.inf), (zero, np.inf)]

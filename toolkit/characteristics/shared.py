@@ -15,6 +15,7 @@ import numpy as np
 
 from toolkit.calibration.apply import coefficient_jacobian
 from toolkit.channels import signs
+from toolkit.reduction.tare import zero_shifts
 from toolkit.units import si_scale
 
 if TYPE_CHECKING:
@@ -34,13 +35,36 @@ class Shared:
 
     ``record`` computed the rows (None where it is not at hand: its share is then zero); ``machine_axes``
     are the axes of its cells; ``tared`` says that a tare was subtracted; ``u_SA_zero`` [rad] is the
-    standard uncertainty of the slip angle's zero, the same for both directions of rotation.
+    standard uncertainty of the slip angle's zero, the same for both directions of rotation;
+    ``u_cell_zero`` that of each cell's zero in the record's units, empty where a tare was subtracted.
     """
 
     record: CalibrationRecord | None
     machine_axes: Axes
     tared: bool
     u_SA_zero: float
+    u_cell_zero: tuple[float, ...] = ()
+
+    def common_u(self, channel: str, parts: Weighted) -> float:
+        """Return the standard uncertainty [SI] of a weighted sum that all rows have in common.
+
+        The record's covariance, and the open zero of the cells where there is no tare.
+        """
+        return float(np.hypot(self.calibration_u(channel, parts), self.zero_u(channel, parts)))
+
+    def zero_u(self, channel: str, parts: Weighted) -> float:
+        """Return the share of the cells' open zeros [SI]: each moves every row, none of them alone."""
+        if self.record is None or not parts or not self.u_cell_zero:
+            return 0.0
+        cells = np.array([condition.indications for condition, _ in parts]).T
+        shifts = zero_shifts(self.record, cells, self.u_cell_zero)[channel]
+        return float(np.linalg.norm(shifts @ self._weights(channel, parts)))
+
+    def _weights(self, channel: str, parts: Weighted) -> NDArray[np.float64]:
+        """Return the weights with the signs from SAE axes back to those of the cells."""
+        return np.array(
+            [w * signs(self.machine_axes, "SAE", condition.rotation)[channel] for condition, w in parts]
+        )
 
     def calibration_u(self, channel: str, parts: Weighted) -> float:
         """Return the standard uncertainty [SI] that the record's covariance gives a weighted sum.
@@ -63,10 +87,7 @@ class Shared:
             name: np.array([condition.indications[i] for condition, _ in parts])
             for i, name in enumerate(names)
         }
-        weights = np.array(
-            [w * signs(self.machine_axes, "SAE", condition.rotation)[channel] for condition, w in parts]
-        )
-        total = weights @ coefficient_jacobian(self.record, channel, rows, tare)
+        total = self._weights(channel, parts) @ coefficient_jacobian(self.record, channel, rows, tare)
         variance = float(total @ np.asarray(fit.covariance) @ total)
         return float(np.sqrt(max(variance, 0.0))) * si_scale(fit.unit)
 

@@ -56,7 +56,7 @@ def _secant(group: Group, fit: CurveFit | None, channel: str, *, shared: Shared)
         angles = steps
     span = float(angles[0] - angles[1])
     slope = float(values[0] - values[1]) / span
-    common = shared.calibration_u(channel, ((plus, 1 / span), (minus, -1 / span)))
+    common = shared.common_u(channel, ((plus, 1 / span), (minus, -1 / span)))
     # The zero of the slip angle cancels in the span; what is left of the angle is its scatter.
     scatter = slope * np.hypot(plus.sd_SA, minus.sd_SA)
     u = float(np.sqrt(own @ own + scatter**2)) / span
@@ -67,7 +67,7 @@ def _slope(group: Group, fit: CurveFit | None, channel: str, *, shared: Shared) 
     if fit is None or "slope_at_zero" in fit.not_determined or fit.slope_at_zero is None:
         return None
     one = slope_estimate_at(fit, 0.0)
-    common = shared.calibration_u(channel, slope_weights(group))
+    common = shared.common_u(channel, slope_weights(group))
     return Estimate(
         value=_SIGN[channel] * one.value,
         u=float(np.hypot(one.u, common)),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from datetime import datetime
 from pathlib import Path
@@ -54,10 +55,13 @@ def command(
     Example: toolkit process tests/2019-06-04 --out test.xlsx
     """
     from toolkit.cli.resolve import resolve_test
+    from toolkit.recording.marks import refuse_original
     from toolkit.testfile import write_test_file
 
     if reader not in ("calamine", "both"):
         raise typer.BadParameter("calamine or both", param_hint="--reader")
+    if out is not None:
+        refuse_original(out, suffix=".xlsx")
     started = time.perf_counter()
     with progress(None, "reading", show=not (json or quiet)) as step:
         resolved = resolve_test(
@@ -110,15 +114,17 @@ def test_payload(resolved: Resolved) -> dict[str, Any]:
                 "FZ_N": c.FZ,
                 "FY_N": c.FY,
                 "MZ_Nm": c.MZ,
-                "u_FY_N": c.u_FY,
-                "u_MZ_Nm": c.u_MZ,
+                "u_FY_N": c.u_FY_total,
+                "u_FY_repeatability_N": c.u_FY,
+                "u_MZ_Nm": c.u_MZ_total,
+                "u_MZ_repeatability_Nm": c.u_MZ,
                 "FY_file_N": c.FY_file,
                 "MZ_file_Nm": c.MZ_file,
                 "FZ_common_N": c.FZ_common,
                 "FY_common_N": c.FY_common,
                 "MZ_common_Nm": c.MZ_common,
-                "u_FY_common_N": c.u_FY_common,
-                "u_MZ_common_Nm": c.u_MZ_common,
+                "u_FY_common_N": math.hypot(c.u_FY_common, c.u_FY_zero),
+                "u_MZ_common_Nm": math.hypot(c.u_MZ_common, c.u_MZ_zero),
                 "used": c.used,
                 "calibration_sha256": c.calibration_sha256,
             }

@@ -112,20 +112,26 @@ def _not_in_force(
     from toolkit.errors import RegistryError
     from toolkit.findings import Finding
 
+    found = []
+    status = registry.status(record.id, known_at=known_at)
+    if status.state == "withdrawn":
+        message = f"the record was withdrawn: {status.reason}"
+        found.append(Finding(rule="withdrawn-record", where=record.id, message=message, level="error"))
     if on is None:
-        return []
+        return found
     try:
         due = registry.in_force(instrument, on=on, known_at=known_at).id
     except RegistryError:
         due = "no record"
-    if due == record.id:
-        return []
-    message = f"{due} was in force on {on.isoformat()}; {record.id} was named and used"
-    return [Finding(rule="not-in-force", where=record.id, message=message)]
+    if due != record.id:
+        message = f"{due} was in force on {on.isoformat()}; {record.id} was named and used"
+        found.append(Finding(rule="not-in-force", where=record.id, message=message))
+    return found
 
 
 def _from_file(test: Path, registry: Registry, *, calibration: str | None) -> Resolved:
     from toolkit.errors import RecordError
+    from toolkit.recording.gate import gate
     from toolkit.recording.marks import is_own_output
     from toolkit.testfile import read_test_file
 
@@ -139,6 +145,7 @@ def _from_file(test: Path, registry: Registry, *, calibration: str | None) -> Re
             rule="no-test",
         )
     if not is_own_output(test):
+        gate(test)
         raise ConfigError(
             "a single recording is not a test",
             where=test,

@@ -26,6 +26,7 @@ _KEYS = (
     "schema date machine operator requestor surface special rotation speed pressure rated_load tire "
     "rotations tare simulated"
 ).split()
+_LITTER = ("Thumbs.db", "desktop.ini", "__MACOSX")  # what file managers leave behind
 _TEXTS = ("operator", "requestor", "surface", "special")
 _TIRE = ("size", "company", "DOT", "series", "construction", "rim")
 
@@ -139,7 +140,7 @@ def _recordings(folder: Path) -> Iterator[Path]:
             next_step="check its permissions", rule="no-file",
         ) from error  # fmt: skip
     for entry in entries:
-        if entry.name.startswith((".", "~$")) or entry.is_symlink():
+        if entry.name.startswith((".", "~$")) or entry.name in _LITTER or entry.is_symlink():
             continue
         if entry.is_dir():
             if not (entry / TEST_FILE).is_file():
@@ -158,7 +159,12 @@ def _machine(table: Mapping[str, Any], toml: Path) -> Machine:
             next_step="add the line",
             rule="missing-key",
         )
-    return load_machine(_machine_name(table, toml))
+    try:
+        return load_machine(_machine_name(table, toml))
+    except ConfigError as error:
+        if error.where is None:
+            error.where = str(toml)
+        raise
 
 
 def _machine_name(table: Mapping[str, Any], toml: Path) -> str:
@@ -265,7 +271,17 @@ def _tare(
             return _named_file(name, "tare", folder, files, toml), ()
         return path, ()
     values = _table(table.get("values", {}), "tare.values", toml)
-    check_keys(values, [column.symbol for column in machine.indications], where=f"{toml}, [tare] values")
+    cells = [column.symbol for column in machine.indications]
+    check_keys(values, cells, where=f"{toml}, [tare] values")
+    if "values" in table and set(values) != set(cells):
+        raise ConfigError(
+            "the tare lacks a load cell",
+            where=f"{toml}, [tare] values",
+            got=", ".join(values) or "no values",
+            expected=", ".join(cells),
+            next_step="state every cell's unloaded indication, or name a recording with '[tare] file'",
+            rule="tare-incomplete",
+        )
     return None, tuple(_tare_value(name, value, machine, toml) for name, value in values.items())
 
 

@@ -12,6 +12,7 @@ import re
 from pathlib import Path
 from typing import Any
 
+from toolkit.errors import OutputError
 from toolkit.recording.archive import MAX_FILE_BYTES, read_members
 from toolkit.recording.sniff import sniff
 
@@ -65,6 +66,34 @@ def keywords_of(core_xml: bytes) -> tuple[str, ...]:
     found = _KEYWORDS.search(core_xml)
     text = found.group(1).decode("utf-8", "replace") if found else ""
     return tuple(word.strip() for word in text.split(";") if word.strip())
+
+
+def refuse_original(target: Path, *, suffix: str) -> None:
+    """Refuse to write a result over a file that the toolkit did not make, or under another kind's name.
+
+    Raises
+    ------
+    OutputError
+        ``target`` exists and is no result of the toolkit, or its name does not end with ``suffix``
+    """
+    if target.suffix.lower() != suffix:
+        raise OutputError(
+            "the output's name is of another kind of file",
+            where=target,
+            got=target.suffix or "no ending",
+            expected=f"a name that ends with {suffix}",
+            next_step="name another file; nothing was written",
+            rule="output-name",
+        )
+    if target.exists() and not (target.is_file() and is_own_output(target)):
+        raise OutputError(
+            "the output would replace a file that the toolkit did not make",
+            where=target,
+            got="an original",
+            expected="a new name, or an earlier result of the toolkit",
+            next_step="name another file; originals are never written to",
+            rule="original",
+        )
 
 
 def machine_named(keywords: tuple[str, ...]) -> str | None:

@@ -59,7 +59,7 @@ def window(recording: Recording, block: Block, *, machine: Machine, rolling_radi
     """Choose the rows of a block that are averaged.
 
     The machine's own files start after the settling revolutions: the whole block counts. Rows are
-    discarded only where the recording itself can tell revolutions: by a tire angle, by a time channel,
+    discarded only where the recording itself can tell revolutions: by a tire or drum angle, a time channel,
     or by a sample rate of a machine that records continuously.
     """
     turns = _revolutions(recording, block, machine=machine, rolling_radius_m=rolling_radius_m)
@@ -87,6 +87,10 @@ def _revolutions(
         return np.asarray(np.abs(angle - angle[0]) / (2 * np.pi))
     if rolling_radius_m is None:
         return None
+    if recording.has("DRUM_ANGLE"):
+        # The tire rolls on the drum: what the drum's surface travels, the tire's does too.
+        angle = np.unwrap(recording["DRUM_ANGLE"].si[block.rows])
+        return np.asarray(np.abs(angle - angle[0]) * machine.drum.radius_m / (2 * np.pi * rolling_radius_m))
     per_second = machine.drum.speed_m_s / (2 * np.pi * rolling_radius_m)
     if recording.has("t"):
         time = recording["t"].si[block.rows]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -30,6 +31,7 @@ class Condition:
     turned by half a turn about z). ``u_FY`` and ``u_MZ`` are the standard uncertainties of the mean
     (repeatability over the rows, autocorrelation included). ``*_common`` are carried to the load
     ``FZ_common`` that all blocks of this nominal load share; ``u_*_common`` includes that correction.
+    ``u_*_zero`` is what an unknown zero of the cells leaves, common to all rows; zero with a tare.
     ``indications`` are the cells' means minus tare, in the record's order and units.
     ``FY_file`` and ``MZ_file`` are the acquisition program's own values, None where the file has none.
     ``first_row`` and ``last_row`` count from 1 at the first data row of the file.
@@ -58,17 +60,34 @@ class Condition:
     MZ_common: float
     u_FY_common: float
     u_MZ_common: float
+    u_FY_zero: float
+    u_MZ_zero: float
     used: bool
     calibration_sha256: str
+
+    @property
+    def u_FY_total(self) -> float:
+        """Standard uncertainty of FY [N]: repeatability, and the zero of the cells where it is open."""
+        return math.hypot(self.u_FY, self.u_FY_zero)
+
+    @property
+    def u_MZ_total(self) -> float:
+        """Standard uncertainty of MZ [N·m]: repeatability, and the zero of the cells where it is open."""
+        return math.hypot(self.u_MZ, self.u_MZ_zero)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Tare:
-    """The tare that was subtracted, each indication in its own unit; source ``none`` where there is none."""
+    """The tare that was subtracted, each indication in its own unit; source ``none`` where there is none.
+
+    ``u`` holds the standard uncertainty of each cell's zero, in the same unit; empty where a tare was
+    recorded, whose own scatter is far below the rows'.
+    """
 
     source: str
     values: tuple[tuple[str, float], ...]
     unit: str
+    u: tuple[tuple[str, float], ...] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

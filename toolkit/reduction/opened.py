@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -72,17 +70,8 @@ def check_record(record: CalibrationRecord, machine: Machine) -> None:
             )
 
 
-def open_file(
-    name: str,
-    recording: Recording,
-    rotation: Rotation,
-    *,
-    info: TestInfo,
-    machine: Machine,
-    record: CalibrationRecord,
-    declared: Tare | None,
-) -> OpenedFile:
-    """Correct a recording's rows and find its blocks.
+def split_blocks(recording: Recording, machine: Machine) -> tuple[tuple[Block, ...], tuple[Block, ...]]:
+    """Return the load blocks and the tare blocks of a recording.
 
     Raises
     ------
@@ -91,62 +80,54 @@ def open_file(
     """
     smallest = min(machine.protocol.loads_N)
     FZ = recording["FZ"].si
-    all_blocks = find_blocks(FZ)
-    tare_blocks = [block for block in all_blocks if is_tare(block, smallest_load=smallest)]
-    blocks = tuple(block for block in all_blocks if not is_tare(block, smallest_load=smallest))
-    if not blocks or any(block.mean_FZ < 0 for block in blocks):
+    found = find_blocks(FZ)
+    tare = tuple(block for block in found if is_tare(block, smallest_load=smallest))
+    loads = tuple(block for block in found if not is_tare(block, smallest_load=smallest))
+    if not loads or any(block.mean_FZ < 0 for block in loads):
         raise RecordingError(
-            "the file has no load block" if not blocks else "the load is negative",
+            "the file has no load block" if not loads else "the load is negative",
             where=recording.path,
             got=f"FZ from {_lbf(np.min(FZ))} to {_lbf(np.max(FZ))} lbf",
             expected=f"loads such as {', '.join(_lbf(load) for load in machine.protocol.loads_N)} lbf",
             next_step="declare a tare file with '[tare] file' in test.toml; else check the load channel",
             rule="no-load-block",
         )
+    return loads, tare
+
+
+def open_file(
+    name: str,
+    recording: Recording,
+    rotation: Rotation,
+    *,
+    blocks: tuple[Block, ...],
+    tare: Tare,
+    info: TestInfo,
+    machine: Machine,
+    record: CalibrationRecord,
+) -> OpenedFile:
+    """Correct a recording's rows and choose those of each block that are averaged."""
     indications = {name: recording[name].values for name in record.indications}
     units = {name: recording[name].unit for name in record.indications}
-    tare = declared or _tare_of(recording, tare_blocks)
     offsets = dict(tare.values) if tare.source != "none" else None
     loads = apply_record(record, indications, units=units, tare=offsets)
     radius = free_radius_m(info.tire_size)
-    windows = tuple(
-        window(
-            recording,
-            block,
-            machine=machine,
-            rolling_radius_m=None if radius is None else ROLLING_RATIO * radius,
-        )
-        for block in blocks
-    )
+    rolling = None if radius is None else ROLLING_RATIO * radius
     return OpenedFile(
         name=name,
         recording=recording,
         rotation=rotation,
         indications=np.stack(
-            [values - (offsets or {}).get(name, 0.0) for name, values in indications.items()]
+            [values - (offsets or {}).get(cell, 0.0) for cell, values in indications.items()]
         ),
-        channels=np.stack([recording["SA"].si, FZ, loads["FY"], loads["MZ"]]),
+        channels=np.stack([recording["SA"].si, recording["FZ"].si, loads["FY"], loads["MZ"]]),
         blocks=blocks,
-        windows=windows,
+        windows=tuple(
+            window(recording, block, machine=machine, rolling_radius_m=rolling) for block in blocks
+        ),
         differences=compare(recording, record, file=name, indications=indications, units=units, tare=offsets),
         tare=tare,
     )
-
-
-def _tare_of(recording: Recording, blocks: Sequence[Block]) -> Tare:
-    indications = [one for one in recording.series if one.role == "indication"]
-    unit = indications[0].unit
-    if not blocks:
-        return Tare(source="none", values=(), unit=unit)
-    rows = np.concatenate([np.arange(block.start, block.stop) for block in blocks])
-    values = tuple((one.symbol, float(np.mean(one.values[rows]))) for one in indications)
-    return Tare(source="block", values=values, unit=unit)
-
-
-def tare_of_file(recording: Recording) -> Tare:
-    """Return the tare from a recording that holds nothing else: the mean of every row."""
-    whole = Block(start=0, stop=recording.rows, mean_FZ=0.0)
-    return dataclasses.replace(_tare_of(recording, [whole]), source=f"file {recording.name}")
 
 
 def _lbf(force_N: float) -> str:

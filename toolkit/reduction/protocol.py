@@ -162,7 +162,7 @@ def _loads(placed: Sequence[Placed], protocol: Protocol) -> list[Finding]:
         mine = [p for p in placed if p.file == file]
         unknown = [p.FZ for p in mine if p.step_FZ is None]
         off = [
-            p.FZ
+            p
             for p in mine
             if p.step_FZ is not None and abs(p.FZ - p.step_FZ) > protocol.load_tolerance * p.step_FZ
         ]
@@ -179,8 +179,9 @@ def _loads(placed: Sequence[Placed], protocol: Protocol) -> list[Finding]:
                 Finding(
                     rule="load-tolerance",
                     where=file,
-                    message=f"load {_list(off, 'lbf')} is more than {protocol.load_tolerance:.0%} "
-                    "off the protocol's",
+                    message=f"load {_list([p.FZ for p in off], 'lbf')} is more than "
+                    f"{protocol.load_tolerance:.0%} off the protocol's "
+                    f"{_list([p.step_FZ for p in off if p.step_FZ is not None], 'lbf')}",
                 )
             )
     return found

@@ -15,7 +15,8 @@ from toolkit.reduction import remarks
 from toolkit.reduction.averaging import Window, means
 from toolkit.reduction.common_load import carry, slopes
 from toolkit.reduction.model import CalibrationUse, Condition, ReducedTest, Tare
-from toolkit.reduction.opened import OpenedFile, check_record, open_file
+from toolkit.reduction.opened import OpenedFile, check_record, open_file, split_blocks
+from toolkit.reduction.tare import choose_tares, zero_shifts
 
 if TYPE_CHECKING:
     from toolkit.calibration.record import CalibrationRecord
@@ -48,15 +49,25 @@ def reduce_test(
         the record does not take the machine's indications in their units, or lacks FY or MZ
     """
     check_record(record, machine)
+    blocks = [split_blocks(recording, machine) for _, recording, _ in recordings]
+    tares = choose_tares(
+        [(recording, empty) for (_, recording, _), (_, empty) in zip(recordings, blocks, strict=True)],
+        declared=tare,
+        machine=machine,
+        record=record,
+    )
     files = [
-        open_file(name, recording, rotation, info=info, machine=machine, record=record, declared=tare)
-        for name, recording, rotation in recordings
+        open_file(
+            name, recording, rotation, blocks=loads, tare=own, info=info, machine=machine, record=record
+        )
+        for (name, recording, rotation), (loads, _), own in zip(recordings, blocks, tares, strict=True)
     ]
     conditions, placed, later = _conditions(files, machine=machine, record=record)
     findings = [
         *plan.check(placed, later, machine.protocol, machine.rotations),
         *remarks.machine_findings(info, machine),
         *remarks.tare_findings(files, record),
+        *remarks.angle_findings(files),
         *remarks.window_findings(files),
         *remarks.acquired_findings(files, record),
         *remarks.record_findings(record),
@@ -105,6 +116,11 @@ def _condition(
     recording, rows = file.recording, chosen.rows
     sign = signs(machine.axes, "SAE", file.rotation)
     SA, FZ, FY, MZ = means(file.channels[:, rows])
+    zero = {"FY": 0.0, "MZ": 0.0}
+    cells = file.indications[:, rows].mean(axis=1)
+    if file.tare.u:
+        shifts = zero_shifts(record, cells[:, None], [u for _, u in file.tare.u])
+        zero = {channel: float(np.linalg.norm(shifts[channel])) for channel in zero}
     return Condition(
         file=file.name,
         file_sha256=recording.sha256,
@@ -121,7 +137,7 @@ def _condition(
         sd_FZ=FZ.sd,
         u_FY=FY.u,
         u_MZ=MZ.u,
-        indications=tuple(file.indications[:, rows].mean(axis=1).tolist()),
+        indications=tuple(cells.tolist()),
         FY_file=_acquired(recording, "FY", rows, sign["FY"]),
         MZ_file=_acquired(recording, "MZ", rows, sign["MZ"]),
         FZ_common=FZ.value,
@@ -129,6 +145,8 @@ def _condition(
         MZ_common=sign["MZ"] * MZ.value,
         u_FY_common=FY.u,
         u_MZ_common=MZ.u,
+        u_FY_zero=zero["FY"],
+        u_MZ_zero=zero["MZ"],
         used=True,
         calibration_sha256=record.sha256,
     )

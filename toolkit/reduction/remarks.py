@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from toolkit.channels import CHANNELS
 from toolkit.findings import Finding
-from toolkit.units import from_si
+from toolkit.units import from_si, unit
 
 if TYPE_CHECKING:
     from toolkit.calibration.record import CalibrationRecord
@@ -30,18 +31,36 @@ def machine_findings(info: TestInfo, machine: Machine) -> list[Finding]:
 
 
 def tare_findings(files: Sequence[OpenedFile], record: CalibrationRecord) -> list[Finding]:
-    """Name the files that have no tare."""
-    bare = [file.name for file in files if file.tare.source == "none"]
-    if not bare:
-        return []
-    return [
-        Finding(
-            rule="no-tare",
-            where=_some(bare),
-            message="no tare was recorded or declared: the zero of the cells stays in FY and MZ"
-            + ("" if record.zero == "included" else ", and the record was fitted on tared indications"),
+    """Tell that there is no tare, or that the tare of some files served all."""
+    source = files[0].tare.source
+    if source == "none":
+        message = (
+            "no tare was recorded or declared: the zero of the cells stays in FY and MZ, and in "
+            "their uncertainty"
+            + ("" if record.zero == "included" else "; the record was fitted on tared indications")
         )
-    ]
+        return [Finding(rule="no-tare", where=_some([file.name for file in files]), message=message)]
+    if source.startswith("mean of"):
+        message = f"the {source} was subtracted from every file"
+        return [Finding(rule="tare-shared", where=_some([file.name for file in files]), message=message)]
+    return []
+
+
+def angle_findings(files: Sequence[OpenedFile]) -> list[Finding]:
+    """Name columns that look like a shaft angle and are none that the toolkit knows."""
+    columns = dict.fromkeys(
+        one.header
+        for file in files
+        for one in file.recording.series
+        if one.role == "covariate" and unit(one.unit).dimension == "angle" and one.symbol not in CHANNELS
+    )
+    if not columns:
+        return []
+    message = (
+        f"column {', '.join(columns)} is an angle but not known as TIRE_ANGLE or DRUM_ANGLE: no row was "
+        "discarded by it"
+    )
+    return [Finding(rule="unknown-angle", where=_some([file.name for file in files]), message=message)]
 
 
 def window_findings(files: Sequence[OpenedFile]) -> list[Finding]:
@@ -86,6 +105,12 @@ def averaging_text(files: Sequence[OpenedFile], machine: Machine) -> str:
         return (
             f"whole blocks averaged, nothing discarded: the machine starts acquisition after {settle:g} tire "
             f"revolutions and records {length:g}; the files have no time or angle channel to count them"
+        )
+    settled = [w for file in files for w in file.windows if not w.short]
+    if not settled:
+        return (
+            f"every block ends before {settle:g} tire revolutions of settling and {length:g} of averaging: "
+            f"its last {min(turns):.2f} to {max(turns):.2f} revolutions averaged"
         )
     return (
         f"the first {settle:g} tire revolutions of each block discarded, then averaged over "

@@ -6,6 +6,7 @@ import datetime as dt
 from typing import Any
 
 from toolkit import __version__
+from toolkit.recording.marks import output_keywords
 from toolkit.report.content import ReportContent
 from toolkit.report.xml import clean
 
@@ -20,6 +21,8 @@ def set_properties(package: Any, content: ReportContent) -> None:
     core.last_modified_by = f"toolkit {__version__}"
     core.subject = "Tire force and moment"
     core.identifier = str(content.values["report.id"].value)
+    # So that a report that lies in a test's folder is never taken for a recording.
+    core.keywords = output_keywords(simulated=any(name == "simulated" for name, _ in content.marks))
     core.comments = ""
     core.created = core.modified = day
     core.revision = 1

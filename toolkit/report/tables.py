@@ -71,9 +71,9 @@ def _results(result: TestResult) -> list[Row]:
             "SA": c.SA / _DEG,
             "FZ": c.FZ,
             "FY": c.FY,
-            "U_FY": 2 * c.u_FY,
+            "U_FY": 2 * c.u_FY_total,
             "MZ": c.MZ,
-            "U_MZ": 2 * c.u_MZ,
+            "U_MZ": 2 * c.u_MZ_total,
             "file": c.file,
         }
         for c in result.reduced.used()

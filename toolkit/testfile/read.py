@@ -127,6 +127,11 @@ def _result(sheets: dict[str, list[Row]], items: Row) -> TestResult:
                 if key.startswith("tare.values.")
             ),
             unit=items["tare.unit"],
+            u=tuple(
+                (key.removeprefix("tare.u."), number(value))
+                for key, value in items.items()
+                if key.startswith("tare.u.")
+            ),
         ),
         averaging=items["averaging"],
         findings=_findings(sheets["findings"]),

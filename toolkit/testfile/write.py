@@ -123,6 +123,8 @@ def _provenance(result: TestResult, digest: str) -> Rows:
     yield ("tare.unit", reduced.tare.unit)
     for name, value in reduced.tare.values:
         yield (f"tare.values.{name}", value)
+    for name, value in reduced.tare.u:
+        yield (f"tare.u.{name}", value)
     for field in dataclasses.fields(reduced.info):
         yield (f"info.{field.name}", getattr(reduced.info, field.name))
 
