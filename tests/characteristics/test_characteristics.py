@@ -56,8 +56,9 @@ def reduced_test(
                 file=f"{rotation}{i}", file_sha256="", rotation=rotation, first_row=1, last_row=100,
                 step_SA=float(np.radians(steps[i])), step_FZ=LOAD, SA=float(SA[i]), FZ=LOAD, FY=float(FY[i]),
                 MZ=float(MZ[i]), sd_SA=0.0, sd_FZ=0.0, u_FY=0.0, u_MZ=0.0, indications=(0.0, 0.0, 0.0),
-                FY_file=None, MZ_file=None, FZ_common=LOAD, FY_common=float(FY[i]), MZ_common=float(MZ[i]),
-                u_FY_common=0.0, u_MZ_common=0.0, u_FY_zero=0.0, u_MZ_zero=0.0, used=True, calibration_sha256="",
+                FY_file=None, MZ_file=None, FZ_common=LOAD, FY_common=float(FY[i]),
+                MZ_common=float(MZ[i]), u_FY_common=0.0, u_MZ_common=0.0, u_FY_zero=0.0, u_MZ_zero=0.0,
+                used=True, calibration_sha256="",
             )
             for i in range(len(steps))
         ]  # fmt: skip

@@ -1,13 +1,15 @@
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
-from click.testing import Result
 from typer.testing import CliRunner
 
 from toolkit.cli import inspect
 from toolkit.errors import ToolkitError
 from toolkit.examples.fig4_4 import packaged_fig4_4
+from toolkit.machine import load_machine
+from toolkit.recording.labview import write_labview
 
 
 @pytest.fixture
@@ -18,7 +20,7 @@ def run():
     app.command("inspect")(inspect.command)
     app.command("other")(lambda: None)
 
-    def call(*arguments) -> Result:
+    def call(*arguments):
         return CliRunner().invoke(app, ["inspect", *map(str, arguments)], standalone_mode=False)
 
     return call
@@ -120,3 +122,24 @@ class TestFigure44InThisRegistry:
         assert "withdrawn calibration: E5 negative in FY, MZ against m15-r2" in text
         assert "first row: Fy -1.79 lbf where the file has 371.36" in text
         assert max(map(len, text.splitlines())) <= 110
+
+
+def test_a_file_without_a_load_is_refused_unless_it_is_the_tare(run, tmp_path):
+    machine = load_machine("m15")
+    columns = {c.symbol: np.full(20, 1.0) for c in machine.columns}
+    write_labview(tmp_path / "rest.xlsx", machine, columns, simulated=False)
+    found = run(tmp_path / "rest.xlsx", "--calibrations", tmp_path)
+    assert isinstance(found.exception, ToolkitError)
+    assert found.exception.rule == "no-load-block"
+    (tmp_path / "test.toml").write_text('schema = 1\nmachine = "m15"\n[tare]\nfile = "rest.xlsx"\n')
+    assert run(tmp_path / "rest.xlsx", "--calibrations", tmp_path).exception is None
+
+
+def test_one_bad_file_of_many_does_not_hide_the_others(run, tmp_path):
+    bad = tmp_path / "bad.xlsx"
+    bad.write_bytes(b"PK\x03\x04 cut off")
+    found = run(packaged_fig4_4()[0], bad, "--calibrations", tmp_path, "--json")
+    assert found.return_value == 2
+    good, refused = json.loads(found.stdout)["files"]
+    assert good["rows"] == 10
+    assert refused["error"]["rule"].startswith("zip-")

@@ -12,7 +12,8 @@ import pytest
 from report_factory import make_record, make_result
 from template_factory import opened, p, run, sdt, tbl
 
-from toolkit.errors import RenderError, TemplateError
+from toolkit.errors import OutputError, RenderError, TemplateError
+from toolkit.recording.marks import is_own_output
 from toolkit.report import verify
 from toolkit.report.build import build_content
 from toolkit.report.deliver import deliver
@@ -168,8 +169,26 @@ def test_a_missing_value_leaves_the_old_report_alone(tmp_path: Path, monkeypatch
     monkeypatch.setenv("TOOLKIT_SOFFICE", str(fake(tmp_path, "exit 0")))
     out = tmp_path / "out"
     out.mkdir()
-    (out / "report.pdf").write_bytes(b"old")
+    old = b"%PDF-1.7 toolkit-output"
+    (out / "report.pdf").write_bytes(old)
     with pytest.raises(TemplateError):
         deliver(opened(tmp_path, p("{{tk:test.operator}}")), content(operator=None), out)
     assert [one.name for one in out.iterdir()] == ["report.pdf"]
-    assert (out / "report.pdf").read_bytes() == b"old"
+    assert (out / "report.pdf").read_bytes() == old
+
+
+@office_needed
+def test_a_report_is_known_again_and_replaces_only_a_report(tmp_path: Path) -> None:
+    template = opened(tmp_path, p("{{tk:calibration.hash}}"))
+    out = tmp_path / "out"
+    out.mkdir()
+    (out / "report.docx").write_bytes(b"somebody's own letter")
+    with pytest.raises(OutputError) as caught:
+        deliver(template, content(), out)
+    assert caught.value.rule == "original"
+    assert [path.name for path in out.iterdir()] == ["report.docx"]
+    (out / "report.docx").unlink()
+    for _ in range(2):
+        made = deliver(template, content(), out)
+        assert is_own_output(made.docx)
+        assert is_own_output(made.pdf)

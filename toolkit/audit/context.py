@@ -21,7 +21,8 @@ DEFAULT_MACHINE = "m15"
 class Context:
     """The machine and how it is known; the test's date and its test.toml, None where there is none.
 
-    ``tare`` tells whether test.toml gives a tare, which `toolkit process` subtracts.
+    ``tare`` tells whether test.toml gives a tare, which `toolkit process` subtracts; ``is_tare`` whether
+    the file itself is that tare.
     """
 
     machine: Machine
@@ -29,6 +30,7 @@ class Context:
     date: dt.date | None
     test_toml: Path | None
     tare: bool = False
+    is_tare: bool = False
 
 
 def context_of(path: Path, *, machine: str | None = None) -> Context:
@@ -52,8 +54,21 @@ def context_of(path: Path, *, machine: str | None = None) -> Context:
         own = machine_of(path)
         name, source = (own, "file") if own is not None else (DEFAULT_MACHINE, "default")
     return Context(
-        machine=load_machine(name), machine_source=source, date=date, test_toml=toml, tare="tare" in table
+        machine=load_machine(name),
+        machine_source=source,
+        date=date,
+        test_toml=toml,
+        tare="tare" in table,
+        is_tare=toml is not None and _is_tare(path, table.get("tare"), toml.parent),
     )
+
+
+def _is_tare(path: Path, tare: object, folder: Path) -> bool:
+    name = tare.get("file") if isinstance(tare, dict) else None
+    if not isinstance(name, str):
+        return False
+    named = folder / name
+    return named.is_file() and path.is_file() and named.samefile(path)
 
 
 def _date(value: object, toml: Path) -> dt.date:

@@ -16,6 +16,7 @@ from toolkit.errors import RecordError, RegistryError
 from toolkit.findings import Finding
 from toolkit.recording.read import read_recording
 from toolkit.reduction.blocks import find_blocks, is_tare
+from toolkit.reduction.opened import split_blocks
 from toolkit.units import si_scale
 
 if TYPE_CHECKING:
@@ -142,6 +143,8 @@ def inspect_file(
     """
     context = context_of(path, machine=machine)
     recording = read_recording(path, context.machine)
+    if not context.is_tare:
+        split_blocks(recording, context.machine)  # refuses a file that holds no load at all
     columns = columns_of(recording)
     choice = (
         None

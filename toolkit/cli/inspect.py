@@ -44,12 +44,25 @@ def command(
     Example: toolkit inspect tests/2019-06-04/M15_1.xlsx
     """
     from toolkit.audit.inspection import inspect_file
+    from toolkit.errors import ToolkitError
 
     registry = _registry(calibrations, home)
     payloads, texts = [], []
     findings: list[Finding] = []
+    failed = False
     for path in files:
-        found = inspect_file(path, registry, machine=machine, known_at=known_at.date() if known_at else None)
+        try:
+            found = inspect_file(
+                path, registry, machine=machine, known_at=known_at.date() if known_at else None
+            )
+        except ToolkitError as error:
+            if len(files) == 1:
+                raise
+            # One bad file of many does not hide what the others hold.
+            failed = True
+            payloads.append({"file": path, "error": error.as_dict()})
+            texts.append(f"{path}\n  error: {error}")
+            continue
         intervals = _intervals(found) if prove else ()
         payloads.append(_payload(found, intervals))
         texts.append(_text(found, intervals))
@@ -58,7 +71,7 @@ def command(
     if len(payloads) == 1:  # one file: its keys stand at the top too
         payload = {**payloads[0], **payload}
     answer(payload, "\n\n".join(texts), as_json=json, quiet=quiet)
-    return exit_code(findings)
+    return 2 if failed else exit_code(findings)
 
 
 def _registry(calibrations: Path | None, home: Path | None) -> Registry | None:

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from toolkit.errors import OutputError, RenderError
+from toolkit.recording.marks import refuse_original
 from toolkit.report.content import ReportContent
 from toolkit.report.drawer import Drawer
 from toolkit.report.fill import Filled, fill, needed_figures
@@ -72,6 +73,8 @@ def deliver(
     """
     from toolkit.report.figures import draw
 
+    for suffix in (".docx", ".pdf"):
+        refuse_original(out / f"{name}{suffix}", suffix=suffix)
     office = office or Office()
     with office, _staging(out) as stage:
         step("figures")
