@@ -84,25 +84,51 @@ def read_toml(path: Path) -> dict[str, Any]:
     Raises
     ------
     ConfigError
-        the file is missing, unreadable, or not TOML
+        ``no-file``: missing or unreadable; ``not-toml``
+    """
+    return parse_toml(read_bytes(path), where=path)
+
+
+def read_bytes(path: Path) -> bytes:
+    """Read a settings file whole.
+
+    Raises
+    ------
+    ConfigError
+        ``no-file``: missing or unreadable
     """
     try:
-        return tomllib.loads(path.read_bytes().decode("utf-8"))
-    except OSError as error:
+        return path.read_bytes()
+    except (OSError, ValueError) as error:
         raise ConfigError(
             "a settings file cannot be read",
             where=path,
-            got=error.strerror,
+            got=getattr(error, "strerror", None) or error,
             expected="a readable TOML file",
             next_step="check the path",
+            rule="no-file",
         ) from error
+
+
+def parse_toml(data: bytes, *, where: object) -> dict[str, Any]:
+    """Parse the content of a TOML file; ``where`` names it in the message.
+
+    Raises
+    ------
+    ConfigError
+        ``not-toml``
+    """
+    try:
+        return tomllib.loads(data.decode("utf-8"))
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        twice = "Cannot overwrite" in str(error) or "Cannot declare" in str(error)
         raise ConfigError(
             "a settings file is not TOML",
-            where=path,
+            where=where,
             got=error,
-            expected="TOML 1.0 in UTF-8",
+            expected="each key once, as a value or as a table" if twice else "TOML 1.0 in UTF-8",
             next_step="mend the line that is named",
+            rule="not-toml",
         ) from error
 
 

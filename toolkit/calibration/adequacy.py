@@ -56,10 +56,18 @@ def check_adequate(session: Session) -> None:
     loads = table.matrix(names)
     constant = [n for n, spread in zip(names, np.ptp(loads, axis=0), strict=True) if spread == 0]
     if constant:
-        raise _missing(session, constant, f"{', '.join(constant)} never varies")
+        raise _missing(
+            session, constant, f"{', '.join(constant)} never var{'ies' if len(constant) == 1 else 'y'}"
+        )
     if len(names) > 1 and condition_number(loads) > COLLINEAR_REFUSED:
         tied = _tied(loads, names)
-        raise _missing(session, tied, f"{', '.join(tied)} only vary together")
+        together = f"{', '.join(tied)} only vary together"
+        raise _refused(
+            session, f"the reference loads do not span the unknowns: {together}",
+            f"{together} (condition number {condition_number(loads):.3g})",
+            "each load varied independently of the others", "not-spanning",
+            f"add rows in which {' or '.join(tied)} varies by itself",
+        )  # fmt: skip
     cells = table.matrix(session.indications)
     dead = [n for n, spread in zip(session.indications, np.ptp(cells, axis=0), strict=True) if spread == 0]
     if dead:
@@ -129,9 +137,12 @@ def _unnamed(session: Session) -> list[str]:
 
 def _missing(session: Session, names: list[str], got: str) -> SessionError:
     return _refused(
-        session, f"the reference loads do not span the unknowns: {', '.join(names)} is missing", got,
+        session,
+        f"the reference loads do not span the unknowns: {', '.join(names)} "
+        f"{'is' if len(names) == 1 else 'are'} missing",
+        got,
         "each load varied independently of the others", "not-spanning",
-        f"add rows in which {', '.join(names)} varies by itself",
+        f"add rows in which {' and '.join(names)} varies by itself",
     )  # fmt: skip
 
 

@@ -12,6 +12,7 @@ coefficient of a term that hardly matters.
 
 from __future__ import annotations
 
+import math
 import tomllib
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -49,11 +50,19 @@ def check_reproduces(record: CalibrationRecord, table: Table) -> None:
         values = columns[cell.name]
         _same_unit(record, cell.name, table.unit(cell.name), cell.unit)
         _demand(record, cell.name, "range", (cell.minimum, cell.maximum) == (values.min(), values.max()))
+    inputs = np.asarray(record.golden.inputs).reshape(-1, len(record.cells))
+    points = dict(zip(record.indications, inputs.T, strict=True))
+    shared: dict[tuple[str, ...], _Solver] = {}
     for at, one in enumerate(record.loads):
         _same_unit(record, one.load, table.unit(one.load), one.unit)
-        terms = term_matrix(one.terms, columns)
-        loads = table.column(one.load)
-        _check_load(record, at, one, terms, loads, _weights(one, table))
+        weights = _weights(one, table)
+        solver = shared.get(one.terms) if weights is None else None
+        if solver is None:
+            terms = term_matrix(one.terms, columns)
+            solver = _solver(terms, weights, one.terms[-1] == INTERCEPT, term_matrix(one.terms, points))
+            if weights is None:
+                shared[one.terms] = solver
+        _check_load(record, at, one, solver, table.column(one.load))
 
 
 def check_transcribed(record: CalibrationRecord, source: bytes) -> None:
@@ -97,34 +106,26 @@ def _weights(one: LoadFit, table: Table) -> NDArray[np.float64] | None:
 
 
 def _check_load(
-    record: CalibrationRecord,
-    at: int,
-    one: LoadFit,
-    terms: NDArray[np.float64],
-    loads: NDArray[np.float64],
-    weights: NDArray[np.float64] | None,
+    record: CalibrationRecord, at: int, one: LoadFit, solver: _Solver, loads: NDArray[np.float64]
 ) -> None:
     where = one.load
     coefficients = np.asarray(one.coefficients)
-    largest = float(np.abs(loads).max())
-    has_constant = one.terms[-1] == INTERCEPT
-    refit = _svd_fit(terms, loads, weights, has_constant)
-    sd, covariance = refit.sd, refit.covariance
-    reach = term_reach(terms, has_constant)
-    moved = np.abs(refit.coefficients - coefficients) * reach
-    worst = int(np.argmax(moved))
+    low, high = float(loads.min()), float(loads.max())
+    largest = max(abs(low), abs(high))
+    solution, sd = solver.solve(loads)
+    moved = np.abs(solver.back @ solution - coefficients) * solver.reach
+    worst = int(moved.argmax())
     if not moved[worst] <= CRITERION * largest:
         raise _refused(
             record, f"{where}, term {one.terms[worst]}", f"{one.coefficients[worst]!r}",
-            f"{float(refit.coefficients[worst])!r} from its own data", "refit",
+            f"{float((solver.back @ solution)[worst])!r} from its own data", "refit",
         )  # fmt: skip
     _demand(
         record, where, "number of rows", one.n == len(loads) and one.dof == len(loads) - len(coefficients)
     )
-    _demand(record, where, "range", (one.minimum, one.maximum) == (loads.min(), loads.max()))
+    _demand(record, where, "range", (one.minimum, one.maximum) == (low, high))
     _demand(record, where, "polarity", one.polarity == polarity(one.coefficients))
-    extent = np.abs(terms).max(axis=0).tolist()
-    issued = tuple(issued_value(c, e, largest) for c, e in zip(one.coefficients, extent, strict=True))
+    issued = tuple(issued_value(c, e, largest) for c, e in zip(one.coefficients, solver.extent, strict=True))
     _demand(record, where, "issued coefficients", one.issued == issued)
     sd_floor = 1e-9 * largest
     _demand(
@@ -132,26 +133,25 @@ def _check_load(
         one.residual_sd is not None and abs(one.residual_sd - sd) <= _SPREAD * sd + sd_floor,
     )  # fmt: skip
     stored = np.asarray(one.covariance)
-    spread = np.sqrt(np.outer(np.diag(covariance), np.diag(covariance)))
+    scale = sd**2 if solver.weights is None else 1.0
     # The covariance scales with sd^2, which noise-free data do not determine: hence the floor.
     # Its rounding grows with the square of the terms' condition number.
-    slack = _SPREAD + 10 * np.finfo(float).eps * refit.condition**2
-    slack += 2 * sd_floor / max(sd, 1e-300) if weights is None else 0.0
+    slack = _SPREAD + 10 * np.finfo(float).eps * solver.condition**2
+    slack += 2 * sd_floor / max(sd, 1e-300) if solver.weights is None else 0.0
     _demand(
         record, where, "covariance",
-        stored.shape == covariance.shape and bool(np.all(np.abs(stored - covariance) <= slack * spread)),
+        stored.shape == solver.inverse.shape
+        and bool((np.abs(stored - scale * solver.inverse) <= slack * scale * solver.spread).all()),
     )  # fmt: skip
-    inputs = np.asarray(record.golden.inputs)
-    golden = term_matrix(one.terms, dict(zip(record.indications, inputs.T, strict=True)))
     wanted = np.asarray(record.golden.outputs[at])
     # A power series in the raw variable cancels: its own rounding is allowed for, nothing more.
-    rounding = 64 * np.finfo(float).eps * (np.abs(golden) @ np.abs(coefficients))
-    ours = golden @ coefficients
-    theirs = refit.predict(golden)
+    rounding = 64 * np.finfo(float).eps * (np.abs(solver.golden) @ np.abs(coefficients))
+    ours = solver.golden @ coefficients
+    theirs = solver.golden_design @ solution
     for values, by, share in ((ours, "the coefficients", GOLDEN), (theirs, "the refit", GOLDEN_REFIT)):
-        allowed = share * largest + rounding
-        if not np.all(np.abs(values - wanted) <= allowed):
-            row = int(np.argmax(np.abs(values - wanted) - allowed))
+        off = np.abs(values - wanted) - (share * largest + rounding)
+        if not (off <= 0).all():
+            row = int(off.argmax())
             raise _refused(
                 record, f"{where}, golden vector {row + 1}", f"{float(values[row])!r} from {by}",
                 f"{float(wanted[row])!r}", "golden",
@@ -159,31 +159,45 @@ def _check_load(
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class _Refit:
-    """Coefficients and covariance in the raw terms; ``predict`` works in the centred, scaled ones."""
+class _Solver:
+    """One decomposition, for every load that shares terms and weights.
 
-    coefficients: NDArray[np.float64]
-    covariance: NDArray[np.float64]
-    sd: float
-    centre: NDArray[np.float64]
-    scale: NDArray[np.float64]
-    solution: NDArray[np.float64]
-    constant_column: float
+    ``design`` (rows, terms) is centred and scaled; raw coefficients = ``back`` @ solution. ``inverse`` is
+    the unscaled covariance in the raw terms and ``spread`` the products of its standard errors. ``golden``
+    are the golden inputs' raw terms and ``golden_design`` the same in the columns of the design. ``reach``
+    and ``extent`` are each term's range and largest absolute value.
+    """
+
+    design: NDArray[np.float64]
+    weights: NDArray[np.float64] | None
+    left: NDArray[np.float64]
+    pseudo: NDArray[np.float64]
+    back: NDArray[np.float64]
+    inverse: NDArray[np.float64]
+    spread: NDArray[np.float64]
     condition: float
+    golden: NDArray[np.float64]
+    golden_design: NDArray[np.float64]
+    reach: NDArray[np.float64]
+    extent: list[float]
 
-    def predict(self, terms: NDArray[np.float64]) -> NDArray[np.float64]:
-        k = len(self.scale)
-        scaled = (terms[:, :k] - self.centre) / self.scale
-        values: NDArray[np.float64] = scaled @ self.solution[:k]
-        return values + self.constant_column * self.solution[k] if len(self.solution) > k else values
+    def solve(self, loads: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
+        """Return the solution in the design's columns, and the residual standard deviation."""
+        w = 1.0 if self.weights is None else self.weights
+        solution = self.pseudo @ (self.left.T @ (loads * w))
+        # One step of refinement: the second solve works on the residuals and mends the first's rounding.
+        solution = solution + self.pseudo @ (self.left.T @ ((loads - self.design @ solution) * w))
+        residuals = loads - self.design @ solution
+        n, p = self.design.shape
+        return solution, math.sqrt(float(residuals @ residuals) / (n - p))
 
 
-def _svd_fit(
+def _solver(
     terms: NDArray[np.float64],
-    loads: NDArray[np.float64],
     weights: NDArray[np.float64] | None,
     has_constant: bool,
-) -> _Refit:
+    golden: NDArray[np.float64],
+) -> _Solver:
     n, p = terms.shape
     k = p - 1 if has_constant else p
     centre = terms[:, :k].mean(axis=0) if has_constant else np.zeros(k)
@@ -192,29 +206,33 @@ def _svd_fit(
     scale = np.sqrt(np.einsum("ij,ij->j", design[:, :k], design[:, :k]))
     scale[scale == 0] = 1.0
     design[:, :k] /= scale
-    w = np.ones(n) if weights is None else weights
-    left, values, right = np.linalg.svd(design * w[:, None], full_matrices=False)
-    solution = right.T @ ((left.T @ (loads * w)) / values)
-    # One step of refinement: the second solve works on the residuals and mends the first one's rounding.
-    solution = solution + right.T @ ((left.T @ ((loads - design @ solution) * w)) / values)
-    residuals = loads - design @ solution
-    sd = float(np.sqrt(residuals @ residuals / (n - p)))
+    left, values, right = np.linalg.svd(
+        design if weights is None else design * weights[:, None], full_matrices=False
+    )
     # Back to the raw terms: c = slope / scale, intercept = constant - centre . c
     back = np.zeros((p, p))
     back[:k, :k] = np.diag(1 / scale)
     if has_constant:
         back[k, :k] = -centre / scale
         back[k, k] = n**-0.5
-    inverse = (right.T / values**2) @ right
-    return _Refit(
-        coefficients=back @ solution,
-        covariance=back @ inverse @ back.T * (sd**2 if weights is None else 1.0),
-        sd=sd,
-        centre=centre,
-        scale=scale,
-        solution=solution,
-        constant_column=n**-0.5,
+    golden_design = np.full(golden.shape, n**-0.5)
+    golden_design[:, :k] = (golden[:, :k] - centre) / scale
+    root = (right.T / values).T @ back.T
+    inverse = root.T @ root
+    errors = np.sqrt(inverse.diagonal())
+    return _Solver(
+        design=design,
+        weights=weights,
+        left=left,
+        pseudo=right.T / values,
+        back=back,
+        inverse=inverse,
+        spread=np.outer(errors, errors),
         condition=float(values[0] / values[-1]),
+        golden=golden,
+        golden_design=golden_design,
+        reach=term_reach(terms, has_constant),
+        extent=np.abs(terms).max(axis=0).tolist(),
     )
 
 

@@ -12,11 +12,12 @@ from datetime import UTC, date, datetime
 from pathlib import Path
 
 from toolkit.calibration import store
+from toolkit.calibration.agreement import check_agrees
 from toolkit.calibration.ledger import HEAD, LEDGER, Ledger
 from toolkit.calibration.record import CalibrationRecord, from_bytes
 from toolkit.calibration.refit import check_reproduces, check_transcribed
 from toolkit.calibration.status import RecordStatus, status_of
-from toolkit.calibration.table import read_table
+from toolkit.calibration.table import Table, read_table
 from toolkit.errors import RecordError, RegistryError, ToolkitError
 from toolkit.files import sha256_bytes
 
@@ -242,34 +243,42 @@ def load_checked(folder: Path, record_id: str, ledger: Ledger) -> CalibrationRec
         if record.kind == "legacy":
             check_transcribed(record, contents["source"])
         else:
-            _refit(record, contents["loads"], folder)
+            table = _table(record, contents["loads"], folder)
+            check_agrees(record, contents["session"], table)
+            check_reproduces(record, table)
     except KeyError as error:
         raise _bad(record_id, path, f"no data file {error}", "its reference-load data", "data") from error
     return record
 
 
-def _refit(record: CalibrationRecord, data: bytes, folder: Path) -> None:
+def _table(record: CalibrationRecord, data: bytes, folder: Path) -> Table:
     needed = [*record.indications, *(one.load for one in record.loads)]
     uncertainties = [f"u_{one.load}" for one in record.loads]
-    where = folder / f"{record.id}: loads"
+    file = record.data_file("loads")
+    where = folder / ("loads" if file is None else file.file)
     try:
-        table = read_table(data, where=where, required=needed, optional=uncertainties)
+        return read_table(data, where=where, required=needed, optional=uncertainties)
     except RegistryError:
         raise
     except ToolkitError as error:
         raise _bad(
-            record.id, where, _reason(error), "reference-load data that can be read", "data"
+            record.id,
+            where,
+            f"{where.name}: {_reason(error)}",
+            "reference-load data that can be read",
+            "data",
         ) from error
-    check_reproduces(record, table)
 
 
 def _data_file(record_id: str, path: Path, expected: str) -> bytes:
     try:
         data = path.read_bytes()
     except OSError as error:
-        raise _bad(record_id, path, error.strerror, "the data that belong to the record", "data") from error
-    if sha256_bytes(data) != expected:
-        raise _bad(record_id, path, f"sha256 {sha256_bytes(data)}", expected, "data")
+        raise _bad(
+            record_id, path, f"{path.name}: {error.strerror}", "the data that belong to the record", "data"
+        ) from error
+    if (found := sha256_bytes(data)) != expected:
+        raise _bad(record_id, path, f"{path.name} with sha256 {found}", f"{expected} as entered", "data")
     return data
 
 

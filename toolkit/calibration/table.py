@@ -108,7 +108,8 @@ def read_table(
     _check_header(names, header, [*required, *(extra[:2])], [*optional, *extra], where)
     if not body:
         raise _error(where, "the file has no rows", "0 rows", "one row a reference load", "no-data")
-    for number, row in enumerate(body, start=1):
+    wide = set(map(len, body)) == {len(names)}
+    for number, row in enumerate(() if wide else body, start=1):
         if len(row) != len(names):
             raise _error(
                 f"{where}, row {number} (line {number + 1})",
@@ -128,10 +129,12 @@ def read_table(
         units.append(unit(match["unit"].strip(), where=f"{where}, column {name}").text)
     direction = None
     if "direction" in cells:
-        direction = tuple(cell.strip().lower() for cell in cells["direction"])
-        for number, cell in enumerate(direction, start=1):
-            if cell not in ("up", "down"):
-                raise _cell(where, number, "direction", cell, "up or down")
+        direction = tuple(cells["direction"])
+        if not set(direction) <= {"up", "down"}:
+            direction = tuple(cell.strip().lower() for cell in direction)
+            for number, cell in enumerate(direction, start=1):
+                if cell not in ("up", "down"):
+                    raise _cell(where, number, "direction", cell, "up or down")
     run = _numbers(cells["run"], "run", where) if "run" in cells else None
     if run is not None and (fraction := np.flatnonzero(run != np.floor(run))).size:
         at = int(fraction[0])
@@ -149,11 +152,8 @@ def read_table(
 def _rows(data: bytes, where: object) -> list[list[str]]:
     try:
         text = data.decode("utf-8-sig")
-        rows = [
-            row
-            for row in csv.reader(io.StringIO(text, newline=""), strict=True)
-            if any(c.strip() for c in row)
-        ]
+        read = csv.reader(io.StringIO(text, newline=""), strict=True)
+        rows = [row for row in read if "".join(row).strip()]
     except (ValueError, csv.Error) as error:
         raise _error(
             where, "the file is no CSV text", str(error), "comma-separated UTF-8 text", "no-csv"
@@ -192,6 +192,7 @@ def _numbers(cells: Sequence[str], name: str, where: object) -> NDArray[np.float
         values = np.array(list(map(float, cells)))
     except ValueError:
         values = np.array([_number(cell, at, name, where) for at, cell in enumerate(cells, start=1)])
+    # float() reads 1_0 as ten; in a table an underscore is a slip.
     if not np.isfinite(values).all() or "_" in "".join(cells):
         for at, cell in enumerate(cells, start=1):
             _number(cell, at, name, where)

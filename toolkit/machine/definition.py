@@ -214,18 +214,19 @@ def _build(table: dict[str, Any], path: Path) -> Machine:
 
 def quantity(entry: dict[str, Any], dimension: str, where: object) -> float:
     """Return ``{ value, unit }`` as a float in SI; the unit must have the dimension that is named."""
-    if not isinstance(entry, dict) or not {"value", "unit"} <= set(entry):
+    if not isinstance(entry, dict) or "value" not in entry or not isinstance(entry.get("unit"), str):
         raise ConfigError(
             "a quantity has no unit",
             where=where,
             got=entry,
             expected='{ value = NUMBER, unit = "..." }',
             next_step="write value and unit",
+            rule="no-unit",
         )
     if isinstance(entry["value"], bool) or not isinstance(entry["value"], int | float):
         raise ConfigError(
             "a quantity's value is not a number", where=where, got=entry["value"], expected="a number",
-            next_step="write value as a plain number",
+            next_step="write value as a plain number", rule="wrong-value",
         )  # fmt: skip
     found = unit(entry["unit"], where=where)
     if found.dimension == dimension:
