@@ -39,13 +39,15 @@ TIMEOUT_S = 180.0
 
 
 class Office:
-    """LibreOffice with a fresh profile, prepared in the background while figures are drawn.
+    """LibreOffice with a fresh profile, started in the background while figures are drawn.
 
-    Use as a context manager; the profile goes with it.
+    The instance waits without a document; the conversion's own call hands its job over to it through the
+    profile they share, so that the start-up is already paid for. Use as a context manager: the instance
+    and the profile go with it.
     """
 
     def __init__(self, *, timeout_s: float = TIMEOUT_S) -> None:
-        """Write the profile and warm it up.
+        """Write the profile and start the waiting instance.
 
         Raises
         ------
@@ -58,7 +60,7 @@ class Office:
         user = self.folder / "profile" / "user"
         user.mkdir(parents=True)
         (user / "registrymodifications.xcu").write_text(_PROFILE)
-        self._warm: subprocess.Popen[bytes] | None = self._start(["--terminate_after_init"])
+        self._warm: subprocess.Popen[bytes] | None = self._start([])
 
     def __enter__(self) -> Office:
         return self
@@ -70,9 +72,7 @@ class Office:
 
     def close(self) -> None:
         """End what still runs and remove the profile."""
-        if self._warm is not None:
-            _kill(self._warm)
-            self._warm = None
+        self._end_warm()
         shutil.rmtree(self.folder, ignore_errors=True)
 
     def convert(self, documents: Sequence[Path], out: Path) -> list[Path]:
@@ -83,13 +83,27 @@ class Office:
         RenderError
             LibreOffice took too long, or a PDF is not there or is no PDF
         """
-        if self._warm is not None:
-            try:
-                self._warm.communicate(timeout=self.timeout_s)
-            except subprocess.TimeoutExpired:
-                _kill(self._warm)
-            self._warm = None
         wanted = [out / f"{one.stem}.pdf" for one in documents]
+        said = self._run(documents, out, wanted)
+        if self._warm is not None:
+            # The waiting instance took the job; where it did not, a fresh one gets it.
+            self._end_warm()
+            if not all(pdf.is_file() for pdf in wanted):
+                said = self._run(documents, out, wanted)
+        for pdf in wanted:
+            if not pdf.is_file() or not pdf.read_bytes()[:5] == b"%PDF-":
+                raise RenderError(
+                    "LibreOffice made no PDF",
+                    where=pdf.name,
+                    got=said or "nothing",
+                    expected="a PDF of the filled report",
+                    rule="render-failed",
+                    next_step="run 'toolkit doctor'; open the .docx in LibreOffice to see why",
+                )
+        return wanted
+
+    def _run(self, documents: Sequence[Path], out: Path, wanted: Sequence[Path]) -> str:
+        """Run one conversion and return what LibreOffice said of it."""
         for old in wanted:
             old.unlink(missing_ok=True)
         process = self._start(
@@ -114,17 +128,12 @@ class Office:
                 rule="render-timeout",
                 next_step="run 'toolkit doctor'; convert the document by hand to see what stops it",
             ) from error
-        for pdf in wanted:
-            if not pdf.is_file() or not pdf.read_bytes()[:5] == b"%PDF-":
-                raise RenderError(
-                    "LibreOffice made no PDF",
-                    where=pdf.name,
-                    got=said.decode("utf-8", "replace").strip()[-300:] or f"exit code {process.returncode}",
-                    expected="a PDF of the filled report",
-                    rule="render-failed",
-                    next_step="run 'toolkit doctor'; open the .docx in LibreOffice to see why",
-                )
-        return wanted
+        return said.decode("utf-8", "replace").strip()[-300:] or f"exit code {process.returncode}"
+
+    def _end_warm(self) -> None:
+        if self._warm is not None:
+            _kill(self._warm)
+            self._warm = None
 
     def _start(self, arguments: list[str]) -> subprocess.Popen[bytes]:
         environment = {**os.environ, "SAL_USE_VCLPLUGIN": "svp"}
