@@ -199,7 +199,7 @@ def _fit_group(curves: Sequence[Curve], loss: Loss) -> list[CurveFit]:
     known = np.nan_to_num(scale.known) >= variance
     dof = np.where(known, np.inf, np.maximum(lengths / times - 6, 1.0))
     variance = np.maximum(variance, _TINY_VARIANCE) * times
-    found = spread(solution, problems, zero=-scale.middle / scale.half, variance=variance)
+    found = spread(solution, problems, zero=-scale.middle / scale.half, variance=variance, dof=dof)
     return [
         _result(
             curve,

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-_E_TOP = 1.25
+E_TOP = 1.25
 C_LOW, C_HIGH = 1e-3, 4.0
 E_LOW, E_HIGH = -20.0, 1.0
 D_LIMIT, SV_LIMIT = 3.0, 1.0
@@ -107,12 +107,12 @@ _FIELDS = ("p", "linear", "cost", "gradient", "square", "cross", "gram", "held")
 
 def curvature_parameter(E: Array | float) -> Array:
     """Return q of E."""
-    return np.log(_E_TOP - np.asarray(E, dtype=np.float64))
+    return np.log(E_TOP - np.asarray(E, dtype=np.float64))
 
 
 def shape_of(p: Array) -> tuple[Array, Array, Array, Array]:
     """Return normalised (B, C, E, shift) of unknowns (..., 4)."""
-    return np.exp(p[..., 0]), p[..., 1], _E_TOP - np.exp(p[..., 2]), p[..., 3]
+    return np.exp(p[..., 0]), p[..., 1], E_TOP - np.exp(p[..., 2]), p[..., 3]
 
 
 def theta_of(state: State) -> Array:
@@ -134,7 +134,7 @@ def assess(p: Array, problems: Problems) -> State:
     u, y, sw = problems.u, problems.y, problems.sw
     B, C, q, h = p[:, 0:1], p[:, 1:2], p[:, 2:3], p[:, 3:4]
     B, eq = np.exp(B), np.exp(q)
-    E = _E_TOP - eq
+    E = E_TOP - eq
     z = B * (u + h)
     bend = z - np.arctan(z)
     psi = z - E * bend

@@ -29,6 +29,7 @@ _EXACT = 1e-20  # a cost below this share of sum(y^2) is rounding
 _SWIFT = (32, ((5, 12), (8, 5)), 40)
 _PATIENT = (80, ((14, 20), (20, 5)), 60)
 _ENOUGH = 2  # starts at one lowest cost end the search of a curve early
+_NEARLY = 3.0  # times the lowest cost: a start that ended beyond will not come within the noise of it
 _NEAR = np.array([0.02, 0.02, 0.05, 0.02])
 
 
@@ -36,8 +37,8 @@ _NEAR = np.array([0.02, 0.02, 0.05, 0.02])
 class Solution:
     """The lowest minimum of every problem, how many starts ended there, and where the others ended.
 
-    ``rivals`` (curves, starts, 6): B, C, D, E, h, Sv of the last starts; ``excess`` (curves, starts): their
-    cost above the lowest.
+    ``rivals`` (curves, starts, 6): B, C, D, E, h, Sv where the last starts ended on the rows; ``excess``
+    (curves, starts): their cost above the lowest, infinite for starts that were given up.
     """
 
     state: State
@@ -67,16 +68,31 @@ def solve(problems: Problems) -> Solution:
         merged.put((order >= count).ravel(), again.take(new.ravel()))
         state.put_at(_rows(open_, count), merged)
         agreeing = _agreeing(state.cost.reshape(-1, count), floor)
-    rivals = theta_of(state).reshape(len(curves), count, 6)
+    # All that differ and come near the lowest are polished on the rows: bin means may rank two minima
+    # otherwise than the rows do, and what another minimum leaves open is not determined.
     cost = state.cost.reshape(len(curves), count)
+    order = np.argsort(cost, axis=1)
+    cost = np.take_along_axis(cost, order, axis=1)
+    p = np.take_along_axis(state.p.reshape(len(curves), count, 4), order[..., None], axis=1)
+    chosen = (cost <= _NEARLY * cost[:, :1] + floor[:, None]) & ~_twins(p)
+    chosen[:, 0] = True
+    owner, place = np.nonzero(chosen)
+    state = descend(p[owner, place], problems.take(owner), steps=30, tolerance=1e-10)
+    cost = np.full((len(curves), count), np.inf)
+    cost[owner, place] = state.cost
+    rivals = np.zeros((len(curves), count, 6))
+    rivals[owner, place] = theta_of(state)
+    best = cost.argmin(axis=1)
+    number = np.zeros((len(curves), count), dtype=np.intp)
+    number[owner, place] = np.arange(len(owner))
     excess = cost - cost.min(axis=1, keepdims=True)
-    # Bin means may rank two minima otherwise than the rows do: both are polished.
-    polished = 1 if coarse is problems else 2
-    order = np.argsort(state.cost.reshape(-1, count), axis=1)[:, :polished]
-    index = (order + count * curves[:, None]).ravel()
-    state = descend(state.p[index], problems.take(np.repeat(curves, polished)), steps=30, tolerance=1e-10)
-    best = state.cost.reshape(-1, polished).argmin(axis=1) + polished * curves
-    return Solution(state=state.take(best), agreeing=agreeing, rivals=rivals, excess=excess)
+    return Solution(state=state.take(number[curves, best]), agreeing=agreeing, rivals=rivals, excess=excess)
+
+
+def _twins(p: Array) -> NDArray[np.bool_]:
+    # Which unknowns (curves, starts, 4) follow others of the same curve closely.
+    close = (np.abs(p[:, :, None] - p[:, None, :]) < _NEAR).all(axis=3)
+    return np.asarray(np.tril(close, -1).any(axis=2))
 
 
 def _search(

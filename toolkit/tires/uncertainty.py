@@ -1,10 +1,17 @@
-"""Which parameters the data determine, and how well: linear propagation, checked against the real cost.
+"""Which parameters the data determine, and how well: linear propagation, held against the model itself.
 
-The Gauss-Newton covariance holds only where the cost is a parabola. So every parameter is moved by two
-standard errors, all else is fitted again, and the cost is compared: where it is not what the parabola
-says, a bound is in the way, or another minimum is as good, the parameter is not determined and gets no
-standard error. Rows of a 100 Hz
-sweep repeat themselves: the covariance is multiplied by the residual's integrated autocorrelation time.
+All is asked of the 95 % interval that a standard error stands for. A parameter is determined where
+
+- it is not at a bound, and its interval lies within the bounds,
+- the interval's half width is at most half of what is natural for it: B, C and D themselves, 1.25 - E, half
+  the range of slip angle for Sh, max|y| for Sv,
+- the model is straight enough over it: with the parameter held at either end and all else fitted again,
+  the curve has moved as far as the linear propagation says,
+- no other minimum that the noise cannot tell from the lowest lies outside it.
+
+Only the model, the places of the rows and the size of the noise are asked, never the residuals: less noise
+determines more. Rows of a 100 Hz sweep repeat themselves: the covariance is multiplied by the
+residual's integrated autocorrelation time.
 """
 
 from __future__ import annotations
@@ -14,12 +21,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from toolkit.estimate import coverage_factor
 from toolkit.tires.kernel import (
     C_HIGH,
     C_LOW,
     D_LIMIT,
     E_HIGH,
     E_LOW,
+    E_TOP,
     SPAN_HIGH,
     SPAN_LOW,
     SV_LIMIT,
@@ -35,11 +44,10 @@ if TYPE_CHECKING:
     from toolkit.tires.kernel import Array
     from toolkit.tires.solver import Solution
 
-_STEP = 2.0  # standard errors by which a parameter is moved
-_PARABOLA = (0.5, 1.8)  # of the expected rise of the cost: beyond, a linear interval would mislead
-_REFITS = 4  # steps by which all else is fitted again where one quantity is held
-_APART = 3.0  # standard errors between minima that differ
-_WIDE = 0.25  # of the spread that the bounds alone leave: beyond, the data say next to nothing
+_PARABOLA = (0.5, 3.0)  # of the expected rise of the cost: below, an interval would be too narrow to be true
+_REFITS = 2  # steps by which all else is fitted again where one parameter is held
+_WIDE = 0.5  # half width of an interval, of what is natural: beyond, the data say next to nothing
+_SAME = 1e-6  # normalised parameters that differ by less are one
 _ROWS_FOR_CORRELATION = 40
 
 
@@ -61,54 +69,51 @@ class Spread:
     value_se: Array
 
 
-def spread(solution: Solution, problems: Problems, *, zero: Array, variance: Array) -> Spread:
+def spread(solution: Solution, problems: Problems, *, zero: Array, variance: Array, dof: Array) -> Spread:
     """Return what the data say about the parameters at a minimum.
 
     Parameters
     ----------
     zero : normalised slip angle of SA = 0 (curves,)
     variance : variance of a row of weight one, autocorrelation included (curves,)
+    dof : degrees of freedom of that variance, infinite where it is known (curves,)
     """
     theta = theta_of(solution.state)
     low, high, width = _box(theta, problems)
     margin = 1e-6 * (high - low)
     at_bound = (theta <= low + margin) | (theta >= high - margin)
-    columns = np.moveaxis(jacobian(theta.T[..., None], problems.u), 0, 1) * problems.sw[:, None, :]
+    columns = _columns(theta, problems)
     information = columns @ columns.transpose(0, 2, 1) / variance[:, None, None]
     # What the bounds alone say keeps the inverse finite; it is negligible for what the data determine.
     information += np.eye(6) / (width * width)[:, :, None]
     # A parameter at its bound stays free here: the others would else look better known than they are.
     covariance = _inverse(information)
     at_zero, level = slope(theta.T, zero), value(theta.T, zero)
-    gradients = np.concatenate(
-        [
-            np.broadcast_to(np.eye(6)[:, None, :], (6, *theta.shape)),
-            slope_jacobian(theta.T, zero).T[None],
-            jacobian(theta.T, zero).T[None],
-        ]
-    )
-    along = np.matvec(covariance, gradients)
-    errors = np.sqrt(np.maximum(np.vecdot(gradients, along), 0.0))
-    along /= np.where(errors > 0, errors, 1.0)[..., None]
-    steady = _steady(theta, gradients[:6], along[:6], compress(problems), variance, low, high)
-    sd = errors[:6].T
-    determined = (~at_bound) & (sd <= _WIDE * width) & steady.T
-    # Another minimum that the noise cannot tell from the lowest: what differs there is not determined.
-    rival = (solution.excess <= _STEP**2 * variance[:, None])[..., None]
-    apart = np.abs(solution.rivals - theta[:, None, :]) > _APART * sd[:, None, :] + 1e-6
-    determined &= ~(rival & apart).any(axis=1)
+    gradients = np.stack([slope_jacobian(theta.T, zero).T, jacobian(theta.T, zero).T])
+    slope_se, value_se = np.sqrt(np.maximum(np.vecdot(gradients, np.matvec(covariance, gradients)), 0.0))
+    factor = np.array([coverage_factor(float(one)) for one in dof])
+    half = factor[:, None] * np.sqrt(np.maximum(np.einsum("pii->pi", covariance), 0.0))
+    inside = (theta - half >= low) & (theta + half <= high)
+    natural = np.ones_like(theta)
+    natural[:, :3], natural[:, 3] = np.abs(theta[:, :3]), E_TOP - theta[:, 3]
+    allowed = (factor * factor * variance)[:, None]
+    rival = (solution.excess <= allowed)[..., None]
+    outside = np.abs(solution.rivals - theta[:, None, :]) > half[:, None, :] + _SAME
+    determined = ~at_bound & inside & (half <= _WIDE * natural) & ~(rival & outside).any(axis=1)
+    determined &= _straight(theta, covariance, half, compress(problems), allowed[:, 0], low, high)
     # Beyond the data a curve is an extrapolation of the model, whatever its covariance says.
     # A slope needs rows on both sides; a value may stand at the end of them.
-    slope_ok = (np.abs(zero) <= 0.95) & (errors[6] <= _WIDE * np.abs(at_zero))
+    slope_ok = (np.abs(zero) <= 0.95) & (factor * slope_se <= _WIDE * np.abs(at_zero))
+    value_ok = (np.abs(zero) <= 1.05) & (factor * value_se <= _WIDE)
     return Spread(
         theta=theta,
         covariance=covariance,
         determined=determined,
         at_bound=at_bound,
         slope=at_zero,
-        slope_se=np.where(slope_ok, errors[6], np.nan),
+        slope_se=np.where(slope_ok, slope_se, np.nan),
         value=level,
-        value_se=np.where(np.abs(zero) <= 1.05, errors[7], np.nan),
+        value_se=np.where(value_ok, value_se, np.nan),
     )
 
 
@@ -128,54 +133,61 @@ def _box(theta: Array, problems: Problems) -> tuple[Array, Array, Array]:
     return low, high, width
 
 
-def _steady(
-    theta: Array,
-    gradients: Array,
-    along: Array,
-    problems: Problems,
-    variance: Array,
-    low: Array,
-    high: Array,
+def _straight(
+    theta: Array, covariance: Array, half: Array, problems: Problems, expected: Array, low: Array, high: Array
 ) -> NDArray[np.bool_]:
-    # Does the cost rise as the parabola says when a quantity is held _STEP standard errors away, on both
-    # sides, and all else is fitted again? gradients, along (quantities, curves, 6) -> (quantities, curves).
-    quantities, curves = len(gradients), len(theta)
-    sides = np.array([_STEP, -_STEP])[:, None, None, None]
-    moved = (theta + sides * along).reshape(-1, 6)
-    repeat = np.tile(np.arange(curves), 2 * quantities)
-    held = np.concatenate([gradients, gradients]).reshape(-1, 6)
-    own = np.einsum("sjpj->sjp", moved.reshape(2, quantities, curves, 6)[:, :6])
-    margin = 0.02 * (high - low).T
-    reachable = np.ones((quantities, curves), dtype=np.bool_)
-    reachable[:6] = ((own >= low.T - margin) & (own <= high.T + margin)).all(axis=0)
+    # Has the curve moved as far as the linear propagation says, at both ends of every parameter's interval,
+    # all else fitted again? (curves, 6). Bin means serve for long curves: their rows' places count, not
+    # their values, for the curve is held against itself.
+    curves = len(theta)
+    variances = np.maximum(np.einsum("pii->pi", covariance), 1e-300)
+    # Along its own row of the covariance a parameter moves with all else where the parabola wants it.
+    step = covariance * (half / variances)[:, :, None]
+    moved = np.stack([theta[:, None] + step, theta[:, None] - step])  # (ends, curves, held, 6)
+    moved = np.clip(moved, low[:, None], high[:, None]).reshape(-1, 6)
+    repeat = np.tile(np.repeat(np.arange(curves), 6), 2)
+    held = np.tile(np.arange(6), 2 * curves)
+    each = np.arange(len(held))
     part, low, high = problems.take(repeat), low[repeat], high[repeat]
-    moved = np.clip(moved, low, high)
-    cost, columns, residual = _linearised(moved, part)
+    aim = value(theta.T[..., None], problems.u)[repeat]
+    residual = _residual(moved, aim, part)
+    cost = np.vecdot(residual, residual)
     for _ in range(_REFITS):
+        columns = _columns(moved, part)
         normal = columns @ columns.transpose(0, 2, 1)
         diagonal = np.einsum("pii->pi", normal)
         diagonal[...] += 1e-9 * diagonal.max(axis=1)[:, None] + 1e-300
-        inverse = _inverse(normal)
-        descent = np.matvec(inverse, np.matvec(columns, residual))
-        across = np.matvec(inverse, held)
-        share = np.vecdot(held, descent) / np.maximum(np.vecdot(held, across), 1e-300)
-        trial = np.clip(moved + descent - share[:, None] * across, low, high)
-        new_cost, new_columns, new_residual = _linearised(trial, part)
+        right = np.matvec(columns, residual)
+        # The held parameter has a row and column of the unit matrix: it stays.
+        normal[each, held, :] = normal[each, :, held] = 0.0
+        normal[each, held, held] = 1.0
+        right[each, held] = 0.0
+        trial = np.clip(moved + _solve(normal, right), low, high)
+        new = _residual(trial, aim, part)
+        new_cost = np.vecdot(new, new)
         better = new_cost < cost
-        moved[better], cost[better] = trial[better], new_cost[better]
-        columns[better], residual[better] = new_columns[better], new_residual[better]
-    base, _, _ = _linearised(theta, problems)
-    rise = (cost.reshape(2, quantities, curves) - base) / (_STEP**2 * variance)
-    fair = ((rise >= _PARABOLA[0]) & (rise <= _PARABOLA[1])).all(axis=0)
-    result: NDArray[np.bool_] = reachable & fair
+        moved[better], residual[better], cost[better] = trial[better], new[better], new_cost[better]
+    rise = cost.reshape(2, curves, 6) / expected[:, None]
+    fair: NDArray[np.bool_] = ((rise >= _PARABOLA[0]) & (rise <= _PARABOLA[1])).all(axis=0)
+    return fair
+
+
+def _columns(theta: Array, problems: Problems) -> Array:
+    # The weighted Jacobian (curves, 6, points).
+    columns: Array = np.moveaxis(jacobian(theta.T[..., None], problems.u), 0, 1) * problems.sw[:, None, :]
+    return columns
+
+
+def _residual(theta: Array, aim: Array, problems: Problems) -> Array:
+    residual: Array = (aim - value(theta.T[..., None], problems.u)) * problems.sw
+    return residual
+
+
+def _solve(matrix: Array, right: Array) -> Array:
+    scale = 1.0 / np.sqrt(np.einsum("pii->pi", matrix))
+    unit = matrix * (scale[:, :, None] * scale[:, None, :])
+    result: Array = np.linalg.solve(unit, (right * scale)[..., None])[..., 0] * scale
     return result
-
-
-def _linearised(theta: Array, problems: Problems) -> tuple[Array, Array, Array]:
-    # Cost (curves,), the columns of the Jacobian (curves, 6, points) and the residual, all weighted.
-    columns = np.moveaxis(jacobian(theta.T[..., None], problems.u), 0, 1) * problems.sw[:, None, :]
-    residual = (problems.y - value(theta.T[..., None], problems.u)) * problems.sw
-    return np.vecdot(residual, residual), columns, residual
 
 
 def _inverse(matrix: Array) -> Array:
