@@ -126,6 +126,7 @@ _EXACT = {
     "V/V": (1.0, 0.0, "V/V", "bridge_ratio"),
     "count": (1.0, 0.0, "count", "count"),
     "m": (1.0, 0.0, "m", "length"),
+    "mm": (1e-3, 0.0, "m", "length"),
     "s": (1.0, 0.0, "s", "time"),
     "m/s": (1.0, 0.0, "m/s", "speed"),
     "km/h": (1 / 3.6, 0.0, "m/s", "speed"),
