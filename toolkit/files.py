@@ -57,6 +57,7 @@ def atomic_path(target: Path) -> Iterator[Path]:
             got=error.strerror or str(error),
             expected="a folder with write permission and free space",
             next_step="free space or choose another folder with --out; nothing was changed",
+            rule="not-writable",
         ) from error
     finally:
         if temporary is not None:

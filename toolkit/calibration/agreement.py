@@ -13,12 +13,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from toolkit.calibration.legacy_file import read_legacy
 from toolkit.calibration.settings import Settings, inputs_hash, parse_session, settings_of
 from toolkit.errors import RecordError, ToolkitError
 
 if TYPE_CHECKING:
     from toolkit.calibration.record import CalibrationRecord
     from toolkit.calibration.table import Table
+
+_RESTORE = "restore the record from a backup; a correction is a new record, made by a new session"
 
 
 def check_agrees(record: CalibrationRecord, session: bytes, table: Table) -> None:
@@ -48,6 +51,50 @@ def check_agrees(record: CalibrationRecord, session: bytes, table: Table) -> Non
         raise _differs(record, file, "its text", error.what, f"a session: {error.expected}") from error
 
 
+def check_transcribed(record: CalibrationRecord, source: bytes) -> None:
+    """Refuse a legacy record that is not what its stored source says: it cannot be refitted.
+
+    Raises
+    ------
+    RecordError
+        ``refit``: a load's equation differs; ``data``: any other entry, or a source that cannot be read
+    """
+    stored = record.data_file("source")
+    file = "the source" if stored is None else stored.file
+    try:
+        told = read_legacy(source, where=file)
+    except ToolkitError as error:
+        raise _differs(record, file, "its text", error.what, f"a legacy file: {error.expected}") from error
+    if record.loads != told.loads:
+        raise RecordError(
+            f"record {record.id} does not reproduce from its own data: its coefficients",
+            where=f"{record.id}, loads",
+            got="not those of its source file",
+            expected=f"those of {file}",
+            next_step=_RESTORE,
+            rule="refit",
+        )
+    for name in ("instrument", "date", "entered_by", "zero", "cells", "golden", "settings", "inputs_sha256"):
+        if getattr(record, name) != getattr(told, name):
+            raise _differs(record, file, name, getattr(record, name), getattr(told, name))
+
+
+def check_inputs(record: CalibrationRecord) -> None:
+    """Refuse a record whose hash of its inputs is not that of its settings and data files.
+
+    It comes after the refit: of data that were exchanged, the refit says what they do to the coefficients.
+
+    Raises
+    ------
+    RecordError
+        ``data``
+    """
+    hashes = {one.role: one.sha256 for one in record.data}
+    expected = inputs_hash(record.settings, hashes["loads"], hashes.get("check"))
+    if record.inputs_sha256 != expected:
+        raise _differs(record, "with its data files", "inputs_sha256", record.inputs_sha256, expected)
+
+
 def _entries(
     record: CalibrationRecord, settings: Settings, table: Table, file: str
 ) -> Iterator[tuple[str, object, object]]:
@@ -70,9 +117,7 @@ def _entries(
     roles = {"loads", "session"}
     if settings.check is not None or (settings.check_table and "check" in hashes):
         roles.add("check")
-    yield "data", (*sorted(hashes), len(record.data)), (*sorted(roles), len(roles))
-    inputs = inputs_hash(settings.text, hashes["loads"], hashes.get("check"))
-    yield "inputs_sha256", record.inputs_sha256, inputs
+    yield "files", (*sorted(hashes), len(record.data)), (*sorted(roles), len(roles))
 
 
 def _first_difference(got: str, expected: str) -> tuple[str, object, object]:
@@ -90,6 +135,6 @@ def _differs(record: CalibrationRecord, file: str, name: str, got: object, expec
         where=f"{record.id}, {name}",
         got="nothing" if got is None else got,
         expected="nothing" if expected is None else f"{expected} by {file}",
-        next_step="restore the record from a backup; a correction is a new record, made by a new session",
+        next_step=_RESTORE,
         rule="data",
     )

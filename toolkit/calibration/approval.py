@@ -25,13 +25,17 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Decision:
-    """The outcome of an approval: ``done`` is False where a gate blocked, and then nothing was changed."""
+    """The outcome of an approval: ``done`` is False where a gate blocked, and then nothing was changed.
+
+    ``note`` tells that the record is in force from a day before the decision; it stands in the ledger too.
+    """
 
     id: str
     done: bool
     failed: tuple[gates.GateResult, ...]
     unverifiable: tuple[str, ...]
     findings: tuple[Finding, ...]
+    note: str | None = None
 
 
 def approve(
@@ -49,10 +53,16 @@ def approve(
     ``known_on`` is the day of the decision (default today). A second approval of a record moves its
     in-force date, with a reason.
 
+    A date before the session's own reaches back to tests that the session cannot speak of by itself: it
+    needs a reason. From the session's date on none is asked for, however late the decision, but a date
+    before the decision is written down: tests of the days between may have been judged by another record,
+    and ledger and answer note by how many days (``Decision.note``).
+
     Raises
     ------
     RegistryError
-        names that do not differ, a past date without a reason, a record that is withdrawn or refused
+        ``names``: entered, checked and approved by do not differ; ``approval``: a date before the
+        session's without a reason, or a record that is withdrawn or approved already
     """
     folder = registry.folder / instrument_of(record_id)
     day = known_on or today()
@@ -60,10 +70,13 @@ def approve(
     _check_names(record, checked_by, approved_by)
     if in_force_from < day and not reason and in_force_from < dt.date.fromisoformat(record.date):
         raise _refused(
-            record_id, "an in-force date in the past needs a reason", in_force_from.isoformat(),
-            "--reason TEXT, as it stands in the ledger", "approval",
+            record_id, "an in-force date before the session's own date needs a reason",
+            f"in force from {in_force_from.isoformat()}, session of {record.date}",
+            f"a date from {record.date} on, or --reason TEXT, which the ledger keeps", "approval",
         )  # fmt: skip
     check = _check_table(registry, record)
+    early = (day - in_force_from).days
+    note = f"in force from {early} day{'' if early == 1 else 's'} before the decision" if early > 0 else None
     decided: list[Decision] = []
 
     def build(ledger: Ledger) -> Change | None:
@@ -85,7 +98,14 @@ def approve(
         terms = gates.unverifiable(record, check)
         findings = tuple(Finding(rule=one.rule, where=one.where, message=one.message) for one in failed)
         decided.append(
-            Decision(id=record_id, done=not failed, failed=failed, unverifiable=terms, findings=findings)
+            Decision(
+                id=record_id,
+                done=not failed,
+                failed=failed,
+                unverifiable=terms,
+                findings=findings,
+                note=None if failed else note,
+            )
         )
         if failed:
             return None
@@ -98,7 +118,7 @@ def approve(
             "since": in_force_from.isoformat(),
             "unverifiable": list(terms),
         }
-        event |= {k: v for k, v in (("approved_by", approved_by), ("reason", reason)) if v}
+        event |= {k: v for k, v in (("approved_by", approved_by), ("reason", reason), ("note", note)) if v}
         return Change(files={}, event=event)
 
     commit(folder, build)
@@ -161,11 +181,11 @@ def _check_names(record: CalibrationRecord, checked_by: str, approved_by: str | 
     for role, name in names:
         key = " ".join(name.split()).casefold()
         if not key or key in seen:
+            got = f"{role} {name!r}" + (f", also {seen[key]}" if key in seen else "")
+            expected = f"a name that is none of {', '.join(f'{n!r} ({r})' for r, n in names if r != role)}"
             raise _refused(
-                record.id, "entered, checked and approved must be different names",
-                f"{role} {name!r}" + (f", also {seen[key]}" if key in seen else ""),
-                f"a name that is not {record.entered_by!r}", "names",
-            )  # fmt: skip
+                record.id, "entered, checked and approved must be different names", got, expected, "names"
+            )
         seen[key] = role
 
 

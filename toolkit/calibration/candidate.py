@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolkit.calibration.agreement import check_agrees
+from toolkit.calibration.agreement import check_agrees, check_inputs
 from toolkit.calibration.checks import history_findings, session_findings
 from toolkit.calibration.exact import golden_inputs, predict_exactly, solve_exactly
 from toolkit.calibration.fitting import LoadResult, SessionFit, fit_session, load_uncertainty
@@ -84,6 +84,7 @@ def calibrate(session_file: Path, registry: Registry) -> Candidate:
         record = _numbered(unnumbered, next_id(folder, session.instrument, ledger), session)
         check_agrees(record, session.session_bytes, session.table)
         check_reproduces(record, session.table)
+        check_inputs(record)
         made.append(record)
         return entering(record, _contents(session, record), by=session.operator)
 

@@ -29,7 +29,7 @@ class Entry:
 
     ``entered``: ``by``, ``record`` (its hash) and ``file`` (the hash of its file's bytes).
     ``approved``: ``known_on``, ``since`` (in force from), ``by`` (checked by), ``approved_by``, ``reason``,
-    ``unverifiable`` terms as "load: term".
+    ``unverifiable`` terms as "load: term", ``note`` where ``since`` lies before ``known_on``.
     ``withdrawn``: ``known_on``, ``since`` (void from; None is the in-force date), ``by``, ``reason``.
     """
 
@@ -46,6 +46,7 @@ class Entry:
     since: date | None = None
     approved_by: str | None = None
     reason: str | None = None
+    note: str | None = None
     unverifiable: tuple[str, ...] = ()
 
 

@@ -13,7 +13,6 @@ coefficient of a term that hardly matters.
 from __future__ import annotations
 
 import math
-import tomllib
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -63,32 +62,6 @@ def check_reproduces(record: CalibrationRecord, table: Table) -> None:
             if weights is None:
                 shared[one.terms] = solver
         _check_load(record, at, one, solver, table.column(one.load))
-
-
-def check_transcribed(record: CalibrationRecord, source: bytes) -> None:
-    """Compare a legacy record with the source text that lies beside it: it cannot be refitted.
-
-    Raises
-    ------
-    RecordError
-        ``refit``: a coefficient is not the one that the source names
-    """
-    try:
-        typed = tomllib.loads(source.decode("utf-8"))["loads"]
-        same = [entry["load"] for entry in typed] == [one.load for one in record.loads] and all(
-            {term: float(value) for term, value in entry["coefficients"].items()}
-            == dict(zip(one.terms, one.coefficients, strict=True))
-            and one.issued == one.coefficients
-            and one.polarity == polarity(one.coefficients)
-            and unit(entry["unit"]).text == one.unit
-            for entry, one in zip(typed, record.loads, strict=True)
-        )
-    except (ValueError, KeyError, TypeError, AttributeError):
-        same = False
-    if not same:
-        raise _refused(
-            record, "its coefficients", "not those of its source file", "those of the source", "refit"
-        )
 
 
 def polarity(coefficients: tuple[float, ...]) -> tuple[int, ...]:

@@ -12,10 +12,10 @@ from datetime import UTC, date, datetime
 from pathlib import Path
 
 from toolkit.calibration import store
-from toolkit.calibration.agreement import check_agrees
+from toolkit.calibration.agreement import check_agrees, check_inputs, check_transcribed
 from toolkit.calibration.ledger import HEAD, LEDGER, Ledger
 from toolkit.calibration.record import CalibrationRecord, from_bytes
-from toolkit.calibration.refit import check_reproduces, check_transcribed
+from toolkit.calibration.refit import check_reproduces
 from toolkit.calibration.status import RecordStatus, status_of
 from toolkit.calibration.table import Table, read_table
 from toolkit.errors import RecordError, RegistryError, ToolkitError
@@ -58,6 +58,7 @@ def instrument_of(record_id: str) -> str:
     if match is None:
         raise RegistryError(
             f"not a record id: {record_id!r}",
+            where="record id",
             got=record_id,
             expected="<instrument>-r<N>, such as m15-r2",
             next_step="see 'toolkit calibration list'",
@@ -246,6 +247,7 @@ def load_checked(folder: Path, record_id: str, ledger: Ledger) -> CalibrationRec
             table = _table(record, contents["loads"], folder)
             check_agrees(record, contents["session"], table)
             check_reproduces(record, table)
+            check_inputs(record)
     except KeyError as error:
         raise _bad(record_id, path, f"no data file {error}", "its reference-load data", "data") from error
     return record

@@ -27,7 +27,7 @@ _KEYS = (
     "phase model degree method drop certificate"
 ).split()
 _CHECK = "file data tolerance".split()
-_INSTRUMENT = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]*\Z")
+INSTRUMENT = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]*\Z")
 _CHECK_VALUE, _CHECK_TABLE = re.compile(r"(?m)^\s*check\s*="), re.compile(r"(?m)^\s*\[\s*check\s*\]")
 
 
@@ -117,7 +117,7 @@ def settings_of(raw: Mapping[str, Any], *, where: object) -> Settings:
     if raw.get("schema", 1) != 1:
         raise wrong(where, "schema", raw["schema"], "1")
     instrument = _text(raw, "instrument", where)
-    if not _INSTRUMENT.match(instrument):
+    if not INSTRUMENT.match(instrument):
         raise wrong(where, "instrument", instrument, "letters, digits, '-', '_' and '.'")
     indications, loads = _names(raw, "indications", where), _names(raw, "loads", where)
     if set(indications) & set(loads):

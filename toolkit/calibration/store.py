@@ -63,6 +63,7 @@ def commit(folder: Path, build: Callable[[Ledger], Change | None]) -> bool:
         raise OutputError(
             "the registry folder cannot be made", where=folder, got=error.strerror,
             expected="a folder with write permission", next_step="choose another folder with --calibrations",
+            rule="not-writable",
         ) from error  # fmt: skip
     with _lock(folder, fcntl.LOCK_EX):
         _recover(folder)

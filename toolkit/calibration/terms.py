@@ -51,6 +51,7 @@ def parse_term(name: str) -> Term:
         if match is None:
             raise SessionError(
                 f"a term cannot be read: {name!r}",
+                where=f"term {name!r}",
                 got=name,
                 expected="products of NAME, NAME^2 to NAME^9 and abs(NAME)",
                 next_step="write it as in D51, D51^2, D51*E5 or abs(D51)",
@@ -109,6 +110,7 @@ def model_terms(
         if name not in names:
             raise SessionError(
                 f"a term to drop is not in the model: {name!r}",
+                where="drop",
                 got=name,
                 expected=", ".join(names),
                 next_step="name one of the model's terms, or remove it from drop",

@@ -19,6 +19,10 @@ if TYPE_CHECKING:
 
 app = typer.Typer(help="Calibration records: what is in force, and why.", no_args_is_help=True)
 
+IN_FORCE = (
+    "First day in force (YYYY-MM-DD). Before the session's date it needs --reason; "
+    "before the decision it is noted in the ledger."
+)
 Id = Annotated[str, typer.Argument(help="Record id, such as m15-r2.")]
 KnownAt = Annotated[str | None, typer.Option("--known-at", help="What was known on this day (YYYY-MM-DD).")]
 
@@ -166,7 +170,7 @@ def history(
             "seq": e.seq, "id": e.id, "event": e.event, "time": e.time, "by": e.by,
             "approved_by": e.approved_by,
             "known_on": e.known_on and e.known_on.isoformat(), "since": e.since and e.since.isoformat(),
-            "reason": e.reason, "unverifiable": list(e.unverifiable), "sha256": e.sha256,
+            "reason": e.reason, "note": e.note, "unverifiable": list(e.unverifiable), "sha256": e.sha256,
         }
         for e in ledger.entries
         if name in (instrument, e.id)
@@ -175,6 +179,7 @@ def history(
         f"{e['seq']:>3}  {e['time']}  {e['id']}  {e['event']:<10}by {e['by']}"
         + (f", since {e['since']}" if e["since"] else "")
         + (f", known on {e['known_on']}" if e["known_on"] else "")
+        + (f", {e['note']}" if e["note"] else "")
         + (f"\n     {e['reason']}" if e["reason"] else "")
         for e in events
     ]
@@ -211,11 +216,12 @@ def import_record(
 @app.command()
 def approve(
     record_id: Id,
-    in_force_from: Annotated[str, typer.Option("--in-force-from", help="First day in force (YYYY-MM-DD).")],
+    in_force_from: Annotated[str, typer.Option("--in-force-from", help=IN_FORCE)],
     checked_by: Annotated[str, typer.Option("--checked-by", help="Who checked; not who entered.")],
     approved_by: Annotated[str | None, typer.Option("--approved-by", help="Who approved.")] = None,
     reason: Annotated[
-        str | None, typer.Option("--reason", help="Why, where the date lies in the past.")
+        str | None,
+        typer.Option("--reason", help="Why; asked for where the date lies before the session's own."),
     ] = None,
     on: Annotated[str | None, typer.Option("--on", help="Day of the decision; default: today.")] = None,
     calibrations: Calibrations = None,
@@ -234,6 +240,7 @@ def approve(
     )  # fmt: skip
     lines = [f"{record_id}  " + (f"approved, in force from {since}" if decision.done else "NOT approved")]
     lines += ["failed gates:", *finding_lines(decision.findings)] if decision.findings else []
+    lines += [f"note: {decision.note}"] if decision.note else []
     if decision.unverifiable:
         lines += ["terms that the check loads cannot verify:", *(f"  {t}" for t in decision.unverifiable)]
     payload = {
@@ -242,6 +249,7 @@ def approve(
         "in_force_from": since and since.isoformat(),
         "findings": [finding.as_dict() for finding in decision.findings],
         "unverifiable": list(decision.unverifiable),
+        "note": decision.note,
         "head": registry.head(_instrument_of(record_id)),
     }
     answer(payload, "\n".join(lines), as_json=as_json, quiet=quiet)
