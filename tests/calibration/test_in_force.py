@@ -152,3 +152,31 @@ def test_the_projects_records_of_the_source_document() -> None:
     assert (record.id, record.verified) == ("m15-r2", False)
     assert record.load("FY").coefficients == (0.99719, 0.99718, 1.0228, 0.6473)
     assert record.load("MZ").coefficients == (-0.15688, 0.16197, 0.0026666, 0.68759)
+
+
+def test_a_date_from_the_session_on_is_noted_and_one_before_it_needs_a_reason(registry: Registry) -> None:
+    # hub-r1 is of 2026-01-05.
+    decided = date(2026, 11, 21)
+    with pytest.raises(RegistryError) as caught:
+        approve(registry, "hub-r1", in_force_from=date(2026, 1, 4), checked_by="B", known_on=decided)
+    assert caught.value.rule == "approval"
+    assert "2026-01-05" in str(caught.value)
+    done = approve(registry, "hub-r1", in_force_from=date(2026, 1, 6), checked_by="B", known_on=decided)
+    assert done.note == "in force from 319 days before the decision"
+    assert registry.ledger("hub").entries[-1].note == done.note
+    assert all(row.ok for row in registry.verify())
+
+
+def test_a_decision_on_its_day_has_no_note(registry: Registry) -> None:
+    day = date(2026, 2, 1)
+    done = approve(registry, "hub-r1", in_force_from=day, checked_by="B", known_on=day)
+    assert (done.note, registry.ledger("hub").entries[-1].note) == (None, None)
+
+
+def test_the_error_names_every_name_that_must_differ(registry: Registry) -> None:
+    with pytest.raises(RegistryError) as caught:
+        approve(
+            registry, "hub-r1", in_force_from=date(2026, 2, 1), checked_by="Bob", approved_by="Bob"
+        )  # fmt: skip
+    assert caught.value.got == "approved by 'Bob', also checked by"
+    assert caught.value.expected == "a name that is none of 'operator one' (entered by), 'Bob' (checked by)"

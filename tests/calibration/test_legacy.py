@@ -74,3 +74,44 @@ def test_bad_files_write_nothing(tmp_path: Path, old: str, new: str) -> None:
         enter(tmp_path, GOOD.replace(old, new, 1))
     assert caught.value.exit_code == 2
     assert not (tmp_path / "cal").exists()
+
+
+TWO = GOOD.replace(
+    '[{ name = "S", unit = "mV/V" }]', '[{ name = "S", unit = "mV/V" }, { name = "T", unit = "counts" }]'
+).replace("{ S = 2,", "{ S = 2, T = 0,")
+MOMENT = '[[loads]]\nload = "MZ"\nunit = "N*m"\ncoefficients = { S = 1.0, T = 2.0 }\n'
+
+
+def test_zero_is_a_coefficient_where_it_is_written(tmp_path: Path) -> None:
+    record = enter(tmp_path, TWO + MOMENT).load("old-r1")
+    assert record.load("F").coefficients == (2.0, 0.0, 1.0)
+    assert record.load("F").polarity == (1, 0, 1)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "rule"),
+    [
+        ('"N*m"', '"N"', "unit-dimension"), ('unit = "N"\n', 'unit = "N*m"\n', "unit-dimension"),
+        ('load = "F"', 'load = "MY"', "unit-dimension"), ('load = "F"', 'load = "drag"', None),
+        ('load = "F"\nunit = "N"', 'load = "drag"\nunit = "degC"', "unit-dimension"),
+        ('load = "MZ"\nunit = "N*m"', 'load = "F"\nunit = "N"', "legacy"),
+        ("T = 0, ", "", "legacy"), (", T = 2.0", "", "legacy"),
+        ("S = 2, T = 0", '"S^2" = 2, T = 0', "legacy"),
+        ('"counts"', '"zork"', "unknown-unit"), ('"counts"', '"1"', "unit-dimension"),
+        ('"counts"', '"deg"', "unit-dimension"), ('"counts"', '"degC"', "unit-dimension"),
+        ('name = "T"', 'name = "S"', "legacy"), ("F", "S", "legacy"),
+        ('name = "T"', 'name = "T 1"', "legacy"),
+        ("S = 2,", "S = 2, S* = 1,", "not-toml"), ("S = 2,", 'S = 2, "S*" = 1,', "legacy"),
+    ],
+)  # fmt: skip
+def test_what_no_calibration_can_have_given(tmp_path: Path, old: str, new: str, rule: str | None) -> None:
+    text = TWO + MOMENT
+    assert old in text
+    if rule is None:
+        enter(tmp_path, text.replace(old, new))
+        return
+    with pytest.raises(ToolkitError) as caught:
+        enter(tmp_path, text.replace(old, new))
+    assert (caught.value.exit_code, caught.value.rule) == (2, rule)
+    assert all(caught.value.as_dict().values())
+    assert not (tmp_path / "cal").exists()

@@ -87,6 +87,7 @@ def test_the_life_of_a_record(run: Run, session: Path) -> None:
     assert (code, approved["approved"]) == (0, True)
     code, listed = run("calibration", "list")
     assert (code, listed["records"][0]["status"]) == (0, "approved")
+    assert approved["note"].endswith("before the decision")
     assert listed["heads"]["pair"]["sha256"] == approved["head"]
     assert run("calibration", "verify", "--head", approved["head"])[0] == 0
     assert run("calibration", "verify", "--head", "0" * 64)[0] == 1
@@ -103,6 +104,7 @@ def test_the_life_of_a_record(run: Run, session: Path) -> None:
         == "withdrawn"
     )
     events = run("calibration", "history", "pair-r1")[1]["events"]
+    assert events[1]["note"] == approved["note"]
     assert [event["event"] for event in events] == ["entered", "approved", "withdrawn"]
     assert run("calibration", "diff", "pair-r1", "pair-r1")[0] == 0
 

@@ -147,7 +147,7 @@ def _check_cell(name: str, cell: Mapping[str, Any], text: str, where: object) ->
         try:
             stated(cell["shunt_expected"], text, place, where)
         except UnitError:
-            if unit(cell["shunt_expected"]["unit"]).dimension != "bridge_ratio":
+            if unit(cell["shunt_expected"]["unit"], where=f"{where}: {place}").dimension != "bridge_ratio":
                 raise
             stated(cell["shunt_expected"], "mV/V", place, where)
     if "scale" in cell:
