@@ -7,8 +7,9 @@ import json
 import math
 import sys
 from collections.abc import Callable, Iterator, Sequence
+from datetime import date, datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
@@ -26,6 +27,31 @@ Home = Annotated[
     Path | None,
     typer.Option("--home", help="Laboratory's home; default: the nearest folder upward with calibrations/."),
 ]
+
+
+CalibrationId = Annotated[
+    str | None,
+    typer.Option("--calibration", help="Record id; default: the one in force on the test's date."),
+]
+KnownAt = Annotated[
+    datetime | None,
+    typer.Option("--known-at", formats=["%Y-%m-%d"], help="Judge the registry as known on this day."),
+]
+Reader = Annotated[
+    str, typer.Option("--reader", help="calamine, or both: read again with openpyxl and compare.")
+]
+
+
+def day(moment: datetime | None) -> date | None:
+    """Return the day of a date option, None where it was not given."""
+    return moment.date() if moment else None
+
+
+def reader(name: str) -> Literal["calamine", "both"]:
+    """Return the reader that ``--reader`` names, or refuse the word."""
+    if name not in ("calamine", "both"):
+        raise typer.BadParameter("calamine or both", param_hint="--reader")
+    return "both" if name == "both" else "calamine"
 
 
 def answer(payload: dict[str, Any], text: str, *, as_json: bool, quiet: bool) -> None:

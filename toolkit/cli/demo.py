@@ -37,6 +37,7 @@ class Step:
 
 
 def command(
+    context: typer.Context,
     out: Annotated[
         Path, typer.Option("--out", help="Output folder; one that an earlier demo made is replaced.")
     ] = Path("demo-out"),
@@ -56,7 +57,7 @@ def command(
         for number, step in enumerate(steps, start=1):
             say(f"[{number}/{len(steps) + 1}] {step.title}")
             say(f"      $ toolkit {' '.join(_shown(step.words, stage, out))}")
-            code, payload = _run(step.words)
+            code, payload = _run(context, step.words)
             told = step.told(payload)
             say(f"      {told}\n")
             done.append({"title": step.title, "exit_code": code, "told": told})
@@ -184,12 +185,12 @@ def _shown(words: tuple[str, ...], stage: Path, out: Path) -> list[str]:
     return [word.replace(str(stage), str(out)).replace(package, "toolkit") for word in words]
 
 
-def _run(words: tuple[str, ...]) -> tuple[int, Payload]:
-    from toolkit.cli.main import app
-
+def _run(context: typer.Context, words: tuple[str, ...]) -> tuple[int, Payload]:
+    """Run another command of the same program and return its exit code and its JSON answer."""
+    program: Any = context.find_root().command
     caught = io.StringIO()
     with contextlib.redirect_stdout(caught):
-        code = app(args=[*words, "--json"], prog_name="toolkit", standalone_mode=False)
+        code = program.main(args=[*words, "--json"], prog_name="toolkit", standalone_mode=False)
     payload: Payload = jsonlib.loads(caught.getvalue())
     return int(code or 0), payload
 

@@ -3,13 +3,23 @@
 from __future__ import annotations
 
 import math
-from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from toolkit.cli.console import Calibrations, Home, Json, Quiet, answer, exit_code, finding_lines, table
+from toolkit.cli.console import (
+    Calibrations,
+    Home,
+    Json,
+    KnownAt,
+    Quiet,
+    answer,
+    day,
+    exit_code,
+    finding_lines,
+    table,
+)
 
 if TYPE_CHECKING:
     from toolkit.audit.inspection import Inspection, LoadBlock
@@ -27,10 +37,7 @@ def command(
         str | None,
         typer.Option("--machine", help="Machine; default: that of test.toml, else of the file, else m15."),
     ] = None,
-    known_at: Annotated[
-        datetime | None,
-        typer.Option("--known-at", formats=["%Y-%m-%d"], help="Judge the registry as known on this day."),
-    ] = None,
+    known_at: KnownAt = None,
     prove: Annotated[
         bool, typer.Option("--prove", help="The interval that the printed digits allow each coefficient.")
     ] = False,
@@ -52,9 +59,7 @@ def command(
     failed = False
     for path in files:
         try:
-            found = inspect_file(
-                path, registry, machine=machine, known_at=known_at.date() if known_at else None
-            )
+            found = inspect_file(path, registry, machine=machine, known_at=day(known_at))
         except ToolkitError as error:
             if len(files) == 1:
                 raise

@@ -4,23 +4,27 @@ from __future__ import annotations
 
 import math
 import time
-from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from toolkit.cli.console import (
+    CalibrationId,
     Calibrations,
     Home,
     Json,
+    KnownAt,
     Quiet,
+    Reader,
     answer,
+    day,
     exit_code,
     finding_lines,
     progress,
     table,
 )
+from toolkit.cli.console import reader as choose_reader
 
 if TYPE_CHECKING:
     from toolkit.cli.resolve import Resolved
@@ -31,20 +35,12 @@ NAME = "process"
 
 def command(
     test: Annotated[Path, typer.Argument(metavar="TEST", help="Folder with test.toml and the recordings.")],
-    calibration: Annotated[
-        str | None,
-        typer.Option("--calibration", help="Record id; default: the one in force on the test's date."),
-    ] = None,
+    calibration: CalibrationId = None,
     out: Annotated[
         Path | None, typer.Option("--out", help="Write the reduced test (.xlsx: the whole test in one file).")
     ] = None,
-    known_at: Annotated[
-        datetime | None,
-        typer.Option("--known-at", formats=["%Y-%m-%d"], help="Judge the registry as known on this day."),
-    ] = None,
-    reader: Annotated[
-        str, typer.Option("--reader", help="calamine, or both: read again with openpyxl and compare.")
-    ] = "calamine",
+    known_at: KnownAt = None,
+    reader: Reader = "calamine",
     calibrations: Calibrations = None,
     home: Home = None,
     json: Json = False,
@@ -58,8 +54,7 @@ def command(
     from toolkit.recording.marks import refuse_original
     from toolkit.testfile import write_test_file
 
-    if reader not in ("calamine", "both"):
-        raise typer.BadParameter("calamine or both", param_hint="--reader")
+    chosen = choose_reader(reader)
     if out is not None:
         refuse_original(out, suffix=".xlsx")
     started = time.perf_counter()
@@ -69,8 +64,8 @@ def command(
             calibration=calibration,
             calibrations=calibrations,
             home=home,
-            known_at=known_at.date() if known_at else None,
-            reader="both" if reader == "both" else "calamine",
+            known_at=day(known_at),
+            reader=chosen,
             step=step,
         )
     digest = write_test_file(out, resolved.result, dict(resolved.recordings)) if out else None

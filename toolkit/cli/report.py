@@ -4,13 +4,26 @@ from __future__ import annotations
 
 import re
 import time
-from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from toolkit.cli.console import Calibrations, Home, Json, Quiet, answer, exit_code, finding_lines, progress
+from toolkit.cli.console import (
+    CalibrationId,
+    Calibrations,
+    Home,
+    Json,
+    KnownAt,
+    Quiet,
+    Reader,
+    answer,
+    day,
+    exit_code,
+    finding_lines,
+    progress,
+)
+from toolkit.cli.console import reader as choose_reader
 
 if TYPE_CHECKING:
     from toolkit.cli.resolve import Resolved
@@ -32,17 +45,9 @@ def command(
     out: Annotated[
         Path | None, typer.Option("--out", help="Output folder; default: report-<test name> here.")
     ] = None,
-    calibration: Annotated[
-        str | None,
-        typer.Option("--calibration", help="Record id; default: the one in force on the test's date."),
-    ] = None,
-    known_at: Annotated[
-        datetime | None,
-        typer.Option("--known-at", formats=["%Y-%m-%d"], help="Judge the registry as known on this day."),
-    ] = None,
-    reader: Annotated[
-        str, typer.Option("--reader", help="calamine, or both: read again with openpyxl and compare.")
-    ] = "calamine",
+    calibration: CalibrationId = None,
+    known_at: KnownAt = None,
+    reader: Reader = "calamine",
     allow_missing: Annotated[
         bool, typer.Option("--allow-missing", help="Print n/a for a value that the test has not.")
     ] = False,
@@ -63,8 +68,7 @@ def command(
     from toolkit.report.package import read_template
     from toolkit.report.pdf import Office
 
-    if reader not in ("calamine", "both"):
-        raise typer.BadParameter("calamine or both", param_hint="--reader")
+    chosen = choose_reader(reader)
     started = time.perf_counter()
     # The template is judged before anything is read: its error must not wait for a long reduction.
     opened = read_template(template or default_template(home))
@@ -74,8 +78,8 @@ def command(
             calibration=calibration,
             calibrations=calibrations,
             home=home,
-            known_at=known_at.date() if known_at else None,
-            reader="both" if reader == "both" else "calamine",
+            known_at=day(known_at),
+            reader=chosen,
             step=step,
         )
         target = out or Path.cwd() / f"report-{_file_name(resolved.result.reduced.info.name)}"
