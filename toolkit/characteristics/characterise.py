@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -19,6 +20,7 @@ from toolkit.units import from_si
 
 if TYPE_CHECKING:
     from toolkit.calibration.record import CalibrationRecord
+    from toolkit.errors import FitError
     from toolkit.machine import Machine
     from toolkit.reduction.model import ReducedTest
 
@@ -70,16 +72,7 @@ def _fit(groups: tuple[Group, ...]) -> tuple[tuple[DirectionFit, ...], tuple[Fin
             strict=True,
         )
     )
-    findings = [
-        Finding(
-            rule=problem.rule or "not-fitted",
-            where=f"{_where(groups[index])}, {channel}",
-            message=f"{problem.what} (got {problem.got}, expected {problem.expected}); "
-            "what the curve feeds is null",
-        )
-        for (index, channel), problem in refused.items()
-        if problem is not None
-    ]
+    findings = _refused_findings(groups, refused)
     findings += [
         Finding(rule="not-converged", where=f"{_where(groups[index])}, {channel}", message=fit.message)
         for (index, channel), fit in solved.items()
@@ -92,6 +85,30 @@ def _fit(groups: tuple[Group, ...]) -> tuple[tuple[DirectionFit, ...], tuple[Fin
         for index, g in enumerate(groups)
     )
     return fits, tuple(findings)
+
+
+def _refused_findings(
+    groups: tuple[Group, ...], refused: Mapping[tuple[int, Literal["FY", "MZ"]], FitError | None]
+) -> list[Finding]:
+    """Return one finding for all curves of a direction that have the same problem."""
+    same: dict[tuple[str, str, str], dict[str, dict[int, None]]] = {}
+    for (index, channel), problem in refused.items():
+        if problem is not None:
+            text = f"{problem.what} (got {problem.got}, expected {problem.expected})"
+            key = (groups[index].rotation, problem.rule or "not-fitted", text)
+            same.setdefault(key, {}).setdefault(channel, {})[index] = None
+    found = []
+    for (rotation, rule, text), channels in same.items():
+        loads = dict.fromkeys(index for indices in channels.values() for index in indices)
+        where = ", ".join(f"{float(from_si(groups[index].load_N, 'lbf')):.0f}" for index in loads)
+        found.append(
+            Finding(
+                rule=rule,
+                where=f"drum {rotation}, {where} lbf, {' and '.join(channels)}",
+                message=f"{text}; what these curves feed is null",
+            )
+        )
+    return found
 
 
 def _where(group: Group) -> str:

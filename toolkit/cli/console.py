@@ -70,8 +70,14 @@ def exit_code(findings: Sequence[Finding]) -> int:
 
 
 def finding_lines(findings: Sequence[Finding]) -> list[str]:
-    """Return findings as lines for people."""
-    return [f"  {one.level:<8}{one.rule:<20} {one.where}: {one.message}" for one in findings]
+    """Return findings as lines for people: level, rule and place, then the sentence, wrapped."""
+    import textwrap
+
+    lines = []
+    for one in findings:
+        lines.append(f"  {one.level:<8}{one.rule:<20} {one.where}")
+        lines += textwrap.wrap(one.message, width=98, initial_indent=" " * 10, subsequent_indent=" " * 10)
+    return lines
 
 
 def table(header: Sequence[str], rows: Sequence[Sequence[str]], *, align: str = "") -> str:

@@ -158,8 +158,6 @@ def _estimate(estimate: Estimate) -> dict[str, Any]:
 
 
 def _text(resolved: Resolved, out: Path | None) -> str:
-    from toolkit.units import from_si
-
     reduced = resolved.result.reduced
     mark = "  SIMULATED" if reduced.info.simulated else ""
     used = sum(c.used for c in reduced.conditions)
@@ -175,18 +173,11 @@ def _text(resolved: Resolved, out: Path | None) -> str:
     if resolved.findings:
         lines += ["", f"{len(resolved.findings)} findings (toolkit explain RULE tells more):"]
         lines += finding_lines(resolved.findings)
-    loads = ", ".join(
-        f"{float(from_si(load, 'lbf')):.0f}" for load in dict.fromkeys(p.load_N for p in _pulls(resolved))
-    )
-    lines += ["", f"loads [lbf]: {loads}"]
+    lines.append("")
     lines.append(
         f"written: {out}" if out else "nothing written; --out test.xlsx keeps the whole test in one file"
     )
     return "\n".join(lines)
-
-
-def _pulls(resolved: Resolved) -> Any:
-    return resolved.result.characteristics.pull
 
 
 def _pull_table(resolved: Resolved) -> str:

@@ -18,7 +18,6 @@ if TYPE_CHECKING:
 # A block belongs to a nominal load when it is nearer to it than this part of the load; beyond, it is a
 # load that the protocol does not know.
 _LOAD_REACH = 0.15
-_FEEDS = "slip-angle curves, fits and stiffness at these steps"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -101,9 +100,9 @@ def _missing(placed: Sequence[Placed], protocol: Protocol, rotations: Sequence[R
                 Finding(
                     rule="missing",
                     where=f"drum {rotation}",
-                    message=f"no file at slip angle {_list(gone, 'deg')}; "
-                    + ("the secant stiffness and " if _has_one_degree(gone) else "")
-                    + f"{_FEEDS} lack it",
+                    message=f"no file at slip angle {_list(gone, 'deg')}: the curves"
+                    + (", the +-1 deg secant" if _has_one_degree(gone) else "")
+                    + " and what they feed lack it",
                 )
             )
         for step in protocol.slip_angles_rad:
