@@ -3,13 +3,20 @@
 from __future__ import annotations
 
 import json
+import os
 from pathlib import Path
 from typing import Any
 
 import pytest
+from hypothesis import settings
 
 from toolkit.calibration.record import CalibrationRecord, Golden, Indication, LoadFit
 from toolkit.simulation.plan import Plan, read_plan
+
+# Machines are shared and noisy: no example is judged by its time. CI repeats the same examples; a developer's
+# machine draws new ones each time.
+settings.register_profile("toolkit", deadline=None, derandomize=bool(os.environ.get("CI")))
+settings.load_profile("toolkit")
 
 EXAMPLES = Path(__file__).resolve().parents[1] / "toolkit" / "examples"
 SHARED_DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
