@@ -26,7 +26,7 @@ _EXACT = 1e-20  # a cost below this share of sum(y^2) is rounding
 # (starts, stages, last): stage by stage the steps that starts take and how many go on, because most show
 # early that they lose; then the steps of those that are left. A curve whose minimum is not confirmed is
 # searched again, with patience.
-_SWIFT = (32, ((5, 12), (8, 5)), 40)
+_SWIFT = (32, ((4, 10), (8, 5)), 40)
 _PATIENT = (80, ((14, 20), (20, 5)), 60)
 _ENOUGH = 2  # starts at one lowest cost end the search of a curve early
 _NEARLY = 3.0  # times the lowest cost: a start that ended beyond will not come within the noise of it
@@ -137,16 +137,18 @@ def _agreeing(cost: Array, floor: Array) -> NDArray[np.intp]:
 def descend(p: Array, problems: Problems, *, steps: int, tolerance: float) -> State:
     """Return where Levenberg-Marquardt ends from shapes ``p`` (problems, 4), one start a problem.
 
-    A problem leaves when the decrease that its step predicts falls below ``tolerance`` of its cost.
+    A problem leaves when the decrease that its step predicts falls below ``tolerance`` of its cost, or when
+    a step succeeded and hardly lowered it: along a bound the prediction alone would never end.
     """
     low, high = problems.low, problems.high
     final = assess(np.clip(p, low, high), problems)
     alive = np.arange(len(p))
     state, part = final, problems
     damping, radius = np.full(len(p), 1e-2), np.ones(len(p))
+    settled = np.zeros(len(p), dtype=np.bool_)
     for step in range(steps):
         delta, length, predicted = _step(state, part, damping, radius)
-        done = predicted <= tolerance * state.cost + 1e-30
+        done = settled | (predicted <= tolerance * state.cost + 1e-30)
         if done.any():
             if step:
                 final.put_at(alive[done], state.take(np.flatnonzero(done)))
@@ -159,8 +161,10 @@ def descend(p: Array, problems: Problems, *, steps: int, tolerance: float) -> St
         elif step == 0:
             state = state.take(np.arange(len(alive)))
         trial = assess(np.clip(state.p + delta, part.low, part.high), part)
-        gain = (state.cost - trial.cost) / predicted
-        better = trial.cost < state.cost
+        decrease = state.cost - trial.cost
+        gain = decrease / predicted
+        better = decrease > 0
+        settled = better & (decrease <= max(tolerance, _SETTLED) * state.cost)
         # A step that fails because D or Sv ran into its bound is tried again with it held: with it held the
         # cost is never underestimated, while with it free the step would run into the bound again.
         state.held |= trial.held & ~better[:, None]
@@ -198,6 +202,7 @@ def _step(state: State, problems: Problems, damping: Array, radius: Array) -> tu
     return delta, np.minimum(length, radius), np.maximum(predicted, 0.0)
 
 
+_SETTLED = 1e-8  # of the cost: a ten-thousandth of a standard error
 _REACH = np.array([1.5, 1.0, 1.5, 1.0])
 
 

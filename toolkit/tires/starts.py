@@ -27,6 +27,7 @@ _B = (0.08, 0.2, 0.5, 1.0, 1.8, 3.2, 6.0, 12.0, 24.0)
 _C = (0.35, 0.7, 1.1, 1.6, 2.2, 2.9, 3.6)
 _E = (-19.0, -6.0, -2.0, -0.3, 0.5, 0.9)
 _H = (-3.0, -1.8, -1.2, -0.9, -0.6, -0.3, 0.0, 0.3, 0.6, 0.9, 1.2, 1.8, 3.0)
+_BLOCK = (16, 378)  # curves and shapes: 16 x 378 x 40 nodes is under 2^18, below which OpenBLAS stays alone
 _GRID = (len(_B), len(_C), len(_E), len(_H))
 
 
@@ -48,7 +49,7 @@ def pick(problems: Problems, count: int) -> Array:
     weight, moment = _deposit(problems)
     total = weight.sum(axis=1)[:, None]
     y = moment.sum(axis=1)[:, None]
-    f, ff, fy = weight @ sines, weight @ squares, moment @ sines
+    f, ff, fy = _product(weight, sines), _product(weight, squares), _product(moment, sines)
     # D and Sv as in the kernel, each clipped in turn; then the cost without its constant sum of y^2.
     D = np.clip((fy - f * (y / total)) / np.maximum(ff - f * f / total, 1e-6 * total), -D_LIMIT, D_LIMIT)
     Sv = np.clip((y - D * f) / total, -SV_LIMIT, SV_LIMIT)
@@ -63,6 +64,18 @@ def pick(problems: Problems, count: int) -> Array:
     order = np.argsort(np.take_along_axis(score, best, axis=1), axis=1)
     best = np.take_along_axis(best, order, axis=1)
     return np.clip(shapes[best], problems.low[:, None, :], problems.high[:, None, :])
+
+
+def _product(left: Array32, right: Array32) -> Array32:
+    # In blocks too small for the linear algebra to share among threads: their start and their waiting for a
+    # core that is busy otherwise cost many times the product.
+    result = np.empty((len(left), right.shape[1]), dtype=np.float32)
+    height, breadth = _BLOCK
+    for top in range(0, len(left), height):
+        for side in range(0, right.shape[1], breadth):
+            place = (slice(top, top + height), slice(side, side + breadth))
+            np.matmul(left[place[0]], right[:, place[1]], out=result[place])
+    return result
 
 
 def _is_basin(score: Array32) -> NDArray[np.bool_]:

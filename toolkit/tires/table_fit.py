@@ -22,6 +22,7 @@ _SLOPE_SIGN: dict[Axes, dict[str, int]] = {
     "ISO-W": {"FY": -1, "MZ": 1},
     "machine": {"FY": -1, "MZ": 1},
 }
+_NO_LOAD = 1.0  # N: a block below stands in the air, or its load was not recorded
 _SURE = 4.0  # standard errors by which a slope must differ from zero before its sign counts
 
 
@@ -70,7 +71,7 @@ def fit_table(table: TireTable, models: tuple[TireModel, ...], *, loss: Loss = "
         not one curve of the table can be fitted; where only some cannot, that is a finding
     """
     curves = table_curves(table)
-    problems = [why_not(curve) for curve in curves]
+    problems = [_no_load(curve) or why_not(curve) for curve in curves]
     good = [curve for curve, problem in zip(curves, problems, strict=True) if problem is None]
     refused = [problem for problem in problems if problem is not None]
     if not good:
@@ -94,6 +95,19 @@ def fit_table(table: TireTable, models: tuple[TireModel, ...], *, loss: Loss = "
     ]
     return TableFits(
         fits=tuple(fits), findings=(*findings, *fit_findings(fits), *_axes_findings(table, fits))
+    )
+
+
+def _no_load(curve: Curve) -> FitError | None:
+    if curve.load_N is None or curve.load_N >= _NO_LOAD:
+        return None
+    return FitError(
+        "the load is missing: FZ is zero",
+        where=f"{curve.channel} at {curve.load_N:.0f} N",
+        got=f"a mean |FZ| of {curve.load_N:g} N over {len(curve.y)} rows",
+        expected="the wheel load of every row, of either sign",
+        next_step="put the measured load into the column FZ, in the unit that its header names",
+        rule="no-load-block",
     )
 
 
