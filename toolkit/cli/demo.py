@@ -44,9 +44,9 @@ def command(
     json: Json = False,
     quiet: Quiet = False,
 ) -> int:
-    """Run the whole path on the packaged example: strain gauges to a Word and PDF report.
+    """Run the whole path on the packaged example.
 
-    Makes report.docx, report.pdf, test.xlsx (the whole test in one file), tire.tir and figures/.
+    From strain gauges to a Word and PDF report. Makes report.docx, report.pdf, test.xlsx (the whole test in one file), tire.tir and figures/.
     """
     started = time.perf_counter()
     say = _silent if json or quiet else typer.echo

@@ -20,7 +20,7 @@ def command(
     json: Json = False,
     quiet: Quiet = False,
 ) -> int:
-    """Explain a finding's rule: what it means and what to do."""
+    """Explain a finding's rule and what to do."""
     import difflib
 
     from toolkit.errors import ConfigError

@@ -19,9 +19,9 @@ def command(
     json: Json = False,
     quiet: Quiet = False,
 ) -> int:
-    """Make a laboratory's home: an empty calibrations/ and the default report_templates/.
+    """Make a laboratory's home folder.
 
-    What is there already is left as it is.
+    An empty calibrations/ and the default report_templates/. What is there already is left as it is.
     """
     from toolkit.errors import OutputError
 

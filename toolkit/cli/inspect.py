@@ -46,7 +46,10 @@ def command(
     json: Json = False,
     quiet: Quiet = False,
 ) -> int:
-    """Show channels, load blocks and slip angle of recordings, and which calibration computed them.
+    """Show what recordings hold, and what computed them.
+
+    Channels with units, load blocks, the measured slip angle, the calibration that computed Fy and Mz,
+    and the corrected values beside them.
 
     Example: toolkit inspect tests/2019-06-04/M15_1.xlsx
     """

@@ -46,7 +46,9 @@ def command(
     json: Json = False,
     quiet: Quiet = False,
 ) -> int:
-    """Turn a test's recordings into one reduced test: corrected, in SI and SAE axes.
+    """Turn a test's recordings into one reduced test.
+
+    Corrected by the calibration in force, averaged, in SI and SAE axes, with curves and characteristics.
 
     Example: toolkit process tests/2019-06-04 --out test.xlsx
     """

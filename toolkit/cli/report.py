@@ -59,7 +59,9 @@ def command(
     json: Json = False,
     quiet: Quiet = False,
 ) -> int:
-    """Fill the organisation's Word template and make the verified PDF: report.docx and report.pdf.
+    """Fill the Word template and make the verified PDF.
+
+    Delivers report.docx and report.pdf, or nothing where the PDF does not show every value and figure.
 
     Example: toolkit report tests/2019-06-04 --template report_templates/org.docx --out reports/89
     """

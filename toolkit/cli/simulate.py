@@ -31,9 +31,9 @@ def command(
     json: Json = False,
     quiet: Quiet = False,
 ) -> int:
-    """Run a test or a reference-load session on the virtual machine: files in the machine's own format.
+    """Run a test or a session on the virtual machine.
 
-    Everything is marked simulated; the truth is stored beside it. Where the registry has a record of the
+    The files are in the machine's own format.     Everything is marked simulated; the truth is stored beside it. Where the registry has a record of the
     virtual machine, its acquisition program computes Fy and Mz by the record's issued coefficients.
 
     Example: toolkit simulate toolkit/examples/virtual/test_plan.toml --out virtual-test
