@@ -46,7 +46,8 @@ def command(
 ) -> int:
     """Run the whole path on the packaged example.
 
-    From strain gauges to a Word and PDF report. Makes report.docx, report.pdf, test.xlsx (the whole test in one file), tire.tir and figures/.
+    From strain gauges to a Word and PDF report. Makes report.docx, report.pdf, test.xlsx (the whole test
+    in one file), tire.tir and figures/.
     """
     started = time.perf_counter()
     say = _silent if json or quiet else typer.echo

@@ -33,8 +33,9 @@ def command(
 ) -> int:
     """Run a test or a session on the virtual machine.
 
-    The files are in the machine's own format.     Everything is marked simulated; the truth is stored beside it. Where the registry has a record of the
-    virtual machine, its acquisition program computes Fy and Mz by the record's issued coefficients.
+    The files are in the machine's own format, everything is marked simulated, and the truth is stored
+    beside it. Where the registry has a record of the virtual machine, its acquisition program computes
+    Fy and Mz by the record's issued coefficients.
 
     Example: toolkit simulate toolkit/examples/virtual/test_plan.toml --out virtual-test
     """
