@@ -149,7 +149,6 @@ class Office:
                 "--norestore",
                 "--nologo",
                 "--nodefault",
-                "--nolockcheck",
                 *arguments,
             ],
             stdin=subprocess.DEVNULL,
