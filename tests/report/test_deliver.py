@@ -128,8 +128,8 @@ def fake(folder: Path, script: str) -> Path:
     ("script", "rule"),
     [
         ("exit 0", "render-failed"),
-        ('case "$*" in *terminate*) exit 0;; esac; exec sleep 30', "render-timeout"),
-        ('case "$*" in *terminate*) exit 0;; esac; for a in "$@"; do last=$a; done; '
+        ('case "$*" in *--convert-to*) ;; *) exit 0;; esac; exec sleep 30', "render-timeout"),
+        ('case "$*" in *--convert-to*) ;; *) exit 0;; esac; for a in "$@"; do last=$a; done; '
          'echo "no pdf" > "${last%.docx}.pdf"', "render-failed"),
     ],
 )  # fmt: skip
