@@ -130,3 +130,19 @@ def test_covariance_golden_and_range_belong_to_the_data_too(registry: Registry) 
         with pytest.raises(RecordError) as caught:
             registry.load("hub-r1")
         assert caught.value.rule in ("refit", "golden")
+
+
+@pytest.mark.parametrize(
+    "golden",
+    [
+        Golden(),
+        Golden(inputs=((0.0, 0.0, 0.0),), outputs=((0.0,), (0.0,), (0.0,))),
+        Golden(inputs=((0.0, 0.0),) * 5, outputs=((0.0,) * 5,) * 3),
+        Golden(inputs=((0.0,) * 3,) * 5, outputs=((0.0,) * 5,) * 2),
+    ],
+)
+def test_golden_vectors_that_are_missing_or_of_another_shape(registry: Registry, golden: Golden) -> None:
+    forge(registry, dataclasses.replace(registry.load("hub-r1"), golden=golden))
+    with pytest.raises(RecordError) as caught:
+        registry.load("hub-r1")
+    assert caught.value.rule == "golden"

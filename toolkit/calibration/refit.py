@@ -48,8 +48,17 @@ def check_reproduces(record: CalibrationRecord, table: Table) -> None:
     for cell in record.cells:
         values = columns[cell.name]
         _same_unit(record, cell.name, table.unit(cell.name), cell.unit)
-        _demand(record, cell.name, "range", (cell.minimum, cell.maximum) == (values.min(), values.max()))
-    inputs = np.asarray(record.golden.inputs).reshape(-1, len(record.cells))
+        found = (float(values.min()), float(values.max()))
+        _demand_equal(record, cell.name, "range", (cell.minimum, cell.maximum), found)
+    golden = record.golden
+    shape = (len(record.cells), len(golden.inputs))
+    whole = len(golden.inputs) > len(record.cells) and len(golden.outputs) == len(record.loads)
+    if not whole or {(len(i), len(o)) for i in golden.inputs for o in golden.outputs} != {shape}:
+        raise _refused(
+            record, "golden vectors", f"{len(golden.inputs)} inputs, {len(golden.outputs)} rows of outputs",
+            "one output a load for each of the inputs, more inputs than indications", "golden",
+        )  # fmt: skip
+    inputs = np.asarray(golden.inputs)
     points = dict(zip(record.indications, inputs.T, strict=True))
     shared: dict[tuple[str, ...], _Solver] = {}
     for at, one in enumerate(record.loads):
@@ -93,17 +102,17 @@ def _check_load(
             record, f"{where}, term {one.terms[worst]}", f"{one.coefficients[worst]!r}",
             f"{float((solver.back @ solution)[worst])!r} from its own data", "refit",
         )  # fmt: skip
-    _demand(
-        record, where, "number of rows", one.n == len(loads) and one.dof == len(loads) - len(coefficients)
-    )
-    _demand(record, where, "range", (one.minimum, one.maximum) == (low, high))
-    _demand(record, where, "polarity", one.polarity == polarity(one.coefficients))
+    n = len(loads)
+    _demand_equal(record, where, "number of rows and dof", (one.n, one.dof), (n, n - len(coefficients)))
+    _demand_equal(record, where, "range", (one.minimum, one.maximum), (low, high))
+    _demand_equal(record, where, "polarity", one.polarity, polarity(one.coefficients))
     issued = tuple(issued_value(c, e, largest) for c, e in zip(one.coefficients, solver.extent, strict=True))
-    _demand(record, where, "issued coefficients", one.issued == issued)
+    _demand_equal(record, where, "issued coefficients", one.issued, issued)
     sd_floor = 1e-9 * largest
     _demand(
         record, where, "residual standard deviation",
         one.residual_sd is not None and abs(one.residual_sd - sd) <= _SPREAD * sd + sd_floor,
+        repr(one.residual_sd), repr(sd),
     )  # fmt: skip
     stored = np.asarray(one.covariance)
     scale = sd**2 if solver.weights is None else 1.0
@@ -115,6 +124,7 @@ def _check_load(
         record, where, "covariance",
         stored.shape == solver.inverse.shape
         and bool((np.abs(stored - scale * solver.inverse) <= slack * scale * solver.spread).all()),
+        "another matrix in the record", "that of the refit",
     )  # fmt: skip
     wanted = np.asarray(record.golden.outputs[at])
     # A power series in the raw variable cancels: its own rounding is allowed for, nothing more.
@@ -209,15 +219,18 @@ def _solver(
     )
 
 
-def _same_unit(record: CalibrationRecord, name: str, got: str, expected: str) -> None:
-    _demand(record, name, "unit", got == expected)
+def _same_unit(record: CalibrationRecord, name: str, header: str, stored: str) -> None:
+    _demand_equal(record, name, "unit", stored, header)
 
 
-def _demand(record: CalibrationRecord, where: str, part: str, holds: bool) -> None:
+def _demand_equal(record: CalibrationRecord, where: str, part: str, got: object, expected: object) -> None:
+    if got != expected:
+        _demand(record, where, part, False, str(got), str(expected))
+
+
+def _demand(record: CalibrationRecord, where: str, part: str, holds: bool, got: str, expected: str) -> None:
     if not holds:
-        raise _refused(
-            record, f"{where}, {part}", "another value in the record", "what its data give", "refit"
-        )
+        raise _refused(record, f"{where}, {part}", got, f"{expected} from its own data", "refit")
 
 
 def _refused(record: CalibrationRecord, where: str, got: str, expected: str, rule: str) -> RecordError:
