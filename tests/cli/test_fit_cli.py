@@ -122,3 +122,29 @@ def test_three_points_are_bad_input(tmp_path):
         run(path)
     assert caught.value.rule == "too-few-points"
     assert str(path) in caught.value.where
+
+
+def test_a_table_without_a_load_is_bad_input(tmp_path, tire):
+    path = tmp_path / "airborne.csv"
+    head, *lines = tire.read_text().splitlines()
+    cells = [line.split(",") for line in lines]
+    path.write_text("\n".join([head, *(f"{SA},0,{FY},{MZ}" for SA, _, FY, MZ in cells)]) + "\n")
+    with pytest.raises(ToolkitError, match="load is missing") as caught:
+        run(path)
+    assert caught.value.exit_code == 2
+    assert str(path) in caught.value.where
+
+
+def test_exact_data_have_standard_errors(tmp_path):
+    path = tmp_path / "exact.csv"
+    truth = {"B": 12.0, "C": 1.4, "D": -2100.0, "E": -0.6, "Sh": 0.004, "Sv": 15.0}
+    degrees = np.linspace(-12.0, 12.0, 61)
+    FY = value(tuple(truth.values()), np.radians(degrees))
+    rows = [f"{a!r},2000,{b!r}" for a, b in zip(degrees.tolist(), FY.tolist(), strict=True)]
+    path.write_text("\n".join(["SA [deg],FZ [N],FY [N]", *rows]) + "\n")
+    code, out = run(path, "--json")
+    one = json.loads(out)["fits"][0]
+    assert code == 0
+    assert one["not_determined"] == []
+    assert one["parameters"] == pytest.approx(truth, rel=1e-8)
+    assert all(0 < error < 1e-8 * abs(truth[name]) for name, error in one["standard_errors"].items())

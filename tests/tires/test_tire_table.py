@@ -121,3 +121,15 @@ def test_three_points_are_an_error_and_a_thin_block_a_finding(tmp_path):
     result = fit_table(read_table(write(tmp_path, rows()[:24])), (model("magic_formula"),))
     assert [finding.rule for finding in result.findings if finding.level != "note"] == ["too-few-points"] * 2
     assert len(result.fits) == 2
+
+
+def test_a_missing_load_is_an_error_and_a_block_without_one_a_finding(tmp_path):
+    lines = rows()
+    airborne = [",".join([line.split(",")[0], "0.0", *line.split(",")[2:]]) for line in lines]
+    with pytest.raises(FitError, match="load is missing") as caught:
+        fit_table(read_table(write(tmp_path, airborne)), (model("magic_formula"),))
+    assert caught.value.rule == "no-load-block"
+    assert "FZ" in caught.value.next_step
+    result = fit_table(read_table(write(tmp_path, airborne[:21] + lines[21:])), (model("magic_formula"),))
+    assert [f.rule for f in result.findings if f.level != "note"] == ["no-load-block"] * 2
+    assert [fit.load_N for fit in result.fits] == [4000.0, 4000.0]
