@@ -8,6 +8,7 @@ import pytest
 
 from toolkit.calibration.legacy import import_legacy
 from toolkit.calibration.registry import Registry
+from toolkit.calibration.verify import verify_registry
 from toolkit.errors import RecordError, ToolkitError
 
 GOOD = """
@@ -45,7 +46,7 @@ def test_a_legacy_record_is_unverified_and_entered_once(tmp_path: Path) -> None:
     )
     assert registry.ids("old") == ("old-r1",)
     assert enter(tmp_path, GOOD).ids("old") == ("old-r1",)
-    assert [(row.id, row.ok, row.verified) for row in registry.verify()] == [("old-r1", True, False)]
+    assert [(row.id, row.ok, row.verified) for row in verify_registry(registry)] == [("old-r1", True, False)]
 
 
 def test_the_source_beside_it_is_what_it_is_compared_with(tmp_path: Path) -> None:

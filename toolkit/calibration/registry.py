@@ -33,16 +33,6 @@ class Refused:
     reason: str
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class VerifyRow:
-    """One row of `verify`: a record, or a file that belongs to none (``id`` is its name)."""
-
-    id: str
-    ok: bool
-    verified: bool
-    reason: str | None
-
-
 def today() -> date:
     """Return the day in UTC: the default day of knowledge."""
     return datetime.now(tz=UTC).date()
@@ -192,12 +182,6 @@ class Registry:
             )
         return load_checked(self.folder / instrument, best[3], ledger)
 
-    def verify(self, head: str | None = None) -> tuple[VerifyRow, ...]:
-        """Check every record and every file; see `toolkit.calibration.verify`."""
-        from toolkit.calibration.verify import verify_registry
-
-        return verify_registry(self, head)
-
     def _sound(self, instrument: str) -> Ledger:
         ledger = self.ledger(instrument)
         if ledger.damage is not None:
@@ -311,4 +295,4 @@ def _number(record_id: str) -> tuple[str, int]:
     return ("", 0) if match is None else (match["instrument"], int(match["number"]))
 
 
-__all__ = ["ID", "LEDGER", "Refused", "Registry", "VerifyRow", "instrument_of", "load_checked", "today"]
+__all__ = ["ID", "LEDGER", "Refused", "Registry", "instrument_of", "load_checked", "today"]

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from toolkit.calibration.ledger import HEAD, LEDGER, Ledger
 from toolkit.calibration.record import from_bytes
-from toolkit.calibration.registry import ID, VerifyRow, load_checked
+from toolkit.calibration.registry import ID, load_checked
 from toolkit.errors import ToolkitError
 
 if TYPE_CHECKING:
@@ -16,7 +17,17 @@ if TYPE_CHECKING:
 _FOLDER_KEEPERS = (".gitkeep", ".gitignore")
 
 
-def verify_registry(registry: Registry, head: str | None) -> tuple[VerifyRow, ...]:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class VerifyRow:
+    """One row of `verify`: a record, or a file that belongs to none (``id`` is its name)."""
+
+    id: str
+    ok: bool
+    verified: bool
+    reason: str | None
+
+
+def verify_registry(registry: Registry, head: str | None = None) -> tuple[VerifyRow, ...]:
     """Return one row for every record and for every stray file; damage never raises.
 
     ``head`` is a ledger hash that was printed earlier: where no instrument's chain holds it, an end was

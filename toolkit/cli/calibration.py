@@ -113,7 +113,9 @@ def verify(
     quiet: Quiet = False,
 ) -> int:
     """Refit every record from its stored data, and name every file that is not as it was entered."""
-    rows = _registry(calibrations, home).verify(head)
+    from toolkit.calibration.verify import verify_registry
+
+    rows = verify_registry(_registry(calibrations, home), head)
     payload = [{"id": r.id, "ok": r.ok, "verified": r.verified, "reason": r.reason} for r in rows]
     text = table(
         ["id", "result", "verified", "reason"],
