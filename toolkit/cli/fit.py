@@ -11,11 +11,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from toolkit.cli.console import (
+    CalibrationId,
     Calibrations,
     Home,
     Json,
+    KnownAt,
     Quiet,
     answer,
+    day,
     exit_code,
     finding_lines,
     table,
@@ -40,13 +43,8 @@ def command(
         str, typer.Option("--axes", help="Axes of the table: SAE, adapted-SAE, ISO-W, machine.")
     ] = "SAE",
     loss: Annotated[str, typer.Option("--loss", help="linear (least squares) or robust.")] = "linear",
-    calibration: Annotated[
-        str | None, typer.Option("--calibration", help="Record id for a test; default: the one in force.")
-    ] = None,
-    known_at: Annotated[
-        datetime | None,
-        typer.Option("--known-at", formats=["%Y-%m-%d"], help="Judge the registry as known on this day."),
-    ] = None,
+    calibration: CalibrationId = None,
+    known_at: KnownAt = None,
     calibrations: Calibrations = None,
     home: Home = None,
     json: Json = False,
@@ -124,7 +122,7 @@ def _of_test(
         calibration=calibration,
         calibrations=calibrations,
         home=home,
-        known_at=known_at.date() if known_at else None,
+        known_at=day(known_at),
     )
     rows: list[tuple[CurveFit, str | None]] = []
     for one in models:
@@ -133,13 +131,15 @@ def _of_test(
             for direction in resolved.result.characteristics.fits:
                 rows += [(fit, direction.rotation) for fit in (direction.FY, direction.MZ) if fit is not None]
             continue
+        from toolkit.tires.catalog import fit_model
+
         made = [
             (Curve(SA=g.SA, y=g.values(channel), channel=channel, load_N=g.load_N), g.rotation)
             for g in group(resolved.result.reduced)
             for channel in ("FY", "MZ")
         ]
         made = [(curve, rotation) for curve, rotation in made if why_not(curve) is None]
-        fits = one.fit([curve for curve, _ in made], loss=loss)
+        fits = fit_model(one, [curve for curve, _ in made], loss=loss)
         rows += list(zip(fits, [rotation for _, rotation in made], strict=True))
     own = [finding for finding in fit_findings([fit for fit, _ in rows]) if finding.level == "note"]
     return rows, (*resolved.findings, *own)

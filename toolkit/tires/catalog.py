@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cache
 from importlib import import_module
 from pkgutil import iter_modules
@@ -9,7 +10,7 @@ from typing import cast
 
 from toolkit.errors import FitError
 from toolkit.tires import models
-from toolkit.tires.model import TireModel
+from toolkit.tires.model import Curve, CurveFit, Loss, TireModel
 
 
 @cache
@@ -41,3 +42,14 @@ def model(name: str) -> TireModel:
             rule="unknown-model",
         )
     return cast("TireModel", import_module(f"{models.__name__}.{name}").MODEL)
+
+
+def fit_model(one: TireModel, curves: Sequence[Curve], *, loss: Loss = "linear") -> tuple[CurveFit, ...]:
+    """Return one fit a curve, without start values, by the model's own fitter.
+
+    Raises
+    ------
+    FitError
+        a curve cannot be fitted
+    """
+    return cast("tuple[CurveFit, ...]", import_module(one.fitter).fit_curves(curves, loss=loss))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal, Protocol, get_args
 
@@ -94,12 +93,16 @@ class CurveFit:
 
 
 class TireModel(Protocol):
-    """What a model file offers. Derivatives are stacked in front: (parameters, points)."""
+    """What a model file offers. Derivatives are stacked in front: (parameters, points).
+
+    ``fitter`` names the module whose ``fit_curves`` fits it: an equation does not know its fit.
+    """
 
     name: str
     title: str
     reference: str
     per_load: bool
+    fitter: str
     channels: tuple[str, ...]
     parameters: tuple[ParameterSpec, ...]
 
@@ -117,8 +120,4 @@ class TireModel(Protocol):
 
     def slope_jacobian(self, values: ArrayLike, SA: ArrayLike) -> NDArray[np.float64]:
         """Return d(dy/dSA)/dparameter."""
-        ...
-
-    def fit(self, curves: Sequence[Curve], *, loss: Loss = "linear") -> tuple[CurveFit, ...]:
-        """Return one fit a curve, without start values."""
         ...

@@ -10,6 +10,7 @@ from toolkit.channels import Axes
 from toolkit.errors import FitError
 from toolkit.findings import Finding
 from toolkit.tires.blocks import load_blocks
+from toolkit.tires.catalog import fit_model
 from toolkit.tires.evaluate import slope_estimate_at
 from toolkit.tires.fit import Curve, why_not
 from toolkit.tires.model import CurveFit, Loss, TireModel
@@ -84,7 +85,7 @@ def fit_table(table: TireTable, models: tuple[TireModel, ...], *, loss: Loss = "
             next_step=first.next_step,
             rule=first.rule,
         )
-    fits = [fit for model in models for fit in model.fit(good, loss=loss)]
+    fits = [fit for model in models for fit in fit_model(model, good, loss=loss)]
     findings = [
         Finding(
             rule=one.rule or "not-fitted",

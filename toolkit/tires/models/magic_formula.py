@@ -9,12 +9,11 @@ The peak is D where C >= 1 and the argument reaches pi/2; far out y tends to D s
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolkit.tires.model import Curve, CurveFit, Loss, ParameterSpec
+from toolkit.tires.model import ParameterSpec
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -30,6 +29,7 @@ class MagicFormula:
     title = "Magic Formula at one load"
     reference = "Bakker, Nyborg, Pacejka, SAE 870421 (1987); Pacejka (2012) eq. 4.6-4.8"
     per_load = True
+    fitter = "toolkit.tires.fit"
     channels = ("FY", "MZ")
     parameters = (
         ParameterSpec(name="B", unit="1/rad", bounds="B x span 0.05 to 50", text="stiffness factor"),
@@ -55,12 +55,6 @@ class MagicFormula:
     def slope_jacobian(self, values: ArrayLike, SA: ArrayLike) -> NDArray[np.float64]:
         """Return d(dy/dSA)/dparameter (6, ...); see `slope_jacobian`."""
         return slope_jacobian(values, SA)
-
-    def fit(self, curves: Sequence[Curve], *, loss: Loss = "linear") -> tuple[CurveFit, ...]:
-        """Return one fit a curve; see `toolkit.tires.fit.fit_curves`."""
-        from toolkit.tires.fit import fit_curves
-
-        return fit_curves(curves, loss=loss)
 
 
 def value(values: ArrayLike, SA: ArrayLike) -> NDArray[np.float64]:

@@ -1,0 +1,48 @@
+"""The structure of the house: no import cycles, small files, one public face."""
+
+from __future__ import annotations
+
+import graphlib
+import statistics
+from pathlib import Path
+
+import grimp
+
+import toolkit
+
+ROOT = Path(toolkit.__file__).parent
+
+
+def test_no_import_cycles() -> None:
+    graph = grimp.build_graph("toolkit")
+    arrows = {
+        module: {other for other in graph.find_modules_directly_imported_by(module) if other != module}
+        for module in graph.modules
+    }
+    # CycleError names the modules of the circle.
+    graphlib.TopologicalSorter(arrows).prepare()
+
+
+def test_files_are_small() -> None:
+    lines = {path: len(path.read_text().splitlines()) for path in ROOT.rglob("*.py")}
+    assert max(lines.values()) <= 400, max(lines, key=lines.get)  # type: ignore[arg-type]
+    assert statistics.median(n for n in lines.values() if n > 10) <= 160
+
+
+def test_the_public_api_is_small_and_there() -> None:
+    names = [name for name in dir(toolkit) if not name.startswith("_")]
+    assert len(names) <= 30
+    for name in names:
+        assert getattr(toolkit, name) is not None
+
+
+def test_importing_the_package_imports_nothing_heavy() -> None:
+    import subprocess
+    import sys
+
+    code = "import sys, toolkit, toolkit.cli.main as m; m._register(); print(*sorted(sys.modules))"
+    loaded = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True
+    ).stdout.split()
+    heavy = {"numpy", "scipy", "pandas", "matplotlib", "statsmodels", "pint", "openpyxl", "docx", "lxml"}
+    assert heavy.isdisjoint(loaded)
