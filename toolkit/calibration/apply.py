@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -24,6 +24,7 @@ def apply_record(
     units: Mapping[str, str],
     tare: Mapping[str, float] | None = None,
     issued: bool = False,
+    only: Collection[str] | None = None,
 ) -> dict[str, NDArray[np.float64]]:
     """Return the loads [N, N*m] of a record from indications in its own units.
 
@@ -34,6 +35,7 @@ def apply_record(
     units : name to the unit of those values, compared with the record's
     tare : name to the unloaded indication, in the same units; None where there is none
     issued : use the issued coefficients, those that an acquisition program is given
+    only : names of the loads that are wanted; None for all
 
     Notes
     -----
@@ -52,6 +54,7 @@ def apply_record(
         one.load: _evaluate(record, one, indications, tare, issued=issued)
         * si_scale(one.unit, where=record.id)
         for one in record.loads
+        if only is None or one.load in only
     }
 
 

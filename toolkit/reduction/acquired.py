@@ -51,19 +51,20 @@ def compare(
     channels = [s for s in recording.series if s.role == "acquired" and _computes(record, s.symbol)]
     if not channels:
         return ()
+    wanted = [one.symbol for one in channels]
+
+    def reading(offset: Mapping[str, float] | None, *, issued: bool) -> Mapping[str, NDArray[np.float64]]:
+        return apply_record(record, indications, units=units, tare=offset, issued=issued, only=wanted)
+
     readings = [
-        apply_record(record, indications, units=units, tare=offset, issued=issued)
+        reading(offset, issued=issued)
         for offset in ((None, tare) if tare else (None,))
         for issued in (False, True)
     ]
-    plain = readings[0]
-    moved = [
-        apply_record(record, {**indications, name: values + half_last_place(values)}, units=units, tare=None)
-        for name, values in indications.items()
-    ]
+    halves = {name: half_last_place(values) for name, values in indications.items()}
     found = []
     for one in channels:
-        bound = sum((np.abs(m[one.symbol] - plain[one.symbol]) for m in moved), np.zeros(recording.rows))
+        bound = _moved(record, one.symbol, indications, units, halves, plain=readings[0][one.symbol])
         bound = bound + half_last_place(one.values) * si_scale(one.unit) + 1e-9 * np.abs(one.si)
         misses = [np.abs(reading[one.symbol] - one.si) for reading in readings]
         found.append(
@@ -75,6 +76,30 @@ def compare(
             )
         )
     return tuple(found)
+
+
+def _moved(
+    record: CalibrationRecord,
+    load: str,
+    indications: Mapping[str, NDArray[np.float64]],
+    units: Mapping[str, str],
+    halves: Mapping[str, NDArray[np.float64]],
+    *,
+    plain: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """Return how far half a printed digit of every indication may move a load [SI], summed."""
+    fit = record.load(load)
+    coefficients = dict(zip(fit.terms, fit.coefficients, strict=True))
+    if coefficients.keys() <= {*indications, "intercept"}:
+        total = np.zeros_like(plain)
+        for name, half in halves.items():
+            total += abs(coefficients.get(name, 0.0)) * half
+        return total * si_scale(fit.unit)
+    moved = [
+        apply_record(record, {**indications, name: indications[name] + half}, units=units, only=(load,))
+        for name, half in halves.items()
+    ]
+    return np.asarray(np.sum([np.abs(one[load] - plain) for one in moved], axis=0))
 
 
 def _computes(record: CalibrationRecord, symbol: str) -> bool:

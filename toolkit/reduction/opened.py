@@ -110,7 +110,7 @@ def open_file(
     indications = {name: recording[name].values for name in record.indications}
     units = {name: recording[name].unit for name in record.indications}
     offsets = dict(tare.values) if tare.source != "none" else None
-    loads = apply_record(record, indications, units=units, tare=offsets)
+    loads = apply_record(record, indications, units=units, tare=offsets, only=("FY", "MZ"))
     radius = free_radius_m(info.tire_size)
     rolling = None if radius is None else ROLLING_RATIO * radius
     return OpenedFile(

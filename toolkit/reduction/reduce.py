@@ -92,7 +92,7 @@ def _conditions(
         step = plan.nearest_step(float(np.mean(file.channels[0])), machine.protocol)
         for block, rows in zip(file.blocks, file.windows, strict=True):
             one = _condition(file, rows, step_SA=step, machine=machine, record=record)
-            conditions.append(dataclasses.replace(one, step_FZ=plan.nearest_load(one.FZ, machine.protocol)))
+            conditions.append(one)
             placed.append(
                 plan.Placed(
                     file=file.name,
@@ -101,7 +101,7 @@ def _conditions(
                     SA=one.SA,
                     FZ=block.mean_FZ,
                     step_SA=step,
-                    step_FZ=conditions[-1].step_FZ,
+                    step_FZ=one.step_FZ,
                 )
             )
     later = plan.doubled(placed)
@@ -128,7 +128,7 @@ def _condition(
         first_row=rows.start + 1,
         last_row=rows.stop,
         step_SA=step_SA,
-        step_FZ=None,
+        step_FZ=plan.nearest_load(FZ.value, machine.protocol),
         SA=sign["SA"] * SA.value,
         FZ=FZ.value,
         FY=sign["FY"] * FY.value,
