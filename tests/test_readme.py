@@ -1,0 +1,97 @@
+"""The README's own examples: every settings file is read, every command and option exists."""
+
+from __future__ import annotations
+
+import csv
+import re
+import shlex
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from toolkit.cli.main import run
+from toolkit.examples.fig4_4 import packaged_fig4_4
+from toolkit.recording.folder import read_test_folder
+
+README = Path(__file__).resolve().parents[1] / "README.md"
+BLOCKS = [
+    "\n".join(line[4:] for line in block.splitlines())
+    for block in re.findall(r"(?:^    .*\n(?:\n(?=    ))?)+", README.read_text(), flags=re.MULTILINE)
+]
+COMMANDS = [
+    line.split("#")[0].split("&&")[0].strip()
+    for block in BLOCKS
+    for line in block.splitlines()
+    if line.startswith("toolkit ")
+]
+
+
+def code_of(*words: object) -> int:
+    with pytest.raises(SystemExit) as caught:
+        run([str(word) for word in words])
+    return int(caught.value.code or 0)
+
+
+@pytest.mark.parametrize("line", COMMANDS)
+def test_every_command_and_option_exists(line: str, capsys: pytest.CaptureFixture[str]) -> None:
+    words = shlex.split(line)[1:]
+    group = words[:2] if words[0] in ("calibration", "template") else words[:1]
+    assert code_of(*group, "--help") == 0
+    helped = capsys.readouterr().out
+    for option in (word for word in words if word.startswith("--")):
+        assert option in helped
+
+
+def test_the_commands_are_there() -> None:
+    assert len(COMMANDS) >= 9
+
+
+def test_the_session_is_one(tmp_path: Path) -> None:
+    session = next(block for block in BLOCKS if "indications" in block)
+    heads = re.search(r"`(run,direction,[^`]*)`", README.read_text())
+    assert heads is not None
+    columns = heads[1].split(",")
+    (tmp_path / "SESSION.toml").write_text(session)
+    rng = np.random.default_rng(7)
+
+    def rows(count: int) -> list[list[float]]:
+        cells = rng.uniform(-500, 500, (count, 3))
+        FY = cells @ [4.4357, 4.4357, 4.5496] + rng.normal(0, 0.3, count)
+        MZ = cells @ [-0.2127, 0.2196, 0.0036] + rng.normal(0, 0.01, count)
+        return np.column_stack([cells, FY, MZ]).tolist()
+
+    with (tmp_path / "loads.csv").open("w", newline="") as stream:
+        writer = csv.writer(stream)
+        writer.writerow(columns)
+        writer.writerows([1 + i // 12, "up" if i % 2 else "down", *row] for i, row in enumerate(rows(36)))
+    with (tmp_path / "check.csv").open("w", newline="") as stream:
+        writer = csv.writer(stream)
+        writer.writerow(columns[2:])
+        writer.writerows(rows(6))
+    registry = tmp_path / "calibrations"
+    registry.mkdir()
+    assert code_of("calibrate", tmp_path / "SESSION.toml", "--calibrations", registry, "-q") == 0
+    assert (registry / "m15" / "m15-r1.json").is_file()
+
+
+def test_the_test_folder_is_one(tmp_path: Path) -> None:
+    block = next(block for block in BLOCKS if "[rotations]" in block).split("\n\n")[0]
+    (tmp_path / "test.toml").write_text(block)
+    for name in ("tare.xlsx", "run_14.xlsx"):
+        (tmp_path / name).write_bytes(packaged_fig4_4()[0].read_bytes())
+    test = read_test_folder(tmp_path)
+    assert test.tare_file == tmp_path / "tare.xlsx"
+    assert test.rotation_of(tmp_path / "run_14.xlsx") == "reverse"
+    assert test.info.tire_size == "205/55R16"
+
+
+def test_the_layers_are_those_of_the_project() -> None:
+    import tomllib
+
+    project = tomllib.loads((README.parent / "pyproject.toml").read_text())
+    layers = project["tool"]["importlinter"]["contracts"][0]["layers"]
+    text = " ".join(README.read_text().split())
+    for layer in layers:
+        for name in layer.split(" | "):
+            assert name in text
