@@ -1,0 +1,1 @@
+"""Evaluations by published standards: ASTM E74 and ISO 376."""

@@ -1,0 +1,101 @@
+"""What ISO 376 is evaluated from: runs at rotated mountings, and the refusal of what cannot be evaluated."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from toolkit.errors import SessionError
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+HIGHEST_DEGREE = 3
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Iso376Run:
+    """One series of forces at one mounting, in the indication's unit.
+
+    ``up`` deflections at the increasing forces (n,), ``down`` at the same forces when decreasing, in the
+    order of ``up``, or None. ``zero_before`` and ``zero_after`` are the indications without force (i_0, i_f).
+    """
+
+    rotation_deg: float
+    up: tuple[float, ...]
+    down: tuple[float, ...] | None = None
+    zero_before: float = 0.0
+    zero_after: float = 0.0
+
+
+def rotated(runs: Sequence[Iso376Run]) -> tuple[Iso376Run, ...]:
+    """Return the first run of each mounting, in the order of the runs (X1, X3, X5 of the standard)."""
+    first: dict[float, Iso376Run] = {}
+    for one in runs:
+        first.setdefault(one.rotation_deg % 360, one)
+    return tuple(first.values())
+
+
+def check(
+    force: NDArray[np.float64],
+    runs: Sequence[Iso376Run],
+    force_uncertainty: float | NDArray[np.float64],
+    resolution: float,
+    creep: tuple[float, float] | None,
+    degree: int,
+) -> None:
+    """Refuse what cannot be evaluated.
+
+    Raises
+    ------
+    SessionError
+        rule ``iso376``
+    """
+    forces = np.asarray(force, dtype=np.float64)
+    n = forces.size
+    if not 1 <= degree <= HIGHEST_DEGREE:
+        raise _refused("no such degree", degree, f"1 to {HIGHEST_DEGREE}", "choose one of them")
+    if forces.ndim != 1 or n < degree + 2:
+        raise _refused(
+            "too few forces for the interpolation", f"{n} forces", f"at least {degree + 2}",
+            "apply more forces or lower the degree",
+        )  # fmt: skip
+    if not (np.isfinite(forces).all() and forces[0] > 0 and (np.diff(forces) > 0).all()):
+        raise _refused("the forces do not increase", forces.tolist(), "from above zero", "sort the rows")
+    if len(runs) < 2 or runs[0].rotation_deg % 360 != runs[1].rotation_deg % 360:
+        raise _refused(
+            "there is no repeated run", [one.rotation_deg for one in runs],
+            "two runs at the first mounting", "give the two runs without a rotation first",
+        )  # fmt: skip
+    for number, one in enumerate(runs, start=1):
+        for values in (one.up, one.down):
+            if values is not None and (len(values) != n or not np.isfinite(values).all()):
+                raise _refused(
+                    f"run {number} does not match the forces", f"{len(values)} values",
+                    f"{n} finite values", "check the run",
+                )  # fmt: skip
+        if not (
+            np.isfinite([one.zero_before, one.zero_after]).all()
+            and np.all(np.multiply(one.up, one.up[-1]) > 0)
+        ):
+            raise _refused(
+                f"run {number} has a deflection or zero that is none", one.up,
+                "deflections of one sign, finite zeros", "take the zero off and check the run",
+            )  # fmt: skip
+    uncertainty = np.asarray(force_uncertainty, dtype=np.float64)
+    if uncertainty.shape not in ((), (n,)) or not (np.isfinite(uncertainty) & (uncertainty >= 0)).all():
+        raise _refused(
+            "the applied force's uncertainty cannot be used", uncertainty.tolist(),
+            "a percentage, one or one a force", "take it from the standard machine's certificate",
+        )  # fmt: skip
+    if not (np.isfinite(resolution) and resolution > 0):
+        raise _refused("no such resolution", resolution, "a positive number", "state it as read")
+    if creep is not None and not np.isfinite(creep).all():
+        raise _refused("the creep is no number", creep, "two indications", "leave it out")
+
+
+def _refused(what: str, got: object, expected: object, next_step: str) -> SessionError:
+    return SessionError(what, where="ISO 376", got=got, expected=expected, next_step=next_step, rule="iso376")
