@@ -321,7 +321,7 @@ def chapters(p: Pieces) -> list[str]:
         heading("8  Measured conditions"),
         p.table(
             "results",
-            "Means of the load blocks as measured; U is the repeatability of the mean, k = 2.",
+            "Means of the load blocks as measured; U (k = 2) is the repeatability of the mean and, without a tare, the open zero of the cells.",
             [
                 "direction",
                 "SA [deg]",
