@@ -53,6 +53,7 @@ def _register() -> None:
         init,
         inspect,
         process,
+        qualify,
         report,
         simulate,
         template,
@@ -64,7 +65,7 @@ def _register() -> None:
     for module in (process, fit, report):
         app.command(module.NAME)(module.command)
     app.add_typer(template.app, name="template")
-    for module in (simulate, explain):
+    for module in (simulate, explain, qualify):
         app.command(module.NAME)(module.command)
 
 

@@ -1,0 +1,103 @@
+"""`toolkit qualify`: the software's own qualification."""
+
+from __future__ import annotations
+
+import dataclasses
+import json as jsonlib
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from toolkit.cli.console import Json, Quiet, answer, table
+
+if TYPE_CHECKING:
+    from toolkit.qualification.model import Check, QualificationRecord
+
+NAME = "qualify"
+
+
+def command(
+    out: Annotated[
+        Path | None, typer.Option("--out", help="Write the record here: .json, else as text.")
+    ] = None,
+    json: Json = False,
+    quiet: Quiet = False,
+) -> int:
+    """Qualify this installation against certified sets, published examples and golden vectors."""
+    from toolkit.cli.home import packaged_home
+    from toolkit.files import write_atomic
+    from toolkit.qualification.run import qualify
+
+    record = qualify(calibrations=packaged_home() / "calibrations", on=datetime.now(tz=UTC).date())
+    payload, text = _payload(record), _text(record)
+    if out is not None:
+        document = jsonlib.dumps({"schema": 1, **payload}, ensure_ascii=False, indent=2, allow_nan=False)
+        write_atomic(out, (document if out.suffix.lower() == ".json" else text) + "\n")
+        text += f"\nwritten: {out}"
+    answer(payload, text, as_json=json, quiet=quiet)
+    return 0 if record.passed else 1
+
+
+def _payload(record: QualificationRecord) -> dict[str, Any]:
+    return {
+        "passed": record.passed,
+        "software": record.software,
+        "python": record.python,
+        "packages": dict(record.packages),
+        "platform": record.platform,
+        "date": record.date.isoformat(),
+        "numbers_sha256": record.numbers_sha256,
+        "checks": [dataclasses.asdict(check) for check in record.checks],
+        "not_covered": [dataclasses.asdict(one) for one in record.not_covered],
+    }
+
+
+def _text(record: QualificationRecord) -> str:
+    packages = ", ".join(f"{name} {number}" for name, number in record.packages)
+    failed = len(record.failed)
+    lines = [
+        "Qualification record (ISO/IEC 17025:2017, 7.11)",
+        f"software   toolkit {record.software}, Python {record.python}, {record.platform}",
+        f"libraries  {packages}",
+        f"date       {record.date.isoformat()}",
+        f"numbers    sha256 {record.numbers_sha256}",
+        "",
+    ]
+    rows = [
+        ["pass" if one.passed else "FAIL", one.group, one.name, one.quantity, one.measure, _required(one),
+         _digits(one.reached)]
+        for one in record.checks
+    ]  # fmt: skip
+    lines.append(
+        table(["", "group", "name", "quantity", "measure", "required", "reached"], rows, align="<<<<<>>")
+    )
+    for title, told in (
+        ("failed", [_reason(one) for one in record.failed]),
+        ("asked for less than public QR solvers reach",
+         [f"{one.name}, {one.quantity}: {one.note}" for one in record.checks if "more than" in one.note]),
+        ("not covered", [f"{one.name}: {one.reason}" for one in record.not_covered]),
+    ):  # fmt: skip
+        if told:
+            lines += ["", f"{title}:", *(f"  {line}" for line in told)]
+    verdict = f"{failed} FAILED" if failed else "all passed"
+    lines += ["", f"{len(record.checks)} checks, {verdict}"]
+    return "\n".join(lines)
+
+
+def _reason(one: Check) -> str:
+    what = ", ".join(part for part in (one.group, one.name, one.quantity) if part)
+    numbers = f"required {_required(one)}, reached {_digits(one.reached)}"
+    return f"{what}: {numbers}" + (f"; {one.note}" if one.note else "")
+
+
+def _required(one: Check) -> str:
+    sign = {"correct digits": ">= ", "text": ""}.get(one.measure, "<= ")
+    return sign + _digits(one.required)
+
+
+def _digits(value: float | str | None) -> str:
+    if value is None:
+        return "-"
+    return value if isinstance(value, str) else f"{value:.3g}"

@@ -1,0 +1,47 @@
+"""The whole qualification, offline, and the record of it."""
+
+from __future__ import annotations
+
+import platform
+from datetime import date
+from importlib.metadata import version
+from pathlib import Path
+
+from toolkit import __version__
+from toolkit.qualification import numbers
+from toolkit.qualification.certified import check_certified
+from toolkit.qualification.examples import check_e74, check_lines
+from toolkit.qualification.golden import check_golden
+from toolkit.qualification.model import QualificationRecord
+
+PACKAGES = ("numpy", "scipy", "statsmodels")
+
+
+def qualify(*, calibrations: Path, on: date, folder: Path | None = None) -> QualificationRecord:
+    """Run every check and return the record; what cannot be run is a failed check.
+
+    Parameters
+    ----------
+    calibrations : registry whose golden vectors are checked
+    on : day of the qualification
+    folder : packaged numbers; default: those of the package
+    """
+    folder = folder or numbers.FOLDER
+    lines, lines_left = check_lines(folder)
+    golden, golden_left = check_golden(calibrations)
+    return QualificationRecord(
+        software=__version__,
+        python=platform.python_version(),
+        packages=tuple((name, version(name)) for name in PACKAGES),
+        platform=f"{platform.system()} {platform.machine()}",
+        date=on,
+        numbers_sha256=numbers.identity(folder),
+        checks=(
+            numbers.check_whole(folder),
+            *check_certified(folder),
+            *lines,
+            *check_e74(folder),
+            *golden,
+        ),
+        not_covered=(*lines_left, *golden_left),
+    )
