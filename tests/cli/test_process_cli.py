@@ -156,3 +156,15 @@ def test_a_withdrawn_record_that_is_named_is_called_withdrawn(
     assert code == 1
     (told,) = [f for f in answer["findings"] if f["rule"] == "withdrawn-record"]
     assert "wrong sign" in told["message"]
+
+
+def test_a_reduced_test_whose_record_was_withdrawn_says_so(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    test = fig_test(tmp_path, 'machine = "m15"\ndate = 2019-05-31')
+    toolkit(capsys, "process", test, "--known-at", "2019-06-30", "--out", tmp_path / "old.xlsx")
+    code, answer = toolkit(capsys, "process", tmp_path / "old.xlsx")
+    assert code == 1
+    assert {"withdrawn-record", "not-in-force"} <= {finding["rule"] for finding in answer["findings"]}
+    _, then = toolkit(capsys, "process", tmp_path / "old.xlsx", "--known-at", "2019-06-30")
+    assert "withdrawn-record" not in {finding["rule"] for finding in then["findings"]}

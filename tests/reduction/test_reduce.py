@@ -293,3 +293,38 @@ def test_an_angle_of_no_known_name_is_told(tmp_path: Path, published_record: Cal
     folder = folder_with(tmp_path)
     write_labview(folder / "x.xlsx", machine, columns, simulated=False)
     assert "unknown-angle" in rules(reduce_folder(folder, published_record))
+
+
+def test_two_near_loads_of_every_file_stay_two(tmp_path: Path, published_record: CalibrationRecord) -> None:
+    # 30 and 33 kN with a spread of 3 %: the groups nearly touch, but every file holds both.
+    machine = load_machine("m15")
+    folder = folder_with(tmp_path)
+    for number, (angle, spread) in enumerate([(0.0, 0.97), (1.0, 1.0), (-1.0, 1.03)]):
+        loads = np.repeat([30000.0 * spread, 33500.0 * spread], 20) / 4.4482216152605
+        columns = {c.symbol: np.linspace(100.0, 101.0, 40) for c in machine.columns} | {"FZ": loads}
+        columns["SA"] = np.full(40, angle)
+        write_labview(folder / f"f{number}.xlsx", machine, columns, simulated=False)
+    reduced = reduce_folder(folder, published_record)
+    groups: dict[float | None, set[str]] = {}
+    for c in reduced.conditions:
+        groups.setdefault(c.step_FZ, set()).add(c.file)
+    assert {round(step or 0.0): len(files) for step, files in groups.items()} == {30000: 3, 33500: 3}
+    assert "unplanned-load" in rules(reduced)
+    assert {round(c.FZ_common) for c in reduced.conditions} == {30000, 33500}
+
+
+def test_cells_beyond_the_calibrated_range_are_told(
+    tmp_path: Path, published_record: CalibrationRecord
+) -> None:
+    ranged = dataclasses.replace(
+        published_record,
+        cells=tuple(
+            Indication(name=c.name, unit=c.unit, minimum=-300.0, maximum=300.0)
+            for c in published_record.cells
+        ),
+    )
+    found = [
+        f for f in reduce_folder(folder_with(tmp_path, "a"), ranged).findings if f.rule == "beyond-range"
+    ]
+    # Figure 4.4: D51 reaches 496 and E5 -498 lbf; D52 stays at 301, within the room of 5 % of the span.
+    assert [f.message.split()[0] for f in found] == ["D51", "E5"]

@@ -199,3 +199,21 @@ def test_any_text_as_an_effect_is_a_plan_or_a_clear_error(text):
     plan = Plan(kind="test", title="", date="2026-03-17", machine=load_machine("m15-virtual"), seed=0)
     with contextlib.suppress(ConfigError):
         assert with_effects(plan, [text]).effects
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "rotations = []",
+        '[tire]\nfree_radius = { value = -0.316, unit = "m" }',
+        '[tire]\nfree_radius = { value = nan, unit = "m" }',
+        '[road]\ndrum_runout_1 = { value = inf, unit = "N" }',
+    ],
+)
+def test_a_plan_that_cannot_be_is_refused_with_its_place(tmp_path, line):
+    path = tmp_path / "plan.toml"
+    path.write_text(f'schema = 1\nkind = "test"\ndate = 2026-03-17\n{line}\n')
+    with pytest.raises(ConfigError) as caught:
+        read_plan(path)
+    assert caught.value.rule == "wrong-value"
+    assert str(path) in str(caught.value.where)

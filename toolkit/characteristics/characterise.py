@@ -10,7 +10,7 @@ import numpy as np
 from toolkit.characteristics.groups import Group, group
 from toolkit.characteristics.model import Characteristics, DirectionFit
 from toolkit.characteristics.pull import Direction, pull
-from toolkit.characteristics.shared import Shared, line_at_zero
+from toolkit.characteristics.shared import Shared, line_at_zero, weights_at_zero
 from toolkit.characteristics.stiffness import stiffness
 from toolkit.findings import Finding
 from toolkit.tires.evaluate import estimate_at
@@ -119,6 +119,9 @@ def _line_findings(directions: list[Direction]) -> list[Finding]:
     """Hold the curve's value at SA = 0 against the line through the nearest points."""
     found = []
     for one in directions:
+        if one.fit.FY is not None and not weights_at_zero(one.group):
+            message = "the slip angles lie on one side of zero: stiffness and pull at SA = 0 are null"
+            found.append(Finding(rule="one-sided", where=_where(one.group), message=message))
         for channel, fit in (("FY", one.fit.FY), ("MZ", one.fit.MZ)):
             line = line_at_zero(one.group, channel)
             if fit is None or line is None:

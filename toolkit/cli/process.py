@@ -173,7 +173,7 @@ def _text(resolved: Resolved, out: Path | None) -> str:
         _pull_table(resolved),
     ]
     if resolved.findings:
-        lines += ["", f"{len(resolved.findings)} findings (toolkit explain RULE tells more):"]
+        lines += ["", f"findings: {len(resolved.findings)} (toolkit explain RULE tells more)"]
         lines += finding_lines(resolved.findings)
     lines.append("")
     lines.append(
@@ -202,7 +202,14 @@ def _pull_table(resolved: Resolved) -> str:
                 _shown(pull.PRAT, 1, 2),
             ]
         )
-    head = ["FZ [N]", "FZ [lbf]", "C_FY [N/deg]", "C_MZ [N·m/deg]", "conicity [N]", "plysteer [N]"]
+    head = [
+        "FZ [N]",
+        "FZ [lbf]",
+        "slope C_FY [N/deg]",
+        "slope C_MZ [N·m/deg]",
+        "conicity [N]",
+        "plysteer [N]",
+    ]
     return table([*head, "CRAT [N·m]", "PRAT [N·m]"], rows, align=">" * 8)
 
 

@@ -57,7 +57,7 @@ def resolve_test(
         return _from_folder(
             test, registry, calibration=calibration, known_at=known_at, reader=reader, step=step
         )
-    return _from_file(test, registry, calibration=calibration)
+    return _from_file(test, registry, calibration=calibration, known_at=known_at)
 
 
 def _from_folder(
@@ -124,12 +124,12 @@ def _not_in_force(
     except RegistryError:
         due = "no record"
     if due != record.id:
-        message = f"{due} was in force on {on.isoformat()}; {record.id} was named and used"
+        message = f"{due} was in force on {on.isoformat()}; {record.id} was used"
         found.append(Finding(rule="not-in-force", where=record.id, message=message))
     return found
 
 
-def _from_file(test: Path, registry: Registry, *, calibration: str | None) -> Resolved:
+def _from_file(test: Path, registry: Registry, *, calibration: str | None, known_at: date | None) -> Resolved:
     from toolkit.errors import RecordError
     from toolkit.recording.gate import gate
     from toolkit.recording.marks import is_own_output
@@ -166,4 +166,7 @@ def _from_file(test: Path, registry: Registry, *, calibration: str | None) -> Re
             next_step="process the recordings again with the record that is wanted",
             rule="record-differs",
         )
-    return Resolved(result=result, record=record, findings=result.findings)
+    info = result.reduced.info
+    on = date.fromisoformat(info.date) if info.date else None
+    findings = _not_in_force(registry, record, record.instrument, on=on, known_at=known_at)
+    return Resolved(result=result, record=record, findings=(*findings, *result.findings))

@@ -24,6 +24,10 @@ if TYPE_CHECKING:
     from toolkit.recording.model import Recording, TestInfo
 
 
+# Blocks at a load that the protocol does not know are one load while they lie within this part of each other.
+_SAME_LOAD = 0.10
+
+
 def reduce_test(
     *,
     info: TestInfo,
@@ -71,11 +75,12 @@ def reduce_test(
         *remarks.window_findings(files),
         *remarks.acquired_findings(files, record),
         *remarks.record_findings(record),
+        *remarks.range_findings(conditions, record),
     ]
     return ReducedTest(
         info=info,
         calibration=CalibrationUse(id=record.id, sha256=record.sha256, unverified=not record.verified),
-        conditions=_ordered(_at_common_load(conditions), machine),
+        conditions=_ordered(_at_common_load(_own_loads(conditions)), machine),
         tare=files[0].tare,
         averaging=remarks.averaging_text(files, machine),
         findings=tuple(findings),
@@ -154,6 +159,31 @@ def _condition(
 
 def _acquired(recording: Recording, symbol: str, rows: slice, sign: int) -> float | None:
     return sign * float(np.mean(recording[symbol].si[rows])) if recording.has(symbol) else None
+
+
+def _own_loads(conditions: Sequence[Condition]) -> list[Condition]:
+    """Give blocks at loads that the protocol does not know the nominal load of their own group.
+
+    Groups are runs of the sorted loads; a new one begins at a gap, and where a file comes again: two
+    blocks of one file are two loads, however near.
+    """
+    found = list(conditions)
+    groups: list[list[int]] = []
+    for index in sorted(range(len(found)), key=lambda i: found[i].FZ):
+        one = found[index]
+        if one.step_FZ is not None or not one.used:
+            continue
+        last = groups[-1] if groups else []
+        near = bool(last) and one.FZ - found[last[-1]].FZ <= _SAME_LOAD * one.FZ
+        if near and all(found[other].file != one.file for other in last):
+            last.append(index)
+        else:
+            groups.append([index])
+    for group in groups:
+        nominal = float(np.median([found[index].FZ for index in group]))
+        for index in group:
+            found[index] = dataclasses.replace(found[index], step_FZ=nominal)
+    return found
 
 
 def _at_common_load(conditions: Sequence[Condition]) -> list[Condition]:

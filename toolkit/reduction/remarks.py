@@ -13,7 +13,12 @@ if TYPE_CHECKING:
     from toolkit.calibration.record import CalibrationRecord
     from toolkit.machine import Machine
     from toolkit.recording.model import TestInfo
+    from toolkit.reduction.model import Condition
     from toolkit.reduction.opened import OpenedFile
+
+
+# A cell may leave the range of the reference loads by this part of it before it is said aloud.
+_BEYOND = 0.05
 
 
 def machine_findings(info: TestInfo, machine: Machine) -> list[Finding]:
@@ -35,8 +40,12 @@ def tare_findings(files: Sequence[OpenedFile], record: CalibrationRecord) -> lis
     source = files[0].tare.source
     if source == "none":
         message = (
-            "no tare was recorded or declared: the zero of the cells stays in FY and MZ, and in "
-            "their uncertainty"
+            "no tare was recorded or declared: the zero of the cells stays in FY and MZ, "
+            + (
+                "and in their uncertainty"
+                if any(u for _, u in files[0].tare.u)
+                else "and no uncertainty holds it: the machine definition states none ([type_b] zero)"
+            )
             + ("" if record.zero == "included" else "; the record was fitted on tared indications")
         )
         return [Finding(rule="no-tare", where=_some([file.name for file in files]), message=message)]
@@ -95,6 +104,30 @@ def record_findings(record: CalibrationRecord) -> list[Finding]:
         return []
     message = "the record is a legacy import without its reference data: nothing verifies its coefficients"
     return [Finding(rule="unverified", where=record.id, message=message)]
+
+
+def range_findings(conditions: Sequence[Condition], record: CalibrationRecord) -> list[Finding]:
+    """Name the cells that left the range of the record's reference loads: the record extrapolates there."""
+    found = []
+    for place, cell in enumerate(record.cells):
+        if cell.minimum is None or cell.maximum is None:
+            continue
+        room = _BEYOND * (cell.maximum - cell.minimum)
+        outside = [
+            c for c in conditions if not cell.minimum - room <= c.indications[place] <= cell.maximum + room
+        ]
+        if outside:
+            values = [c.indications[place] for c in outside]
+            message = (
+                f"{cell.name} reads {min(values):.4g} to {max(values):.4g} {cell.unit} in {len(outside)} "
+                f"blocks; the reference loads of {record.id} reached {cell.minimum:.4g} to {cell.maximum:.4g}"
+            )
+            found.append(Finding(rule="beyond-range", where=_some(_files(outside)), message=message))
+    return found
+
+
+def _files(conditions: Sequence[Condition]) -> list[str]:
+    return list(dict.fromkeys(c.file for c in conditions))
 
 
 def averaging_text(files: Sequence[OpenedFile], machine: Machine) -> str:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import dataclasses
 import datetime as dt
+import math
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal, TypeVar, cast
@@ -136,7 +137,12 @@ def read_plan(path: Path, *, seed: int | None = None) -> Plan:
         )
     protocol = machine.protocol
     rotations = table.get("rotations", list(machine.rotations))
-    for one in rotations if isinstance(rotations, list) else [rotations]:
+    if not isinstance(rotations, list) or not rotations:
+        raise ConfigError(
+            "a test needs a direction of rotation", where=f"{path}: rotations", got=rotations,
+            expected=", ".join(ROTATIONS), next_step="name one or both in a list", rule="wrong-value",
+        )  # fmt: skip
+    for one in rotations:
         _choice(one, ROTATIONS, f"{path}: rotations")
     label = table.get("label", {})
     check_keys(label, _LABEL, where=f"{path}: label")
@@ -161,12 +167,24 @@ def read_plan(path: Path, *, seed: int | None = None) -> Plan:
     )
 
 
+# Sizes of the tire that no tire can have at zero or below.
+_SIZES = ("nominal_load_N", "free_radius_m", "rolling_ratio", "vertical_stiffness_N_m")
+
+
 def _section(default: T, table: dict[str, Any], known: dict[str, tuple[str, str]], where: str) -> T:
     check_keys(table, known, where=where)
     values = {
         known[key][0]: quantity(entry, _dimension(known[key][1]), f"{where}.{key}")
         for key, entry in table.items()
     }
+    for key, entry in table.items():
+        value = values[known[key][0]]
+        if not math.isfinite(value) or (known[key][0] in _SIZES and value <= 0):
+            raise ConfigError(
+                "a number of the plan cannot be", where=f"{where}.{key}", got=entry,
+                expected="a number above zero" if known[key][0] in _SIZES else "a finite number",
+                next_step="correct the line", rule="wrong-value",
+            )  # fmt: skip
     return cast("T", dataclasses.replace(cast("Any", default), **values))
 
 
