@@ -37,7 +37,7 @@ class Channel:
 
 
 _ALL = (
-    Channel(symbol="t", name="time", si="s", dimension="time", tydex="MEASNUMB", aliases=("time", "T [s]")),
+    Channel(symbol="t", name="time", si="s", dimension="time", aliases=("time",)),
     Channel(symbol="FX", name="longitudinal force", si="N", dimension="force", tydex="FX"),
     Channel(symbol="FY", name="lateral force", si="N", dimension="force", tydex="FYW", aliases=("Fy",)),
     Channel(
