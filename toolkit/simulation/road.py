@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -44,8 +43,3 @@ def load_on_drum(
         + road.runout_1_N * np.cos(angle + road.runout_1_phase_rad)
         + road.runout_2_N * np.cos(2 * angle + road.runout_2_phase_rad)
     )
-
-
-def revolution_s(*, speed_m_s: float, radius_m: float) -> float:
-    """Return the time [s] of one drum revolution."""
-    return 2 * math.pi * radius_m / speed_m_s

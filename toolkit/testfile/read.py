@@ -13,7 +13,7 @@ from toolkit.errors import RecordingError
 from toolkit.estimate import Estimate
 from toolkit.findings import Finding, Level
 from toolkit.pipeline import TestResult
-from toolkit.recording.gate import gate
+from toolkit.recording.gate import check_workbook
 from toolkit.recording.model import TestInfo
 from toolkit.reduction.model import CalibrationUse, Condition, ReducedTest, Tare
 from toolkit.testfile.layout import (
@@ -81,10 +81,7 @@ def read_test_file(path: Path) -> TestResult:
 def _open(path: Path) -> Any:
     from python_calamine import CalamineWorkbook
 
-    gated = gate(path)
-    if gated.kind != "xlsx":
-        raise _broken(path, "a text file", "an .xlsx file")
-    return CalamineWorkbook.from_filelike(BytesIO(gated.data))
+    return CalamineWorkbook.from_filelike(BytesIO(check_workbook(path).data))
 
 
 def _broken(path: Path, got: str, expected: str) -> RecordingError:

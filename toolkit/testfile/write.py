@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from toolkit.errors import OutputError
 from toolkit.estimate import Estimate
 from toolkit.files import write_atomic
-from toolkit.recording.marks import GENERATOR, output_keywords
+from toolkit.recording.marks import mark_workbook
 from toolkit.testfile.layout import CONDITION_FIELDS, KIND, SCHEMA, cell, content_hash, header
 
 if TYPE_CHECKING:
@@ -49,8 +49,7 @@ def _workbook(result: TestResult, digest: str, recordings: Mapping[str, Recordin
     from openpyxl import Workbook
 
     book = Workbook(write_only=True)
-    book.properties.creator = GENERATOR
-    book.properties.keywords = output_keywords(simulated=result.reduced.info.simulated)
+    mark_workbook(book, simulated=result.reduced.info.simulated, machine=result.reduced.info.machine)
     for name, rows in (
         ("provenance", _provenance(result, digest)),
         ("reduced", _reduced(result)),
