@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 from hypothesis import settings
 
-from toolkit.calibration.record import CalibrationRecord, Golden, Indication, LoadFit
+from toolkit.calibration.records.record import CalibrationRecord, Golden, Indication, LoadFit
 from toolkit.simulation.plan import Plan, read_plan
 
 # Machines are shared and noisy: no example is judged by its time. CI repeats the same examples; a developer's

@@ -16,7 +16,7 @@ from toolkit.reduction.reduce import reduce_test
 from toolkit.reduction.tare import tare_of_file
 
 if TYPE_CHECKING:
-    from toolkit.calibration.record import CalibrationRecord
+    from toolkit.calibration.records.record import CalibrationRecord
     from toolkit.machine import Machine
     from toolkit.recording.folder import TestFolder
     from toolkit.recording.model import Recording

@@ -7,7 +7,7 @@ import dataclasses
 import numpy as np
 
 from toolkit.audit.columns import Columns
-from toolkit.calibration.record import CalibrationRecord, Golden, Indication, LoadFit, sealed
+from toolkit.calibration.records.record import CalibrationRecord, Golden, Indication, LoadFit, sealed
 from toolkit.recording.digits import half_last_place
 
 TERMS = ("D51", "D52", "E5", "intercept")

@@ -10,8 +10,8 @@ import toolkit
 from toolkit.audit.context import context_of
 from toolkit.audit.identify import identify
 from toolkit.audit.inspection import inspect_file
-from toolkit.calibration.candidate import calibrate
-from toolkit.calibration.registry import Registry
+from toolkit.calibration.registry.candidate import calibrate
+from toolkit.calibration.registry.registry import Registry
 from toolkit.errors import ConfigError
 from toolkit.recording.read import read_recording
 from toolkit.simulation.plan import read_plan

@@ -10,7 +10,7 @@ from toolkit.cli.home import packaged_home
 def virtual_test(folder: Path) -> Path:
     """Return the folder of the packaged virtual test, simulated there on the first call."""
     from toolkit import examples
-    from toolkit.calibration.registry import Registry
+    from toolkit.calibration.registry.registry import Registry
     from toolkit.simulation.plan import read_plan
     from toolkit.simulation.program import program_from
     from toolkit.simulation.run import simulate

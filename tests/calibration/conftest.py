@@ -10,8 +10,8 @@ import pytest
 from calibration_factory import CELLS, LOADS, UNITS, csv_text, hub_data, session_text
 from numpy.typing import NDArray
 
-from toolkit.calibration.candidate import calibrate
-from toolkit.calibration.registry import Registry
+from toolkit.calibration.registry.candidate import calibrate
+from toolkit.calibration.registry.registry import Registry
 
 
 @pytest.fixture

@@ -14,10 +14,10 @@ import pytest
 from test_legacy import GOOD, enter
 from test_mutations import forge
 
-from toolkit.calibration.candidate import calibrate
-from toolkit.calibration.record import canonical
-from toolkit.calibration.registry import Registry
-from toolkit.calibration.verify import verify_registry
+from toolkit.calibration.records.record import canonical
+from toolkit.calibration.registry.candidate import calibrate
+from toolkit.calibration.registry.registry import Registry
+from toolkit.calibration.registry.verify import verify_registry
 from toolkit.errors import RecordError
 from toolkit.files import sha256_bytes
 
@@ -123,7 +123,7 @@ def test_sessions_of_every_form_agree_with_themselves(
 
 def test_loading_stays_light() -> None:
     code = (
-        "import sys; from pathlib import Path; from toolkit.calibration.registry import Registry; "
+        "import sys; from pathlib import Path; from toolkit.calibration.registry.registry import Registry; "
         "Registry(Path(sys.argv[1])).load('m15-virtual-r1'); "
         "print([n for n in ('scipy', 'statsmodels', 'pandas') if n in sys.modules])"
     )

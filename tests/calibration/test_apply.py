@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from toolkit.calibration.apply import apply_record, coefficient_jacobian
-from toolkit.calibration.record import CalibrationRecord
-from toolkit.calibration.registry import Registry
+from toolkit.calibration.records.record import CalibrationRecord
+from toolkit.calibration.registry.registry import Registry
 from toolkit.errors import RecordError
 
 LBF = 4.4482216152605

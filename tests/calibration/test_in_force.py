@@ -9,10 +9,10 @@ from pathlib import Path
 import pytest
 from calibration_factory import hub_data
 
-from toolkit.calibration.approval import approve, withdraw
-from toolkit.calibration.candidate import calibrate
-from toolkit.calibration.registry import Registry
-from toolkit.calibration.verify import verify_registry
+from toolkit.calibration.registry.approval import approve, withdraw
+from toolkit.calibration.registry.candidate import calibrate
+from toolkit.calibration.registry.registry import Registry
+from toolkit.calibration.registry.verify import verify_registry
 from toolkit.errors import RecordError, RegistryError
 
 PROJECT = Registry(Path(__file__).resolve().parents[2] / "calibrations")

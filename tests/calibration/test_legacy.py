@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from toolkit.calibration.legacy import import_legacy
-from toolkit.calibration.registry import Registry
-from toolkit.calibration.verify import verify_registry
+from toolkit.calibration.registry.legacy import import_legacy
+from toolkit.calibration.registry.registry import Registry
+from toolkit.calibration.registry.verify import verify_registry
 from toolkit.errors import RecordError, ToolkitError
 
 GOOD = """

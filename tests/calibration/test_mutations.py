@@ -9,11 +9,11 @@ from pathlib import Path
 
 import pytest
 
-from toolkit.calibration.candidate import calibrate, entering
-from toolkit.calibration.ledger import head_bytes, next_line
-from toolkit.calibration.record import CalibrationRecord, Golden, LoadFit, sealed, to_bytes
-from toolkit.calibration.refit import polarity
-from toolkit.calibration.registry import Registry
+from toolkit.calibration.records.record import CalibrationRecord, Golden, LoadFit, sealed, to_bytes
+from toolkit.calibration.registry.candidate import calibrate, entering
+from toolkit.calibration.registry.ledger import head_bytes, next_line
+from toolkit.calibration.registry.refit import polarity
+from toolkit.calibration.registry.registry import Registry
 from toolkit.errors import RecordError
 
 PROJECT = Path(__file__).resolve().parents[2] / "calibrations"

@@ -10,9 +10,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from toolkit.calibration.record import canonical, from_bytes, sealed, to_bytes
-from toolkit.calibration.registry import Registry
-from toolkit.calibration.verify import verify_registry
+from toolkit.calibration.records.record import canonical, from_bytes, sealed, to_bytes
+from toolkit.calibration.registry.registry import Registry
+from toolkit.calibration.registry.verify import verify_registry
 from toolkit.errors import RecordError
 
 FOLDER = Path(__file__).resolve().parents[2] / "calibrations"
@@ -93,8 +93,8 @@ def test_verify_names_missing_and_stray_files_and_a_ledger_that_was_cut(registry
 def test_a_printed_head_shows_that_the_end_was_cut_off(registry: Registry) -> None:
     from datetime import date
 
-    from toolkit.calibration.approval import approve
-    from toolkit.calibration.ledger import head_bytes
+    from toolkit.calibration.registry.approval import approve
+    from toolkit.calibration.registry.ledger import head_bytes
 
     folder = registry.folder / "hub"
     one = registry.head("hub")

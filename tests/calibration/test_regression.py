@@ -13,8 +13,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from toolkit.calibration.exact import golden_inputs, predict_exactly, solve_exactly
-from toolkit.calibration.regression import fit_terms
+from toolkit.calibration.fit.regression import fit_terms
+from toolkit.calibration.records.exact import golden_inputs, predict_exactly, solve_exactly
 from toolkit.calibration.terms import model_terms, parse_term, term_matrix
 from toolkit.errors import SessionError
 

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from calibration_factory import SENSITIVITY, ZERO, hub_data
 
-from toolkit.calibration.candidate import Candidate, calibrate
-from toolkit.calibration.registry import Registry
+from toolkit.calibration.registry.candidate import Candidate, calibrate
+from toolkit.calibration.registry.registry import Registry
 from toolkit.errors import ConfigError, SessionError, ToolkitError, UnitError
 
 Make = Callable[..., Path]

@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 from calibration_factory import hub_data
 
-from toolkit.calibration.candidate import calibrate
-from toolkit.calibration.registry import Registry
+from toolkit.calibration.registry.candidate import calibrate
+from toolkit.calibration.registry.registry import Registry
 from toolkit.errors import ToolkitError
 
 Make = Callable[..., Path]

@@ -10,10 +10,10 @@ from pathlib import Path
 import pytest
 from calibration_factory import hub_data
 
-from toolkit.calibration import store
-from toolkit.calibration.candidate import calibrate
-from toolkit.calibration.registry import Registry
-from toolkit.calibration.verify import verify_registry
+from toolkit.calibration.registry import store
+from toolkit.calibration.registry.candidate import calibrate
+from toolkit.calibration.registry.registry import Registry
+from toolkit.calibration.registry.verify import verify_registry
 from toolkit.errors import RegistryError
 
 FORK = multiprocessing.get_context("fork")

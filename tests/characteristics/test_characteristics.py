@@ -22,7 +22,7 @@ from toolkit.reduction.model import CalibrationUse, Condition, ReducedTest, Tare
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from toolkit.calibration.record import CalibrationRecord
+    from toolkit.calibration.records.record import CalibrationRecord
 
 M15 = load_machine("m15")
 LOAD = 4000.0

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from scipy import linalg
 
-from toolkit.calibration.basis import build_basis
+from toolkit.calibration.fit.basis import build_basis
 from toolkit.cli.home import packaged_home
 from toolkit.qualification.agreement import correct_digits, printed_check
 from toolkit.qualification.certified import check_certified, solve

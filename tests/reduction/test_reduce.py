@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from toolkit.calibration.record import CalibrationRecord, Indication
+from toolkit.calibration.records.record import CalibrationRecord, Indication
 from toolkit.errors import RecordError, RecordingError
 from toolkit.machine import load_machine
 from toolkit.pipeline import declared_tare, process, read_test

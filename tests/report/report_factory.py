@@ -6,7 +6,7 @@ import dataclasses
 import hashlib
 import math
 
-from toolkit.calibration.record import CalibrationRecord, Golden, Indication, LoadFit
+from toolkit.calibration.records.record import CalibrationRecord, Golden, Indication, LoadFit
 from toolkit.characteristics.model import Characteristics, DirectionFit, Pull, Stiffness
 from toolkit.estimate import Estimate
 from toolkit.findings import Finding

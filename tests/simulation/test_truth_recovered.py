@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 
 import toolkit
-from toolkit.calibration.candidate import calibrate
-from toolkit.calibration.registry import Registry
+from toolkit.calibration.registry.candidate import calibrate
+from toolkit.calibration.registry.registry import Registry
 from toolkit.pipeline import process, read_test
 from toolkit.recording.folder import read_test_folder
 from toolkit.simulation.plan import read_plan

@@ -17,7 +17,7 @@ from toolkit.testfile import is_test_file, read_test_file, write_test_file
 from toolkit.testfile.layout import content_hash
 
 if TYPE_CHECKING:
-    from toolkit.calibration.record import CalibrationRecord
+    from toolkit.calibration.records.record import CalibrationRecord
     from toolkit.recording.model import Recording
 
 Made = tuple[TestResult, dict[str, "Recording"]]

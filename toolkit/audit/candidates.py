@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from toolkit.audit.columns import Columns
-    from toolkit.calibration.record import CalibrationRecord, LoadFit
+    from toolkit.calibration.records.record import CalibrationRecord, LoadFit
 
 CONSTANT = "constant"
 _ALL_ORDERS = 4  # beyond so many channels only exchanges of two are tried

@@ -24,7 +24,7 @@ from toolkit.units import si_scale
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from toolkit.calibration.record import CalibrationRecord
+    from toolkit.calibration.records.record import CalibrationRecord
     from toolkit.recording.model import Recording
 
 _ALIKE = "{:.12g}"

@@ -23,9 +23,9 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from toolkit.calibration.record import CalibrationRecord
-    from toolkit.calibration.registry import Refused, Registry
-    from toolkit.calibration.status import RecordStatus
+    from toolkit.calibration.records.record import CalibrationRecord
+    from toolkit.calibration.registry.registry import Refused, Registry
+    from toolkit.calibration.registry.status import RecordStatus
     from toolkit.recording.model import Recording
 
 
@@ -88,7 +88,7 @@ def choose(
     registry: Registry, instrument: str, *, on: dt.date | None, known_at: dt.date | None = None
 ) -> Choice:
     """Return the records that may have computed a file, and the one in force on the test's day."""
-    from toolkit.calibration.registry import today
+    from toolkit.calibration.registry.registry import today
 
     records, refused = registry.usable(instrument)
     now = known_at or today()

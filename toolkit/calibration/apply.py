@@ -14,7 +14,7 @@ from toolkit.units import si_scale, unit
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from toolkit.calibration.record import CalibrationRecord, LoadFit
+    from toolkit.calibration.records.record import CalibrationRecord, LoadFit
 
 
 def apply_record(

@@ -19,7 +19,7 @@ from toolkit.tires.model import Curve
 from toolkit.units import from_si
 
 if TYPE_CHECKING:
-    from toolkit.calibration.record import CalibrationRecord
+    from toolkit.calibration.records.record import CalibrationRecord
     from toolkit.errors import FitError
     from toolkit.machine import Machine
     from toolkit.reduction.model import ReducedTest

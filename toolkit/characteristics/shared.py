@@ -21,7 +21,7 @@ from toolkit.units import si_scale
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from toolkit.calibration.record import CalibrationRecord
+    from toolkit.calibration.records.record import CalibrationRecord
     from toolkit.channels import Axes
     from toolkit.characteristics.groups import Group
     from toolkit.reduction.model import Condition

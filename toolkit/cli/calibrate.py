@@ -11,7 +11,7 @@ from toolkit.cli.console import Calibrations, Home, Json, Quiet, answer, exit_co
 from toolkit.cli.home import calibrations_folder
 
 if TYPE_CHECKING:
-    from toolkit.calibration.candidate import Candidate
+    from toolkit.calibration.registry.candidate import Candidate
 
 NAME = "calibrate"
 
@@ -25,8 +25,8 @@ def command(
     quiet: Quiet = False,
 ) -> int:
     """Fit a session: a candidate record and its diagnostics."""
-    from toolkit.calibration.candidate import calibrate
-    from toolkit.calibration.registry import Registry
+    from toolkit.calibration.registry.candidate import calibrate
+    from toolkit.calibration.registry.registry import Registry
 
     folder = calibrations or out
     if folder is not None and not folder.exists() and folder.parent.is_dir():

@@ -13,9 +13,9 @@ from toolkit.cli.home import calibrations_folder
 from toolkit.errors import ConfigError
 
 if TYPE_CHECKING:
-    from toolkit.calibration.record import CalibrationRecord
-    from toolkit.calibration.registry import Registry
-    from toolkit.calibration.status import RecordStatus
+    from toolkit.calibration.records.record import CalibrationRecord
+    from toolkit.calibration.registry.registry import Registry
+    from toolkit.calibration.registry.status import RecordStatus
 
 app = typer.Typer(help="Calibration records: what is in force, and why.", no_args_is_help=True)
 
@@ -113,7 +113,7 @@ def verify(
     quiet: Quiet = False,
 ) -> int:
     """Refit every record from its stored data, and name every file that is not as it was entered."""
-    from toolkit.calibration.verify import verify_registry
+    from toolkit.calibration.registry.verify import verify_registry
 
     rows = verify_registry(_registry(calibrations, home), head)
     payload = [{"id": r.id, "ok": r.ok, "verified": r.verified, "reason": r.reason} for r in rows]
@@ -200,7 +200,7 @@ def import_record(
     quiet: Quiet = False,
 ) -> int:
     """Enter a legacy record: coefficients without their data, marked unverified for ever."""
-    from toolkit.calibration.legacy import import_legacy
+    from toolkit.calibration.registry.legacy import import_legacy
 
     registry = _registry(calibrations, home)
     record, existing = import_legacy(file, registry)
@@ -232,7 +232,7 @@ def approve(
     quiet: Quiet = False,
 ) -> int:
     """Put a record in force; a failed sign, span or check load blocks and changes nothing."""
-    from toolkit.calibration.approval import approve as decide
+    from toolkit.calibration.registry.approval import approve as decide
 
     registry = _registry(calibrations, home)
     since = _day(in_force_from, "--in-force-from")
@@ -273,7 +273,7 @@ def withdraw(
     quiet: Quiet = False,
 ) -> int:
     """Withdraw a record; the ledger keeps it and says why."""
-    from toolkit.calibration.approval import withdraw as decide
+    from toolkit.calibration.registry.approval import withdraw as decide
 
     registry = _registry(calibrations, home)
     known = _day(on, "--on") or dt.date.max
@@ -287,13 +287,13 @@ def withdraw(
 
 
 def _registry(calibrations: Path | None, home: Path | None) -> Registry:
-    from toolkit.calibration.registry import Registry
+    from toolkit.calibration.registry.registry import Registry
 
     return Registry(calibrations_folder(calibrations, home))
 
 
 def _instrument_of(record_id: str) -> str:
-    from toolkit.calibration.registry import instrument_of
+    from toolkit.calibration.registry.registry import instrument_of
 
     return instrument_of(record_id)
 

@@ -24,7 +24,7 @@ from toolkit.cli.console import (
 if TYPE_CHECKING:
     from toolkit.audit.inspection import Inspection, LoadBlock
     from toolkit.audit.intervals import Interval
-    from toolkit.calibration.registry import Registry
+    from toolkit.calibration.registry.registry import Registry
     from toolkit.findings import Finding
 
 NAME = "inspect"
@@ -83,7 +83,7 @@ def command(
 
 
 def _registry(calibrations: Path | None, home: Path | None) -> Registry | None:
-    from toolkit.calibration.registry import Registry
+    from toolkit.calibration.registry.registry import Registry
     from toolkit.cli.home import calibrations_folder
     from toolkit.errors import ConfigError
 

@@ -12,8 +12,8 @@ from toolkit.cli.home import calibrations_folder
 from toolkit.errors import ConfigError
 
 if TYPE_CHECKING:
-    from toolkit.calibration.record import CalibrationRecord
-    from toolkit.calibration.registry import Registry
+    from toolkit.calibration.records.record import CalibrationRecord
+    from toolkit.calibration.registry.registry import Registry
     from toolkit.findings import Finding
     from toolkit.pipeline import TestResult
     from toolkit.recording.model import Recording
@@ -50,7 +50,7 @@ def resolve_test(
     ToolkitError
         whatever stage cannot go on; nothing is written
     """
-    from toolkit.calibration.registry import Registry
+    from toolkit.calibration.registry.registry import Registry
 
     registry = Registry(calibrations_folder(calibrations, home))
     if test.is_dir():

@@ -115,7 +115,7 @@ def _program(plan: Plan, calibrations: Path | None, home: Path | None) -> OwnPro
     # A virtual machine needs no registry; but a registry that is named, or is damaged, is never passed over.
     from datetime import date
 
-    from toolkit.calibration.registry import Registry
+    from toolkit.calibration.registry.registry import Registry
     from toolkit.cli.home import calibrations_folder
     from toolkit.errors import ConfigError, RegistryError
     from toolkit.simulation.program import program_from

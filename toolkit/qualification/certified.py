@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolkit.calibration.regression import fit_terms
+from toolkit.calibration.fit.regression import fit_terms
 from toolkit.errors import ToolkitError
 from toolkit.qualification.agreement import correct_digits, digits_check
 from toolkit.qualification.model import Check, not_run

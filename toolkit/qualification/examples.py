@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from toolkit.calibration.regression import fit_terms
+from toolkit.calibration.fit.regression import fit_terms
 from toolkit.calibration.standards.e74 import evaluate_e74
 from toolkit.errors import ToolkitError
 from toolkit.files import read_toml

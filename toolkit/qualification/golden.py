@@ -7,15 +7,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolkit.calibration.record import CalibrationRecord
-from toolkit.calibration.refit import GOLDEN
-from toolkit.calibration.registry import Registry
+from toolkit.calibration.records.record import CalibrationRecord
+from toolkit.calibration.registry.refit import GOLDEN
+from toolkit.calibration.registry.registry import Registry
 from toolkit.calibration.terms import term_matrix
 from toolkit.errors import ToolkitError
 from toolkit.qualification.model import Check, NotCovered, not_run
 
 if TYPE_CHECKING:
-    from toolkit.calibration.record import LoadFit
+    from toolkit.calibration.records.record import LoadFit
 
 GROUP = "golden vectors"
 

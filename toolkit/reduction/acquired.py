@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from toolkit.calibration.record import CalibrationRecord
+    from toolkit.calibration.records.record import CalibrationRecord
     from toolkit.recording.model import Recording
 
 

@@ -19,7 +19,7 @@ from toolkit.reduction.opened import OpenedFile, check_record, open_file, split_
 from toolkit.reduction.tare import choose_tares, zero_shifts
 
 if TYPE_CHECKING:
-    from toolkit.calibration.record import CalibrationRecord
+    from toolkit.calibration.records.record import CalibrationRecord
     from toolkit.machine import Machine
     from toolkit.recording.model import Recording, TestInfo
 

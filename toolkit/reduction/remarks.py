@@ -10,7 +10,7 @@ from toolkit.findings import Finding
 from toolkit.units import from_si, unit
 
 if TYPE_CHECKING:
-    from toolkit.calibration.record import CalibrationRecord
+    from toolkit.calibration.records.record import CalibrationRecord
     from toolkit.machine import Machine
     from toolkit.recording.model import TestInfo
     from toolkit.reduction.model import Condition

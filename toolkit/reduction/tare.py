@@ -14,7 +14,7 @@ from toolkit.reduction.model import Tare
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from toolkit.calibration.record import CalibrationRecord
+    from toolkit.calibration.records.record import CalibrationRecord
     from toolkit.machine import Machine
     from toolkit.recording.model import Recording
 

@@ -18,7 +18,7 @@ from toolkit.report.tables import build_tables
 from toolkit.report.tags import FIGURES, catalogue, format_number
 
 if TYPE_CHECKING:
-    from toolkit.calibration.record import CalibrationRecord
+    from toolkit.calibration.records.record import CalibrationRecord
     from toolkit.estimate import Estimate
     from toolkit.findings import Finding
     from toolkit.pipeline import TestResult

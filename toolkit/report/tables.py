@@ -12,7 +12,7 @@ from toolkit.report.content import Cell, Table
 from toolkit.report.style import Style
 
 if TYPE_CHECKING:
-    from toolkit.calibration.record import CalibrationRecord
+    from toolkit.calibration.records.record import CalibrationRecord
     from toolkit.estimate import Estimate
     from toolkit.findings import Finding
     from toolkit.pipeline import TestResult

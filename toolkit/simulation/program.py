@@ -10,7 +10,7 @@ from toolkit.simulation.cells import CELLS
 from toolkit.units import si_scale
 
 if TYPE_CHECKING:
-    from toolkit.calibration.record import CalibrationRecord, LoadFit
+    from toolkit.calibration.records.record import CalibrationRecord, LoadFit
 
 
 def program_from(record: CalibrationRecord) -> OwnProgram:

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolkit.calibration.regression import fit_terms
+from toolkit.calibration.fit.regression import fit_terms
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolkit.calibration.regression import TermFit, fit_terms
+from toolkit.calibration.fit.regression import TermFit, fit_terms
 from toolkit.calibration.standards.degree import DegreeStep, best_degree
 from toolkit.errors import SessionError
 

@@ -14,7 +14,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from toolkit.calibration.record import canonical
+from toolkit.calibration.records.record import canonical
 from toolkit.files import sha256_bytes
 
 LEDGER = "ledger.jsonl"

@@ -14,8 +14,8 @@ import numpy as np
 from toolkit.calibration.terms import INTERCEPT, term_matrix
 
 if TYPE_CHECKING:
-    from toolkit.calibration.record import CalibrationRecord, LoadFit
-    from toolkit.calibration.table import Table
+    from toolkit.calibration.records.record import CalibrationRecord, LoadFit
+    from toolkit.calibration.session.table import Table
 
 SPAN = 0.02
 VERIFIED = 5.0

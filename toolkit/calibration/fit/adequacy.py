@@ -13,7 +13,7 @@ from toolkit.errors import ConfigError, SessionError
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from toolkit.calibration.session import Session
+    from toolkit.calibration.session.read import Session
 
 COLLINEAR_FINDING = 30.0
 COLLINEAR_REFUSED = 300.0

@@ -18,8 +18,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolkit.calibration.issue import issued_value, term_reach
-from toolkit.calibration.table import Table
+from toolkit.calibration.records.issue import issued_value, term_reach
+from toolkit.calibration.session.table import Table
 from toolkit.calibration.terms import INTERCEPT, term_matrix
 from toolkit.errors import RecordError
 from toolkit.units import unit
@@ -27,7 +27,7 @@ from toolkit.units import unit
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from toolkit.calibration.record import CalibrationRecord, LoadFit
+    from toolkit.calibration.records.record import CalibrationRecord, LoadFit
 
 CRITERION = 1e-6
 GOLDEN = 1e-12

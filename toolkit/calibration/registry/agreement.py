@@ -13,13 +13,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolkit.calibration.legacy_file import read_legacy
-from toolkit.calibration.settings import Settings, inputs_hash, parse_session, settings_of
+from toolkit.calibration.registry.legacy_file import read_legacy
+from toolkit.calibration.session.settings import Settings, inputs_hash, parse_session, settings_of
 from toolkit.errors import RecordError, ToolkitError
 
 if TYPE_CHECKING:
-    from toolkit.calibration.record import CalibrationRecord
-    from toolkit.calibration.table import Table
+    from toolkit.calibration.records.record import CalibrationRecord
+    from toolkit.calibration.session.table import Table
 
 _RESTORE = "restore the record from a backup; a correction is a new record, made by a new session"
 

@@ -9,15 +9,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolkit.calibration.adequacy import COLLINEAR_FINDING
-from toolkit.calibration.diagnostics import repeated_share
-from toolkit.calibration.gates import new_history, sign_and_span
+from toolkit.calibration.fit.adequacy import COLLINEAR_FINDING
+from toolkit.calibration.fit.diagnostics import repeated_share
 from toolkit.findings import Finding
 
 if TYPE_CHECKING:
-    from toolkit.calibration.fitting import LoadResult, SessionFit
-    from toolkit.calibration.record import CalibrationRecord
-    from toolkit.calibration.session import Session
+    from toolkit.calibration.fit.session_fit import LoadResult, SessionFit
+    from toolkit.calibration.session.read import Session
 
 FEW_POINTS = 30
 REPEATED = 0.1
@@ -35,26 +33,6 @@ def session_findings(fit: SessionFit) -> tuple[Finding, ...]:
         found.append(Finding(rule="collinear", where=session.path.name, message=message))
     for one in fit.loads:
         found += _load_findings(session, one)
-    return tuple(found)
-
-
-def history_findings(record: CalibrationRecord, last: CalibrationRecord | None) -> tuple[Finding, ...]:
-    """Return the findings against the instrument's last approved record."""
-    if last is None:
-        return ()
-    found = [
-        Finding(rule=one.rule, where=one.where, message=one.message) for one in sign_and_span(record, last)
-    ]
-    before = {cell.name: cell for cell in last.cells}
-    for name in new_history(record, last):
-        cell = next(c for c in record.cells if c.name == name)
-        old = before.get(name)
-        told = "it has no history" if old is None else (
-            f"serial {old.serial or 'not stated'} [{old.unit}] in {last.id}, "
-            f"now {cell.serial or 'not stated'} [{cell.unit}]"
-        )  # fmt: skip
-        message = f"a new sign and span history begins: {told}"
-        found.append(Finding(rule="serial", where=name, message=message))
     return tuple(found)
 
 
@@ -111,7 +89,7 @@ def _model_findings(fit: SessionFit) -> list[Finding]:
     """Recommend the next model where it fits better beyond chance (F test on the added terms)."""
     from scipy.special import fdtrc
 
-    from toolkit.calibration.regression import fit_terms
+    from toolkit.calibration.fit.regression import fit_terms
     from toolkit.calibration.terms import model_terms
 
     session = fit.session

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolkit.calibration.basis import build_basis
+from toolkit.calibration.fit.basis import build_basis
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -11,14 +11,14 @@ import re
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-from toolkit.calibration.settings import wrong
+from toolkit.calibration.session.settings import wrong
 from toolkit.errors import SessionError, UnitError
 from toolkit.files import check_keys
 from toolkit.machine.definition import quantity
 from toolkit.units import si_scale, unit
 
 if TYPE_CHECKING:
-    from toolkit.calibration.table import Table
+    from toolkit.calibration.session.table import Table
 
 _REFERENCE = "standard certificate uncertainty due shared_group".split()
 _CELL = "serial resolution scale excitation shunt_expected u".split()

@@ -9,18 +9,18 @@ import datetime as dt
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from toolkit.calibration import gates
-from toolkit.calibration.candidate import last_approved, now
-from toolkit.calibration.registry import Registry, instrument_of, today
-from toolkit.calibration.status import RecordStatus, status_of
-from toolkit.calibration.store import Change, commit
-from toolkit.calibration.table import Table, read_table
+from toolkit.calibration.registry import gates
+from toolkit.calibration.registry.candidate import last_approved, now
+from toolkit.calibration.registry.registry import Registry, instrument_of, today
+from toolkit.calibration.registry.status import RecordStatus, status_of
+from toolkit.calibration.registry.store import Change, commit
+from toolkit.calibration.session.table import Table, read_table
 from toolkit.errors import RegistryError
 from toolkit.findings import Finding
 
 if TYPE_CHECKING:
-    from toolkit.calibration.ledger import Ledger
-    from toolkit.calibration.record import CalibrationRecord
+    from toolkit.calibration.records.record import CalibrationRecord
+    from toolkit.calibration.registry.ledger import Ledger
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

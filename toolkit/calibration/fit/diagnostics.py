@@ -14,7 +14,7 @@ import numpy as np
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from toolkit.calibration.regression import TermFit
+    from toolkit.calibration.fit.regression import TermFit
 
 OUTLIER_RISK = 0.01
 

@@ -11,13 +11,13 @@ from dataclasses import dataclass
 from datetime import UTC, date, datetime
 from pathlib import Path
 
-from toolkit.calibration import store
-from toolkit.calibration.agreement import check_agrees, check_inputs, check_transcribed
-from toolkit.calibration.ledger import HEAD, LEDGER, Ledger
-from toolkit.calibration.record import CalibrationRecord, from_bytes
-from toolkit.calibration.refit import check_reproduces
-from toolkit.calibration.status import RecordStatus, status_of
-from toolkit.calibration.table import Table, read_table
+from toolkit.calibration.records.record import CalibrationRecord, from_bytes
+from toolkit.calibration.registry import store
+from toolkit.calibration.registry.agreement import check_agrees, check_inputs, check_transcribed
+from toolkit.calibration.registry.ledger import HEAD, LEDGER, Ledger
+from toolkit.calibration.registry.refit import check_reproduces
+from toolkit.calibration.registry.status import RecordStatus, status_of
+from toolkit.calibration.session.table import Table, read_table
 from toolkit.errors import RecordError, RegistryError, ToolkitError
 from toolkit.files import sha256_bytes
 

@@ -7,16 +7,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolkit.calibration.adequacy import check_adequate, condition_number, terms_condition_number
-from toolkit.calibration.diagnostics import Diagnostics, diagnose, variance_inflation
-from toolkit.calibration.regression import TermFit, fit_terms
+from toolkit.calibration.fit.adequacy import check_adequate, condition_number, terms_condition_number
+from toolkit.calibration.fit.diagnostics import Diagnostics, diagnose, variance_inflation
+from toolkit.calibration.fit.regression import TermFit, fit_terms
 from toolkit.calibration.terms import term_matrix
 from toolkit.units import unit
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from toolkit.calibration.session import LoadSetting, Session
+    from toolkit.calibration.session.read import LoadSetting, Session
 
 LLF_FACTOR = 2.4
 

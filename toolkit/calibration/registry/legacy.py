@@ -24,13 +24,13 @@ from __future__ import annotations
 import dataclasses
 from pathlib import Path
 
-from toolkit.calibration.agreement import check_transcribed
-from toolkit.calibration.candidate import entering, next_id
-from toolkit.calibration.ledger import Ledger
-from toolkit.calibration.legacy_file import check_possible, read_legacy
-from toolkit.calibration.record import CalibrationRecord, DataFile, sealed
-from toolkit.calibration.registry import Registry, load_checked
-from toolkit.calibration.store import Change, commit
+from toolkit.calibration.records.record import CalibrationRecord, DataFile, sealed
+from toolkit.calibration.registry.agreement import check_transcribed
+from toolkit.calibration.registry.candidate import entering, next_id
+from toolkit.calibration.registry.ledger import Ledger
+from toolkit.calibration.registry.legacy_file import check_possible, read_legacy
+from toolkit.calibration.registry.registry import Registry, load_checked
+from toolkit.calibration.registry.store import Change, commit
 from toolkit.errors import ToolkitError
 from toolkit.files import read_bytes, sha256_bytes
 

@@ -6,13 +6,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from toolkit.calibration.ledger import HEAD, LEDGER, Ledger
-from toolkit.calibration.record import from_bytes
-from toolkit.calibration.registry import ID, load_checked
+from toolkit.calibration.records.record import from_bytes
+from toolkit.calibration.registry.ledger import HEAD, LEDGER, Ledger
+from toolkit.calibration.registry.registry import ID, load_checked
 from toolkit.errors import ToolkitError
 
 if TYPE_CHECKING:
-    from toolkit.calibration.registry import Registry
+    from toolkit.calibration.registry.registry import Registry
 
 _FOLDER_KEEPERS = (".gitkeep", ".gitignore")
 

@@ -9,10 +9,10 @@ from __future__ import annotations
 import datetime as dt
 from typing import Any, cast
 
-from toolkit.calibration.record import CalibrationRecord, Golden, Indication, LoadFit, Zero, canonical
-from toolkit.calibration.refit import polarity
-from toolkit.calibration.session_checks import check_load_unit
-from toolkit.calibration.settings import INSTRUMENT, wrong
+from toolkit.calibration.records.record import CalibrationRecord, Golden, Indication, LoadFit, Zero, canonical
+from toolkit.calibration.registry.refit import polarity
+from toolkit.calibration.session.settings import INSTRUMENT, wrong
+from toolkit.calibration.session.statement_checks import check_load_unit
 from toolkit.calibration.terms import INTERCEPT, NAME, parse_term
 from toolkit.errors import ConfigError, ToolkitError, UnitError
 from toolkit.files import check_keys, parse_toml, sha256_bytes

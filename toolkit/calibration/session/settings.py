@@ -13,7 +13,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, cast
 
-from toolkit.calibration.record import Zero, canonical
+from toolkit.calibration.records.record import Zero, canonical
 from toolkit.calibration.terms import INTERCEPT, MODELS, NAME, model_terms
 from toolkit.errors import ConfigError, ToolkitError
 from toolkit.files import check_keys, parse_toml, sha256_bytes

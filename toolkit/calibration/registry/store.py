@@ -29,8 +29,16 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from toolkit.calibration.ledger import HEAD, LEDGER, START, Ledger, head_bytes, next_line, read_ledger
-from toolkit.calibration.record import canonical
+from toolkit.calibration.records.record import canonical
+from toolkit.calibration.registry.ledger import (
+    HEAD,
+    LEDGER,
+    START,
+    Ledger,
+    head_bytes,
+    next_line,
+    read_ledger,
+)
 from toolkit.errors import OutputError, RegistryError
 from toolkit.files import sha256_bytes, sync_folder, write_atomic
 

@@ -10,13 +10,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolkit.calibration.agreement import check_agrees, check_inputs
-from toolkit.calibration.checks import history_findings, session_findings
-from toolkit.calibration.exact import golden_inputs, predict_exactly, solve_exactly
-from toolkit.calibration.fitting import LoadResult, SessionFit, fit_session, load_uncertainty
-from toolkit.calibration.issue import issued_value
-from toolkit.calibration.ledger import Ledger
-from toolkit.calibration.record import (
+from toolkit.calibration.fit.findings import session_findings
+from toolkit.calibration.fit.session_fit import LoadResult, SessionFit, fit_session, load_uncertainty
+from toolkit.calibration.records.exact import golden_inputs, predict_exactly, solve_exactly
+from toolkit.calibration.records.issue import issued_value
+from toolkit.calibration.records.record import (
     CalibrationRecord,
     DataFile,
     Golden,
@@ -26,11 +24,14 @@ from toolkit.calibration.record import (
     sealed,
     to_bytes,
 )
-from toolkit.calibration.refit import check_reproduces, polarity
-from toolkit.calibration.registry import ID, Registry, load_checked, today
-from toolkit.calibration.session import Session, read_session
-from toolkit.calibration.status import status_of
-from toolkit.calibration.store import Change, commit
+from toolkit.calibration.registry.agreement import check_agrees, check_inputs
+from toolkit.calibration.registry.history import history_findings
+from toolkit.calibration.registry.ledger import Ledger
+from toolkit.calibration.registry.refit import check_reproduces, polarity
+from toolkit.calibration.registry.registry import ID, Registry, load_checked, today
+from toolkit.calibration.registry.status import status_of
+from toolkit.calibration.registry.store import Change, commit
+from toolkit.calibration.session.read import Session, read_session
 from toolkit.calibration.terms import term_matrix
 from toolkit.errors import ToolkitError
 from toolkit.files import sha256_bytes

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from datetime import date
 from typing import Literal
 
-from toolkit.calibration.ledger import Entry
+from toolkit.calibration.registry.ledger import Entry
 
 State = Literal["candidate", "approved", "withdrawn"]
 

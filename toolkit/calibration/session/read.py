@@ -8,10 +8,17 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from toolkit.calibration.record import Zero
-from toolkit.calibration.session_checks import check_columns, check_statements, stated
-from toolkit.calibration.settings import Settings, date_of, inputs_hash, parse_session, settings_of, wrong
-from toolkit.calibration.table import Table, read_table
+from toolkit.calibration.records.record import Zero
+from toolkit.calibration.session.settings import (
+    Settings,
+    date_of,
+    inputs_hash,
+    parse_session,
+    settings_of,
+    wrong,
+)
+from toolkit.calibration.session.statement_checks import check_columns, check_statements, stated
+from toolkit.calibration.session.table import Table, read_table
 from toolkit.errors import SessionError
 from toolkit.files import check_keys, read_bytes, sha256_bytes
 

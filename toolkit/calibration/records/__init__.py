@@ -1,0 +1,1 @@
+"""The immutable record of a calibration, its issued digits and its golden vectors."""

@@ -1,0 +1,1 @@
+"""Records on disk: the ledger, the gates, what is in force, who decided."""

@@ -1,0 +1,1 @@
+"""A calibration session: SESSION.toml and its CSV files, read and checked."""
