@@ -14,7 +14,7 @@ from toolkit.calibration.registry.candidate import last_approved, now
 from toolkit.calibration.registry.registry import Registry, instrument_of, today
 from toolkit.calibration.registry.status import RecordStatus, status_of
 from toolkit.calibration.registry.store import Change, commit
-from toolkit.calibration.session.table import Table, read_table
+from toolkit.calibration.registry.stored import stored_check
 from toolkit.errors import RegistryError
 from toolkit.findings import Finding
 
@@ -74,7 +74,7 @@ def approve(
             f"in force from {in_force_from.isoformat()}, session of {record.date}",
             f"a date from {record.date} on, or --reason TEXT, which the ledger keeps", "approval",
         )  # fmt: skip
-    check = _check_table(registry, record)
+    check = stored_check(registry.folder, record)
     early = (day - in_force_from).days
     note = f"in force from {early} day{'' if early == 1 else 's'} before the decision" if early > 0 else None
     decided: list[Decision] = []
@@ -187,22 +187,6 @@ def _check_names(record: CalibrationRecord, checked_by: str, approved_by: str | 
                 record.id, "entered, checked and approved must be different names", got, expected, "names"
             )
         seen[key] = role
-
-
-def _check_table(registry: Registry, record: CalibrationRecord) -> Table | None:
-    entry = record.data_file("check")
-    if entry is None:
-        return None
-    path = registry.folder / record.instrument / entry.file
-    table = read_table(
-        path.read_bytes(),
-        where=path,
-        required=[*record.indications, *(one.load for one in record.loads)],
-        runs=False,
-    )
-    units = dict(zip(record.indications, record.indication_units, strict=True))
-    units |= {one.load: one.unit for one in record.loads}
-    return table.in_units(units)
 
 
 def _refused(record_id: str, what: str, got: str, expected: str, rule: str) -> RegistryError:

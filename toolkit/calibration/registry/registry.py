@@ -17,7 +17,7 @@ from toolkit.calibration.registry.agreement import check_agrees, check_inputs, c
 from toolkit.calibration.registry.ledger import HEAD, LEDGER, Ledger
 from toolkit.calibration.registry.refit import check_reproduces
 from toolkit.calibration.registry.status import RecordStatus, status_of
-from toolkit.calibration.session.table import Table, read_table
+from toolkit.calibration.registry.stored import bad_record, parse_loads, reason_of
 from toolkit.errors import RecordError, RegistryError, ToolkitError
 from toolkit.files import sha256_bytes
 
@@ -122,7 +122,7 @@ class Registry:
             try:
                 good.append(load_checked(self.folder / instrument, record_id, ledger))
             except ToolkitError as error:
-                bad.append(Refused(id=record_id, rule=error.rule or "unreadable", reason=_reason(error)))
+                bad.append(Refused(id=record_id, rule=error.rule or "unreadable", reason=reason_of(error)))
         return tuple(good), tuple(bad)
 
     def status(self, record_id: str, *, known_at: date | None = None) -> RecordStatus:
@@ -216,71 +216,45 @@ def load_checked(folder: Path, record_id: str, ledger: Ledger) -> CalibrationRec
         ) from error
     record = from_bytes(data, where=path)
     if ledger.damage is not None:
-        raise _bad(record_id, path, f"the ledger is damaged: {ledger.damage}", "an unbroken ledger", "ledger")
+        raise bad_record(
+            record_id, path, f"the ledger is damaged: {ledger.damage}", "an unbroken ledger", "ledger"
+        )
     if entered is None or record.id != record_id or record.instrument != folder.name:
-        raise _bad(record_id, path, "no entry of this record in the ledger", "an 'entered' line", "ledger")
+        raise bad_record(
+            record_id, path, "no entry of this record in the ledger", "an 'entered' line", "ledger"
+        )
     if entered.record != record.sha256:
-        raise _bad(record_id, path, f"sha256 {record.sha256}", f"{entered.record} as entered", "ledger")
+        raise bad_record(record_id, path, f"sha256 {record.sha256}", f"{entered.record} as entered", "ledger")
     if entered.file != sha256_bytes(data):
-        raise _bad(record_id, path, "a file whose bytes were changed", "the file as entered", "hash")
+        raise bad_record(record_id, path, "a file whose bytes were changed", "the file as entered", "hash")
     contents = {one.role: _data_file(record_id, folder / one.file, one.sha256) for one in record.data}
     try:
         if record.kind == "legacy":
             check_transcribed(record, contents["source"])
         else:
-            table = _table(record, contents["loads"], folder)
+            table = parse_loads(record, contents["loads"], folder)
             check_agrees(record, contents["session"], table)
             check_reproduces(record, table)
             check_inputs(record)
     except KeyError as error:
-        raise _bad(record_id, path, f"no data file {error}", "its reference-load data", "data") from error
-    return record
-
-
-def _table(record: CalibrationRecord, data: bytes, folder: Path) -> Table:
-    needed = [*record.indications, *(one.load for one in record.loads)]
-    uncertainties = [f"u_{one.load}" for one in record.loads]
-    file = record.data_file("loads")
-    where = folder / ("loads" if file is None else file.file)
-    try:
-        return read_table(data, where=where, required=needed, optional=uncertainties)
-    except RegistryError:
-        raise
-    except ToolkitError as error:
-        raise _bad(
-            record.id,
-            where,
-            f"{where.name}: {_reason(error)}",
-            "reference-load data that can be read",
-            "data",
+        raise bad_record(
+            record_id, path, f"no data file {error}", "its reference-load data", "data"
         ) from error
+    return record
 
 
 def _data_file(record_id: str, path: Path, expected: str) -> bytes:
     try:
         data = path.read_bytes()
     except OSError as error:
-        raise _bad(
+        raise bad_record(
             record_id, path, f"{path.name}: {error.strerror}", "the data that belong to the record", "data"
         ) from error
     if (found := sha256_bytes(data)) != expected:
-        raise _bad(record_id, path, f"{path.name} with sha256 {found}", f"{expected} as entered", "data")
+        raise bad_record(
+            record_id, path, f"{path.name} with sha256 {found}", f"{expected} as entered", "data"
+        )
     return data
-
-
-def _bad(record_id: str, where: object, got: object, expected: object, rule: str) -> RecordError:
-    return RecordError(
-        f"record {record_id} may not be used",
-        where=where,
-        got=got,
-        expected=expected,
-        next_step="restore the registry from a backup; 'toolkit calibration verify' lists every bad file",
-        rule=rule,
-    )
-
-
-def _reason(error: ToolkitError) -> str:
-    return f"{error.what}: got {error.got}, expected {error.expected}" if error.got else error.what
 
 
 def _told(status: RecordStatus) -> str:

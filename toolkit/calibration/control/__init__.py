@@ -1,0 +1,1 @@
+"""A calibration over the years: as found and as left, control charts, recall interval and due date."""

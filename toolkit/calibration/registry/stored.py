@@ -1,0 +1,74 @@
+"""The reference loads and check loads that lie beside a record, as the tables they were fitted from."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from toolkit.calibration.session.table import Table, read_table
+from toolkit.errors import RecordError, RegistryError, ToolkitError
+
+if TYPE_CHECKING:
+    from toolkit.calibration.records.record import CalibrationRecord
+
+
+def stored_loads(registry: Path, record: CalibrationRecord) -> Table | None:
+    """Return a record's reference loads, in its own units; None for a legacy record, which has none.
+
+    ``registry`` is the registry's folder; the record has been checked (`Registry.load`).
+    """
+    entry = record.data_file("loads")
+    if entry is None:
+        return None
+    folder = registry / record.instrument
+    return parse_loads(record, (folder / entry.file).read_bytes(), folder)
+
+
+def stored_check(registry: Path, record: CalibrationRecord) -> Table | None:
+    """Return a record's check loads, in its own units; None where its session had none."""
+    entry = record.data_file("check")
+    if entry is None:
+        return None
+    path = registry / record.instrument / entry.file
+    loads = [one.load for one in record.loads]
+    table = read_table(path.read_bytes(), where=path, required=[*record.indications, *loads], runs=False)
+    units = dict(zip(record.indications, record.indication_units, strict=True))
+    return table.in_units(units | {one.load: one.unit for one in record.loads})
+
+
+def parse_loads(record: CalibrationRecord, data: bytes, folder: Path) -> Table:
+    """Parse the bytes of a record's reference loads.
+
+    Raises
+    ------
+    RecordError
+        ``data``: they cannot be read
+    """
+    needed = [*record.indications, *(one.load for one in record.loads)]
+    uncertainties = [f"u_{one.load}" for one in record.loads]
+    file = record.data_file("loads")
+    where = folder / ("loads" if file is None else file.file)
+    try:
+        return read_table(data, where=where, required=needed, optional=uncertainties)
+    except RegistryError:
+        raise
+    except ToolkitError as error:
+        got = f"{where.name}: {reason_of(error)}"
+        raise bad_record(record.id, where, got, "reference-load data that can be read", "data") from error
+
+
+def bad_record(record_id: str, where: object, got: object, expected: object, rule: str) -> RecordError:
+    """Return the error of a record that may not be used."""
+    return RecordError(
+        f"record {record_id} may not be used",
+        where=where,
+        got=got,
+        expected=expected,
+        next_step="restore the registry from a backup; 'toolkit calibration verify' lists every bad file",
+        rule=rule,
+    )
+
+
+def reason_of(error: ToolkitError) -> str:
+    """Return an error in one line."""
+    return f"{error.what}: got {error.got}, expected {error.expected}" if error.got else error.what
