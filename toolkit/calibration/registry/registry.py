@@ -17,7 +17,8 @@ from toolkit.calibration.registry.agreement import check_agrees, check_inputs, c
 from toolkit.calibration.registry.ledger import HEAD, LEDGER, Ledger
 from toolkit.calibration.registry.refit import check_reproduces
 from toolkit.calibration.registry.status import RecordStatus, status_of
-from toolkit.calibration.registry.stored import bad_record, parse_loads, reason_of
+from toolkit.calibration.registry.stored import bad_record as _bad
+from toolkit.calibration.registry.stored import parse_loads, reason_of
 from toolkit.errors import RecordError, RegistryError, ToolkitError
 from toolkit.files import sha256_bytes
 
@@ -216,17 +217,13 @@ def load_checked(folder: Path, record_id: str, ledger: Ledger) -> CalibrationRec
         ) from error
     record = from_bytes(data, where=path)
     if ledger.damage is not None:
-        raise bad_record(
-            record_id, path, f"the ledger is damaged: {ledger.damage}", "an unbroken ledger", "ledger"
-        )
+        raise _bad(record_id, path, f"the ledger is damaged: {ledger.damage}", "an unbroken ledger", "ledger")
     if entered is None or record.id != record_id or record.instrument != folder.name:
-        raise bad_record(
-            record_id, path, "no entry of this record in the ledger", "an 'entered' line", "ledger"
-        )
+        raise _bad(record_id, path, "no entry of this record in the ledger", "an 'entered' line", "ledger")
     if entered.record != record.sha256:
-        raise bad_record(record_id, path, f"sha256 {record.sha256}", f"{entered.record} as entered", "ledger")
+        raise _bad(record_id, path, f"sha256 {record.sha256}", f"{entered.record} as entered", "ledger")
     if entered.file != sha256_bytes(data):
-        raise bad_record(record_id, path, "a file whose bytes were changed", "the file as entered", "hash")
+        raise _bad(record_id, path, "a file whose bytes were changed", "the file as entered", "hash")
     contents = {one.role: _data_file(record_id, folder / one.file, one.sha256) for one in record.data}
     try:
         if record.kind == "legacy":
@@ -237,9 +234,7 @@ def load_checked(folder: Path, record_id: str, ledger: Ledger) -> CalibrationRec
             check_reproduces(record, table)
             check_inputs(record)
     except KeyError as error:
-        raise bad_record(
-            record_id, path, f"no data file {error}", "its reference-load data", "data"
-        ) from error
+        raise _bad(record_id, path, f"no data file {error}", "its reference-load data", "data") from error
     return record
 
 
@@ -247,13 +242,11 @@ def _data_file(record_id: str, path: Path, expected: str) -> bytes:
     try:
         data = path.read_bytes()
     except OSError as error:
-        raise bad_record(
+        raise _bad(
             record_id, path, f"{path.name}: {error.strerror}", "the data that belong to the record", "data"
         ) from error
     if (found := sha256_bytes(data)) != expected:
-        raise bad_record(
-            record_id, path, f"{path.name} with sha256 {found}", f"{expected} as entered", "data"
-        )
+        raise _bad(record_id, path, f"{path.name} with sha256 {found}", f"{expected} as entered", "data")
     return data
 
 
