@@ -1,0 +1,81 @@
+"""The budget of a calibrated load: components, combined and expanded uncertainty, and what was not stated.
+
+Symbols of JCGM 100:2008 (GUM). Every component is already in the load's unit: its sensitivity coefficient
+has been applied, so that the shares u_i^2 / u^2 add up to one.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from toolkit.estimate import Estimate
+
+Evaluation = Literal["A", "B"]
+Distribution = Literal["normal", "student", "rectangular"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Component:
+    """One source of uncertainty.
+
+    Attributes
+    ----------
+    name : short id such as ``reference``
+    description : one sentence with the numbers that it follows from
+    type : evaluation of type A (from observations) or B (from a statement), GUM 4.2 and 4.3
+    distribution : what Monte Carlo draws; ``student`` is scaled and shifted, with ``dof``
+    u : standard uncertainty in the load's unit
+    dof : degrees of freedom; infinite where a type B statement is taken as certain
+    source : where the figure comes from: data, session, conditions of use
+    stated : False where nothing was stated or measured: u is then 0, and is no claim that it is small
+    """
+
+    name: str
+    description: str
+    type: Evaluation
+    distribution: Distribution
+    u: float
+    dof: float
+    source: str
+    stated: bool = True
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Budget:
+    """The budget of one load at one value.
+
+    ``at`` the load value, ``u`` combined standard and ``U`` expanded uncertainty, all in ``unit``; ``dof``
+    effective (Welch-Satterthwaite), ``k`` from Student's t for ``probability``. ``indications`` is the
+    point, in the record's order and units, at which the equation's sensitivities were taken.
+    """
+
+    record: str
+    load: str
+    unit: str
+    at: float
+    indications: tuple[float, ...]
+    components: tuple[Component, ...]
+    u: float
+    dof: float
+    k: float
+    U: float
+    probability: float
+
+    @property
+    def not_stated(self) -> tuple[str, ...]:
+        """Names of the components that nothing was stated or measured for."""
+        return tuple(one.name for one in self.components if not one.stated)
+
+    @property
+    def estimate(self) -> Estimate:
+        """The load with its uncertainty."""
+        return Estimate(value=self.at, u=self.u, unit=self.unit, dof=self.dof)
+
+    def component(self, name: str) -> Component:
+        """Return one component."""
+        return next(one for one in self.components if one.name == name)
+
+    def share(self, component: Component) -> float:
+        """Return a component's share of the combined variance, 0 to 1."""
+        return (component.u / self.u) ** 2 if self.u else 0.0
