@@ -1,7 +1,13 @@
-"""`verify`: every record on disk or in a ledger, and every file that belongs to none."""
+"""`verify`: every record on disk or in a ledger, and every file that belongs to none.
+
+Many records are shared out among processes. Each record passes the same gates there, one by one, and the
+rows are the same and in the same order.
+"""
 
 from __future__ import annotations
 
+import os
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -15,6 +21,9 @@ if TYPE_CHECKING:
     from toolkit.calibration.registry.registry import Registry
 
 _FOLDER_KEEPERS = (".gitkeep", ".gitignore")
+# Starting the processes takes as long as some hundred records.
+_SHARED_FROM = 200
+_CHUNK = 25
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -64,25 +73,66 @@ def _instrument(folder: Path, ledger: Ledger) -> list[VerifyRow]:
     on_disk = {path.stem for path in folder.glob("*.json") if path.name != HEAD and ID.match(path.stem)}
     owned = {HEAD, LEDGER}
     records = {record_id for record_id in {*on_disk, *entered} if ID.match(record_id)}
-    for record_id in sorted(records, key=lambda one: (len(one), one)):
-        path = folder / f"{record_id}.json"
-        owned.add(path.name)
-        try:
-            checked = load_checked(folder, record_id, ledger)
-            owned |= {one.file for one in checked.data}
-            rows.append(VerifyRow(id=record_id, ok=True, verified=checked.verified, reason=None))
-        except ToolkitError as error:
-            owned |= _owned_by_bad(folder, record_id)
-            reason = f"{error.rule or 'unreadable'}: {error.what}"
-            reason += f" (got {error.got}, expected {error.expected})" if error.got else ""
-            rows.append(VerifyRow(id=record_id, ok=False, verified=False, reason=reason))
+    ids = sorted(records, key=lambda one: (len(one), one))
+    for row, files in _judged(folder, ids, ledger):
+        rows.append(row)
+        owned |= {f"{row.id}.json", *files}
     if ledger.damage is not None and not rows:
         rows.append(VerifyRow(id=LEDGER, ok=False, verified=False, reason=f"ledger: {ledger.damage}"))
-    for path in sorted(folder.rglob("*")):
-        name = path.relative_to(folder).as_posix()
-        if (path.is_file() or path.is_symlink()) and name not in owned:
-            rows.append(_stray(name))
+    rows += [_stray(name) for name in _files(folder) if name not in owned]
     return rows
+
+
+def _judged(folder: Path, ids: Sequence[str], ledger: Ledger) -> Iterator[tuple[VerifyRow, tuple[str, ...]]]:
+    """Yield each record's row and the names of its files, in the order of ``ids``."""
+    import functools
+    import multiprocessing
+
+    # A worker of somebody else's pool may not start processes of its own.
+    alone = multiprocessing.current_process().daemon
+    workers = 1 if alone else min(len(os.sched_getaffinity(0)), 4)
+    if len(ids) < _SHARED_FROM or workers < 2:
+        yield from (_judge(folder, record_id, ledger) for record_id in ids)
+        return
+    from concurrent.futures import ProcessPoolExecutor
+
+    # A fork holds the parsed ledger already; nothing but ids and rows goes through the pipe.
+    context = multiprocessing.get_context("fork")
+    with ProcessPoolExecutor(workers, mp_context=context, initializer=_share, initargs=(ledger,)) as pool:
+        yield from pool.map(functools.partial(_judge_shared, folder), ids, chunksize=_CHUNK)
+
+
+_shared: list[Ledger] = []
+
+
+def _share(ledger: Ledger) -> None:
+    _shared[:] = [ledger]
+
+
+def _judge_shared(folder: Path, record_id: str) -> tuple[VerifyRow, tuple[str, ...]]:
+    return _judge(folder, record_id, _shared[0])
+
+
+def _judge(folder: Path, record_id: str, ledger: Ledger) -> tuple[VerifyRow, tuple[str, ...]]:
+    try:
+        checked = load_checked(folder, record_id, ledger)
+    except ToolkitError as error:
+        reason = f"{error.rule or 'unreadable'}: {error.what}"
+        reason += f" (got {error.got}, expected {error.expected})" if error.got else ""
+        row = VerifyRow(id=record_id, ok=False, verified=False, reason=reason)
+        return row, tuple(_owned_by_bad(folder, record_id))
+    row = VerifyRow(id=record_id, ok=True, verified=checked.verified, reason=None)
+    return row, tuple(one.file for one in checked.data)
+
+
+def _files(folder: Path) -> list[str]:
+    """Return every file and link below a folder, as sorted names relative to it."""
+    found: list[str] = []
+    for top, folders, names in os.walk(folder):
+        below = os.path.relpath(top, folder)
+        links = [name for name in folders if os.path.islink(os.path.join(top, name))]  # noqa: PTH114, PTH118
+        found += [name if below == "." else f"{below}/{name}" for name in (*names, *links)]
+    return sorted(found)
 
 
 def _owned_by_bad(folder: Path, record_id: str) -> set[str]:
