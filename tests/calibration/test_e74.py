@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy import stats
 
-from toolkit.calibration.standards.degree import degree_factor
+from toolkit.calibration.standards.degree import best_degree, degree_factor
 from toolkit.calibration.standards.e74 import evaluate_e74
 from toolkit.errors import SessionError
 
@@ -72,6 +73,24 @@ def test_a_third_run_brings_the_class() -> None:
 def test_the_factors_of_the_annex(n: int, m: int, published: float) -> None:
     # The F quantiles behind them, 8.073 for (1, 7), 8.813, 10.007, 12.218 and 7.571, 6.042, are tabulated.
     assert degree_factor(n, m) == pytest.approx(published, abs=6e-4)
+
+
+def test_the_annex_is_the_f_test_of_one_more_term() -> None:
+    # SSE by another solver; s_(m-1)/s_m beats C(n, m) exactly where F of the added term beats its quantile.
+    rng = np.random.default_rng(7)
+    force = np.arange(1.0, 12.0)
+    seen = set()
+    for bend in np.linspace(0, 4e-3, 9):
+        indication = force + bend * force**2 + rng.normal(0, 0.02, 11)
+        sse = [float(np.sum((np.polyval(np.polyfit(force, indication, m), force) - indication) ** 2))
+               for m in range(6)]  # fmt: skip
+        _, steps = best_degree(force=force, indication=indication)
+        for step in steps:
+            m, dof = step.degree, 11 - step.degree - 1
+            F = (sse[m - 1] - sse[m]) / (sse[m] / dof)
+            assert step.better == (F > stats.f.ppf(0.975, 1, dof))
+            seen.add(step.better)
+    assert seen == {True, False}
 
 
 def exact(run_noise: float = 0.0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

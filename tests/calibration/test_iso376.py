@@ -40,7 +40,8 @@ def test_a_perfect_instrument_is_of_class_00() -> None:
 
 def test_the_errors_by_hand() -> None:
     # At every force: X1 = X, X2 = X + 0.01 %, X3 = X + 0.06 %, X5 = X - 0.03 %; decreasing X' of the rotated
-    # runs off by +0.10, -0.05 and +0.03 % of their own X. The mean of X1, X3, X5 is X (1 + 0.0001).
+    # runs off by +0.10, -0.05 and +0.03 % of their own X; the standard takes the turned mountings' alone.
+    # The mean of X1, X3, X5 is X (1 + 0.0001).
     runs = [
         Iso376Run(rotation_deg=0, up=scaled(0), down=tuple(x * 1.0010 for x in scaled(0))),
         Iso376Run(rotation_deg=0, up=scaled(0.01), zero_before=0.001, zero_after=0.0012),
@@ -53,7 +54,7 @@ def test_the_errors_by_hand() -> None:
     assert row.deflection == pytest.approx(1.0001)
     assert row.b == pytest.approx(0.09 / 1.0001)
     assert row.b_same == pytest.approx(0.01 / 1.00005)
-    assert row.v == pytest.approx((0.10 + 0.05 + 0.03) / 3)
+    assert row.v == pytest.approx((0.05 + 0.03) / 2)
     assert row.fc == pytest.approx(0, abs=1e-9)
     assert found.f0 == pytest.approx(100 * 0.0002 / 2.0002)
     assert found.c == pytest.approx(100 * 0.0004 / 2.0002)
@@ -188,6 +189,53 @@ def test_creep_stands_in_for_decreasing_forces() -> None:
     assert found.forces[0].v is None
 
 
+@pytest.mark.parametrize(
+    ("change", "told", "empty"),
+    [
+        (
+            {"runs": [Iso376Run(rotation_deg=a, up=LINE, down=LINE) for a in (0, 120, 240)]},
+            "repeated",
+            "b_same",
+        ),
+        ({"runs": [Iso376Run(rotation_deg=0, up=LINE, down=LINE)] * 2}, "mounted at 0 deg", "b"),
+        ({"runs": [Iso376Run(rotation_deg=a, up=LINE) for a in (0, 0, 120, 240)]}, "decreasing", "v"),
+        ({"force_uncertainty": None}, "uncertainty is not stated", None),
+        ({"resolution": None}, "resolution is not stated", None),
+        ({"preloads": None}, "preloads are not stated", None),
+        ({"preloads": 2}, "2 preloads", None),
+    ],
+)
+def test_what_the_procedure_lacks_costs_the_class_and_not_the_figures(
+    change: dict[str, Any], told: str, empty: str | None
+) -> None:
+    found = ideal(**change)
+    assert found.class_name is None
+    assert found.ranges == ()
+    assert any(told in reason for reason in found.procedure)
+    row = found.forces[0]
+    assert row.deflection == pytest.approx(0.25)
+    assert [name for name in ("b", "b_same", "v") if getattr(row, name) is None] == ([empty] if empty else [])
+
+
+def test_a_zero_that_nobody_read_is_no_zero_error() -> None:
+    runs = [
+        Iso376Run(rotation_deg=a, up=LINE, down=LINE, zero_before=0.0, zero_after=None)
+        for a in (0, 0, 120, 240)
+    ]
+    found = ideal(runs=runs)
+    assert found.f0 is None
+    assert found.class_name is None
+    assert any("zero was not read" in reason for reason in found.procedure)
+
+
+def test_decreasing_forces_at_the_first_mounting_alone_give_a_figure_and_no_class() -> None:
+    runs = [Iso376Run(rotation_deg=a, up=LINE) for a in (0, 0, 120, 240)]
+    runs[0] = dataclasses.replace(runs[0], down=scaled(0.02))
+    found = ideal(runs=runs)
+    assert found.forces[2].v == pytest.approx(0.02)
+    assert found.class_name is None
+
+
 def test_compression_with_negative_deflections_has_the_same_class() -> None:
     runs = [
         Iso376Run(rotation_deg=a, up=tuple(-x for x in LINE), down=tuple(-x for x in LINE))
@@ -202,7 +250,6 @@ def test_compression_with_negative_deflections_has_the_same_class() -> None:
         {"degree": 0}, {"degree": 4}, {"resolution": 0.0}, {"force": FORCE[::-1]}, {"force": FORCE - 1000},
         {"force": FORCE[:3]}, {"force_uncertainty": -1.0}, {"force_uncertainty": np.array([0.1, 0.2])},
         {"creep": (np.nan, 1.0)}, {"runs": []},
-        {"runs": [Iso376Run(rotation_deg=a, up=LINE) for a in (0, 120, 240)]},
         {"runs": [Iso376Run(rotation_deg=a, up=LINE[1:]) for a in (0, 0, 120, 240)]},
         {"runs": [Iso376Run(rotation_deg=a, up=(0.0, *LINE[1:])) for a in (0, 0, 120, 240)]},
         {"runs": [Iso376Run(rotation_deg=a, up=LINE, zero_after=np.nan) for a in (0, 0, 120, 240)]},

@@ -172,7 +172,8 @@ def history(
             "seq": e.seq, "id": e.id, "event": e.event, "time": e.time, "by": e.by,
             "approved_by": e.approved_by,
             "known_on": e.known_on and e.known_on.isoformat(), "since": e.since and e.since.isoformat(),
-            "reason": e.reason, "note": e.note, "unverifiable": list(e.unverifiable), "sha256": e.sha256,
+            "reason": e.reason, "note": e.note, "recall": e.recall,
+            "unverifiable": list(e.unverifiable), "sha256": e.sha256,
         }
         for e in ledger.entries
         if name in (instrument, e.id)
@@ -182,6 +183,7 @@ def history(
         + (f", since {e['since']}" if e["since"] else "")
         + (f", known on {e['known_on']}" if e["known_on"] else "")
         + (f", {e['note']}" if e["note"] else "")
+        + (f", recall after {e['recall']}" if e["recall"] else "")
         + (f"\n     {e['reason']}" if e["reason"] else "")
         for e in events
     ]
@@ -226,6 +228,9 @@ def approve(
         typer.Option("--reason", help="Why; asked for where the date lies before the session's own."),
     ] = None,
     on: Annotated[str | None, typer.Option("--on", help="Day of the decision; default: today.")] = None,
+    recall: Annotated[
+        str | None, typer.Option("--recall", help='Recall interval after the session, such as "12 months".')
+    ] = None,
     calibrations: Calibrations = None,
     home: Home = None,
     as_json: Json = False,
@@ -238,7 +243,7 @@ def approve(
     since = _day(in_force_from, "--in-force-from")
     decision = decide(
         registry, record_id, in_force_from=since or dt.date.max, checked_by=checked_by,
-        approved_by=approved_by, reason=reason, known_on=_day(on, "--on"),
+        approved_by=approved_by, reason=reason, known_on=_day(on, "--on"), recall=recall,
     )  # fmt: skip
     lines = [f"{record_id}  " + (f"approved, in force from {since}" if decision.done else "NOT approved")]
     lines += ["failed gates:", *finding_lines(decision.findings)] if decision.findings else []
@@ -252,6 +257,7 @@ def approve(
         "findings": [finding.as_dict() for finding in decision.findings],
         "unverifiable": list(decision.unverifiable),
         "note": decision.note,
+        "recall": registry.status(record_id).recall,
         "head": registry.head(_instrument_of(record_id)),
     }
     answer(payload, "\n".join(lines), as_json=as_json, quiet=quiet)
@@ -339,4 +345,5 @@ def _row(record: CalibrationRecord, status: RecordStatus) -> dict[str, Any]:
         "approved_by": status.approved_by,
         "reason": status.reason,
         "unverifiable": list(status.unverifiable),
+        "recall": status.recall,
     }

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from toolkit.calibration.registry import gates
 from toolkit.calibration.registry.candidate import last_approved, now
+from toolkit.calibration.registry.interval import parse_interval
 from toolkit.calibration.registry.registry import Registry, instrument_of, today
 from toolkit.calibration.registry.status import RecordStatus, status_of
 from toolkit.calibration.registry.store import Change, commit
@@ -47,11 +48,13 @@ def approve(
     approved_by: str | None = None,
     reason: str | None = None,
     known_on: dt.date | None = None,
+    recall: str | None = None,
 ) -> Decision:
     """Put a record in force, where its gates let it through.
 
     ``known_on`` is the day of the decision (default today). A second approval of a record moves its
-    in-force date, with a reason.
+    in-force date or sets its recall interval anew, with a reason. ``recall`` is the interval after the
+    session's date, such as "12 months"; it stands in the ledger and changes nothing about the record.
 
     A date before the session's own reaches back to tests that the session cannot speak of by itself: it
     needs a reason. From the session's date on none is asked for, however late the decision, but a date
@@ -62,7 +65,7 @@ def approve(
     ------
     RegistryError
         ``names``: entered, checked and approved by do not differ; ``approval``: a date before the
-        session's without a reason, or a record that is withdrawn or approved already
+        session's without a reason, or a record that is withdrawn or approved already; ``recall``: no interval
     """
     folder = registry.folder / instrument_of(record_id)
     day = known_on or today()
@@ -74,6 +77,7 @@ def approve(
             f"in force from {in_force_from.isoformat()}, session of {record.date}",
             f"a date from {record.date} on, or --reason TEXT, which the ledger keeps", "approval",
         )  # fmt: skip
+    interval = None if recall is None else str(parse_interval(recall))
     check = stored_check(registry.folder, record)
     early = (day - in_force_from).days
     note = f"in force from {early} day{'' if early == 1 else 's'} before the decision" if early > 0 else None
@@ -85,11 +89,12 @@ def approve(
             raise _refused(
                 record_id, "a withdrawn record cannot be approved", "withdrawn", "a new session", "approval"
             )
-        if status.in_force_from is not None and (not reason or status.in_force_from == in_force_from):
+        changes = status.in_force_from != in_force_from or interval not in (None, status.recall)
+        if status.in_force_from is not None and not (reason and changes):
             raise _refused(
                 record_id, "the record is approved already",
                 f"in force from {status.in_force_from.isoformat()}",
-                "another in-force date, with --reason TEXT", "approval",
+                "another in-force date or recall interval, with --reason TEXT", "approval",
             )  # fmt: skip
         last = last_approved(registry, record.instrument, but=record_id, ledger=ledger)
         failed = () if last is None else gates.sign_and_span(record, last)
@@ -118,7 +123,8 @@ def approve(
             "since": in_force_from.isoformat(),
             "unverifiable": list(terms),
         }
-        event |= {k: v for k, v in (("approved_by", approved_by), ("reason", reason), ("note", note)) if v}
+        more = {"approved_by": approved_by, "reason": reason, "note": note, "recall": interval}
+        event |= {key: value for key, value in more.items() if value}
         return Change(files={}, event=event)
 
     commit(folder, build)

@@ -29,7 +29,8 @@ class Entry:
 
     ``entered``: ``by``, ``record`` (its hash) and ``file`` (the hash of its file's bytes).
     ``approved``: ``known_on``, ``since`` (in force from), ``by`` (checked by), ``approved_by``, ``reason``,
-    ``unverifiable`` terms as "load: term", ``note`` where ``since`` lies before ``known_on``.
+    ``unverifiable`` terms as "load: term", ``note`` where ``since`` lies before ``known_on``, ``recall`` the
+    recall interval such as "12 months", where one was set.
     ``withdrawn``: ``known_on``, ``since`` (void from; None is the in-force date), ``by``, ``reason``.
     """
 
@@ -47,6 +48,7 @@ class Entry:
     approved_by: str | None = None
     reason: str | None = None
     note: str | None = None
+    recall: str | None = None
     unverifiable: tuple[str, ...] = ()
 
 

@@ -19,7 +19,7 @@ class RecordStatus:
     ``in_force_from`` is the earliest day of its approvals, ``void_from`` the first day on which it is
     void; both None where there is none. ``void_always``: void on every day of its use. ``reason`` is that
     of the withdrawal, else of the approval. ``unverifiable`` are the terms that its check loads could not
-    verify, as "load: term".
+    verify, as "load: term". ``recall`` is the interval that the last approval with one has set.
     """
 
     id: str
@@ -33,6 +33,7 @@ class RecordStatus:
     checked_by: str | None
     approved_by: str | None
     unverifiable: tuple[str, ...]
+    recall: str | None = None
 
     def covers(self, on: date) -> bool:
         """Tell whether the record may serve a test of this day (it may still be superseded)."""
@@ -75,4 +76,5 @@ def status_of(record_id: str, entries: Sequence[Entry], known_at: date) -> Recor
         checked_by=last.by if last else None,
         approved_by=last.approved_by if last else None,
         unverifiable=last.unverifiable if last else (),
+        recall=next((entry.recall for entry in reversed(approvals) if entry.recall), None),
     )

@@ -5,7 +5,11 @@ highest degree downward, the first degree m with s_(m-1) / s_m above
 
     C(n, m) = sqrt(1 + (F_0.975(1, n - m - 1) - 1) / (n - m))
 
-is the degree of best fit; where there is none, it is 1.
+is the degree of best fit; where there is none, it is 1. The factor is the F test of one more term, written
+for the standard deviations: with SSE_(m-1) = SSE_m + F s_m^2 and n - m and n - m - 1 degrees of freedom,
+(s_(m-1) / s_m)^2 = 1 + (F - 1) / (n - m).
+
+Reference: ASTM E74, annex on the degree of the best fitting polynomial, with its table of factors.
 """
 
 from __future__ import annotations

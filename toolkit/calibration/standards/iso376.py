@@ -1,17 +1,23 @@
 """ISO 376: classification of a force-proving instrument.
 
-Errors in % at each force, from the deflections X of rotated mountings (0, 120, 240 degrees):
+Two runs X1, X2 with increasing forces at the first mounting, then one at each turned mounting (X3 at 120
+degrees, X5 at 240), each with its decreasing forces (X4', X6'). Errors in % at each force:
 
-    b  = (Xmax - Xmin) / mean over the rotated runs        reproducibility
-    b' = |X2 - X1| / mean of the two                       repeatability, same mounting
-    fc = (X - Xa) / Xa                                     interpolation; X the mean of the rotated runs
-    v  = |X' - X| / X, mean over the runs with decreasing forces      reversibility
+    b  = (Xmax - Xmin) / Xr, of X1, X3, X5 with Xr their mean        reproducibility
+    b' = |X2 - X1| / Xwr, Xwr the mean of the two                    repeatability, same mounting
+    fc = (Xr - Xa) / Xa, Xa of the interpolation equation            interpolation
+    v  = (|X4' - X3| / X3 + |X6' - X5| / X5) / 2                     reversibility
 
-and of the instrument: f0 = (i_f - i_0) / X_N (zero), c = |i_300 - i_30| / X_N (creep), X_N the mean
-deflection at the largest force. A class also asks for an applied force of small uncertainty and for forces
-that are large against the resolution.
+and of the instrument: f0 = (i_f - i_0) / X_N (zero, the largest of all runs), c = |i_300 - i_30| / X_N
+(creep), X_N the mean deflection at the largest force. A class also asks for an applied force of small
+uncertainty and for forces that are large against the resolution. What the procedure lacks costs the class,
+not the figures that can still be had.
 
-Reference: ISO 376, classification table; the limits are in % of the value that the error is relative to.
+Not judged: temperature and time between the readings, the regularity of the steps, the age of the
+calibration.
+
+Reference: ISO 376:2011, clauses on procedure and on classification with its table; EURAMET cg-4 on force
+measurements names the same components. The limits are in % of the value that the error is relative to.
 """
 
 from __future__ import annotations
@@ -72,14 +78,16 @@ LIMITS = (
 class Iso376Force:
     """One force: mean deflection, errors in %, class, and what the next better class would need.
 
-    ``v`` is None without decreasing forces. ``class_name`` None: not even class 2.
+    An error that was not measured is None: ``b`` without turned mountings, ``b_same`` without a repeated
+    run, ``v`` without decreasing forces. ``class_name`` is of the errors that are there; None: not even
+    class 2.
     """
 
     force: float
     deflection: float
     interpolated: float
-    b: float
-    b_same: float
+    b: float | None
+    b_same: float | None
     fc: float
     v: float | None
     class_name: str | None
@@ -102,7 +110,7 @@ class Iso376Result:
     ``class_name`` holds at every force; None where a force has none or the procedure was not the standard's
     (``procedure`` says what it lacks). ``reasons`` tell why it is not better. ``ranges`` only lists classes
     that reach from the largest force down to half of it at least. ``f0`` and ``c`` in %, ``resolution`` in
-    force; ``coefficients[i]`` belongs to force^i.
+    force, each None where it was not measured or stated; ``coefficients[i]`` belongs to force^i.
     """
 
     class_name: str | None
@@ -110,9 +118,9 @@ class Iso376Result:
     procedure: tuple[str, ...]
     forces: tuple[Iso376Force, ...]
     ranges: tuple[Iso376Range, ...]
-    f0: float
+    f0: float | None
     c: float | None
-    resolution: float
+    resolution: float | None
     coefficients: tuple[float, ...]
 
 
@@ -120,10 +128,10 @@ def evaluate_iso376(
     *,
     force: NDArray[np.float64],
     runs: Sequence[Iso376Run],
-    force_uncertainty: float | NDArray[np.float64],
-    resolution: float,
+    force_uncertainty: float | NDArray[np.float64] | None,
+    resolution: float | None,
     creep: tuple[float, float] | None = None,
-    preloads: int = MIN_PRELOADS,
+    preloads: int | None = MIN_PRELOADS,
     degree: int = 3,
 ) -> Iso376Result:
     """Classify a force-proving instrument.
@@ -131,11 +139,12 @@ def evaluate_iso376(
     Parameters
     ----------
     force : increasing forces (n,), without zero
-    runs : two at the first mounting, then one a rotated mounting; see `Iso376Run`
-    force_uncertainty : expanded uncertainty of the applied force in %, one or one a force (n,)
-    resolution : of the indication, in its unit
+    runs : two at the first mounting, then one a turned mounting; see `Iso376Run`
+    force_uncertainty : expanded uncertainty of the applied force in %, one or one a force (n,); None: not
+        stated, hence no class
+    resolution : of the indication, in its unit; None: not stated, hence no class
     creep : indication 30 s and 300 s after the largest force was applied or taken off; None: not measured
-    preloads : to the largest force, before the first run
+    preloads : to the largest force, before the first run; None: not stated, hence no class
     degree : of the interpolation, deflection on force, 1 to 3; it ends with the constant
 
     Raises
@@ -147,41 +156,56 @@ def evaluate_iso376(
     forces = np.asarray(force, dtype=np.float64)
     rotated = iso376_input.rotated(runs)
     X = np.array([one.up for one in rotated])
-    first, second = (np.array(one.up) for one in runs[:2])
     mean = X.mean(axis=0)
     fit = fit_curve(force=forces, indication=mean, degree=degree)
     curve = mean - fit.residuals
-    b = 100 * np.ptp(X, axis=0) / np.abs(mean)
-    b_same = 100 * np.abs(second - first) / np.abs((first + second) / 2)
-    fc = 100 * fit.residuals / curve
     full = float(abs(mean[-1]))
-    f0 = 100 * max((one.zero_after - one.zero_before for one in runs), key=abs) / full
+    zeros = [
+        one.zero_after - one.zero_before
+        for one in runs
+        if one.zero_after is not None and one.zero_before is not None
+    ]
+    f0 = 100 * max(zeros, key=abs) / full if zeros else None
     c = None if creep is None else 100 * abs(creep[1] - creep[0]) / full
-    turned = [(np.array(one.up), np.array(one.down)) for one in rotated if one.down is not None]
-    v = 100 * np.mean([np.abs(down - up) / np.abs(up) for up, down in turned], axis=0) if turned else None
-    uncertainty = np.broadcast_to(np.asarray(force_uncertainty, dtype=np.float64), forces.shape)
-    in_force = resolution * float(forces[-1]) / full
+    b = 100 * np.ptp(X, axis=0) / np.abs(mean) if len(rotated) > 1 else None
+    b_same, v = _repeatability(runs), _reversibility(rotated)
+    fc = 100 * fit.residuals / curve
+    uncertainty = (
+        None
+        if force_uncertainty is None
+        else np.broadcast_to(np.asarray(force_uncertainty, dtype=np.float64), forces.shape)
+    )
+    in_force = None if resolution is None else resolution * float(forces[-1]) / full
     rows = []
     for i, value in enumerate(forces.tolist()):
-        name, reasons = _classify(
-            {"b": float(b[i]), "b'": float(b_same[i]), "fc": float(fc[i]), "f0": f0,
-             "v": None if v is None else float(v[i]), "c": c, "U": float(uncertainty[i])},
-            value / in_force,
-        )  # fmt: skip
+        errors = {
+            "b": _at(b, i), "b'": _at(b_same, i), "fc": float(fc[i]), "f0": f0, "v": _at(v, i), "c": c,
+            "U": _at(uncertainty, i),
+        }  # fmt: skip
+        name, reasons = _classify(errors, None if in_force is None else value / in_force)
         rows.append(
             Iso376Force(
                 force=value,
                 deflection=float(mean[i]),
                 interpolated=float(curve[i]),
-                b=float(b[i]),
-                b_same=float(b_same[i]),
+                b=errors["b"],
+                b_same=errors["b'"],
                 fc=float(fc[i]),
-                v=None if v is None else float(v[i]),
+                v=errors["v"],
                 class_name=name,
                 reasons=reasons,
             )
         )
-    procedure = _procedure(forces, runs, rotated, preloads, has_v=bool(turned), has_c=creep is not None)
+    unstated = (
+        (b_same is None, "no repeated run at the first mounting"),
+        (f0 is None, "the zero was not read before and after a run"),
+        (uncertainty is None, "the applied force's uncertainty is not stated"),
+        (in_force is None, "the resolution is not stated"),
+    )
+    procedure = (
+        *_procedure(forces, runs, rotated, preloads, has_c=creep is not None),
+        *(text for lacks, text in unstated if lacks),
+    )
     worst = max(_rank(row.class_name) for row in rows)
     limiting = [row for row in rows if _rank(row.class_name) == worst and worst > 0]
     told = [f"{row.force:g}: {reason}" for row in limiting for reason in row.reasons]
@@ -198,7 +222,30 @@ def evaluate_iso376(
     )
 
 
-def _classify(errors: dict[str, float | None], resolutions: float) -> tuple[str | None, tuple[str, ...]]:
+def _repeatability(runs: Sequence[Iso376Run]) -> NDArray[np.float64] | None:
+    if not iso376_input.repeated(runs):
+        return None
+    first, second = (np.array(one.up) for one in runs[:2])
+    return np.asarray(100 * np.abs(second - first) / np.abs((first + second) / 2))
+
+
+def _reversibility(rotated: Sequence[Iso376Run]) -> NDArray[np.float64] | None:
+    # The standard takes it at the turned mountings; the first one stands in where it is alone.
+    pairs = [(np.array(one.up), np.array(one.down)) for one in rotated[1:] if one.down is not None]
+    if not pairs and rotated[0].down is not None:
+        pairs = [(np.array(rotated[0].up), np.array(rotated[0].down))]
+    if not pairs:
+        return None
+    return np.asarray(100 * np.mean([np.abs(down - up) / np.abs(up) for up, down in pairs], axis=0))
+
+
+def _at(values: NDArray[np.float64] | None, i: int) -> float | None:
+    return None if values is None else float(values[i])
+
+
+def _classify(
+    errors: dict[str, float | None], resolutions: float | None
+) -> tuple[str | None, tuple[str, ...]]:
     """Return the best class at one force, and what the next better class is refused for."""
     reasons: tuple[str, ...] = ()
     for limits in LIMITS:
@@ -211,7 +258,7 @@ def _classify(errors: dict[str, float | None], resolutions: float) -> tuple[str 
             for name, value in errors.items()
             if value is not None and not abs(value) <= allowed[name] * _SLACK
         ]
-        if resolutions * _SLACK < limits.least_resolutions:
+        if resolutions is not None and resolutions * _SLACK < limits.least_resolutions:
             missed.append(
                 f"the force is {resolutions:.5g} resolutions, class {limits.name} needs "
                 f"{limits.least_resolutions:g}"
@@ -244,9 +291,8 @@ def _procedure(
     forces: NDArray[np.float64],
     runs: Sequence[Iso376Run],
     rotated: Sequence[Iso376Run],
-    preloads: int,
+    preloads: int | None,
     *,
-    has_v: bool,
     has_c: bool,
 ) -> tuple[str, ...]:
     found = []
@@ -256,8 +302,11 @@ def _procedure(
     if turned != [0, 120, 240]:
         told = ", ".join(f"{angle:g}" for angle in turned)
         found.append(f"mounted at {told} deg, 0, 120 and 240 deg are needed")
-    if preloads < MIN_PRELOADS:
-        found.append(f"{preloads} preloads, {MIN_PRELOADS} are needed")
-    if not has_v and not has_c:
-        found.append("neither decreasing forces nor creep were measured, one of them is needed")
+    if preloads is None or preloads < MIN_PRELOADS:
+        told = "the preloads are not stated" if preloads is None else f"{preloads} preloads"
+        found.append(f"{told}, {MIN_PRELOADS} are needed")
+    if not has_c and not any(one.down is not None for one in rotated[1:]):
+        found.append(
+            "neither decreasing forces at the turned mountings nor creep were measured, one of them is needed"
+        )
     return tuple(found)

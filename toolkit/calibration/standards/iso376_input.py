@@ -21,14 +21,15 @@ class Iso376Run:
     """One series of forces at one mounting, in the indication's unit.
 
     ``up`` deflections at the increasing forces (n,), ``down`` at the same forces when decreasing, in the
-    order of ``up``, or None. ``zero_before`` and ``zero_after`` are the indications without force (i_0, i_f).
+    order of ``up``, or None. ``zero_before`` and ``zero_after`` are the indications without force (i_0, i_f,
+    the latter some 30 s after the force was taken off); None: not read.
     """
 
     rotation_deg: float
     up: tuple[float, ...]
     down: tuple[float, ...] | None = None
-    zero_before: float = 0.0
-    zero_after: float = 0.0
+    zero_before: float | None = 0.0
+    zero_after: float | None = 0.0
 
 
 def rotated(runs: Sequence[Iso376Run]) -> tuple[Iso376Run, ...]:
@@ -39,11 +40,16 @@ def rotated(runs: Sequence[Iso376Run]) -> tuple[Iso376Run, ...]:
     return tuple(first.values())
 
 
+def repeated(runs: Sequence[Iso376Run]) -> bool:
+    """Tell whether the first two runs share their mounting (X1 and X2 of the standard)."""
+    return len(runs) > 1 and runs[0].rotation_deg % 360 == runs[1].rotation_deg % 360
+
+
 def check(
     force: NDArray[np.float64],
     runs: Sequence[Iso376Run],
-    force_uncertainty: float | NDArray[np.float64],
-    resolution: float,
+    force_uncertainty: float | NDArray[np.float64] | None,
+    resolution: float | None,
     creep: tuple[float, float] | None,
     degree: int,
 ) -> None:
@@ -65,11 +71,8 @@ def check(
         )  # fmt: skip
     if not (np.isfinite(forces).all() and forces[0] > 0 and (np.diff(forces) > 0).all()):
         raise _refused("the forces do not increase", forces.tolist(), "from above zero", "sort the rows")
-    if len(runs) < 2 or runs[0].rotation_deg % 360 != runs[1].rotation_deg % 360:
-        raise _refused(
-            "there is no repeated run", [one.rotation_deg for one in runs],
-            "two runs at the first mounting", "give the two runs without a rotation first",
-        )  # fmt: skip
+    if not runs:
+        raise _refused("there is no run", "no runs", "runs of increasing forces", "give the runs")
     for number, one in enumerate(runs, start=1):
         for values in (one.up, one.down):
             if values is not None and (len(values) != n or not np.isfinite(values).all()):
@@ -78,20 +81,20 @@ def check(
                     f"{n} finite values", "check the run",
                 )  # fmt: skip
         if not (
-            np.isfinite([one.zero_before, one.zero_after]).all()
+            np.isfinite([zero for zero in (one.zero_before, one.zero_after) if zero is not None]).all()
             and np.all(np.multiply(one.up, one.up[-1]) > 0)
         ):
             raise _refused(
                 f"run {number} has a deflection or zero that is none", one.up,
                 "deflections of one sign, finite zeros", "take the zero off and check the run",
             )  # fmt: skip
-    uncertainty = np.asarray(force_uncertainty, dtype=np.float64)
+    uncertainty = np.asarray(0.0 if force_uncertainty is None else force_uncertainty, dtype=np.float64)
     if uncertainty.shape not in ((), (n,)) or not (np.isfinite(uncertainty) & (uncertainty >= 0)).all():
         raise _refused(
             "the applied force's uncertainty cannot be used", uncertainty.tolist(),
             "a percentage, one or one a force", "take it from the standard machine's certificate",
         )  # fmt: skip
-    if not (np.isfinite(resolution) and resolution > 0):
+    if resolution is not None and not (np.isfinite(resolution) and resolution > 0):
         raise _refused("no such resolution", resolution, "a positive number", "state it as read")
     if creep is not None and not np.isfinite(creep).all():
         raise _refused("the creep is no number", creep, "two indications", "leave it out")
