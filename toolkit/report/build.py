@@ -75,6 +75,8 @@ def build_content(
         conditions=_conditions(result, values, tables, list(plots), len(listed)),
         calibrations=((use.id, use.sha256, use.unverified),),
         title=str(values["report.title"].value),
+        identity=str(values["report.id"].value),
+        subject="Tire force and moment",
         author=style.laboratory or info.operator or "Tire force and moment laboratory",
         issued=day,
         marks=tuple(marks),

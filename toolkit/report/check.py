@@ -11,7 +11,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Literal
 
-from toolkit.report.columns import TABLES
+from toolkit.report.certificate.vocabulary import CERTIFICATE
 from toolkit.report.fonts import missing_fonts
 from toolkit.report.package import Template, open_package
 from toolkit.report.scan import (
@@ -25,13 +25,8 @@ from toolkit.report.scan import (
     table_of,
 )
 from toolkit.report.style import Style
-from toolkit.report.tags import (
-    FIGURES,
-    condition_names,
-    format_problem,
-    known_value,
-    value_spec,
-)
+from toolkit.report.tags import format_problem
+from toolkit.report.vocabulary import REPORT, Vocabulary
 from toolkit.report.xml import (
     SDT_CONTENT,
     W_P,
@@ -105,11 +100,26 @@ def check_template(template: Template, style: Style, *, fonts: bool = True) -> t
 
 
 def check_stories(
-    package: object, parts: list[Story], template: Template, style: Style, *, fonts: bool
+    package: object,
+    parts: list[Story],
+    template: Template,
+    style: Style,
+    *,
+    fonts: bool,
+    vocabulary: Vocabulary | None = None,
 ) -> tuple[LintFinding, ...]:
-    """Return the findings of an opened package (see `check_template`)."""
+    """Return the findings of an opened package (see `check_template`).
+
+    Without a vocabulary a template is one of a certificate where it holds a ``tk:certificate.`` tag.
+    """
     sites = scan(parts)
-    found = [*_tags(sites, style), *_tables(sites), *_broken(parts), *_surroundings(package, parts, style)]
+    words = vocabulary or vocabulary_of(sites)
+    found = [
+        *_tags(sites, style, words),
+        *_tables(sites, words),
+        *_broken(parts),
+        *_surroundings(package, parts, style),
+    ]
     found += [
         LintFinding(
             rule="attached-template",
@@ -134,11 +144,17 @@ def check_stories(
     return tuple(sorted(found, key=lambda one: one.level != "error"))
 
 
+def vocabulary_of(sites: list[Site]) -> Vocabulary:
+    """Return the vocabulary that a template was made for, by its own tags."""
+    certificate = any(site.tag.path.startswith("certificate.") for site in sites)
+    return CERTIFICATE if certificate else REPORT
+
+
 def _at(site: Site, rule: str, message: str) -> LintFinding:
     return LintFinding(rule=rule, level="error", part=site.story.name, place=site.place, message=message)
 
 
-def _tags(sites: list[Site], style: Style) -> Iterator[LintFinding]:
+def _tags(sites: list[Site], style: Style, words: Vocabulary) -> Iterator[LintFinding]:
     main = sites[0].story.name if sites else "word/document.xml"
     if not sites:
         yield LintFinding(
@@ -149,7 +165,7 @@ def _tags(sites: list[Site], style: Style) -> Iterator[LintFinding]:
             message="the template has no tag: neither a content control tagged tk:... nor {{tk:...}}",
         )
     present = {f"tk:{site.tag.path}" for site in sites}
-    for required in style.required:
+    for required in words.demanded(style.required):
         if required not in present:
             yield LintFinding(
                 rule="missing-required",
@@ -160,7 +176,7 @@ def _tags(sites: list[Site], style: Style) -> Iterator[LintFinding]:
             )
     counted: dict[str, int] = {}
     for site in sites:
-        yield from _one(site)
+        yield from _one(site, words)
         if site.tag.family in ("figure", "table") and site.story.body and not site.fallback:
             counted[site.tag.path] = counted.get(site.tag.path, 0) + 1
             if counted[site.tag.path] == 2:
@@ -169,20 +185,24 @@ def _tags(sites: list[Site], style: Style) -> Iterator[LintFinding]:
                 )
 
 
-def _one(site: Site) -> Iterator[LintFinding]:
+def _one(site: Site, words: Vocabulary) -> Iterator[LintFinding]:
     tag, family = site.tag, site.tag.family
-    known: dict[str, Mapping[str, object]] = {"figure": FIGURES, "table": TABLES, "if": condition_names()}
+    known: dict[str, Mapping[str, object]] = {
+        "figure": words.figures,
+        "table": words.tables,
+        "if": words.conditions,
+    }
     if not tag.path or re.search(r"[\s|{}]", tag.path):
         yield _at(site, "malformed-tag", f"'{tag}' has no path, or white space in it")
         return
-    if (family == "value" and not known_value(tag.path)) or (
+    if (family == "value" and not words.knows(tag.path)) or (
         tag.name not in known.get(family, {tag.name: ""})
     ):
-        yield _at(site, "unknown-tag", f"{tag} is not known: {_near(tag.path)}")
+        yield _at(site, "unknown-tag", f"{tag} is not known: {_near(tag.path, words)}")
         return
     kind = family
     if family == "value":
-        entry = value_spec(tag.path)
+        entry = words.value(tag.path)
         kind = entry.kind if entry else "number"
     if family != "row" and (problem := format_problem(kind, tag.spec)):
         yield _at(site, "bad-format", f"{tag}: {problem}")
@@ -210,12 +230,10 @@ def _one(site: Site) -> Iterator[LintFinding]:
             )
 
 
-def _near(path: str) -> str:
+def _near(path: str, words: Vocabulary) -> str:
     import difflib
 
-    from toolkit.report.tags import catalogue
-
-    near = difflib.get_close_matches(path, [one.path for one in catalogue()], n=1, cutoff=0.5)
+    near = difflib.get_close_matches(path, [one.path for one in words.catalogue], n=1, cutoff=0.5)
     return f"did you mean tk:{near[0]}?" if near else "see 'toolkit template tags'"
 
 
@@ -248,10 +266,10 @@ def _in_heading(site: Site) -> bool:
     return any(name.startswith("heading") for name in names)
 
 
-def _tables(sites: list[Site]) -> Iterator[LintFinding]:
+def _tables(sites: list[Site], words: Vocabulary) -> Iterator[LintFinding]:
     inside: set[int] = set()
     for site in sites:
-        if site.tag.family != "table" or site.tag.name not in TABLES:
+        if site.tag.family != "table" or site.tag.name not in words.tables:
             continue
         table = table_of(site)
         if table is None:
@@ -259,7 +277,7 @@ def _tables(sites: list[Site]) -> Iterator[LintFinding]:
                 site, "no-table", f"{site.tag}: no table inside the control, nor right after its paragraph"
             )
             continue
-        columns = [one.name for one in TABLES[site.tag.name][1]]
+        columns = [one.name for one in words.tables[site.tag.name][1]]
         rows: list[Element] = []
         for other in sites:
             row = row_in(table, other.element) if other.story is site.story else None
@@ -276,7 +294,7 @@ def _tables(sites: list[Site]) -> Iterator[LintFinding]:
                         f"{other.tag} is no column of {site.tag}; it has {', '.join(columns)}",
                     )
                 else:
-                    kind = next(c.kind for c in TABLES[site.tag.name][1] if c.name == other.tag.name)
+                    kind = next(c.kind for c in words.tables[site.tag.name][1] if c.name == other.tag.name)
                     if problem := format_problem(kind, other.tag.spec):
                         yield _at(other, "bad-format", f"{other.tag}: {problem}")
             elif other.tag.family == "table" and other is not site:

@@ -9,6 +9,7 @@ from typing import Literal
 from toolkit.report.columns import Column
 from toolkit.report.style import Style
 from toolkit.report.tags import format_number
+from toolkit.report.vocabulary import REPORT, Vocabulary
 
 Cell = str | float | None
 
@@ -86,6 +87,9 @@ class ReportContent:
     calibrations: tuple[tuple[str, str, bool], ...]
     title: str
     author: str
+    identity: str
+    subject: str
     issued: str
     marks: tuple[tuple[str, str], ...] = ()
     style: Style = field(default_factory=Style)
+    vocabulary: Vocabulary = REPORT

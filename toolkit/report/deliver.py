@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import shutil
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -27,6 +27,7 @@ class Delivered:
 
     docx: Path
     pdf: Path
+    companions: tuple[Path, ...] = ()
     pages: int
     checks: tuple[Check, ...]
     filled: Filled
@@ -54,6 +55,7 @@ def deliver(
     name: str = "report",
     allow_missing: bool = False,
     keep: bool = False,
+    companions: Mapping[str, bytes] | None = None,
     step: Step = lambda _text: None,
 ) -> Delivered:
     """Fill, convert, verify and deliver ``<name>.docx`` and ``<name>.pdf``.
@@ -64,6 +66,7 @@ def deliver(
     out : output folder; made where it does not exist
     office, drawer : LibreOffice and the figures' workers prepared by the caller; default: LibreOffice of
         its own, figures drawn here
+    companions : files that are handed over with the two, suffix to content (``.xml``)
     keep : on failure leave what was made in ``rejected/`` of the folder
 
     Raises
@@ -73,7 +76,8 @@ def deliver(
     """
     from toolkit.report.figures import draw
 
-    for suffix in (".docx", ".pdf"):
+    beside = companions or {}
+    for suffix in (".docx", ".pdf", *beside):
         refuse_original(out / f"{name}{suffix}", suffix=suffix)
     office = office or Office()
     with office, _staging(out) as stage:
@@ -96,10 +100,13 @@ def deliver(
             if keep:
                 _reject(stage, out, name, str(error))
             raise
-        targets = _hand_over([docx, pdf], out)
+        for suffix, data in beside.items():
+            (stage / f"{name}{suffix}").write_bytes(data)
+        targets = _hand_over([docx, pdf, *(stage / f"{name}{suffix}" for suffix in beside)], out)
     return Delivered(
         docx=targets[0],
         pdf=targets[1],
+        companions=tuple(targets[2:]),
         pages=pages,
         checks=tuple(checks),
         filled=filled,

@@ -107,7 +107,7 @@ def fill(
     """
     package: Any = open_package(template)
     parts = stories(package)
-    lint = check_stories(package, parts, template, content.style, fonts=fonts)
+    lint = check_stories(package, parts, template, content.style, fonts=fonts, vocabulary=content.vocabulary)
     errors = [one for one in lint if one.level == "error"]
     if errors:
         raise _lint_error(template, errors)
@@ -340,11 +340,8 @@ class _Filler:
         )
 
     def _marks(self, used: set[str]) -> tuple[str, ...]:
-        """Say that data are simulated or a record unverified where the template has no place for it."""
-        places = {
-            "simulated": {"if.simulated", "simulated"},
-            "unverified": {"if.unverified", "calibration.status"},
-        }
+        """Say what must be said (simulated, unverified, draft) where the template has no place for it."""
+        places = self.content.vocabulary.marks
         body = self.parts[0].root.find(q("w:body"))
         added = []
         for name, text in reversed(self.content.marks):

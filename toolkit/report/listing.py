@@ -6,12 +6,15 @@ from typing import Any
 
 from toolkit.report.content import ReportContent, Value
 from toolkit.report.style import Style
-from toolkit.report.tags import Spec, catalogue
+from toolkit.report.tags import Spec
+from toolkit.report.vocabulary import REPORT, Vocabulary
 
 
-def list_tags(content: ReportContent | None, style: Style) -> list[dict[str, Any]]:
+def list_tags(
+    content: ReportContent | None, style: Style, vocabulary: Vocabulary = REPORT
+) -> list[dict[str, Any]]:
     """Return every tag as a JSON-ready dict; ``available`` and ``value`` are null without a test."""
-    listed = [_entry(one, content, style) for one in catalogue()]
+    listed = [_entry(one, content, style, vocabulary) for one in vocabulary.catalogue]
     known = {one["tag"] for one in listed}
     for path, value in (content.values if content else {}).items():
         if f"tk:{path}" not in known:
@@ -21,11 +24,11 @@ def list_tags(content: ReportContent | None, style: Style) -> list[dict[str, Any
                 description="coefficient of the calibration record",
                 unit=value.unit,
             )
-            listed.append(_entry(spec, content, style))
+            listed.append(_entry(spec, content, style, vocabulary))
     return listed
 
 
-def _entry(one: Spec, content: ReportContent | None, style: Style) -> dict[str, Any]:
+def _entry(one: Spec, content: ReportContent | None, style: Style, vocabulary: Vocabulary) -> dict[str, Any]:
     available: bool | None = None
     value: str | bool | None = None
     name = one.path.partition(".")[2]
@@ -47,7 +50,7 @@ def _entry(one: Spec, content: ReportContent | None, style: Style) -> dict[str, 
         "tag": f"tk:{one.path}",
         "kind": one.kind,
         "unit": unit,
-        "required": f"tk:{one.path}" in style.required,
+        "required": f"tk:{one.path}" in vocabulary.demanded(style.required),
         "columns": [column.name for column in one.columns],
         "available": available,
         "value": value,

@@ -19,8 +19,8 @@ def set_properties(package: Any, content: ReportContent) -> None:
     )
     core.title, core.author = clean(content.title)[:255], clean(content.author)[:255]
     core.last_modified_by = f"toolkit {__version__}"
-    core.subject = "Tire force and moment"
-    core.identifier = str(content.values["report.id"].value)
+    core.subject = clean(content.subject)[:255]
+    core.identifier = content.identity
     # So that a report that lies in a test's folder is never taken for a recording.
     core.keywords = output_keywords(simulated=any(name == "simulated" for name, _ in content.marks))
     core.comments = ""

@@ -27,6 +27,9 @@ class Style:
 
     laboratory: str | None = None
     address: str | None = None
+    place: str | None = None
+    country: str | None = None
+    accreditation: str | None = None
     decimal_comma: bool = False
     dates: str = "%Y-%m-%d"
     missing: str = "n/a"
@@ -80,7 +83,11 @@ def read_style(path: Path | None) -> Style:
     table = read_toml(path)
     check_keys(table, _KEYS, where=path)
     parts = {key: _typed(table, key, dict, {}, path) for key in ("laboratory", "styles", "decimals", "units")}
-    check_keys(parts["laboratory"], ("name", "address"), where=f"{path}: laboratory")
+    check_keys(
+        parts["laboratory"],
+        ("name", "address", "place", "country", "accreditation"),
+        where=f"{path}: laboratory",
+    )
     check_keys(parts["styles"], _STYLES, where=f"{path}: styles")
     check_keys(parts["units"], _UNITS, where=f"{path}: units")
     for name, digits in parts["decimals"].items():
@@ -96,6 +103,9 @@ def read_style(path: Path | None) -> Style:
     return Style(
         laboratory=_text(parts["laboratory"], "name", path),
         address=_text(parts["laboratory"], "address", path),
+        place=_text(parts["laboratory"], "place", path),
+        country=_text(parts["laboratory"], "country", path),
+        accreditation=_text(parts["laboratory"], "accreditation", path),
         decimal_comma=_typed(table, "decimal_comma", bool, False, path),
         dates=_typed(table, "dates", str, "%Y-%m-%d", path),
         missing=missing,

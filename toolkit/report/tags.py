@@ -168,7 +168,7 @@ CONDITIONS = {
 
 
 _LOADS = ("FY", "MZ", "MX", "FX", "FZ")
-_TERM = re.compile(rf"calibration\.(?:{'|'.join(_LOADS)})\.[A-Za-z0-9_^*()]+")
+TERM = re.compile(rf"calibration\.(?:{'|'.join(_LOADS)})\.[A-Za-z0-9_^*()]+")
 
 
 def catalogue() -> tuple[Spec, ...]:
@@ -233,15 +233,7 @@ def condition_names() -> dict[str, str]:
 
 def known_value(path: str) -> bool:
     """Tell whether a value of that path can exist for some test (coefficients of any cell included)."""
-    return path in _value_paths() or _TERM.fullmatch(path) is not None
-
-
-def value_spec(path: str) -> Spec | None:
-    """Return the catalogue's entry of a value, None for one that only a record can define."""
-    for one in catalogue():
-        if one.path == path:
-            return one
-    return None
+    return path in _value_paths() or TERM.fullmatch(path) is not None
 
 
 def _value_paths() -> frozenset[str]:
