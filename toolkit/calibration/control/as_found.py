@@ -1,0 +1,215 @@
+"""As found and as left: what an instrument indicated before anybody adjusted it.
+
+The record in force when the instrument came in is applied to the rows of a session with
+``phase = "as_found"``. An error beyond the tolerance says that tests since the last good as-found result
+may be wrong (ISO/IEC 17025:2017, 7.8.4.1 d, 7.10). An ``as_left`` session belongs to the as-found one
+before it.
+"""
+
+from __future__ import annotations
+
+import datetime as dt
+import json
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from toolkit.calibration.control.errors import errors_by
+from toolkit.calibration.control.in_use import in_use_before
+from toolkit.calibration.registry.registry import load_checked
+from toolkit.calibration.registry.status import status_of
+from toolkit.calibration.registry.stored import stored_loads
+from toolkit.findings import Finding
+
+if TYPE_CHECKING:
+    from toolkit.calibration.records.record import CalibrationRecord
+    from toolkit.calibration.registry.registry import Registry
+
+_SLACK = 1 + 1e-9
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AsFoundLoad:
+    """One load, in ``unit``: reference and error (fitted - reference) of each row, tolerance, worst row.
+
+    ``full_scale`` is the largest load of the session; ``worst_row`` counts from 1.
+    """
+
+    load: str
+    unit: str
+    reference: tuple[float, ...]
+    error: tuple[float, ...]
+    tolerance: float
+    full_scale: float
+    max_error: float
+    max_percent_fs: float
+    worst_row: int
+
+    @property
+    def within(self) -> bool:
+        """Whether no error is beyond the tolerance."""
+        return abs(self.max_error) <= self.tolerance * _SLACK
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AsFound:
+    """A session's rows by the record in force before it.
+
+    ``session_record`` is the record that the session led to, ``record`` the one that was applied (None:
+    there was none), ``since`` the date of that record's own session. ``reason`` tells why nothing could be
+    compared, and then ``loads`` is empty.
+    """
+
+    instrument: str
+    date: dt.date
+    session_record: str
+    record: str | None
+    record_sha256: str | None
+    since: dt.date | None
+    loads: tuple[AsFoundLoad, ...]
+    reason: str | None
+
+    @property
+    def within(self) -> bool | None:
+        """Whether every load was within its tolerance; None where nothing could be compared."""
+        return all(one.within for one in self.loads) if self.loads else None
+
+    @property
+    def worst_share(self) -> float | None:
+        """Largest |error| of all loads as a share of its tolerance; None where nothing was compared."""
+        return max((abs(one.max_error) / one.tolerance for one in self.loads), default=None)
+
+
+def phase_of(record: CalibrationRecord) -> str | None:
+    """Return ``as_found``, ``as_left`` or None, as the record's session stated."""
+    phase = json.loads(record.settings).get("phase") if record.kind == "fit" else None
+    return None if phase is None else str(phase)
+
+
+def as_found(registry: Registry, record: CalibrationRecord) -> AsFound:
+    """Return what a session found, by the record in force before it; ``record`` is the session's own.
+
+    Raises
+    ------
+    RegistryError, RecordError
+        the ledger is damaged, or the record in force fails a gate
+    """
+    date = dt.date.fromisoformat(record.date)
+    before = in_use_before(registry, record.instrument, date, but=record.id)
+    table = stored_loads(registry.folder, record)
+    loads: tuple[AsFoundLoad, ...] = ()
+    reason = None
+    if before is None:
+        reason = f"no record was in force before {date.isoformat()}"
+    elif table is None:
+        reason = f"{record.id} has no reference-load data"
+    else:
+        errors = errors_by(before, table, zero=record.zero)
+        if isinstance(errors, str):
+            reason = errors
+        else:
+            loads = tuple(_load(record, name, table.column(name), error) for name, error in errors.items())
+    return AsFound(
+        instrument=record.instrument,
+        date=date,
+        session_record=record.id,
+        record=None if before is None else before.id,
+        record_sha256=None if before is None else before.sha256,
+        since=None if before is None else dt.date.fromisoformat(before.date),
+        loads=loads,
+        reason=reason,
+    )
+
+
+def as_found_findings(found: AsFound) -> tuple[Finding, ...]:
+    """Return a finding for each load that was out of tolerance, or a note where nothing was compared."""
+    if found.reason is not None:
+        message = f"the as-found session could not be judged: {found.reason}"
+        level = "note" if found.record is None else "warning"
+        return (Finding(rule="as-found", where=found.session_record, message=message, level=level),)  # type: ignore[arg-type]
+    return tuple(
+        Finding(
+            rule="as-found",
+            where=one.load,
+            message=f"as found, {found.record} is off by {one.max_error:+.4g} {one.unit} in row "
+            f"{one.worst_row} ({one.max_percent_fs:.3g} % of full scale), tolerance {one.tolerance:.4g} "
+            f"{one.unit}",
+        )
+        for one in found.loads
+        if not one.within
+    )
+
+
+def as_found_history(registry: Registry, instrument: str) -> tuple[AsFound, ...]:
+    """Return every as-found result of an instrument, oldest first; withdrawn records are left out.
+
+    Raises
+    ------
+    RegistryError, RecordError
+        the ledger is damaged, or a record fails a gate
+    """
+    return tuple(as_found(registry, one) for one in _of_phase(registry, instrument, "as_found"))
+
+
+def as_found_before(registry: Registry, as_left: CalibrationRecord) -> AsFound | None:
+    """Return the as-found result that an as-left session belongs to.
+
+    That is the newest as-found session not after it, unless another as-left session lies between.
+    """
+    day = dt.date.fromisoformat(as_left.date)
+    entered = list(registry.ledger(as_left.instrument).entered())
+    at = (as_left.date, entered.index(as_left.id) if as_left.id in entered else len(entered))
+
+    def place(one: CalibrationRecord) -> tuple[str, int]:
+        return one.date, entered.index(one.id)
+
+    found = [o for o in _of_phase(registry, as_left.instrument, "as_found") if place(o) < at]
+    left = [o for o in _of_phase(registry, as_left.instrument, "as_left") if place(o) < at]
+    if not found or (left and place(left[-1]) > place(found[-1])):
+        return None
+    newest = found[-1]
+    return as_found(registry, newest) if dt.date.fromisoformat(newest.date) <= day else None
+
+
+def last_good_as_found(registry: Registry, instrument: str, before: dt.date) -> AsFound | None:
+    """Return the newest as-found result before a day that was within tolerance.
+
+    The tests between its date and a failing as-found result are those that the failure concerns.
+    """
+    good = [one for one in as_found_history(registry, instrument) if one.date < before and one.within]
+    return good[-1] if good else None
+
+
+def _of_phase(registry: Registry, instrument: str, phase: str) -> list[CalibrationRecord]:
+    ledger = registry.ledger(instrument)
+    made = []
+    for at, record_id in enumerate(ledger.entered()):
+        if status_of(record_id, ledger.of(record_id), dt.date.max).state == "withdrawn":
+            continue
+        record = load_checked(registry.folder / instrument, record_id, ledger)
+        if phase_of(record) == phase:
+            made.append((record.date, at, record))
+    return [record for _, _, record in sorted(made, key=lambda one: one[:2])]
+
+
+def _load(
+    record: CalibrationRecord,
+    name: str,
+    reference: np.ndarray[tuple[int, ...], np.dtype[np.float64]],
+    error: np.ndarray[tuple[int, ...], np.dtype[np.float64]],
+) -> AsFoundLoad:
+    one = record.load(name)
+    worst = int(np.abs(error).argmax())
+    full = float(np.abs(reference).max())
+    return AsFoundLoad(
+        load=name,
+        unit=one.unit,
+        reference=tuple(reference.tolist()),
+        error=tuple(error.tolist()),
+        tolerance=one.tolerance or 1e-3 * one.largest,
+        full_scale=full,
+        max_error=float(error[worst]),
+        max_percent_fs=100 * abs(float(error[worst])) / full,
+        worst_row=worst + 1,
+    )

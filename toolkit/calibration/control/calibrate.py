@@ -1,0 +1,55 @@
+"""`calibrate`, and what the new session says about the years before it: as found, and the control chart."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from toolkit.calibration.control.as_found import as_found, as_found_findings, phase_of
+from toolkit.calibration.control.chart import chart_findings, control_chart
+from toolkit.calibration.registry.candidate import Candidate
+from toolkit.calibration.registry.candidate import calibrate as enter
+from toolkit.calibration.registry.stored import reason_of
+from toolkit.errors import ToolkitError
+from toolkit.findings import Finding
+
+if TYPE_CHECKING:
+    from toolkit.calibration.records.record import CalibrationRecord
+    from toolkit.calibration.registry.registry import Registry
+
+
+def calibrate(session_file: Path, registry: Registry) -> Candidate:
+    """Enter a session's candidate record and judge it against the instrument's history.
+
+    The history is judged after the record was entered: where it cannot be, that is a finding, not an error.
+
+    Raises
+    ------
+    ToolkitError
+        as `registry.candidate.calibrate`; nothing is written
+    """
+    made = enter(session_file, registry)
+    return dataclasses.replace(made, findings=made.findings + control_findings(registry, made.record))
+
+
+def control_findings(registry: Registry, record: CalibrationRecord) -> tuple[Finding, ...]:
+    """Return the findings of a session's record against the sessions and records before it."""
+    found: tuple[Finding, ...] = ()
+    if phase_of(record) == "as_found":
+        found += _judged("as-found", record, lambda: as_found_findings(as_found(registry, record)))
+    if record.data_file("check") is not None and len(registry.ids(record.instrument)) > 1:
+        found += _judged(
+            "chart", record, lambda: chart_findings(control_chart(registry, record.instrument), record.id)
+        )
+    return found
+
+
+def _judged(
+    rule: str, record: CalibrationRecord, judge: Callable[[], tuple[Finding, ...]]
+) -> tuple[Finding, ...]:
+    try:
+        return judge()
+    except ToolkitError as error:
+        return (Finding(rule=rule, where=record.id, message=f"could not be judged: {reason_of(error)}"),)

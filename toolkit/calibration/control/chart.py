@@ -1,0 +1,245 @@
+"""Control charts of an instrument: the error of each check load, session by session.
+
+A point is the error (fitted - reference) that the record in force before a session makes at a check load of
+that session. Check loads of different sessions are the same where all their reference loads agree within a
+share of full scale; repeated ones of a session are averaged. An as-left session has no point: it was
+measured after an adjustment that the record before it does not know.
+"""
+
+from __future__ import annotations
+
+import datetime as dt
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from toolkit.calibration.control.as_found import phase_of
+from toolkit.calibration.control.errors import errors_by
+from toolkit.calibration.control.in_use import in_use_before
+from toolkit.calibration.control.rules import Break
+from toolkit.calibration.control.shewhart import LEAST_BASELINE, Limits, breaks_of, limits_of
+from toolkit.calibration.registry.registry import load_checked
+from toolkit.calibration.registry.status import status_of
+from toolkit.calibration.registry.stored import stored_check
+from toolkit.findings import Finding
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from toolkit.calibration.records.record import CalibrationRecord
+    from toolkit.calibration.registry.registry import Registry
+
+SAME_PERCENT = 1.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ChartPoint:
+    """One session: ``error`` in the load's unit by ``record``, which was in force before it."""
+
+    session_record: str
+    date: dt.date
+    record: str
+    error: float
+    rows: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CheckLoad:
+    """One check load: every load's reference value at its first session, as (name, value, unit)."""
+
+    loads: tuple[tuple[str, float, str], ...]
+
+    def __str__(self) -> str:
+        acting = [f"{name} {value:g} {unit}" for name, value, unit in self.loads if value != 0]
+        return ", ".join(acting) or "no load"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Series:
+    """The chart of one load's error at one check load.
+
+    ``limits`` is None where fewer than the least number of points are there to take them from; ``breaks``
+    are at indices of ``points``. ``baseline`` points, from the first on, made the limits.
+    """
+
+    check_load: CheckLoad
+    load: str
+    unit: str
+    tolerance: float
+    points: tuple[ChartPoint, ...]
+    baseline: int
+    limits: Limits | None
+    breaks: tuple[Break, ...]
+
+    @property
+    def ranges(self) -> tuple[float, ...]:
+        """Moving ranges, one fewer than the points."""
+        return tuple(np.abs(np.diff([one.error for one in self.points])).tolist())
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Chart:
+    """An instrument's charts; ``left_out`` names sessions without a point and why (record id, reason)."""
+
+    instrument: str
+    series: tuple[Series, ...]
+    left_out: tuple[tuple[str, str], ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Session:
+    record: CalibrationRecord
+    before: str
+    names: tuple[str, ...]
+    references: NDArray[np.float64]
+    errors: NDArray[np.float64]
+
+
+def control_chart(
+    registry: Registry,
+    instrument: str,
+    *,
+    baseline: int | None = None,
+    same_percent: float = SAME_PERCENT,
+) -> Chart:
+    """Return the control charts of an instrument, every session in the order of the dates.
+
+    Parameters
+    ----------
+    baseline : the first sessions that the limits are taken from; None: all before the newest point
+    same_percent : reference loads within this share of full scale are the same check load
+
+    Raises
+    ------
+    RegistryError, RecordError
+        the ledger is damaged, or a record fails a gate
+    """
+    sessions, left_out = _sessions(registry, instrument)
+    series: list[Series] = []
+    for group in _groups(sessions, same_percent):
+        first, row = group[0]
+        check_load = CheckLoad(
+            loads=tuple(
+                (name, float(first.references[row, j]), first.record.load(name).unit)
+                for j, name in enumerate(first.names)
+            )
+        )
+        series += [_series(check_load, group, j, baseline) for j in range(len(first.names))]
+    return Chart(instrument=instrument, series=tuple(series), left_out=tuple(left_out))
+
+
+def chart_findings(chart: Chart, session_record: str) -> tuple[Finding, ...]:
+    """Return a finding for each rule that the points of one session break."""
+    found = []
+    for one in chart.series:
+        for broken in one.breaks:
+            point = one.points[broken.index]
+            if point.session_record != session_record or one.limits is None:
+                continue
+            found.append(
+                Finding(
+                    rule="chart",
+                    where=f"{one.load} at {one.check_load}",
+                    message=f"rule {broken.rule.number} ({broken.rule.text}) is broken: error "
+                    f"{point.error:+.4g} {one.unit} by {point.record}, centre {one.limits.centre:+.4g}, "
+                    f"limits {one.limits.lower:+.4g} to {one.limits.upper:+.4g} of {one.limits.points} sessions",
+                )
+            )
+    return tuple(found)
+
+
+def _sessions(registry: Registry, instrument: str) -> tuple[list[_Session], list[tuple[str, str]]]:
+    ledger = registry.ledger(instrument)
+    made: list[tuple[str, int, _Session]] = []
+    left_out: list[tuple[str, str]] = []
+    for at, record_id in enumerate(ledger.entered()):
+        if status_of(record_id, ledger.of(record_id), dt.date.max).state == "withdrawn":
+            left_out.append((record_id, "withdrawn"))
+            continue
+        record = load_checked(registry.folder / instrument, record_id, ledger)
+        found = _session(registry, record)
+        if isinstance(found, str):
+            left_out.append((record_id, found))
+        else:
+            made.append((record.date, at, found))
+    return [session for _, _, session in sorted(made, key=lambda one: one[:2])], left_out
+
+
+def _session(registry: Registry, record: CalibrationRecord) -> _Session | str:
+    if phase_of(record) == "as_left":
+        return "as left: measured after an adjustment"
+    check = stored_check(registry.folder, record)
+    if check is None:
+        return "no check loads"
+    before = in_use_before(registry, record.instrument, dt.date.fromisoformat(record.date), but=record.id)
+    if before is None:
+        return "no record was in force before it"
+    errors = errors_by(before, check, zero=record.zero)
+    if isinstance(errors, str):
+        return errors
+    return _Session(
+        record=record,
+        before=before.id,
+        names=tuple(errors),
+        references=check.matrix(tuple(errors)),
+        errors=np.column_stack(list(errors.values())),
+    )
+
+
+def _groups(sessions: list[_Session], same_percent: float) -> list[list[tuple[_Session, int]]]:
+    groups: list[list[tuple[_Session, int]]] = []
+    for session in sessions:
+        for row in range(len(session.references)):
+            for group in groups:
+                if _same(group[0], (session, row), same_percent):
+                    group.append((session, row))
+                    break
+            else:
+                groups.append([(session, row)])
+    return groups
+
+
+def _same(one: tuple[_Session, int], other: tuple[_Session, int], same_percent: float) -> bool:
+    (a, i), (b, j) = one, other
+    if a.names != b.names or any(a.record.load(n).unit != b.record.load(n).unit for n in a.names):
+        return False
+    full = np.array([max(a.record.load(n).largest, b.record.load(n).largest) for n in a.names])
+    return bool((np.abs(a.references[i] - b.references[j]) <= same_percent / 100 * full).all())
+
+
+def _series(
+    check_load: CheckLoad, group: list[tuple[_Session, int]], column: int, baseline: int | None
+) -> Series:
+    rows: dict[str, list[tuple[_Session, int]]] = {}
+    for session, row in group:
+        rows.setdefault(session.record.id, []).append((session, row))
+    points = []
+    for record_id, members in rows.items():
+        session = members[0][0]
+        points.append(
+            ChartPoint(
+                session_record=record_id,
+                date=dt.date.fromisoformat(session.record.date),
+                record=session.before,
+                error=float(np.mean([session.errors[row, column] for _, row in members])),
+                rows=len(members),
+            )
+        )
+    newest = group[-1][0].record.load(group[0][0].names[column])
+    values = np.array([one.error for one in points])
+    count = min(baseline, len(values)) if baseline is not None else max(len(values) - 1, 0)
+    limits = limits_of(values[:count])
+    return Series(
+        check_load=check_load,
+        load=newest.load,
+        unit=newest.unit,
+        tolerance=newest.tolerance or 1e-3 * newest.largest,
+        points=tuple(points),
+        baseline=count,
+        limits=limits,
+        breaks=() if limits is None else breaks_of(values, limits),
+    )
+
+
+__all__ = ["LEAST_BASELINE", "Chart", "ChartPoint", "CheckLoad", "Series", "chart_findings", "control_chart"]
