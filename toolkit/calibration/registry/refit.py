@@ -32,7 +32,10 @@ if TYPE_CHECKING:
 CRITERION = 1e-6
 GOLDEN = 1e-12
 GOLDEN_REFIT = 1e-9
-_SPREAD = 1e-6
+# Two algorithms agree in a covariance to some 1e-13 where the terms are well conditioned; an entry off the
+# diagonal is small beside its two standard errors, so that a wide tolerance would not see it dropped.
+_SPREAD = 1e-9
+_RESIDUAL = 1e-12
 
 
 def check_reproduces(record: CalibrationRecord, table: Table) -> None:
@@ -108,18 +111,17 @@ def _check_load(
     _demand_equal(record, where, "polarity", one.polarity, polarity(one.coefficients))
     issued = tuple(issued_value(c, e, largest) for c, e in zip(one.coefficients, solver.extent, strict=True))
     _demand_equal(record, where, "issued coefficients", one.issued, issued)
-    sd_floor = 1e-9 * largest
     _demand(
         record, where, "residual standard deviation",
-        one.residual_sd is not None and abs(one.residual_sd - sd) <= _SPREAD * sd + sd_floor,
+        one.residual_sd is not None and abs(one.residual_sd - sd) <= _SPREAD * sd + _RESIDUAL * largest,
         repr(one.residual_sd), repr(sd),
     )  # fmt: skip
     stored = np.asarray(one.covariance)
-    scale = sd**2 if solver.weights is None else 1.0
-    # The covariance scales with sd^2, which noise-free data do not determine: hence the floor.
+    # By the record's own residual sd, which was just held against the refit's: of noise-free data it is
+    # rounding, and the covariance is that rounding squared.
+    scale = (one.residual_sd or 0.0) ** 2 if solver.weights is None else 1.0
     # Its rounding grows with the square of the terms' condition number.
     slack = _SPREAD + 10 * np.finfo(float).eps * solver.condition**2
-    slack += 2 * sd_floor / max(sd, 1e-300) if solver.weights is None else 0.0
     _demand(
         record, where, "covariance",
         stored.shape == solver.inverse.shape
