@@ -43,7 +43,8 @@ class Estimate:
 def coverage_factor(dof: float, probability: float = 0.95) -> float:
     """Return Student's t for a two-sided coverage probability.
 
-    Degrees of freedom are truncated to a whole number as in GUM G.4.2; below one there is no interval.
+    Degrees of freedom are truncated to a whole number as in GUM G.4.1, but for the rounding of a quotient that
+    is whole; below one there is no interval.
 
     >>> round(coverage_factor(math.inf), 4)
     1.96
@@ -51,9 +52,9 @@ def coverage_factor(dof: float, probability: float = 0.95) -> float:
     from scipy.special import ndtri, stdtrit
 
     tail = 0.5 + probability / 2
-    if math.isnan(dof) or dof < 1:
+    if math.isnan(dof) or dof < 1 - 1e-9:
         return math.nan
-    return float(ndtri(tail)) if math.isinf(dof) else float(stdtrit(math.floor(dof), tail))
+    return float(ndtri(tail)) if math.isinf(dof) else float(stdtrit(math.floor(dof * (1 + 1e-9)), tail))
 
 
 def effective_dof(contributions: list[tuple[float, float]]) -> float:

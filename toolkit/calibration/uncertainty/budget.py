@@ -1,0 +1,177 @@
+"""Budget of a calibrated load at any load value (GUM), and of any point of indications.
+
+The measurand is the load that the record gives for one reading in later use: another day, run and mounting.
+
+    L = f(x + e_x; c + e_c) + e_reference + e_repeat + e_between + e_creep + e_zero + e_rev + e_misfit + e_T
+
+with u(L)^2 = sum of u_i^2 (JCGM 100, eq. 10: the terms are independent), effective degrees of freedom by
+Welch-Satterthwaite (G.2b), U = k u with k = t_95(dof) (G.6.4). Which parts a force calibration has:
+ISO 376:2011 annex C and EURAMET cg-4; their forms are those of a deflection, ours of the load.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from toolkit.calibration.session.statements import statements_of
+from toolkit.calibration.terms import term_matrix
+from toolkit.calibration.uncertainty.components import components_of
+from toolkit.calibration.uncertainty.conditions import Temperature
+from toolkit.calibration.uncertainty.model import Budget
+from toolkit.errors import SessionError
+from toolkit.estimate import coverage_factor, effective_dof
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from toolkit.calibration.records.record import CalibrationRecord, LoadFit
+    from toolkit.calibration.session.table import Table
+
+PROBABILITY = 0.95
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Prediction:
+    """A load predicted from indications. ``beyond`` names the indications outside their calibrated range."""
+
+    budget: Budget
+    beyond: tuple[str, ...]
+
+
+def calibration_budget(
+    record: CalibrationRecord,
+    loads: Table,
+    check: Table | None,
+    load: str,
+    at: float | None = None,
+    *,
+    temperature: Temperature | None = None,
+    probability: float = PROBABILITY,
+) -> Budget:
+    """Return the budget of a load at a load value.
+
+    Parameters
+    ----------
+    record : as the registry checked it
+    loads, check : its reference and check loads (`registry.stored`), in its units
+    load : name
+    at : load value in the record's unit, the other loads zero; None: the largest
+    temperature : the sensitivity's coefficient and the span in use; None: listed as not stated
+
+    Raises
+    ------
+    SessionError
+        ``budget``: a legacy record, or a value outside the calibrated range
+    RecordError
+        the record has no such load
+    """
+    one = _fitted(record, load)
+    low, high = min(one.minimum or 0.0, 0.0), max(one.maximum or 0.0, 0.0)
+    value = (high if high >= -low else low) if at is None else float(at)
+    if not low <= value <= high:
+        raise _refused(
+            f"{record.id}, {load}", "the load lies outside the calibrated range", f"{value:.6g} {one.unit}",
+            f"{low:.6g} to {high:.6g} {one.unit}", "ask within the range, or calibrate over a larger one",
+        )  # fmt: skip
+    point = typical_indications(record, loads, load, value)
+    return _budget(record, loads, check, one, value, point, temperature, probability)
+
+
+def predict(
+    record: CalibrationRecord,
+    loads: Table,
+    check: Table | None,
+    load: str,
+    indications: Mapping[str, float],
+    *,
+    temperature: Temperature | None = None,
+    probability: float = PROBABILITY,
+) -> Prediction:
+    """Return the load that a set of indications [the record's units] means, with its budget.
+
+    Raises
+    ------
+    SessionError
+        ``budget``: a legacy record; an indication is missing, unknown or no finite number
+    """
+    one = _fitted(record, load)
+    if set(indications) != set(record.indications) or not all(map(math.isfinite, indications.values())):
+        raise _refused(
+            record.id, "the indications are not those of the record",
+            ", ".join(f"{name}={value:g}" for name, value in indications.items()),
+            "a finite number for each of " + ", ".join(record.indications), "give every indication once",
+        )  # fmt: skip
+    point = np.array([indications[name] for name in record.indications])
+    terms = term_matrix(one.terms, dict(zip(record.indications, point[:, None], strict=True)))
+    value = float((terms @ np.asarray(one.coefficients))[0])
+    return Prediction(
+        budget=_budget(record, loads, check, one, value, point, temperature, probability),
+        beyond=tuple(
+            cell.name
+            for cell, x in zip(record.cells, point.tolist(), strict=True)
+            if cell.minimum is not None and cell.maximum is not None and not cell.minimum <= x <= cell.maximum
+        ),
+    )
+
+
+def typical_indications(record: CalibrationRecord, loads: Table, load: str, at: float) -> NDArray[np.float64]:
+    """Return the indications (indications,) that a load makes by itself: a plane through the session's rows.
+
+    The plane is indications on loads; it only sets the point at which sensitivities are taken.
+    """
+    names = [one.load for one in record.loads]
+    design = np.column_stack([loads.matrix(names), np.ones(loads.rows)])
+    scale = np.maximum(np.abs(design).max(axis=0), 1e-300)
+    plane = np.linalg.lstsq(design / scale, loads.matrix(record.indications), rcond=None)[0]
+    here = np.array([at if name == load else 0.0 for name in names] + [1.0])
+    point: NDArray[np.float64] = (here / scale) @ plane
+    return point
+
+
+def combine(
+    contributions: Sequence[tuple[float, float]], probability: float
+) -> tuple[float, float, float, float]:
+    """Return (u, dof, k, U) of independent (u_i, dof_i): JCGM 100 eq. 10, G.2b and G.6.4."""
+    u = math.sqrt(math.fsum(u * u for u, _ in contributions))
+    dof = effective_dof(list(contributions)) if u else math.inf
+    k = coverage_factor(dof, probability)
+    return u, dof, k, k * u
+
+
+def _budget(
+    record: CalibrationRecord,
+    loads: Table,
+    check: Table | None,
+    one: LoadFit,
+    value: float,
+    point: NDArray[np.float64],
+    temperature: Temperature | None,
+    probability: float,
+) -> Budget:
+    parts = components_of(
+        record, statements_of(record), loads, check, one, value=value, point=point, temperature=temperature
+    )
+    u, dof, k, U = combine([(part.u, part.dof) for part in parts], probability)
+    return Budget(
+        record=record.id, load=one.load, unit=one.unit, at=value, indications=tuple(point.tolist()),
+        components=parts, u=u, dof=dof, k=k, U=U, probability=probability,
+    )  # fmt: skip
+
+
+def _fitted(record: CalibrationRecord, load: str) -> LoadFit:
+    one = record.load(load)
+    if record.kind != "fit" or not one.covariance:
+        raise _refused(
+            f"{record.id}, {load}", "a record without its data has no budget", "a legacy import",
+            "a record that was fitted from reference loads", "calibrate the instrument",
+        )  # fmt: skip
+    return one
+
+
+def _refused(where: str, what: str, got: object, expected: object, next_step: str) -> SessionError:
+    return SessionError(what, where=where, got=got, expected=expected, next_step=next_step, rule="budget")

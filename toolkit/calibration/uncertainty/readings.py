@@ -1,0 +1,130 @@
+"""What a session's own readings give a budget: zero before and after, creep, errors of an indication."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from toolkit.calibration.session.bridge import bridges_of
+from toolkit.calibration.session.reading_entries import Scope, creep_entries, zero_entries
+from toolkit.calibration.session.settings import zero_readings
+from toolkit.calibration.terms import term_matrix
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from toolkit.calibration.records.record import CalibrationRecord, LoadFit
+    from toolkit.calibration.session.statements import Statements
+
+_STEP = 1e-5
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class IndicationError:
+    """Errors of one indication in its unit: ``readings`` roundings of ``half_width``, and a normal ``u``."""
+
+    name: str
+    half_width: float
+    readings: int
+    u: float
+
+
+def indication_errors(record: CalibrationRecord, statements: Statements) -> tuple[IndicationError, ...]:
+    """Return what is stated of every indication; zeros where nothing is.
+
+    A load from a tared record is a difference of two readings, each rounded by itself: the standard
+    uncertainty of the rounding is then r/sqrt(6) of a resolution r, as in ISO 376 annex C, else r/sqrt(12).
+    """
+    readings = 2 if record.zero == "tared" else 1
+    return tuple(
+        IndicationError(
+            name=cell.name,
+            half_width=(cell.resolution or 0.0) / 2,
+            readings=readings,
+            u=cell.u or 0.0,
+        )
+        for cell in statements.cells
+    )
+
+
+def sensitivities(record: CalibrationRecord, one: LoadFit, point: Sequence[float]) -> NDArray[np.float64]:
+    """Return d load / d indication (indications,) at a point, by central differences."""
+    steps = np.array(
+        [_STEP * _extent(cell.minimum, cell.maximum, x) for cell, x in zip(record.cells, point, strict=True)]
+    )
+    at = np.asarray(point, dtype=np.float64)[:, None]
+    moved = np.hstack([at + np.diag(steps), at - np.diag(steps)])
+    values = term_matrix(one.terms, dict(zip(record.indications, moved, strict=True))) @ np.asarray(
+        one.coefficients
+    )
+    found: NDArray[np.float64] = (values[: len(steps)] - values[len(steps) :]) / (2 * steps)
+    return found
+
+
+def zero_drift(record: CalibrationRecord) -> tuple[float, ...] | str:
+    """Return after minus before of each indication's zero, in its unit; else why it is not known.
+
+    The last reading whose ``when`` begins with *after* is held against the first that begins with *before*;
+    without such words the last reading against the first. Readings with the shunt connected are no zeros.
+    """
+    scope = _scope(record)
+    entries = [e for e in zero_entries(zero_readings(json.loads(record.settings)), scope) if not e.shunt]
+    if len(entries) < 2:
+        return "no zero before and after the session is stated"
+    said = [entry.when.casefold() for entry in entries]
+    before = next((i for i, text in enumerate(said) if text.startswith("before")), 0)
+    after = max((i for i, text in enumerate(said) if text.startswith("after")), default=len(said) - 1)
+    first, last = dict(entries[before].values), dict(entries[after].values)
+    missing = [name for name in record.indications if name not in first or name not in last]
+    if missing:
+        return f"the zero readings lack {', '.join(missing)}"
+    return tuple(last[name] - first[name] for name in record.indications)
+
+
+def creep(record: CalibrationRecord, one: LoadFit) -> float | str:
+    """Return the creep of a load as a ratio of the load, |last - first reading|; else why it is not known.
+
+    ISO 376 relates the change of the deflection between 30 s and 300 s to the deflection at the largest
+    force. A reading after unloading is related to the largest load too; of several series the largest counts.
+    """
+    series: dict[str, list[tuple[float, float]]] = {}
+    slope = None
+    for entry in creep_entries(json.loads(record.settings).get("creep", []), _scope(record)):
+        if entry.load != one.load and len(record.loads) > 1:
+            continue
+        if entry.shown is not None:
+            value = entry.shown[1]
+        else:
+            if slope is None:
+                slope = dict(
+                    zip(record.indications, sensitivities(record, one, _middle(record)), strict=True)
+                )
+            value = sum(float(slope[name]) * reading for name, reading in entry.values)
+        key = f"{entry.load} {' '.join(name for name, _ in entry.values)}"
+        series.setdefault(key, []).append((entry.seconds, value))
+    moved = [
+        abs(max(one_series)[1] - min(one_series)[1]) for one_series in series.values() if len(one_series) > 1
+    ]
+    return max(moved) / one.largest if moved else "no two creep readings of this load are stated"
+
+
+def _scope(record: CalibrationRecord) -> Scope:
+    cells = json.loads(record.settings).get("cells", {})
+    return Scope(
+        bridges=bridges_of(cells, record.indications, where=record.id),
+        columns={cell.name: cell.column_unit or cell.unit for cell in record.cells},
+        loads={one.load: one.unit for one in record.loads},
+        where=record.id,
+    )
+
+
+def _middle(record: CalibrationRecord) -> tuple[float, ...]:
+    return tuple(((cell.minimum or 0.0) + (cell.maximum or 0.0)) / 2 for cell in record.cells)
+
+
+def _extent(low: float | None, high: float | None, x: float) -> float:
+    return max(abs(low or 0.0), abs(high or 0.0), abs(x)) or 1.0
