@@ -30,13 +30,18 @@ class DataFile:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Indication:
-    """One load cell's output: its unit, the range of the fitted data in it, its serial number."""
+    """One load cell's output: its unit, the range of the fitted data in it, its serial number.
+
+    ``column_unit`` is the unit of the stored data where they were converted to ``unit`` by the cell's
+    excitation or scale (`session.bridge`); None: the data are in ``unit``.
+    """
 
     name: str
     unit: str
     minimum: float | None = None
     maximum: float | None = None
     serial: str | None = None
+    column_unit: str | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -165,10 +170,7 @@ def content_of(record: CalibrationRecord) -> dict[str, Any]:
         "date": record.date,
         "entered_by": record.entered_by,
         "zero": record.zero,
-        "cells": [
-            {"name": c.name, "unit": c.unit, "minimum": c.minimum, "maximum": c.maximum, "serial": c.serial}
-            for c in record.cells
-        ],
+        "cells": [_cell_content(one) for one in record.cells],
         "loads": [_load_content(one) for one in record.loads],
         "golden": {"inputs": record.golden.inputs, "outputs": record.golden.outputs},
         "data": [{"role": d.role, "file": d.file, "sha256": d.sha256} for d in record.data],
@@ -181,6 +183,15 @@ _LOAD_KEYS = (
     "load unit terms coefficients issued polarity covariance method n dof residual_sd minimum "
     "maximum tolerance"
 ).split()
+
+
+def _cell_content(one: Indication) -> dict[str, Any]:
+    content: dict[str, Any] = {
+        "name": one.name, "unit": one.unit, "minimum": one.minimum, "maximum": one.maximum,
+        "serial": one.serial,
+    }  # fmt: skip
+    # Only where it says something: records of data that needed no conversion keep their hash.
+    return content if one.column_unit is None else content | {"column_unit": one.column_unit}
 
 
 def _load_content(one: LoadFit) -> dict[str, Any]:

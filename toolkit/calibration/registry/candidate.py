@@ -178,7 +178,14 @@ def _record(fit: SessionFit) -> CalibrationRecord:
         entered_by=session.operator,
         zero=session.zero,
         cells=tuple(
-            Indication(name=c.name, unit=c.unit, minimum=low, maximum=high, serial=c.serial)
+            Indication(
+                name=c.name,
+                unit=c.unit,
+                minimum=low,
+                maximum=high,
+                serial=c.serial,
+                column_unit=c.column_unit,
+            )
             for c, (low, high) in zip(session.cells, ranges, strict=True)
         ),
         loads=tuple(_load_fit(session, one) for one in fit.loads),

@@ -1,12 +1,19 @@
-"""The reference loads and check loads that lie beside a record, as the tables they were fitted from."""
+"""The reference loads and check loads that lie beside a record, as the tables they were fitted from.
+
+The stored files are those of the session, byte for byte. Where the record says that a column was converted
+(bridge output in mV, counts), the same conversion is made again, from the settings that the record holds.
+"""
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from toolkit.calibration.session.bridge import Bridge, bridges_of, converted
 from toolkit.calibration.session.table import Table, read_table
 from toolkit.errors import RecordError, RegistryError, ToolkitError
+from toolkit.units import unit
 
 if TYPE_CHECKING:
     from toolkit.calibration.records.record import CalibrationRecord
@@ -33,6 +40,8 @@ def stored_check(registry: Path, record: CalibrationRecord) -> Table | None:
     loads = [one.load for one in record.loads]
     table = read_table(path.read_bytes(), where=path, required=[*record.indications, *loads], runs=False)
     units = dict(zip(record.indications, record.indication_units, strict=True))
+    other = [n for n, text in units.items() if unit(table.unit(n)).dimension != unit(text).dimension]
+    table = converted(table, _bridges(record, other), units, where=path)
     return table.in_units(units | {one.load: one.unit for one in record.loads})
 
 
@@ -49,12 +58,33 @@ def parse_loads(record: CalibrationRecord, data: bytes, folder: Path) -> Table:
     file = record.data_file("loads")
     where = folder / ("loads" if file is None else file.file)
     try:
-        return read_table(data, where=where, required=needed, optional=uncertainties)
+        table = read_table(data, where=where, required=needed, optional=uncertainties)
+        return _as_fitted(record, table, where)
     except RegistryError:
         raise
     except ToolkitError as error:
         got = f"{where.name}: {reason_of(error)}"
         raise bad_record(record.id, where, got, "reference-load data that can be read", "data") from error
+
+
+def _as_fitted(record: CalibrationRecord, table: Table, where: Path) -> Table:
+    # A column that the record does not call converted is left alone: the refit compares its unit.
+    changed = {cell.name: cell for cell in record.cells if cell.column_unit is not None}
+    if not changed:
+        return table
+    for cell in changed.values():
+        if table.unit(cell.name) != cell.column_unit:
+            raise bad_record(
+                record.id, f"{where}, column {cell.name}", table.unit(cell.name), cell.column_unit, "data"
+            )
+    units = {name: cell.unit for name, cell in changed.items()}
+    return converted(table, _bridges(record, list(changed)), units, where=where)
+
+
+def _bridges(record: CalibrationRecord, names: list[str]) -> dict[str, Bridge]:
+    if not names:
+        return {}
+    return bridges_of(json.loads(record.settings).get("cells", {}), names, where=record.id)
 
 
 def bad_record(record_id: str, where: object, got: object, expected: object, rule: str) -> RecordError:

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from toolkit.calibration.records.record import Zero
+from toolkit.calibration.session.bridge import Bridge, bridges_of, converted, fit_units
 from toolkit.calibration.session.settings import (
     Settings,
     date_of,
@@ -17,7 +18,7 @@ from toolkit.calibration.session.settings import (
     settings_of,
     wrong,
 )
-from toolkit.calibration.session.statement_checks import check_columns, check_statements, stated
+from toolkit.calibration.session.statement_checks import check_columns, check_statements
 from toolkit.calibration.session.table import Table, read_table
 from toolkit.errors import SessionError
 from toolkit.files import check_keys, read_bytes, sha256_bytes
@@ -34,17 +35,24 @@ class LoadSetting:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CellSetting:
-    """One indication: its unit in the data, serial number, and resolution in that unit (None: not stated)."""
+    """One indication: the unit of the fit, serial number, and resolution in that unit (None: not stated).
+
+    ``column_unit`` is the unit in the file where it was converted (`bridge`), None where it is ``unit``.
+    """
 
     name: str
     unit: str
     serial: str | None
     resolution: float | None
+    column_unit: str | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Session:
-    """A calibration session as read. ``settings`` is the canonical JSON of what decides about the fit."""
+    """A calibration session as read. ``settings`` is the canonical JSON of what decides about the fit.
+
+    ``table`` and ``check`` are in the units of the fit; ``data_bytes`` and ``check_bytes`` as recorded.
+    """
 
     path: Path
     instrument: str
@@ -105,18 +113,22 @@ def read_session(path: Path) -> Session:
         )  # fmt: skip
     data_bytes = _file(path, raw.get("data"), "data")
     uncertainties = [f"u_{load}" for load in loads]
-    table = read_table(
+    recorded = read_table(
         data_bytes,
         where=path.parent / str(raw["data"]),
         required=[*indications, *loads, *(uncertainties if settings.method == "wls" else ())],
         optional=uncertainties,
     )
-    check_columns(table, loads, path)
+    check_columns(recorded, loads, path)
+    check_statements(raw, recorded, loads, path)
+    bridges = bridges_of(raw.get("cells", {}), indications, where=path)
+    table = converted(recorded, bridges, fit_units(recorded, bridges), where=path)
     check_keys(dict(settings.tolerances), loads, where=f"{path}: check.tolerance")
     check_name = _check_name(settings, path)
     check_bytes = None if check_name is None else _file(path, check_name, "check")
-    check = None if check_bytes is None else _check_table(check_bytes, path, str(check_name), table, settings)
-    check_statements(raw, table, loads, path)
+    check = None
+    if check_bytes is not None:
+        check = _check_table(check_bytes, path.parent / str(check_name), table, bridges, settings)
     reference = raw.get("reference", {})
     return Session(
         path=path,
@@ -124,7 +136,7 @@ def read_session(path: Path) -> Session:
         date=settings.date,
         operator=settings.operator,
         cells=tuple(
-            _cell(name, serial, raw.get("cells", {}).get(name, {}), table, path)
+            _cell(bridges[name], serial, raw.get("cells", {}).get(name, {}), recorded.unit(name))
             for name, serial in zip(indications, settings.serials, strict=True)
         ),
         loads=tuple(_load(name, settings, table, path) for name in loads),
@@ -151,11 +163,13 @@ def _check_name(settings: Settings, path: Path) -> str | None:
     return settings.check
 
 
-def _check_table(data: bytes, path: Path, name: str, table: Table, settings: Settings) -> Table:
-    where = path.parent / name
+def _check_table(
+    data: bytes, where: Path, table: Table, bridges: Mapping[str, Bridge], settings: Settings
+) -> Table:
     check = read_table(data, where=where, required=[*settings.indications, *settings.loads], runs=False)
-    # The check file may be in other units of the same dimension; it is brought to those of the fit.
-    return check.in_units({name: table.unit(name) for name in check.names})
+    # The check file may be in other units than the data; it is brought to those of the fit.
+    units = {name: table.unit(name) for name in check.names}
+    return converted(check, bridges, units, where=where).in_units(units)
 
 
 def _load(name: str, settings: Settings, table: Table, path: Path) -> LoadSetting:
@@ -163,12 +177,18 @@ def _load(name: str, settings: Settings, table: Table, path: Path) -> LoadSettin
     return LoadSetting(name=name, unit=text, tolerance=settings.tolerance(name, text, largest, path))
 
 
-def _cell(name: str, serial: str | None, entry: Mapping[str, Any], table: Table, path: Path) -> CellSetting:
-    text = table.unit(name)
+def _cell(bridge: Bridge, serial: str | None, entry: Mapping[str, Any], column: str) -> CellSetting:
+    text, key = bridge.unit(column), f"cells.{bridge.name}.resolution"
     resolution = (
-        stated(entry["resolution"], text, f"cells.{name}.resolution", path) if "resolution" in entry else None
+        bridge.stated(entry["resolution"], key, column=column, target=text) if "resolution" in entry else None
     )
-    return CellSetting(name=name, unit=text, serial=serial, resolution=resolution)
+    return CellSetting(
+        name=bridge.name,
+        unit=text,
+        serial=serial,
+        resolution=resolution,
+        column_unit=None if column == text else column,
+    )
 
 
 def _file(path: Path, name: object, key: str) -> bytes:

@@ -150,6 +150,18 @@ def settings_of(raw: Mapping[str, Any], *, where: object) -> Settings:
     )
 
 
+def zero_readings(raw: Mapping[str, Any]) -> Any:
+    """Return the entries of [[zero]], or of [[zero.readings]] below a table ``[zero]`` with ``fit``.
+
+    >>> zero_readings({"zero": {"fit": "tared", "readings": [{"when": "before"}]}})
+    [{'when': 'before'}]
+    """
+    entry = raw.get("zero", [])
+    if isinstance(entry, dict):
+        return entry.get("readings", [])
+    return [] if isinstance(entry, str) else entry
+
+
 def inputs_hash(settings: str, loads: str, check: str | None) -> str:
     """Return the hash of a session's settings (canonical JSON) and of its data files' hashes."""
     return sha256_bytes(canonical([settings, loads, check]).encode())
@@ -229,9 +241,12 @@ def _text(raw: Mapping[str, Any], key: str, where: object) -> str:
 
 def _choice(raw: Mapping[str, Any], key: str, known: tuple[str, ...], default: str, where: object) -> str:
     value = raw.get(key, default)
-    if key == "zero" and isinstance(value, list):
+    if key == "zero" and isinstance(value, list | dict):
         # [[zero]] readings and zero = "tared" share the key: readings say nothing about the fit's zero.
-        return default
+        # A table [zero] says both, as [check] does.
+        if isinstance(value, dict):
+            check_keys(value, ("fit", "readings"), where=f"{where}: zero")
+        value = value.get("fit", default) if isinstance(value, dict) else default
     if value not in known:
         raise wrong(where, key, value, " | ".join(known))
     return str(value)

@@ -1,7 +1,7 @@
 """What a session states beside its data: reference uncertainties, cells, zero and creep readings.
 
-None of it changes the fit, all of it is hashed and printed on certificates: a number whose unit is of
-another dimension is refused, never kept.
+Only a cell's excitation and scale change the fit (`bridge`). All of it is hashed and printed on
+certificates: a number whose unit is of another dimension is refused, never kept.
 """
 
 from __future__ import annotations
@@ -11,8 +11,15 @@ import re
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-from toolkit.calibration.session.settings import wrong
-from toolkit.errors import SessionError, UnitError
+from toolkit.calibration.session.bridge import Bridge, bridges_of, per
+from toolkit.calibration.session.reading_entries import (
+    Scope,
+    creep_entries,
+    shunt_entry,
+    zero_entries,
+)
+from toolkit.calibration.session.settings import wrong, zero_readings
+from toolkit.errors import SessionError
 from toolkit.files import check_keys
 from toolkit.machine.definition import quantity
 from toolkit.units import si_scale, unit
@@ -21,7 +28,11 @@ if TYPE_CHECKING:
     from toolkit.calibration.session.table import Table
 
 _REFERENCE = "standard certificate uncertainty due shared_group".split()
-_CELL = "serial resolution scale excitation shunt_expected u".split()
+_CELL = (
+    "serial resolution scale excitation shunt_expected shunt_measured shunt_tolerance u "
+    "temperature_coefficient"
+).split()
+_PER_KELVIN = re.compile(r"\s*/\s*(K|degC|°C)\s*\Z")
 _FORCE, _MOMENT = re.compile(r"F[XYZ]?\Z"), re.compile(r"M[XYZ]\Z")
 
 
@@ -63,7 +74,7 @@ def check_columns(table: Table, loads: tuple[str, ...], where: object) -> None:
 
 
 def check_statements(raw: Mapping[str, Any], table: Table, loads: tuple[str, ...], where: object) -> None:
-    """Check the parts of a session that the fit does not use.
+    """Check what a session states beside its data; ``table`` is the data as recorded.
 
     Raises
     ------
@@ -77,22 +88,61 @@ def check_statements(raw: Mapping[str, Any], table: Table, loads: tuple[str, ...
             raise wrong(where, key, entry, f"a table [{key}]")
         if known is not None:
             check_keys(entry, known, where=f"{where}: {key}")
-    for name, cell in raw.get("cells", {}).items():
+    cells = raw.get("cells", {})
+    for name, cell in cells.items():
         if not isinstance(cell, dict):
             raise wrong(where, f"cells.{name}", cell, f"a table [cells.{name}]")
         check_keys(cell, _CELL, where=f"{where}: cells.{name}")
-        _check_cell(name, cell, table.unit(name), where)
+    scope = Scope(
+        bridges=bridges_of(cells, indications, where=where),
+        columns={name: table.unit(name) for name in indications},
+        loads={load: table.unit(load) for load in loads},
+        where=where,
+    )
+    for name, cell in cells.items():
+        bridge, column = scope.bridges[name], scope.columns[name]
+        for key in ("resolution", "u"):
+            if key in cell:
+                bridge.stated(cell[key], f"cells.{name}.{key}", column=column, target=scope.unit(name))
+        temperature_effect(cell.get("temperature_coefficient"), bridge, column, scope.unit(name))
+        shunt_entry(name, cell, scope)
     _check_reference(raw.get("reference", {}), table, loads, where)
-    for key, keys in (("zero", ("when", "values")), ("creep", ("load", "seconds", "value"))):
-        entries = raw.get(key, [])
-        if isinstance(entries, str) and key == "zero":
-            continue
-        if not isinstance(entries, list) or not all(isinstance(e, dict) for e in entries):
-            raise wrong(where, key, entries, f"tables [[{key}]] with {', '.join(keys)}")
-        for entry in entries:
-            check_keys(entry, keys, where=f"{where}: {key}")
+    zero_entries(zero_readings(raw), scope)
+    creep_entries(raw.get("creep", []), scope)
     if "temperature" in raw:
         quantity(raw["temperature"], "temperature", f"{where}: temperature")
+
+
+def temperature_effect(
+    entry: object, bridge: Bridge, column: str, target: str
+) -> tuple[float | None, float | None]:
+    """Read ``temperature_coefficient`` of a cell: (span [1/K], zero [``target`` per K]).
+
+    It is ``{ span, zero }``, or one number for the span. ``span`` is a number, or ``{ value, unit }`` in
+    1/K, %/K, ppm/K; ``zero`` a number in the column's unit per kelvin, or ``{ value, unit }``. A unit may
+    leave out its "/K".
+
+    Raises
+    ------
+    ConfigError, UnitError
+    """
+    key = f"cells.{bridge.name}.temperature_coefficient"
+    if entry is None:
+        return None, None
+    parts = entry if isinstance(entry, dict) and not {"value", "unit"} & set(entry) else {"span": entry}
+    check_keys(parts, ("span", "zero"), where=f"{bridge.where}: {key}")
+    plain = {
+        name: one | {"unit": per(one["unit"], _PER_KELVIN)}
+        if isinstance(one, dict) and isinstance(one.get("unit"), str)
+        else one
+        for name, one in parts.items()
+    }
+    span = zero = None
+    if "span" in plain:
+        span = bridge.stated(plain["span"], f"{key}.span", column="1", target="1")
+    if "zero" in plain:
+        zero = bridge.stated(plain["zero"], f"{key}.zero", column=column, target=target)
+    return span, zero
 
 
 def stated(entry: object, text: str, place: str, where: object) -> float:
@@ -133,28 +183,3 @@ def _check_reference(
         if not isinstance(text, str):
             raise wrong(where, f"{place}.unit", text, f"a unit such as {table.unit(name)!r}", "no-unit")
         si_scale(text, unit(table.unit(name)).dimension, where=f"{where}: {place}")
-
-
-def _check_cell(name: str, cell: Mapping[str, Any], text: str, where: object) -> None:
-    for key in ("resolution", "u"):
-        if key in cell:
-            stated(cell[key], text, f"cells.{name}.{key}", where)
-    if "excitation" in cell:
-        stated(cell["excitation"], "V", f"cells.{name}.excitation", where)
-    if "shunt_expected" in cell:
-        # A shunt is told as the bridge's output, also where the file has the cell scaled to a force.
-        place = f"cells.{name}.shunt_expected"
-        try:
-            stated(cell["shunt_expected"], text, place, where)
-        except UnitError:
-            if unit(cell["shunt_expected"]["unit"], where=f"{where}: {place}").dimension != "bridge_ratio":
-                raise
-            stated(cell["shunt_expected"], "mV/V", place, where)
-    if "scale" in cell:
-        scale = cell["scale"]
-        value = scale.get("value") if isinstance(scale, dict) else scale
-        if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-            raise wrong(where, f"cells.{name}.scale", scale, "a number, or { value, unit }")
-        if isinstance(scale, dict):
-            check_keys(scale, ("value", "unit"), where=f"{where}: cells.{name}.scale")
-            si_scale(str(scale.get("unit")), where=f"{where}: cells.{name}.scale")

@@ -13,7 +13,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from toolkit.calibration.session.statement_checks import stated
+from toolkit.calibration.session.bridge import bridge_of
+from toolkit.calibration.session.settings import zero_readings
+from toolkit.calibration.session.statement_checks import temperature_effect
 from toolkit.machine.definition import quantity
 from toolkit.units import unit
 
@@ -52,7 +54,11 @@ class Reference:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CellStatement:
-    """One indication. ``resolution`` and ``u`` (standard) in its unit, ``excitation`` in V, as stated."""
+    """One indication. ``resolution`` and ``u`` (standard) in its unit, ``excitation`` in V, as stated.
+
+    ``span_per_K`` [1/K] and ``zero_per_K`` [unit/K] are its temperature coefficients, None where not stated.
+    ``column_unit`` is the unit of the stored data, and of bare numbers in ``scale`` and ``shunt_expected``.
+    """
 
     name: str
     unit: str
@@ -62,6 +68,9 @@ class CellStatement:
     excitation_V: float | None
     scale: Any
     shunt_expected: Any
+    column_unit: str
+    span_per_K: float | None
+    zero_per_K: float | None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -85,12 +94,14 @@ class Statements:
 def statements_of(record: CalibrationRecord) -> Statements:
     """Return what a record's session stated; a legacy record has stated nothing."""
     units = dict(zip(record.indications, record.indication_units, strict=True))
+    columns = {cell.name: cell.column_unit or cell.unit for cell in record.cells}
     return parse_statements(
         json.loads(record.settings),
         indications=units,
         loads={one.load: one.unit for one in record.loads},
         date=dt.date.fromisoformat(record.date),
         where=record.id,
+        columns=columns,
     )
 
 
@@ -101,13 +112,18 @@ def parse_statements(
     loads: Mapping[str, str],
     date: dt.date,
     where: object,
+    columns: Mapping[str, str] | None = None,
 ) -> Statements:
-    """Return the statements of a session's settings; ``indications`` and ``loads`` name to unit."""
+    """Return the statements of a session's settings.
+
+    ``indications`` and ``loads`` are name to unit of the fit, ``columns`` name to unit of the data where an
+    indication was converted.
+    """
     entry = settings.get("reference", {})
     due = entry.get("due")
     cells = settings.get("cells", {})
     temperature = settings.get("temperature")
-    zero, creep = settings.get("zero", []), settings.get("creep", [])
+    zero, creep = zero_readings(settings), settings.get("creep", [])
     return Statements(
         date=date,
         temperature_C=None
@@ -123,7 +139,10 @@ def parse_statements(
                 _reference(name, one, loads[name]) for name, one in entry.get("uncertainty", {}).items()
             ),
         ),
-        cells=tuple(_cell(name, text, cells.get(name, {}), where) for name, text in indications.items()),
+        cells=tuple(
+            _cell(name, text, (columns or indications)[name], cells.get(name, {}), where)
+            for name, text in indications.items()
+        ),
         zero=tuple(zero) if isinstance(zero, list) else (),
         creep=tuple(creep) if isinstance(creep, list) else (),
         certificate=settings.get("certificate", {}),
@@ -135,17 +154,25 @@ def _reference(load: str, entry: Mapping[str, Any], text: str) -> ReferenceUncer
     return ReferenceUncertainty(load=load, U=float(entry["U"]) * factor, k=float(entry["k"]))
 
 
-def _cell(name: str, text: str, entry: Mapping[str, Any], where: object) -> CellStatement:
-    def number(key: str, in_unit: str) -> float | None:
-        return stated(entry[key], in_unit, f"cells.{name}.{key}", where) if key in entry else None
+def _cell(name: str, text: str, column: str, entry: Mapping[str, Any], where: object) -> CellStatement:
+    bridge = bridge_of(name, entry, where=where)
 
+    def number(key: str) -> float | None:
+        if key not in entry:
+            return None
+        return bridge.stated(entry[key], f"cells.{name}.{key}", column=column, target=text)
+
+    span, zero = temperature_effect(entry.get("temperature_coefficient"), bridge, column, text)
     return CellStatement(
         name=name,
         unit=text,
         serial=None if entry.get("serial") is None else str(entry["serial"]),
-        resolution=number("resolution", text),
-        u=number("u", text),
-        excitation_V=number("excitation", "V"),
+        resolution=number("resolution"),
+        u=number("u"),
+        excitation_V=bridge.excitation_V,
         scale=entry.get("scale"),
         shunt_expected=entry.get("shunt_expected"),
+        column_unit=column,
+        span_per_K=span,
+        zero_per_K=zero,
     )

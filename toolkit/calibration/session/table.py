@@ -64,15 +64,23 @@ class Table:
 
     def in_units(self, wanted: Mapping[str, str]) -> Table:
         """Return the table with columns brought to other units of the same dimension; UnitError otherwise."""
-        factors = [
-            1.0
-            if text == wanted.get(name, text)
-            else si_scale(text, unit(wanted[name]).dimension, where=f"column {name}")
+        factors = {
+            name: si_scale(text, unit(wanted[name]).dimension, where=f"column {name}")
             / unit(wanted[name]).factor
             for name, text in zip(self.names, self.units, strict=True)
-        ]
-        units = tuple(wanted.get(name, text) for name, text in zip(self.names, self.units, strict=True))
-        return dataclasses.replace(self, units=units, values=self.values * factors)
+            if text != wanted.get(name, text)
+        }
+        return self.scaled(factors, wanted)
+
+    def scaled(self, factors: Mapping[str, float], units: Mapping[str, str]) -> Table:
+        """Return the table with columns multiplied by factors, and named in their new units."""
+        by = [factors.get(name, 1.0) for name in self.names]
+        values = self.values if set(by) == {1.0} else self.values * by
+        told = tuple(
+            units[name] if name in factors else text
+            for name, text in zip(self.names, self.units, strict=True)
+        )
+        return dataclasses.replace(self, units=told, values=values)
 
     def matrix(self, names: Sequence[str]) -> NDArray[np.float64]:
         """Return columns side by side (rows, names)."""

@@ -1,0 +1,190 @@
+"""A strain-gauge bridge's output as it was recorded -> the unit of the fit.
+
+A bridge is ratiometric: its output is proportional to its excitation, so that only the ratio mV/V belongs
+to the cell. What a file holds may be
+
+- mV/V: taken as it is, an excitation is only recorded;
+- volts (mV, µV) with a stated excitation: mV/V = mV / V;
+- a digitiser's counts with a stated scale, ``{ value, unit }`` of one count (``mV/V`` or ``mV/V/count``,
+  or mV, lbf ...): value x counts, in the scale's unit; volts go on to mV/V where there is an excitation.
+
+A column without such a statement keeps its own unit. A scale without a unit is recorded, never guessed
+and never applied. The stored file stays as it was recorded: the same factors are applied when it is read
+back, so that a record is refitted from the raw bytes.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from toolkit.calibration.session.settings import wrong
+from toolkit.files import check_keys
+from toolkit.machine.definition import quantity
+from toolkit.units import si_scale, unit
+
+if TYPE_CHECKING:
+    from toolkit.calibration.session.table import Table
+
+RATIO = "mV/V"
+COUNT_DIMENSION, RATIO_DIMENSION = "count", "bridge_ratio"
+_PER_COUNT = re.compile(r"\s*/\s*counts?\s*\Z")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Bridge:
+    """What is stated of one indication's electrics.
+
+    ``excitation_V`` [V] and ``scale`` (number, unit) of one count are None where not stated.
+    """
+
+    name: str
+    where: str
+    excitation_V: float | None = None
+    scale: tuple[float, str] | None = None
+
+    def unit(self, column: str) -> str:
+        """Return the unit in which a column is fitted."""
+        text = column
+        if self.scale is not None and unit(column).dimension == COUNT_DIMENSION:
+            text = self.scale[1]
+        return RATIO if self.excitation_V is not None and _is_voltage(text) else text
+
+    def factor(self, text: str, target: str, *, where: object) -> float:
+        """Return the factor from one unit to another, by scale and excitation where they are needed.
+
+        Raises
+        ------
+        UnitError
+            nothing stated leads from the one dimension to the other
+        """
+        if text == target:
+            return 1.0
+        found, wanted = unit(text, where=where), unit(target)
+        if found.dimension != wanted.dimension:
+            if found.dimension == COUNT_DIMENSION and self.scale is not None:
+                # The scale first: counts x scale stays exact where the scale's unit is the target.
+                return self.scale[0] * self.factor(self.scale[1], target, where=where)
+            if (
+                wanted.dimension == RATIO_DIMENSION
+                and self.excitation_V is not None
+                and _is_voltage(found.text)
+            ):
+                return found.factor / wanted.factor / self.excitation_V
+        return si_scale(text, wanted.dimension, where=where) / wanted.factor
+
+    def stated(self, entry: object, key: str, *, column: str, target: str) -> float:
+        """Return a number in the target unit: ``{ value, unit }``, or a bare number in the column's unit.
+
+        Raises
+        ------
+        ConfigError, UnitError
+            it is no finite number, its unit is unknown or of a dimension that does not lead to the target
+        """
+        place = f"{self.where}: {key}"
+        text: str = column
+        value = entry
+        if isinstance(entry, dict):
+            told = entry.get("unit")
+            # For its checks alone: the number must keep its last digit where no unit is changed.
+            quantity(entry, unit(told, where=place).dimension if isinstance(told, str) else "", place)
+            text, value = str(told), entry["value"]
+        if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+            raise wrong(self.where, key, entry, f"a finite number in {column}, or {{ value, unit }}")
+        return value * self.factor(text, target, where=place)
+
+
+def bridge_of(name: str, cell: Mapping[str, Any], *, where: object) -> Bridge:
+    """Read the excitation and the scale of ``[cells.NAME]``.
+
+    Raises
+    ------
+    ConfigError, UnitError
+        one of them is not positive, or in a unit that a bridge cannot have
+    """
+    excitation = scale = None
+    if "excitation" in cell:
+        entry = cell["excitation"]
+        excitation = (
+            quantity(entry, unit("V").dimension, f"{where}: cells.{name}.excitation")
+            if isinstance(entry, dict)
+            else entry
+        )
+        excitation = _positive(excitation, entry, f"cells.{name}.excitation", where, "volts above zero")
+    if "scale" in cell:
+        scale = _scale(cell["scale"], f"cells.{name}.scale", where)
+    return Bridge(name=name, where=str(where), excitation_V=excitation, scale=scale)
+
+
+def bridges_of(cells: Mapping[str, Any], indications: Sequence[str], *, where: object) -> dict[str, Bridge]:
+    """Return the bridges of indications by name, from a session's ``[cells]``."""
+    return {name: bridge_of(name, cells.get(name, {}), where=where) for name in indications}
+
+
+def fit_units(table: Table, bridges: Mapping[str, Bridge]) -> dict[str, str]:
+    """Return the unit in which each indication of a table is fitted."""
+    return {name: bridge.unit(table.unit(name)) for name, bridge in bridges.items()}
+
+
+def converted(
+    table: Table, bridges: Mapping[str, Bridge], units: Mapping[str, str], *, where: object
+) -> Table:
+    """Return the table with its indications in the given units; other columns are as they were.
+
+    A file in another unit than the fit's data is converted by its own: check loads may be in counts where
+    the fit's data are in mV.
+
+    Raises
+    ------
+    UnitError
+        nothing stated leads from a column's unit to the one wanted
+    """
+    factors = {
+        name: bridge.factor(table.unit(name), units[name], where=f"{where}, column {name}")
+        for name, bridge in bridges.items()
+    }
+    return table.scaled(factors, units)
+
+
+def per(text: str, suffix: re.Pattern[str] = _PER_COUNT) -> str:
+    """Return a unit without its "per count".
+
+    >>> per("mV/V/count"), per("mV/V")
+    ('mV/V', 'mV/V')
+    """
+    return suffix.sub("", text)
+
+
+def _scale(entry: object, key: str, where: object) -> tuple[float, str] | None:
+    stated = isinstance(entry, dict)
+    if isinstance(entry, dict):
+        check_keys(entry, ("value", "unit"), where=f"{where}: {key}")
+    value = _positive(
+        entry.get("value") if isinstance(entry, dict) else entry, entry, key, where,
+        'a number above zero, or { value, unit = "mV/V" } of one count; a reversed bridge shows in the '
+        "sign of its coefficient, which has a gate of its own",
+    )  # fmt: skip
+    if not stated or not isinstance(entry, dict):
+        return None
+    text = entry.get("unit")
+    if not isinstance(text, str):
+        raise wrong(where, f"{key}.unit", text, "a unit such as 'mV/V'", "no-unit")
+    found = unit(per(text), where=f"{where}: {key}")
+    if not (found.dimension in (RATIO_DIMENSION, "force", "moment") or _is_voltage(found.text)):
+        si_scale(found.text, RATIO_DIMENSION, where=f"{where}: {key}")
+    return value, found.text
+
+
+def _positive(value: object, entry: object, key: str, where: object, expected: str) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float) or not 0 < value < math.inf:
+        raise wrong(where, key, entry, expected)
+    return float(value)
+
+
+def _is_voltage(text: str) -> bool:
+    dimension = unit(text).dimension
+    # A unit of force or a ratio is known without the table of all units; only others ask for it.
+    return dimension.startswith("[mass] * [length] ** 2") and dimension == unit("V").dimension
