@@ -23,25 +23,42 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Basis:
-    """``design`` (rows, terms): unit-length columns, the constant last; raw = ``back`` @ solution.
+    """``design`` (rows, terms): columns near unit length, the constant last; raw = ``back`` @ solution.
 
     ``back_exact`` is the same map in rationals: back-substitution of a polynomial cancels, and the last
-    digits of its low coefficients depend on it.
+    digits of its low coefficients depend on it. ``centre`` and ``half`` are those of the indications where
+    powers are built from z = (x - centre) / half, else None; ``middle`` and ``length`` (terms,) those of
+    the columns.
     """
 
+    terms: tuple[str, ...]
     design: NDArray[np.float64]
     back: NDArray[np.float64]
     back_exact: tuple[tuple[Fraction, ...], ...]
+    centre: Mapping[str, float] | None
+    half: Mapping[str, float] | None
+    middle: NDArray[np.float64]
+    length: NDArray[np.float64]
+
+    def at(self, columns: Mapping[str, NDArray[np.float64]]) -> NDArray[np.float64]:
+        """Return the design's columns at other indications (rows, terms)."""
+        if self.centre is not None and self.half is not None:
+            columns = {n: (x - self.centre[n]) / self.half[n] for n, x in columns.items()}
+        return (term_matrix(self.terms, columns) - self.middle) / self.length
 
 
 def build_basis(terms: Sequence[str], columns: Mapping[str, NDArray[np.float64]]) -> Basis:
-    """Return the solving basis of a list of terms (the intercept, where there is one, last)."""
+    """Return the solving basis of a list of terms (the intercept, where there is one, last).
+
+    Centres lie on a grid of a power of two and scales are powers of two, so that neither rounds: a
+    rounding of the columns is seen by the coefficients as soon as the residuals are large (Wampler5).
+    """
     parsed = [parse_term(name) for name in terms]
+    centre, half = None, None
     if _closed(parsed):
-        centre = {name: float(np.mean(x)) for name, x in columns.items()}
+        centre = {name: _anchor(x) for name, x in columns.items()}
         half = {name: _power_of_two(np.max(np.abs(x - centre[name]))) for name, x in columns.items()}
-        z = {name: (x - centre[name]) / half[name] for name, x in columns.items()}
-        raw = term_matrix(terms, z)
+        raw = term_matrix(terms, {name: (x - centre[name]) / half[name] for name, x in columns.items()})
         expand = _expansion(parsed, centre, half)
     else:
         raw = term_matrix(terms, columns)
@@ -49,30 +66,43 @@ def build_basis(terms: Sequence[str], columns: Mapping[str, NDArray[np.float64]]
     n, p = raw.shape
     constant = terms[-1] == INTERCEPT
     k = p - 1 if constant else p
-    middle = raw[:, :k].mean(axis=0) if constant else np.zeros(k)
-    design = np.empty((n, p), order="F")
-    design[:, :k] = raw[:, :k] - middle
-    length = np.sqrt(np.einsum("ij,ij->j", design[:, :k], design[:, :k]))
-    length[length == 0] = 1.0
-    design[:, :k] /= length
-    # design column j = (raw_j - middle_j) / length_j, and the constant column = 1 / sqrt(n)
-    unscale = [[Fraction(0)] * p for _ in range(p)]
-    for j in range(k):
-        unscale[j][j] = 1 / Fraction(float(length[j]))
-        if constant:
-            unscale[k][j] = -Fraction(float(middle[j])) / Fraction(float(length[j]))
+    middle, length = np.zeros(p), np.ones(p)
     if constant:
-        design[:, k] = 1 / math.sqrt(n)
-        unscale[k][k] = Fraction(1 / math.sqrt(n))
+        middle[:k] = [_anchor(column) for column in raw[:, :k].T]
+        length[k] = _power_of_two(math.sqrt(n))
+    design = np.asfortranarray(raw)
+    design[:, :k] -= middle[:k]
+    length[:k] = [_power_of_two(math.sqrt(float(column @ column))) for column in design[:, :k].T]
+    design /= length
+    # design column j = (raw_j - middle_j) / length_j
+    unscale = [[Fraction(0)] * p for _ in range(p)]
+    for j in range(p):
+        unscale[j][j] = 1 / Fraction(float(length[j]))
+        if constant and j < k:
+            unscale[k][j] = -Fraction(float(middle[j])) / Fraction(float(length[j]))
     exact = tuple(
         tuple(sum((a * unscale[m][j] for m, a in enumerate(row) if a), Fraction(0)) for j in range(p))
         for row in expand
     )
     return Basis(
+        terms=tuple(terms),
         design=design,
         back=np.array([[float(value) for value in row] for row in exact]),
         back_exact=exact,
+        centre=centre,
+        half=half,
+        middle=middle,
+        length=length,
     )
+
+
+def _anchor(values: NDArray[np.float64]) -> float:
+    # Near the mean, to 2^-12 of the spread: few digits, so that the difference to a value is exact.
+    middle, spread = float(values.mean()), float(np.ptp(values))
+    if not (spread > 0 and math.isfinite(spread)):
+        return middle
+    step = math.ldexp(1.0, math.frexp(spread)[1] - 13)
+    return round(middle / step) * step if abs(middle / step) < 2**53 else middle
 
 
 def _power_of_two(value: float) -> float:

@@ -45,12 +45,17 @@ def diagnose(
     cells: NDArray[np.float64],
     load: NDArray[np.float64],
     direction: tuple[str, ...] | None,
+    replicates: NDArray[np.intp] | None = None,
 ) -> Diagnostics:
-    """Return the diagnostics of a solved load; ``cells`` (rows, indications), ``load`` (rows,)."""
+    """Return the diagnostics of a solved load.
+
+    ``cells`` (rows, indications), ``load`` (rows,); ``replicates`` as of `replicate_groups`, where they are
+    known already.
+    """
     n, p = len(load), len(fit.terms)
     w = np.ones(n) if fit.weights is None else np.sqrt(fit.weights)
-    e, h = fit.residuals * w, np.minimum(fit.leverage, 1 - 1e-12)
-    sse, dof = float(e @ e), fit.dof
+    e, h = fit.scaled, np.minimum(fit.leverage, 1 - 1e-12)
+    sse, dof = float(e @ e) if fit.chi2 is None else fit.chi2, fit.dof
     variance = sse / dof
     # Residuals at the level of rounding say nothing about the data.
     floor = (1e-12 * float(np.abs(load * w).max())) ** 2
@@ -66,10 +71,10 @@ def diagnose(
         internal=internal,
         external=external,
         cook=internal**2 * h / (1 - h) / p,
-        press=float(np.sqrt(np.mean((fit.residuals / (1 - h)) ** 2))),
+        press=float(np.sqrt(np.mean((e / w / (1 - h)) ** 2))),
         outliers=() if quiet or dof < 2 else _outliers(external, dof - 1),
         reversibility=_reversibility(fit.residuals, direction),
-        lack_of_fit=None if quiet else _lack_of_fit(fit, cells, load),
+        lack_of_fit=None if quiet else _lack_of_fit(fit, cells, load, replicates),
         heteroscedasticity=None if quiet or n < 10 else _breusch_pagan(e, load),
     )
 
@@ -81,9 +86,31 @@ def variance_inflation(cells: NDArray[np.float64]) -> tuple[float, ...]:
     return tuple(np.diag(np.linalg.inv(scaled.T @ scaled)).tolist())
 
 
+def replicate_groups(rows: NDArray[np.float64]) -> NDArray[np.intp]:
+    """Return the number of each row's group of equal rows (rows,), groups counted from 0."""
+    # Sorting rows is slow, sorting one mixed key a row is not. Equal rows have equal keys, so that rows
+    # with a key of their own are alone; only the others are compared in full.
+    bits = np.ascontiguousarray(rows + 0.0).view(np.uint64)
+    key = np.zeros(len(rows), dtype=np.uint64)
+    for column in bits.T:
+        key = (key ^ (column ^ (column >> np.uint64(29)))) * np.uint64(0x9E3779B97F4A7C15)
+        key ^= key >> np.uint64(32)
+    order = np.sort(key)
+    again = np.unique(order[1:][order[1:] == order[:-1]])
+    groups = np.arange(len(rows), dtype=np.intp)
+    if not again.size:
+        return groups
+    several = np.isin(key, again)
+    _, inverse = np.unique(rows[several], axis=0, return_inverse=True)
+    alone = int((~several).sum())
+    groups[~several] = np.arange(alone)
+    groups[several] = alone + inverse.ravel()
+    return groups
+
+
 def repeated_share(rows: NDArray[np.float64]) -> float:
     """Return the share of rows that repeat another one, cell by cell."""
-    return 1.0 - len(np.unique(rows, axis=0)) / len(rows)
+    return 1.0 - (int(replicate_groups(rows).max()) + 1) / len(rows)
 
 
 def _outliers(external: NDArray[np.float64], dof: int) -> tuple[int, ...]:
@@ -102,12 +129,14 @@ def _reversibility(residuals: NDArray[np.float64], direction: tuple[str, ...] | 
 
 
 def _lack_of_fit(
-    fit: TermFit, cells: NDArray[np.float64], load: NDArray[np.float64]
+    fit: TermFit,
+    cells: NDArray[np.float64],
+    load: NDArray[np.float64],
+    replicates: NDArray[np.intp] | None,
 ) -> tuple[float, float] | None:
     if fit.weights is not None:
         return None
-    _, group = np.unique(cells, axis=0, return_inverse=True)
-    group = group.ravel()
+    group = replicate_groups(cells) if replicates is None else replicates
     groups = int(group.max()) + 1
     pure_dof, lack_dof = len(load) - groups, groups - len(fit.terms)
     if pure_dof < 1 or lack_dof < 1:
