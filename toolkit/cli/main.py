@@ -44,10 +44,12 @@ def _root(
 def _register() -> None:
     # Each module holds one command and imports what is heavy only when it runs.
     from toolkit.cli import (
+        audit,
         calibrate,
         calibration,
         demo,
         doctor,
+        evaluate,
         explain,
         fit,
         init,
@@ -62,10 +64,10 @@ def _register() -> None:
     for module in (demo, init, doctor, inspect, calibrate):
         app.command(module.NAME)(module.command)
     app.add_typer(calibration.app, name="calibration")
-    for module in (process, fit, report):
+    for module in (process, fit, evaluate, report):
         app.command(module.NAME)(module.command)
     app.add_typer(template.app, name="template")
-    for module in (simulate, explain, qualify):
+    for module in (audit, simulate, explain, qualify):
         app.command(module.NAME)(module.command)
 
 

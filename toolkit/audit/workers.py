@@ -1,0 +1,148 @@
+"""Workers that a file cannot take down with it.
+
+A reader may abort its whole process on a hostile file, hang, or ask for all the memory there is; a pool
+that loses a worker that way loses what the others hold. Here every worker is a process with a memory limit
+and a pipe of its own, and has one file at a time: where it dies or takes too long, that file alone is told,
+a new worker takes its place and the others go on.
+"""
+
+from __future__ import annotations
+
+import multiprocessing as mp
+import time
+from collections import deque
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from multiprocessing.connection import Connection, wait
+from multiprocessing.context import SpawnProcess
+from typing import Generic, TypeVar
+
+Result = TypeVar("Result")
+
+TIMEOUT_S = 120.0
+MEMORY_BYTES = 4 << 30
+_AHEAD = 16  # files in a worker's pipe: it never waits for the next one
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Lost:
+    """A file whose worker died (``worker-died``) or took too long (``timeout``)."""
+
+    reason: str
+
+
+@dataclass(slots=True, kw_only=True, eq=False)
+class _Worker(Generic[Result]):
+    process: SpawnProcess
+    pipe: Connection
+    waiting: deque[str]
+    since: float
+
+
+def run_isolated(
+    make: Callable[[], Callable[[str], Result]],
+    names: Sequence[str],
+    *,
+    workers: int = 1,
+    timeout_s: float = TIMEOUT_S,
+) -> Iterator[tuple[str, Result | Lost]]:
+    """Yield (name, result) of every name, in the order in which they are done.
+
+    Parameters
+    ----------
+    make : called once in each worker, returns what is called with each name; both must pickle
+    names : what there is to do
+    workers : processes
+    timeout_s : of one name; its worker is killed beyond
+
+    A name whose worker died is given to a fresh worker, alone, once more: where several were in its pipe,
+    the dead one is the first, but a machine that ran short of memory may have killed the wrong one.
+    """
+    context = mp.get_context("spawn")
+    todo = deque(names)
+    doubtful: set[str] = set()
+    pool: list[_Worker[Result]] = []
+
+    def start() -> _Worker[Result]:
+        ours, theirs = context.Pipe()
+        process = context.Process(target=_serve, args=(make, theirs), daemon=True)
+        process.start()
+        theirs.close()
+        return _Worker(process=process, pipe=ours, waiting=deque(), since=time.monotonic())
+
+    def feed(worker: _Worker[Result]) -> None:
+        while todo and len(worker.waiting) < _AHEAD:
+            if todo[0] in doubtful and worker.waiting:
+                return  # a suspect runs alone
+            name = todo.popleft()
+            try:
+                worker.pipe.send(name)
+            except OSError:
+                todo.appendleft(name)
+                return
+            if not worker.waiting:
+                worker.since = time.monotonic()
+            worker.waiting.append(name)
+            if name in doubtful:
+                return
+
+    def bury(worker: _Worker[Result], reason: str) -> Lost | None:
+        worker.process.kill()
+        worker.process.join()
+        worker.pipe.close()
+        pool.remove(worker)
+        if not worker.waiting:
+            return None
+        suspect = worker.waiting[0]
+        todo.extendleft(reversed(worker.waiting))
+        if suspect in doubtful or reason.startswith("timeout"):
+            todo.popleft()
+            return Lost(reason=reason)
+        doubtful.add(suspect)
+        return None
+
+    try:
+        while todo or any(worker.waiting for worker in pool):
+            while len(pool) < min(workers, len(todo) + len(pool)) and todo:
+                pool.append(start())
+            for worker in pool:
+                feed(worker)
+            busy = [worker for worker in pool if worker.waiting]
+            ready = set(wait([worker.pipe for worker in busy], timeout=1.0))
+            for worker in busy:
+                if worker.pipe in ready:
+                    try:
+                        result = worker.pipe.recv()
+                    except (EOFError, OSError):
+                        name = worker.waiting[0]
+                        lost = bury(worker, "worker-died: the reader's process ended without an answer")
+                        if lost is not None:
+                            yield name, lost
+                        continue
+                    worker.since = time.monotonic()
+                    yield worker.waiting.popleft(), result
+                elif time.monotonic() - worker.since > timeout_s:
+                    name = worker.waiting[0]
+                    lost = bury(worker, f"timeout: no answer within {timeout_s:g} s")
+                    if lost is not None:
+                        yield name, lost
+    finally:
+        for worker in pool:
+            worker.process.kill()
+            worker.process.join()
+            worker.pipe.close()
+
+
+def _serve(make: Callable[[], Callable[[str], Result]], pipe: Connection) -> None:
+    import resource
+    import signal
+
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent is interrupted, and ends its workers
+    resource.setrlimit(resource.RLIMIT_AS, (MEMORY_BYTES, MEMORY_BYTES))
+    work = make()
+    while True:
+        try:
+            name = pipe.recv()
+        except (EOFError, OSError):
+            return
+        pipe.send(work(name))
