@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from toolkit.calibration.registry import gates
 from toolkit.calibration.registry.candidate import last_approved, now
 from toolkit.calibration.registry.interval import parse_interval
+from toolkit.calibration.registry.names import check_names
 from toolkit.calibration.registry.registry import Registry, instrument_of, today
 from toolkit.calibration.registry.status import RecordStatus, status_of
 from toolkit.calibration.registry.store import Change, commit
@@ -20,7 +21,6 @@ from toolkit.errors import RegistryError
 from toolkit.findings import Finding
 
 if TYPE_CHECKING:
-    from toolkit.calibration.records.record import CalibrationRecord
     from toolkit.calibration.registry.ledger import Ledger
 
 
@@ -53,7 +53,7 @@ def approve(
     """Put a record in force, where its gates let it through.
 
     ``known_on`` is the day of the decision (default today). A second approval of a record moves its
-    in-force date or sets its recall interval anew, with a reason. ``recall`` is the interval after the
+    in-force date back or sets its recall interval anew, with a reason. ``recall`` is the interval after the
     session's date, such as "12 months"; it stands in the ledger and changes nothing about the record.
 
     A date before the session's own reaches back to tests that the session cannot speak of by itself: it
@@ -65,12 +65,13 @@ def approve(
     ------
     RegistryError
         ``names``: entered, checked and approved by do not differ; ``approval``: a date before the
-        session's without a reason, or a record that is withdrawn or approved already; ``recall``: no interval
+        session's without a reason, a record that is withdrawn or approved already, or a
+        later date than before; ``recall``: no interval
     """
     folder = registry.folder / instrument_of(record_id)
     day = known_on or today()
     record = registry.load(record_id)
-    _check_names(record, checked_by, approved_by)
+    check_names(record, checked_by, approved_by)
     if in_force_from < day and not reason and in_force_from < dt.date.fromisoformat(record.date):
         raise _refused(
             record_id, "an in-force date before the session's own date needs a reason",
@@ -95,6 +96,14 @@ def approve(
                 record_id, "the record is approved already",
                 f"in force from {status.in_force_from.isoformat()}",
                 "another in-force date or recall interval, with --reason TEXT", "approval",
+            )  # fmt: skip
+        if status.in_force_from is not None and in_force_from > status.in_force_from:
+            # The first approval stands: the days between would stay in force, whatever was answered here.
+            raise _refused(
+                record_id, "an approval takes no day away from a record",
+                in_force_from.isoformat(),
+                f"not after {status.in_force_from.isoformat()}; 'toolkit calibration withdraw' makes days void",
+                "approval",
             )  # fmt: skip
         last = last_approved(registry, record.instrument, but=record_id, ledger=ledger)
         failed = () if last is None else gates.sign_and_span(record, last)
@@ -178,21 +187,6 @@ def withdraw(
         raise _refused(record_id, "no such record", record_id, ", ".join(registry.instruments()), "missing")
     commit(folder, build)
     return registry.status(record_id, known_at=max(on, today()))
-
-
-def _check_names(record: CalibrationRecord, checked_by: str, approved_by: str | None) -> None:
-    names = [("entered by", record.entered_by), ("checked by", checked_by)]
-    names += [("approved by", approved_by)] if approved_by is not None else []
-    seen: dict[str, str] = {}
-    for role, name in names:
-        key = " ".join(name.split()).casefold()
-        if not key or key in seen:
-            got = f"{role} {name!r}" + (f", also {seen[key]}" if key in seen else "")
-            expected = f"a name that is none of {', '.join(f'{n!r} ({r})' for r, n in names if r != role)}"
-            raise _refused(
-                record.id, "entered, checked and approved must be different names", got, expected, "names"
-            )
-        seen[key] = role
 
 
 def _refused(record_id: str, what: str, got: str, expected: str, rule: str) -> RegistryError:
