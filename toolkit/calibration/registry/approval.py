@@ -85,6 +85,9 @@ def approve(
     decided: list[Decision] = []
 
     def build(ledger: Ledger) -> Change | None:
+        if record_id not in ledger.entered():
+            # The folder was removed or exchanged since the record was read.
+            raise _refused(record_id, "no such record", record_id, ", ".join(ledger.entered()), "missing")
         status = status_of(record_id, ledger.of(record_id), dt.date.max)
         if status.state == "withdrawn":
             raise _refused(
@@ -102,7 +105,7 @@ def approve(
             raise _refused(
                 record_id, "an approval takes no day away from a record",
                 in_force_from.isoformat(),
-                f"not after {status.in_force_from.isoformat()}; 'toolkit calibration withdraw' makes days void",
+                f"not after {status.in_force_from.isoformat()}; a withdrawal makes days void",
                 "approval",
             )  # fmt: skip
         last = last_approved(registry, record.instrument, but=record_id, ledger=ledger)
