@@ -43,8 +43,8 @@ class Estimate:
 def coverage_factor(dof: float, probability: float = 0.95) -> float:
     """Return Student's t for a two-sided coverage probability.
 
-    Degrees of freedom are truncated to a whole number as in GUM G.4.1, but for the rounding of a quotient that
-    is whole; below one there is no interval.
+    Degrees of freedom are truncated to a whole number as in GUM G.4.1; one that is whole but for
+    rounding counts as whole. Below one there is no interval.
 
     >>> round(coverage_factor(math.inf), 4)
     1.96

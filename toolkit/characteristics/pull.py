@@ -13,13 +13,14 @@ physics reads conicity = (F - R)/2 there. The source document's own formulas tak
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from toolkit.characteristics.model import DirectionFit, Pull
-from toolkit.characteristics.shared import Shared, weights_at_zero
+from toolkit.characteristics.shared import Shared, Weighted, weights_at, weights_at_zero
 from toolkit.estimate import Estimate, effective_dof
 from toolkit.tires.evaluate import estimate_at, slope_estimate_at, zero_crossing
 
@@ -59,13 +60,13 @@ def pull(
         plysteer=_half("FY", forward, reverse, 1.0, shared=shared),
         CRAT=CRAT,
         PRAT=PRAT,
-        PRAT_at_FY_zero=_mean_of(ahead, back),
+        PRAT_at_FY_zero=_residual([ahead, back], shared=shared),
         # MZ is the same in machine-fixed axes and in those that follow the travel: the source document's
         # pair for MZ is this pair with the names exchanged.
         thesis_CRAT=PRAT,
         thesis_PRAT=CRAT,
-        residual_forward=ahead,
-        residual_reverse=back,
+        residual_forward=_residual([ahead], shared=shared),
+        residual_reverse=_residual([back], shared=shared),
     )
 
 
@@ -101,30 +102,54 @@ def _curve(direction: Direction | None, channel: str) -> CurveFit | None:
     return direction.fit.FY if channel == "FY" else direction.fit.MZ
 
 
-def _moment_without_force(direction: Direction | None) -> Estimate | None:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Residual:
+    """MZ of one direction where its own FY is zero, by its curves alone.
+
+    ``MZ`` and ``FY`` are the weighted conditions through which a common error moves it: that of MZ itself,
+    and that of FY by way of the angle at which FY is zero, dMZ/dFY along the curves.
+    """
+
+    value: float
+    unit: str
+    own: tuple[tuple[float, float], ...]
+    MZ: Weighted
+    FY: Weighted
+
+
+def _moment_without_force(direction: Direction | None) -> _Residual | None:
     """Return MZ where the direction's own FY is zero: the residual aligning torque."""
     FY, MZ = _curve(direction, "FY"), _curve(direction, "MZ")
-    if FY is None or MZ is None:
+    if FY is None or MZ is None or direction is None:
         return None
     crossing = zero_crossing(FY)
     if crossing is None:
         return None
     moment, slope = estimate_at(MZ, crossing.value), slope_estimate_at(MZ, crossing.value)
-    moved = abs(slope.value) * crossing.u
-    return Estimate(
+    stiff = slope_estimate_at(FY, crossing.value).value
+    parts = weights_at(direction.group, crossing.value)
+    return _Residual(
         value=moment.value,
-        u=float(np.hypot(moment.u, moved)),
         unit=moment.unit,
-        dof=effective_dof([(moment.u, moment.dof), (moved, crossing.dof)]),
+        own=((moment.u, moment.dof), (abs(slope.value) * crossing.u, crossing.dof)),
+        MZ=parts,
+        FY=tuple((c, -w * slope.value / stiff) for c, w in parts) if stiff else (),
     )
 
 
-def _mean_of(one: Estimate | None, other: Estimate | None) -> Estimate | None:
-    if one is None or other is None:
+def _residual(sides: Sequence[_Residual | None], *, shared: Shared) -> Estimate | None:
+    """Return the mean of one or two residual torques; errors of FY and of MZ are taken as independent."""
+    found = [one for one in sides if one is not None]
+    if len(found) < len(sides):
         return None
+    n = len(found)
+    contributions = [(u / n, dof) for one in found for u, dof in one.own]
+    for channel in ("MZ", "FY"):
+        parts = [(c, w / n) for one in found for c, w in (one.MZ if channel == "MZ" else one.FY)]
+        contributions.append((shared.common_u(channel, parts), np.inf))
     return Estimate(
-        value=(one.value + other.value) / 2,
-        u=float(np.hypot(one.u, other.u)) / 2,
-        unit=one.unit,
-        dof=effective_dof([(one.u, one.dof), (other.u, other.dof)]),
+        value=sum(one.value for one in found) / n,
+        u=float(np.sqrt(sum(u * u for u, _ in contributions))),
+        unit=found[0].unit,
+        dof=effective_dof(contributions),
     )

@@ -2,18 +2,23 @@
 
 A characteristic is, to first order, a weighted sum of conditions. The record's coefficients are the same
 in every one of them, so their uncertainty goes through the weighted sum of the sensitivities, not through
-the conditions one by one: it cancels in a difference of equal readings and adds in a sum.
+the conditions one by one: it cancels in a difference of equal readings and adds in a sum. What the record's
+session stated (reference standard, indications, drift of the zero, creep) is in their covariance: an error of
+the scale stays in conicity and stiffness in proportion to their values, a shift of the zero goes where the
+signs of the axes take it (`uncertainty.propagation`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from toolkit.calibration.apply import coefficient_jacobian
+from toolkit.calibration.uncertainty.propagation import record_covariance
 from toolkit.channels import signs
 from toolkit.reduction.tare import zero_shifts
 from toolkit.units import si_scale
@@ -29,7 +34,7 @@ if TYPE_CHECKING:
 Weighted = Sequence[tuple["Condition", float]]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Shared:
     """What every row of a test has in common.
 
@@ -37,6 +42,7 @@ class Shared:
     are the axes of its cells; ``tared`` says that a tare was subtracted; ``u_SA_zero`` [rad] is the
     standard uncertainty of the slip angle's zero, the same for both directions of rotation;
     ``u_cell_zero`` that of each cell's zero in the record's units, empty where a tare was subtracted.
+    ``covariance`` of each load's coefficients follows from the record and what its session stated.
     """
 
     record: CalibrationRecord | None
@@ -44,6 +50,11 @@ class Shared:
     tared: bool
     u_SA_zero: float
     u_cell_zero: tuple[float, ...] = ()
+    covariance: Mapping[str, NDArray[np.float64]] = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        found = {} if self.record is None else record_covariance(self.record)
+        object.__setattr__(self, "covariance", MappingProxyType(found))
 
     def common_u(self, channel: str, parts: Weighted) -> float:
         """Return the standard uncertainty [SI] of a weighted sum that all rows have in common.
@@ -67,7 +78,7 @@ class Shared:
         )
 
     def calibration_u(self, channel: str, parts: Weighted) -> float:
-        """Return the standard uncertainty [SI] that the record's covariance gives a weighted sum.
+        """Return the standard uncertainty [SI] that the record gives a weighted sum: fit and statements.
 
         Parameters
         ----------
@@ -77,7 +88,7 @@ class Shared:
         if self.record is None or not parts:
             return 0.0
         fit = self.record.load(channel)
-        if not fit.covariance:
+        if channel not in self.covariance:
             return 0.0
         names = self.record.indications
         # The conditions hold tared means. A record whose intercept carries the zero of its session loses
@@ -88,7 +99,7 @@ class Shared:
             for i, name in enumerate(names)
         }
         total = self._weights(channel, parts) @ coefficient_jacobian(self.record, channel, rows, tare)
-        variance = float(total @ np.asarray(fit.covariance) @ total)
+        variance = float(total @ self.covariance[channel] @ total)
         return float(np.sqrt(max(variance, 0.0))) * si_scale(fit.unit)
 
 
@@ -97,12 +108,17 @@ def weights_at_zero(group: Group) -> tuple[tuple[Condition, float], ...]:
 
     They stand for the fitted curve's own weights there; empty where the angles have one sign only.
     """
+    return weights_at(group, 0.0)
+
+
+def weights_at(group: Group, angle: float) -> tuple[tuple[Condition, float], ...]:
+    """Return the weights of the line through the conditions on both sides of an angle [rad]; else empty."""
     SA = group.SA
-    if len(SA) < 2 or SA[0] > 0 or SA[-1] < 0:
+    if len(SA) < 2 or SA[0] > angle or SA[-1] < angle:
         return ()
-    right = int(np.clip(np.searchsorted(SA, 0.0), 1, len(SA) - 1))
+    right = int(np.clip(np.searchsorted(SA, angle), 1, len(SA) - 1))
     left = right - 1
-    share = -float(SA[left]) / float(SA[right] - SA[left])
+    share = float(angle - SA[left]) / float(SA[right] - SA[left])
     return ((group.conditions[left], 1 - share), (group.conditions[right], share))
 
 

@@ -125,7 +125,8 @@ def monte_carlo(
     low, high = coverage_interval(drawn, budget.probability)
     return MonteCarlo(
         trials=len(drawn), seed=seed, value=float(drawn.mean()), u=float(drawn.std(ddof=1)),
-        low=low, high=high, budget_low=value - budget.U, budget_high=value + budget.U, digits=digits, delta=delta, stable=stable,
+        low=low, high=high, budget_low=value - budget.U, budget_high=value + budget.U,
+        digits=digits, delta=delta, stable=stable,
     )  # fmt: skip
 
 
