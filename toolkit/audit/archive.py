@@ -5,6 +5,7 @@ from __future__ import annotations
 import datetime as dt
 from collections import Counter
 from collections.abc import Callable
+from contextlib import ExitStack
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -12,9 +13,11 @@ from pathlib import Path
 from toolkit.audit.inventory import inventory
 from toolkit.audit.model import GRADES, TELLS
 from toolkit.audit.one_file import Auditor, FileAudit, unreadable
+from toolkit.audit.resume import Results
 from toolkit.audit.workers import Lost, run_isolated
 from toolkit.calibration.registry.registry import Refused, Registry
 from toolkit.errors import ConfigError, RegistryError
+from toolkit.files import sha256_bytes
 from toolkit.findings import Finding
 
 CLEAN = ("exact", "rounding")
@@ -59,6 +62,7 @@ def audit_archive(
     workers: int = 1,
     step: Callable[[str], None] = lambda _: None,
     names: tuple[str, ...] | None = None,
+    out: Path | None = None,
 ) -> ArchiveAudit:
     """Audit every file of an archive; the result does not depend on the number of workers.
 
@@ -68,11 +72,14 @@ def audit_archive(
     workers : processes; each file is read in one, behind the gate, with a memory limit and a timeout
     step : called with each path that is done
     names : the inventory where the caller has made it already
+    out : folder in which results are kept as they come; those that still hold are used again
 
     Raises
     ------
     ConfigError
         the archive is no folder, or ``workers`` is no count
+    OutputError
+        ``out`` cannot be written to, or another audit writes there
     """
     from toolkit.calibration.registry.registry import today
 
@@ -85,12 +92,26 @@ def audit_archive(
     todo = inventory(archive) if names is None else names
     done: dict[str, FileAudit] = {}
     make = partial(Auditor, archive, registry, day)
-    for name, result in run_isolated(make, todo, workers=workers):
-        if isinstance(result, Lost):
-            done[name] = unreadable(name, result.reason)
-        elif result is not None:
-            done[name] = result
-        step(name)
+    with ExitStack() as stack:
+        kept = None
+        keys: dict[str, str | None] = {}
+        if out is not None:
+            kept = stack.enter_context(Results(out, archive=archive, registry_hash=_hash(registry, day)))
+            keys = {name: kept.key_of(name) for name in todo}
+            for name, key in keys.items():
+                if key is not None and kept.has(name, key):
+                    reused = kept.get(name, key)
+                    if reused is not None:
+                        done[name] = reused
+                    step(name)
+            todo = tuple(name for name in todo if not kept.has(name, keys[name]))
+        for name, result in run_isolated(make, todo, workers=workers):
+            found = unreadable(name, result.reason) if isinstance(result, Lost) else result
+            if kept is not None and not isinstance(result, Lost):
+                kept.put(name, keys[name], found)
+            if found is not None:
+                done[name] = found
+            step(name)
     files = tuple(done[name] for name in sorted(done))
     instruments = sorted({one.instrument for one in files if one.instrument is not None})
     refused: list[Refused] = []
@@ -110,6 +131,11 @@ def audit_archive(
         heads=tuple(heads),
         findings=(*_findings(files), *_refusals(refused), *troubles),
     )
+
+
+def _hash(registry: Registry, day: dt.date) -> str:
+    parts = [f"{name}={registry.digest(name)}" for name in registry.instruments()]
+    return sha256_bytes("|".join([day.isoformat(), *parts]).encode())
 
 
 def _findings(files: tuple[FileAudit, ...]) -> list[Finding]:

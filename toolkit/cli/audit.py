@@ -13,7 +13,6 @@ from toolkit.cli.home import calibrations_folder
 
 if TYPE_CHECKING:
     from toolkit.audit.archive import ArchiveAudit
-    from toolkit.audit.one_file import FileAudit
 
 NAME = "audit"
 _SHOWN = 40
@@ -22,6 +21,10 @@ _SHOWN = 40
 def command(
     archive: Annotated[Path, typer.Argument(help="A folder of recordings, in any depth.")],
     workers: Annotated[int, typer.Option("--workers", help="Processes that read files.")] = 1,
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", help="Folder that keeps the results: an audit goes on where it was ended."),
+    ] = None,
     known_at: KnownAt = None,
     calibrations: Calibrations = None,
     home: Home = None,
@@ -44,7 +47,7 @@ def command(
     began = time.perf_counter()
     with progress(len(names), "audit", show=not quiet and not json) as step:
         made = audit_archive(
-            archive, registry, known_at=day(known_at), workers=workers, step=step, names=names
+            archive, registry, known_at=day(known_at), workers=workers, step=step, names=names, out=out
         )
     seconds = time.perf_counter() - began
     payload = _payload(made)
@@ -54,42 +57,17 @@ def command(
 
 
 def _payload(made: ArchiveAudit) -> dict[str, Any]:
+    from toolkit.audit.serial import to_plain
+
     return {
         "archive": made.archive,
         "known_at": made.known_at.isoformat(),
-        "files": [_file(one) for one in made.files],
+        "files": [to_plain(one) for one in made.files],
         "summary": {"files": len(made.files), "grades": made.grades, "undated": made.undated},
         "refused_records": [{"id": r.id, "rule": r.rule, "reason": r.reason} for r in made.refused],
         "heads": dict(made.heads),
         "findings": [finding.as_dict() for finding in made.findings],
     }
-
-
-def _file(one: FileAudit) -> dict[str, Any]:
-    found = one.found
-    repair = None if found is None else found.repair
-    return {
-        "path": one.path,
-        "sha256": one.sha256,
-        "instrument": one.instrument,
-        "date": one.date and one.date.isoformat(),
-        "rows": one.rows,
-        "grade": one.grade,
-        "record": found and found.record,
-        "variant": found and found.variant,
-        "issued": found and found.issued,
-        "candidates": list(found.candidates) if found else [],
-        "segments": [
-            {
-                "first_row": s.first_row, "last_row": s.last_row, "record": s.record, "variant": s.variant,
-                "grade": s.grade, "candidates": list(s.candidates),
-            }
-            for s in (found.segments if found else ())
-        ],
-        "in_force": found and found.in_force,
-        "repair": repair and {"FY_max_abs_N": repair.FY_max_abs_N, "MZ_max_abs_Nm": repair.MZ_max_abs_Nm},
-        "reason": one.reason,
-    }  # fmt: skip
 
 
 def _text(made: ArchiveAudit) -> str:

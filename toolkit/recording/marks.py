@@ -131,7 +131,7 @@ def is_own_output(path: Path) -> bool:
         try:
             top = json.loads(data)
         except (ValueError, RecursionError):
-            return False
+            return OWN_OUTPUT.encode() in data[:_HEAD]  # JSON Lines: the first one tells
         return isinstance(top, dict) and top.get("generator") == GENERATOR
     return OWN_OUTPUT.encode() in data[:_HEAD]
 

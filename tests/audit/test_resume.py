@@ -1,0 +1,107 @@
+"""An audit goes on where it was ended, and does again only what changed."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+
+import pytest
+
+from toolkit.audit import archive as archive_module
+from toolkit.audit.archive import audit_archive
+from toolkit.audit.resume import RESULTS, Results
+from toolkit.audit.serial import from_plain, to_plain
+from toolkit.calibration.registry.registry import Registry
+from toolkit.errors import OutputError
+from toolkit.examples.fig4_4 import write_fig4_4
+
+HOME = Path(__file__).resolve().parents[2]
+
+
+@pytest.fixture
+def archive(tmp_path):
+    root = tmp_path / "archive"
+    for name in ("one", "two", "three"):
+        (root / name).mkdir(parents=True)
+        write_fig4_4(root / name)
+    (root / "bad.xlsx").write_bytes(b"PK\x03\x04 and nothing more")
+    return root
+
+
+@pytest.fixture
+def asked(monkeypatch):
+    """Names that a run gave to its workers."""
+    names = []
+    real = archive_module.run_isolated
+
+    def spy(make, todo, *, workers):
+        names.extend(todo)
+        return real(make, todo, workers=workers)
+
+    monkeypatch.setattr(archive_module, "run_isolated", spy)
+    return names
+
+
+def registry(folder=HOME / "calibrations"):
+    return Registry(folder)
+
+
+def test_results_survive_the_way_through_the_file(archive):
+    for one in audit_archive(archive, registry()).files:
+        assert from_plain(json.loads(json.dumps(to_plain(one)))) == one
+
+
+def test_a_second_run_reads_nothing_and_answers_the_same(archive, tmp_path, asked):
+    first = audit_archive(archive, registry(), out=tmp_path / "out")
+    assert len(asked) == len(first.files)
+    asked.clear()
+    assert audit_archive(archive, registry(), out=tmp_path / "out") == first
+    assert asked == []
+
+
+def test_only_what_changed_is_done_again(archive, tmp_path, asked):
+    audit_archive(archive, registry(), out=tmp_path / "out")
+    asked.clear()
+    changed = next((archive / "two").iterdir())
+    changed.write_bytes(b"not a recording any more")
+    (archive / "three" / "test.toml").write_text('schema = 1\nmachine = "m15"\ndate = 2019-05-05\n')
+    audit_archive(archive, registry(), out=tmp_path / "out")
+    expected = {changed.relative_to(archive).as_posix()}
+    expected |= {
+        p.relative_to(archive).as_posix() for p in (archive / "three").iterdir() if p.suffix != ".toml"
+    }
+    assert set(asked) == expected
+
+
+def test_another_registry_makes_every_result_new(archive, tmp_path, asked):
+    audit_archive(archive, registry(), out=tmp_path / "out")
+    asked.clear()
+    shutil.copytree(HOME / "calibrations" / "m15", tmp_path / "calibrations" / "m15")
+    audit_archive(archive, registry(tmp_path / "calibrations"), out=tmp_path / "out")
+    assert len(asked) == 7
+
+
+def test_a_line_that_a_crash_cut_off_costs_one_file(archive, tmp_path, asked):
+    first = audit_archive(archive, registry(), out=tmp_path / "out")
+    results = tmp_path / "out" / RESULTS
+    data = results.read_bytes()
+    results.write_bytes(data[:-20])
+    asked.clear()
+    assert audit_archive(archive, registry(), out=tmp_path / "out") == first
+    assert len(asked) == 1
+    assert len(results.read_bytes()) == len(data)
+
+
+def test_an_output_folder_inside_the_archive_is_no_part_of_it(archive):
+    first = audit_archive(archive, registry(), out=archive / "audit")
+    again = audit_archive(archive, registry(), out=archive / "audit")
+    assert [one.path for one in again.files] == [one.path for one in first.files]
+
+
+def test_two_audits_do_not_write_one_folder(archive, tmp_path):
+    with (
+        Results(tmp_path, archive=archive, registry_hash=""),
+        pytest.raises(OutputError, match="another audit"),
+    ):
+        Results(tmp_path, archive=archive, registry_hash="")
