@@ -9,6 +9,7 @@ from __future__ import annotations
 import datetime as dt
 import io
 import zipfile
+from collections.abc import Callable
 from typing import Any
 
 from toolkit.report.blocks import Pieces, elements, field, paragraph, placeholder_png, run
@@ -24,8 +25,9 @@ dates = "%Y-%m-%d"
 missing = "n/a"                       # what --allow-missing prints
 required = ["tk:calibration.hash", "tk:calibration.id", "tk:report.id", "tk:test.name"]
 
-[laboratory]
+[laboratory]                          # also: address, place, accreditation, as certificates print them
 name = "Tire Force and Moment Laboratory"
+country = "US"                        # ISO 3166-1: the machine-readable certificate needs it; yours
 
 [units]                               # force = "lbf", moment = "lbf*ft" for a report in those
 force = "N"
@@ -52,6 +54,22 @@ load = 0
 
 def build_default() -> bytes:
     """Return the default template as the bytes of a .docx, the same on every call."""
+    return build_document(
+        title="Tire force and moment test report",
+        body=lambda pieces: [*title_page(pieces), *chapters(pieces)],
+        header=_header,
+        footer=_footer,
+    )
+
+
+def build_document(
+    *,
+    title: str,
+    body: Callable[[Pieces], list[str]],
+    header: Callable[[Pieces], str],
+    footer: Callable[[Pieces], str],
+) -> bytes:
+    """Return a template in the house's layout: an A4 page, its styles, header and footer on every page."""
     import docx
     from docx.opc.constants import RELATIONSHIP_TYPE
     from docx.shared import Mm
@@ -66,17 +84,17 @@ def build_default() -> bytes:
     part = document.part
     image = part.package.get_or_add_image_part(io.BytesIO(placeholder_png()))
     pieces = Pieces(part.relate_to(image, RELATIONSHIP_TYPE.IMAGE))
-    body = document.element.body
-    for element in list(body):
+    story = document.element.body
+    for element in list(story):
         if element.tag != q("w:sectPr"):
-            body.remove(element)
-    for fragment in (*title_page(pieces), *chapters(pieces)):
+            story.remove(element)
+    for fragment in body(pieces):
         for element in elements(fragment):
-            body.insert(len(body) - 1, element)
-    _replace(section.header._element, _header(pieces))
-    _replace(section.footer._element, _footer(pieces))
+            story.insert(len(story) - 1, element)
+    _replace(section.header._element, header(pieces))
+    _replace(section.footer._element, footer(pieces))
     core = document.core_properties
-    core.author, core.title, core.comments = "", "Tire force and moment test report", ""
+    core.author, core.title, core.comments = "", title, ""
     core.created = core.modified = dt.datetime(2026, 11, 21)  # noqa: DTZ001  python-docx wants it naive
     core.revision = 1
     stream = io.BytesIO()

@@ -28,7 +28,6 @@ phase|state of the item: as found, as left, or not stated
 temperature|temperature during the calibration
 reference|reference standard
 reference_certificate|certificate of the reference standard
-reference_due|last day on which the reference standard was valid, as stated
 traceability|statement of metrological traceability
 uncertainty|statement about the expanded uncertainty
 decision_rule|decision rule of the conformity statement, and its risk
@@ -177,10 +176,11 @@ TABLES: Tables = {
         _columns(
             """
             load|load
-            row|number of the check load
-            reference|reference load
-            as_found|deviation as found
-            as_left|deviation as left
+            found_by|record that was in force when the instrument came in
+            as_found|largest deviation as found, by that record
+            at|reference load of the largest deviation as found
+            as_left|largest deviation of the new equation, check loads where there are some
+            tolerance|tolerance
             unit|unit
             """
         ),
@@ -197,8 +197,8 @@ TABLES: Tables = {
 }
 
 REQUIRED = (
-    "title id laboratory address place customer method item calibrated issued checked_by temperature uncertainty "
-    "traceability record_hash ledger_head"
+    "title id laboratory address place customer method item calibrated issued checked_by temperature "
+    "uncertainty traceability record_hash ledger_head"
 ).split()
 
 

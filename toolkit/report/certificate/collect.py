@@ -1,0 +1,249 @@
+"""From a registry's record to a certificate: who may have one, and what it says."""
+
+from __future__ import annotations
+
+import datetime as dt
+import json
+import re
+from typing import TYPE_CHECKING
+
+from toolkit.calibration.control.as_found import as_found, as_found_before
+from toolkit.calibration.records.record import from_bytes
+from toolkit.calibration.registry.gates import unverifiable
+from toolkit.calibration.registry.registry import today
+from toolkit.calibration.registry.stored import stored_check, stored_loads
+from toolkit.calibration.session.statements import Statements, statements_of
+from toolkit.errors import ConfigError, RecordError, ToolkitError
+from toolkit.report.certificate.findings import gap_findings, gaps_of, result_findings, state_findings
+from toolkit.report.certificate.loads import load_results
+from toolkit.report.certificate.model import Certificate
+from toolkit.report.certificate.statements import Stated, read_stated
+
+if TYPE_CHECKING:
+    from toolkit.calibration.control.as_found import AsFound
+    from toolkit.calibration.records.record import CalibrationRecord
+    from toolkit.calibration.registry.registry import Registry
+    from toolkit.calibration.registry.status import RecordStatus
+    from toolkit.report.style import Style
+
+_AMENDED = re.compile(r"(?P<stem>.+)-A(?P<number>[1-9][0-9]*)\Z")
+
+
+def collect(
+    registry: Registry,
+    record_id: str,
+    style: Style,
+    *,
+    issued: dt.date | None = None,
+    draft: bool = False,
+    replaces: str | None = None,
+    amendment: str | None = None,
+) -> Certificate:
+    """Return the certificate of a record.
+
+    Parameters
+    ----------
+    registry : the laboratory's
+    style : for the laboratory's own name, address and place
+    issued : day of issue, and of what was known; default today
+    draft : let a record pass that is not approved; the paper then says that it is no certificate
+    replaces, amendment : the id of the certificate that this one replaces, and why
+
+    Raises
+    ------
+    RegistryError, RecordError
+        no such record, or one that fails a gate; ``certificate-unverified`` a legacy import;
+        ``certificate-candidate`` not approved and no draft; ``certificate-withdrawn`` withdrawn
+    ConfigError
+        a statement that cannot be printed; a replacement without a reason, or the reverse
+    """
+    day = issued or today()
+    record = registry.load(record_id)
+    status = registry.status(record_id, known_at=day)
+    draft = _admit(record, status, day, draft)
+    later = registry.status(record_id)
+    statements = statements_of(record)
+    stated = read_stated(statements.certificate, style, recall=status.recall, where=record.id)
+    loads, check = stored_loads(registry.folder, record), stored_check(registry.folder, record)
+    if loads is None:
+        raise _refused(record.id, "certificate-unverified", "no reference loads", "its reference loads")
+    found = _found(registry, record, statements)
+    results = load_results(
+        record,
+        loads,
+        check,
+        rule=stated.rule if check is not None else None,
+        unverifiable=unverifiable(record, check),
+        found=found,
+        as_left=statements.phase == "as_left",
+    )
+    gaps = gaps_of(record, statements, stated)
+    ledger = registry.ledger(record.instrument)
+    return Certificate(
+        id=_identity(record, stated, replaces, amendment),
+        issued=day,
+        received=stated.received,
+        calibrated=statements.date,
+        approved_on=None if draft else status.known_on,
+        in_force_from=None if draft else status.in_force_from,
+        draft=draft,
+        withdrawn=_withdrawn(later),
+        replaces=replaces,
+        amendment=amendment,
+        laboratory=stated.get("laboratory"),
+        address=stated.get("address"),
+        place=stated.get("place"),
+        country=stated.get("country"),
+        accreditation=stated.get("accreditation"),
+        customer=stated.get("customer"),
+        customer_address=stated.get("customer_address"),
+        item=stated.get("item") or f"Load cells {', '.join(record.indications)} of {record.instrument}",
+        instrument=record.instrument,
+        method=stated.get("method"),
+        model=_model(record),
+        phase=statements.phase,
+        adjustment=_adjustment(statements, found),
+        temperature_C=statements.temperature_C,
+        reference=statements.reference.standard,
+        reference_certificate=statements.reference.certificate,
+        reference_uncertainties=tuple(
+            (one.load, one.U, one.k, record.load(one.load).unit) for one in statements.reference.uncertainties
+        ),
+        rule=stated.rule,
+        interval=stated.interval,
+        opinions=stated.get("opinions"),
+        entered_by=record.entered_by,
+        checked_by=None if draft else status.checked_by,
+        approved_by=None if draft else status.approved_by,
+        status=later.state,
+        record=record.id,
+        record_sha256=record.sha256,
+        record_software=record.software,
+        data=record.data,
+        ledger_head=ledger.head,
+        ledger_count=len(ledger.entries),
+        cells=record.cells,
+        resolutions=tuple(statements.cell(cell.name).resolution for cell in record.cells),
+        loads=results,
+        gaps=gaps,
+        findings=(
+            *stated.findings,
+            *gap_findings(record, gaps),
+            *result_findings(record, results, check is None, stated),
+            *state_findings(record, draft, later, _same_number(registry, record, stated)),
+        ),
+    )
+
+
+def _admit(record: CalibrationRecord, status: RecordStatus, day: dt.date, draft: bool) -> bool:
+    """Return whether the paper is a draft; refuse what may have no certificate at all."""
+    if not record.verified:
+        raise _refused(
+            record.id, "certificate-unverified", "a legacy import, without its reference loads",
+            "a record that reproduces from its own data",
+        )  # fmt: skip
+    if status.state == "withdrawn":
+        raise _refused(
+            record.id, "certificate-withdrawn", f"withdrawn: {status.reason or 'no reason stated'}",
+            "a record that is not withdrawn, or the paper of an earlier day with --known-at",
+        )  # fmt: skip
+    if day < dt.date.fromisoformat(record.date):
+        raise _refused(
+            record.id, "certificate-date", f"an issue on {day.isoformat()}",
+            f"a day not before the calibration on {record.date}",
+        )  # fmt: skip
+    approved = status.state == "approved" and (status.known_on is None or status.known_on <= day)
+    if not approved and not draft:
+        raise _refused(
+            record.id, "certificate-candidate", f"not approved on {day.isoformat()}",
+            "an approved record: 'toolkit calibration approve', or --draft for a paper that says DRAFT",
+        )  # fmt: skip
+    return not approved
+
+
+def _identity(record: CalibrationRecord, stated: Stated, replaces: str | None, amendment: str | None) -> str:
+    """Return the certificate's own id: its number as stated, else of the record; -A1 for an amendment."""
+    if bool(replaces) != bool(amendment):
+        raise ConfigError(
+            "an amended certificate names the one that it replaces, and why",
+            where="--replaces, --amendment-reason",
+            got=f"--replaces {replaces}" if replaces else f"--amendment-reason {amendment!r}",
+            expected="both options",
+            next_step="give --replaces CERT-ID and --amendment-reason TEXT together",
+            rule="usage",
+        )
+    own = stated.get("number") or f"CC-{record.id}-{record.sha256[:8].upper()}"
+    if not replaces:
+        return own
+    match = _AMENDED.match(replaces)
+    stem, number = (match["stem"], int(match["number"])) if match else (replaces, 0)
+    return f"{own}-A{number + 1}" if stem == own else own
+
+
+def _found(registry: Registry, record: CalibrationRecord, statements: Statements) -> AsFound | None:
+    if statements.phase == "as_found":
+        return as_found(registry, record)
+    return as_found_before(registry, record) if statements.phase == "as_left" else None
+
+
+def _adjustment(statements: Statements, found: AsFound | None) -> str:
+    if statements.phase is None:
+        return "No adjustment or repair is stated: the results hold for the item as it was calibrated."
+    if statements.phase == "as_found":
+        text = "The results are those of the item as found, before any adjustment."
+    else:
+        text = "The results are those of the item as left, after adjustment."
+    if found is None:
+        return f"{text} There is no record of the results before the adjustment."
+    if found.reason is not None:
+        return f"{text} As found could not be judged: {found.reason}."
+    return f"{text} As found is judged by {found.record}, the record in force when the item came in."
+
+
+def _same_number(registry: Registry, record: CalibrationRecord, stated: Stated) -> str | None:
+    """Return another record of the instrument whose session states the same number."""
+    number = stated.get("number")
+    if number is None:
+        return None
+    for other in registry.ids(record.instrument):
+        path = registry.folder / record.instrument / f"{other}.json"
+        if other == record.id or not path.is_file():
+            continue
+        try:
+            table = json.loads(from_bytes(path.read_bytes(), where=path).settings).get("certificate", {})
+        except ToolkitError:
+            continue  # 'verify' names a damaged record; this one is not concerned by it
+        if str(table.get("number", "")) == number:
+            return other
+    return None
+
+
+def _withdrawn(status: RecordStatus) -> str | None:
+    if status.state != "withdrawn":
+        return None
+    void = (
+        f", void from {status.void_from.isoformat()}"
+        if status.void_from and not status.void_always
+        else ", void on every day"
+    )
+    known = status.known_on.isoformat() if status.known_on else "an unknown day"
+    return f"{status.id} was withdrawn on {known}{void}: {status.reason or 'no reason stated'}"
+
+
+def _model(record: CalibrationRecord) -> str:
+    terms = record.loads[0].terms
+    method = {"ols": "ordinary", "wls": "weighted", "gls": "generalised"}.get(record.loads[0].method)
+    fit = f"{method} least squares" if method else record.loads[0].method
+    zero = "indications tared before each run" if record.zero == "tared" else "zero of the cells included"
+    return f"load = sum of coefficient x term, {len(terms)} terms a load, fitted by {fit}; {zero}"
+
+
+def _refused(where: str, rule: str, got: str, expected: str) -> RecordError:
+    return RecordError(
+        f"{where} has no calibration certificate",
+        where=where,
+        got=got,
+        expected=expected,
+        next_step="see 'toolkit calibration show' and 'history'; nothing was written",
+        rule=rule,
+    )

@@ -1,0 +1,164 @@
+"""The results of every load: equation, residuals, uncertainty over the range, check loads, adjustment."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from toolkit.calibration.terms import INTERCEPT, parse_term, term_matrix
+from toolkit.calibration.uncertainty.budget import calibration_budget, predict
+from toolkit.report.certificate.decision import decide
+from toolkit.report.certificate.model import Adjustment, CheckLine, Expanded, LoadResult, Part, TermLine
+
+if TYPE_CHECKING:
+    from toolkit.calibration.control.as_found import AsFound
+    from toolkit.calibration.records.record import CalibrationRecord, LoadFit
+    from toolkit.calibration.session.table import Table
+    from toolkit.calibration.uncertainty.model import Budget
+
+
+def load_results(
+    record: CalibrationRecord,
+    loads: Table,
+    check: Table | None,
+    *,
+    rule: str | None,
+    unverifiable: tuple[str, ...],
+    found: AsFound | None,
+    as_left: bool,
+) -> tuple[LoadResult, ...]:
+    """Return the results of every load of a checked record.
+
+    Parameters
+    ----------
+    loads, check : its reference and check loads, in its units
+    rule : decision rule, None where none was agreed
+    unverifiable : terms as "load: term"
+    found : what the session found by the record in force before, where that is known
+    as_left : the record is of the session after the adjustment
+    """
+    return tuple(_load(record, one, loads, check, rule, unverifiable, found, as_left) for one in record.loads)
+
+
+def _load(
+    record: CalibrationRecord,
+    one: LoadFit,
+    loads: Table,
+    check: Table | None,
+    rule: str | None,
+    unverifiable: tuple[str, ...],
+    found: AsFound | None,
+    as_left: bool,
+) -> LoadResult:
+    reference = loads.column(one.load)
+    fitted = term_matrix(one.terms, loads.columns(record.indications)) @ np.asarray(one.coefficients)
+    residuals = fitted - reference
+    tolerance = one.tolerance or 1e-3 * one.largest
+    checks = () if check is None else _checks(record, one, loads, check, rule, tolerance)
+    full = calibration_budget(record, loads, check, one.load)
+    left = [line.deviation for line in checks] or residuals.tolist()
+    errors = one.standard_errors
+    return LoadResult(
+        load=one.load,
+        unit=one.unit,
+        terms=tuple(
+            TermLine(term=t, full=c, issued=i, standard_error=u, unit=_term_unit(record, one, t))
+            for t, c, i, u in zip(one.terms, one.coefficients, one.issued, errors, strict=True)
+        ),
+        method=one.method,
+        n=loads.rows,
+        dof=one.dof or 0,
+        residual_sd=one.residual_sd or 0.0,
+        minimum=float(reference.min()),
+        maximum=float(reference.max()),
+        tolerance=tolerance,
+        references=tuple(reference.tolist()),
+        residuals=tuple(residuals.tolist()),
+        full_scale=_expanded(full),
+        range=tuple(
+            _expanded(calibration_budget(record, loads, check, one.load, at))
+            for at in steps(float(reference.min()), float(reference.max()))
+        ),
+        parts=tuple(
+            Part(
+                name=part.name,
+                evaluation=part.type,
+                distribution=part.distribution,
+                u=part.u,
+                dof=part.dof,
+                share=full.share(part),
+                source=part.source,
+                stated=part.stated,
+            )
+            for part in full.components
+        ),
+        checks=checks,
+        adjustment=_adjustment(one, found, max(left, key=abs) if as_left else None),
+        unverifiable=tuple(
+            name.partition(": ")[2] for name in unverifiable if name.partition(": ")[0] == one.load
+        ),
+    )
+
+
+def steps(low: float, high: float) -> tuple[float, ...]:
+    """Return the loads at which the uncertainty is told: ends, halves and zero, rising.
+
+    >>> steps(-10.0, 20.0), steps(2.0, 20.0)
+    ((-10.0, -5.0, 0.0, 10.0, 20.0), (2.0, 5.0, 10.0, 15.0, 20.0))
+    """
+    if low < 0 < high:
+        return low, low / 2, 0.0, high / 2, high
+    if low >= 0:
+        return low, *(q * high for q in (0.25, 0.5, 0.75) if q * high > low), high
+    return low, *(q * low for q in (0.75, 0.5, 0.25) if q * low < high), high
+
+
+def _checks(
+    record: CalibrationRecord, one: LoadFit, loads: Table, check: Table, rule: str | None, tolerance: float
+) -> tuple[CheckLine, ...]:
+    lines = []
+    cells = check.matrix(record.indications).tolist()
+    for row, (point, reference) in enumerate(zip(cells, check.column(one.load).tolist(), strict=True), 1):
+        told = predict(record, loads, check, one.load, dict(zip(record.indications, point, strict=True)))
+        uncertainty = _expanded(told.budget)
+        stated = rule is not None and not told.beyond
+        lines.append(
+            CheckLine(
+                row=row,
+                reference=reference,
+                result=told.budget.at,
+                uncertainty=uncertainty,
+                beyond=told.beyond,
+                verdict=decide(rule, told.budget.at - reference, tolerance, uncertainty.U)
+                if stated and rule
+                else None,
+            )
+        )
+    return tuple(lines)
+
+
+def _expanded(budget: Budget) -> Expanded:
+    return Expanded(at=budget.at, U=budget.U, k=budget.k, probability=budget.probability, dof=budget.dof)
+
+
+def _adjustment(one: LoadFit, found: AsFound | None, left: float | None) -> Adjustment | None:
+    told = next((o for o in found.loads if o.load == one.load), None) if found else None
+    if told is None or found is None or found.record is None:
+        return None
+    return Adjustment(
+        found_by=found.record,
+        as_found=told.max_error,
+        at=told.reference[told.worst_row - 1],
+        as_left=left,
+    )
+
+
+def _term_unit(record: CalibrationRecord, one: LoadFit, term: str) -> str:
+    if term == INTERCEPT:
+        return one.unit
+    units = dict(zip(record.indications, record.indication_units, strict=True))
+    parsed = parse_term(term)
+    factors = [f"({units[name]})" + (f"^{power}" if power > 1 else "") for name, power in parsed.powers]
+    factors += [f"({units[name]})" for name in parsed.absolutes]
+    return f"{one.unit}/" + (factors[0] if len(factors) == 1 else "(" + "*".join(factors) + ")")
