@@ -10,7 +10,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from toolkit.calibration.fit.adequacy import COLLINEAR_FINDING
+from toolkit.calibration.fit.balance_report import balance_findings
 from toolkit.calibration.fit.diagnostics import repeated_share
+from toolkit.calibration.fit.levels import lack_of_fit, load_levels
+from toolkit.calibration.fit.recommend import NEGLIGIBLE_PERCENT, recommend_drop, recommend_wider
+from toolkit.calibration.fit.robust import hidden_outliers, robust_weights
 from toolkit.findings import Finding
 
 if TYPE_CHECKING:
@@ -25,7 +29,7 @@ _RISK = 0.01
 def session_findings(fit: SessionFit) -> tuple[Finding, ...]:
     """Return the findings of a session's data and fit."""
     session = fit.session
-    found = [*_data_findings(session), *_model_findings(fit)]
+    found = [*_data_findings(session), *_model_findings(fit), *balance_findings(fit)]
     if fit.condition_number > COLLINEAR_FINDING:
         message = (
             f"condition number {fit.condition_number:.3g} of the indications, over {COLLINEAR_FINDING:g}"
@@ -33,6 +37,7 @@ def session_findings(fit: SessionFit) -> tuple[Finding, ...]:
         found.append(Finding(rule="collinear", where=session.path.name, message=message))
     for one in fit.loads:
         found += _load_findings(session, one)
+    found += _robust_findings(fit)
     return tuple(found)
 
 
@@ -79,41 +84,88 @@ def _load_findings(session: Session, one: LoadResult) -> list[Finding]:
             )
             found.append(Finding(rule="check-load", where=f"{name}, check row {row + 1}", message=message))
     spread = one.diagnostics.heteroscedasticity
-    if spread is not None and spread < _RISK and session.method == "ols":
+    if spread is not None and spread < _RISK / len(session.loads) and session.method == "ols":
         message = 'the scatter grows or shrinks with the load; consider method = "wls" with u_ columns'
         found.append(Finding(rule="method", where=name, message=message, level="note"))
     return found
 
 
 def _model_findings(fit: SessionFit) -> list[Finding]:
-    """Recommend the next model where it fits better beyond chance (F test on the added terms)."""
-    from scipy.special import fdtrc
-
-    from toolkit.calibration.fit.regression import fit_terms
-    from toolkit.calibration.terms import model_terms
-
+    """Recommend other terms, each with the lines to write; the fit stays as the session names it."""
     session = fit.session
-    if session.model == "balance" or session.method != "ols":
+    if session.method not in ("ols", "wls"):
         return []
-    degree = session.degree + 1
-    terms = model_terms("polynomial", session.indications, degree=degree)
-    extra = len(terms) - len(session.terms)
-    columns = session.table.columns(session.indications)
     found: list[Finding] = []
-    for one in fit.loads:
-        if one.fit.dof <= extra + 1 or one.fit.residual_sd <= 1e-12 * one.setting.tolerance:
-            continue
-        try:
-            wider = fit_terms(terms=terms, columns=columns, load=session.table.column(one.setting.name))
-        except np.linalg.LinAlgError:
-            continue
-        rest = wider.residual_sd**2
-        gain = one.fit.residual_sd**2 * one.fit.dof - rest * wider.dof
-        ratio = gain / extra / rest if rest > 0 else 0.0
-        probability = float(fdtrc(extra, wider.dof, max(ratio, 0.0)))
-        if probability < _RISK / 10:
-            message = (
-                f"degree {degree} is recommended: it fits better (F = {ratio:.3g}, p = {probability:.1g})"
-            )
-            found.append(Finding(rule="model", where=one.setting.name, message=message, level="note"))
+    wider = recommend_wider(fit)
+    if wider is not None:
+        message = (
+            f"{wider.name} fits better than chance: F = {wider.F:.3g}, p = {wider.probability:.1g}, residual "
+            f"sd {wider.before_percent_fs:.3g} -> {wider.after_percent_fs:.3g} % of full scale; "
+            f"to use it write in SESSION.toml: {_inline(wider.lines)}"
+        )
+        where = ", ".join(wider.loads)
+        found.append(Finding(rule="model", where=where, message=message, level="note"))
+    spare = recommend_drop(fit)
+    if spare is not None:
+        small = f"under {NEGLIGIBLE_PERCENT:g} % of full scale in every load"
+        groups = {
+            f"{small} and significant in none": [t for t in spare.small if t in spare.idle],
+            small: [t for t in spare.small if t not in spare.idle],
+            "significant in no load": [t for t in spare.idle if t not in spare.small],
+        }
+        parts = [f"{', '.join(terms)} ({why})" for why, terms in groups.items() if terms]
+        message = (
+            f"candidates to drop: {'; '.join(parts)}; all at once: p = {spare.probability:.1g}; "
+            f"to drop them write in SESSION.toml: {_inline(spare.lines)}"
+        )
+        found.append(Finding(rule="terms", where=session.path.name, message=message, level="note"))
+    if wider is None:
+        found += _misfits(fit)
     return found
+
+
+def _misfits(fit: SessionFit) -> list[Finding]:
+    table = fit.session.table
+    level = load_levels(table.matrix([one.name for one in fit.session.loads]))
+    found = []
+    for one in fit.loads:
+        lack = lack_of_fit(one.fit, level)
+        # Scatter that is rounding has no pure error to judge by.
+        if lack is None or one.fit.residual_sd <= 1e-9 * one.setting.tolerance:
+            continue
+        if lack.probability < _RISK / len(fit.loads):
+            message = (
+                f"levels differ by more than their own scatter (F = {lack.F:.3g} with {lack.lack_dof} and "
+                f"{lack.pure_dof} degrees of freedom, p = {lack.probability:.1g}), and no model that a "
+                "session can name fits better: look at the residuals against the load and against the order"
+            )
+            found.append(Finding(rule="lack-of-fit", where=one.setting.name, message=message, level="note"))
+    return found
+
+
+def _robust_findings(fit: SessionFit) -> list[Finding]:
+    """Point at rows that hide each other; those already named as outliers are not named twice."""
+    columns = fit.session.table.columns(fit.session.indications)
+    found = []
+    for one in fit.loads:
+        load = fit.session.table.column(one.setting.name)
+        weights = robust_weights(one.fit, columns=columns, load=load)
+        hidden = hidden_outliers(one.fit, weights, columns=columns)
+        rows = [row for row in hidden if row not in one.diagnostics.outliers]
+        if rows:
+            message = (
+                f"row{'s' if len(rows) > 1 else ''} {_some(rows)}: almost no weight in a robust fit "
+                "(Huber, then Tukey's biweight); rows that are wrong together hide from the ordinary "
+                "residuals. The fit is unchanged: look at these loadings"
+            )
+            found.append(Finding(rule="robust", where=one.setting.name, message=message, level="note"))
+    return found
+
+
+def _some(rows: list[int], most: int = 20) -> str:
+    text = ", ".join(str(row) for row in rows[:most])
+    return text if len(rows) <= most else f"{text} and {len(rows) - most} more"
+
+
+def _inline(lines: str) -> str:
+    return "; ".join(lines.split("\n"))

@@ -1,0 +1,304 @@
+"""Recommend another set of terms, and never take it: the session decides.
+
+Wider models are compared with the session's by the F test of nested models, Holm's step-down procedure
+holding the risk that a sound session is told anything at RISK over all loads and models. Of the better models
+on which no wider one improves, that of the least Bayesian information criterion is named. Terms beyond the
+linear ones are candidates to drop where they are worth under 0.05 % of full scale in every load (AIAA R-091),
+or are significant in none.
+
+References: Holm, Scandinavian Journal of Statistics 6 (1979); AIAA R-091A-2020; Draper and Smith, Applied
+Regression Analysis (1998), ch. 6.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from toolkit.calibration.fit.adequacy import RANK, terms_condition_number
+from toolkit.calibration.fit.basis import build_basis
+from toolkit.calibration.terms import INTERCEPT, model_terms, term_matrix
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from toolkit.calibration.fit.regression import TermFit
+    from toolkit.calibration.fit.session_fit import LoadResult, SessionFit
+    from toolkit.calibration.session.read import Session
+
+RISK = 0.01
+NEGLIGIBLE_PERCENT = 0.05
+HIGHEST_DEGREE = 5
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Wider:
+    """A model that fits better. ``lines`` go into SESSION.toml; ``loads`` are those that gain.
+
+    ``F`` and ``probability`` (Holm's, over all comparisons) are of the load that gains most,
+    ``before_percent_fs`` and ``after_percent_fs`` its residual standard deviation.
+    """
+
+    name: str
+    lines: str
+    loads: tuple[str, ...]
+    F: float
+    probability: float
+    before_percent_fs: float
+    after_percent_fs: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Droppable:
+    """Terms that may go. ``small``: under 0.05 % of full scale in every load; ``idle``: significant in none.
+
+    ``probability`` is the smallest over the loads of the F test that drops them all at once.
+    """
+
+    small: tuple[str, ...]
+    idle: tuple[str, ...]
+    lines: str
+    probability: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Sum:
+    """The (weighted) sum of squared residuals of a fit, its rows and degrees of freedom."""
+
+    squares: float
+    rows: int
+    dof: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Model:
+    name: str
+    lines: str
+    terms: tuple[str, ...]
+
+
+def holm(probabilities: Sequence[float]) -> tuple[float, ...]:
+    """Return Holm's adjusted probabilities, in the order given.
+
+    >>> holm([0.01, 0.04, 0.03])
+    (0.03, 0.06, 0.06)
+    """
+    count, worst = len(probabilities), 0.0
+    adjusted = [0.0] * count
+    for rank, i in enumerate(sorted(range(count), key=lambda i: probabilities[i])):
+        worst = max(worst, min(1.0, (count - rank) * probabilities[i]))
+        adjusted[i] = worst
+    return tuple(adjusted)
+
+
+def recommend_wider(fit: SessionFit) -> Wider | None:
+    """Return the simplest wider model on which no other improves; None where the session's is as good."""
+    session, columns = fit.session, fit.session.table.columns(fit.session.indications)
+    loads = [one for one in fit.loads if not _exact(one)]
+    own = _Model(name="session", lines="", terms=session.terms)
+    models = [m for m in _models(session) if _determined(m.terms, columns)]
+    if not models or not loads:
+        return None
+    solved = {(own.name, one.setting.name): _sum_of(one.fit) for one in loads}
+    for model in models:
+        sums = _refit(fit, loads, model.terms, columns)
+        solved |= {(model.name, one.setting.name): found for one, found in zip(loads, sums, strict=True)}
+    better = _better(own, models, loads, solved)
+    enough = [
+        m
+        for m in models
+        if m.name in better
+        and not _better(m, [n for n in models if set(m.terms) < set(n.terms)], loads, solved)
+    ]
+    if not enough:
+        return None
+    model = min(enough, key=lambda m: _information([solved[m.name, one.setting.name] for one in loads]))
+    rows = better[model.name]
+    ratio, probability, most = min(rows, key=lambda row: (row[1], -row[0]))
+    full = float(np.abs(session.table.column(most)).max())
+    before = 100 * next(one.fit.residual_sd for one in loads if one.setting.name == most) / full
+    old, new = solved[own.name, most], solved[model.name, most]
+    shrink = float(np.sqrt(new.squares / new.dof / (old.squares / old.dof)))
+    return Wider(
+        name=model.name,
+        lines=model.lines,
+        loads=tuple(name for _, p, name in rows if p < RISK),
+        F=ratio,
+        probability=probability,
+        before_percent_fs=before,
+        after_percent_fs=before * shrink,
+    )
+
+
+def recommend_drop(fit: SessionFit) -> Droppable | None:
+    """Return the terms beyond the linear ones that the data do not need; None where every one is needed.
+
+    The indications themselves and the constant stay: they are the instrument and its zero.
+    """
+    session, columns = fit.session, fit.session.table.columns(fit.session.indications)
+    higher = [name for name in session.terms if name not in (*session.indications, INTERCEPT)]
+    loads = [one for one in fit.loads if not _exact(one)]
+    if not higher or not loads:
+        return None
+    extent = dict(zip(session.terms, np.abs(term_matrix(session.terms, columns)).max(axis=0), strict=True))
+    small, tests = set(higher), []
+    for one in loads:
+        full = float(np.abs(session.table.column(one.setting.name)).max())
+        named = dict(zip(session.terms, one.fit.coefficients, strict=True))
+        error = dict(zip(session.terms, one.fit.standard_errors.tolist(), strict=True))
+        small -= {t for t in higher if 100 * abs(named[t]) * extent[t] >= NEGLIGIBLE_PERCENT * full}
+        tests += [(t, _two_sided(named[t] / error[t], one.fit)) for t in higher]
+    adjusted = holm([p for _, p in tests])
+    needed = {t for (t, _), p in zip(tests, adjusted, strict=True) if p < RISK}
+    idle = [t for t in higher if t not in needed]
+    out = [t for t in higher if t in small or t in idle]
+    if not out:
+        return None
+    left = tuple(t for t in session.terms if t not in out)
+    ratios = [
+        _f_test(narrow, _sum_of(one.fit))
+        for narrow, one in zip(_refit(fit, loads, left, columns), loads, strict=True)
+    ]
+    if idle and min(p for _, p in ratios) < RISK / len(loads):
+        # Parallel terms share their effect: each seems idle while the other is there.
+        out = [t for t in higher if t in small]
+        idle = [t for t in idle if t in small]
+        if not out:
+            return None
+        left = tuple(t for t in session.terms if t not in out)
+        ratios = [
+            _f_test(narrow, _sum_of(one.fit))
+            for narrow, one in zip(_refit(fit, loads, left, columns), loads, strict=True)
+        ]
+    base = model_terms(session.model, session.indications, degree=session.degree)
+    dropped = [t for t in base if t not in session.terms]
+    keeps = [t for t in left if t not in (*session.indications, INTERCEPT)]
+    return Droppable(
+        small=tuple(t for t in out if t in small),
+        idle=tuple(idle),
+        lines=_lines("linear", [t for t in dropped if t in (*session.indications, INTERCEPT)])
+        if not keeps
+        else _drop_line([*dropped, *out]),
+        probability=min(p for _, p in ratios),
+    )
+
+
+def _models(session: Session) -> list[_Model]:
+    """Return the models that a session may name and that hold all of its own terms, simplest first."""
+    names, own, degree = session.indications, set(session.terms), session.degree
+    linear = model_terms("linear", names)
+    balance = model_terms("balance", names)
+    # What the session leaves out of the linear part on purpose stays out.
+    gone = [t for t in linear if t not in own]
+    found = []
+    cross = [t for t in balance if "*" in t and "abs" not in t]
+    squares = [t for t in balance if t.endswith("^2")]
+    for name, added in (("interaction", cross), ("interaction and squares", cross + squares)):
+        wanted = own | set(added)
+        if cross and wanted <= set(balance):
+            kept = tuple(t for t in balance if t in wanted)
+            drop = [t for t in balance if t not in wanted]
+            found.append(_Model(name=name, lines=_lines("balance", drop), terms=kept))
+    for higher in range(max(degree, 1) + 1, min(max(degree, 1) + 2, HIGHEST_DEGREE) + 1):
+        terms = model_terms("polynomial", names, degree=higher, drop=gone)
+        lines = f'model = "polynomial"\ndegree = {higher}' + ("\n" + _drop_line(gone) if gone else "")
+        found.append(_Model(name=f"degree {higher}", lines=lines, terms=terms))
+    terms = tuple(t for t in balance if t not in gone)
+    found.append(_Model(name="balance", lines=_lines("balance", gone), terms=terms))
+    return [m for m in found if own < set(m.terms)]
+
+
+def _better(
+    base: _Model,
+    models: Sequence[_Model],
+    loads: Sequence[LoadResult],
+    solved: Mapping[tuple[str, str], _Sum],
+) -> dict[str, list[tuple[float, float, str]]]:
+    """Return the models that fit better beyond chance: (F, Holm's probability, load) of every load."""
+    tests = [
+        (m.name, load, *_f_test(solved[base.name, load], solved[m.name, load]))
+        for m in models
+        for load in (one.setting.name for one in loads)
+    ]
+    rows: dict[str, list[tuple[float, float, str]]] = {}
+    for (name, load, ratio, _), p in zip(tests, holm([t[3] for t in tests]), strict=True):
+        rows.setdefault(name, []).append((ratio, p, load))
+    return {name: found for name, found in rows.items() if min(p for _, p, _ in found) < RISK}
+
+
+def _f_test(narrow: _Sum, wide: _Sum) -> tuple[float, float]:
+    """Return F and its probability that the wide model's further terms gain nothing."""
+    from scipy.special import fdtrc
+
+    extra = narrow.dof - wide.dof
+    if wide.squares <= 0:
+        return float("inf"), 0.0
+    ratio = max((narrow.squares - wide.squares) / extra / (wide.squares / wide.dof), 0.0)
+    return ratio, float(fdtrc(extra, wide.dof, ratio))
+
+
+def _information(sums: Sequence[_Sum]) -> float:
+    """Return the Bayesian information criterion, summed over the loads (Schwarz, Ann. Statist. 6, 1978)."""
+    tiny = float(np.finfo(float).tiny)
+    return sum(
+        one.rows * float(np.log(max(one.squares, tiny) / one.rows))
+        + (one.rows - one.dof) * float(np.log(one.rows))
+        for one in sums
+    )
+
+
+def _sum_of(fit: TermFit) -> _Sum:
+    return _Sum(squares=float(fit.scaled @ fit.scaled), rows=len(fit.residuals), dof=fit.dof)
+
+
+def _two_sided(t: float, fit: TermFit) -> float:
+    from scipy.special import ndtr, stdtr
+
+    return 2 * float(ndtr(-abs(t)) if fit.weights is not None else stdtr(fit.dof, -abs(t)))
+
+
+def _refit(
+    fit: SessionFit,
+    loads: Sequence[LoadResult],
+    terms: tuple[str, ...],
+    columns: Mapping[str, NDArray[np.float64]],
+) -> list[_Sum]:
+    """Return what other terms leave over of each load; the coefficients themselves are not wanted."""
+    table, design = fit.session.table, build_basis(terms, columns).design
+    sums, q = [], None
+    for one in loads:
+        root = None if one.fit.weights is None else np.sqrt(one.fit.weights)
+        if q is None or root is not None:
+            q, _ = np.linalg.qr(design if root is None else design * root[:, None])
+        load = table.column(one.setting.name) * (1.0 if root is None else root)
+        rest = load - q @ (q.T @ load)
+        sums.append(_Sum(squares=float(rest @ rest), rows=len(rest), dof=len(rest) - len(terms)))
+    return sums
+
+
+def _exact(one: LoadResult) -> bool:
+    # The tolerance is 0.1 % of full scale unless stated: scatter this small is rounding of the arithmetic.
+    return one.fit.residual_sd <= 1e-9 * one.setting.tolerance
+
+
+def _determined(terms: tuple[str, ...], columns: Mapping[str, NDArray[np.float64]]) -> bool:
+    matrix = term_matrix(terms, columns)
+    if len(matrix) - len(terms) < 3:
+        return False
+    if terms[-1] == INTERCEPT:
+        matrix = matrix - np.append(matrix[:, :-1].mean(axis=0), 0.0)
+    # A column that only rounding tells from zero is undetermined too.
+    if (np.abs(matrix).max(axis=0) == 0).any():
+        return False
+    return bool(terms_condition_number(matrix) < RANK**-0.5)
+
+
+def _lines(model: str, drop: Sequence[str]) -> str:
+    return f'model = "{model}"' + ("\n" + _drop_line(drop) if drop else "")
+
+
+def _drop_line(terms: Sequence[str]) -> str:
+    return "drop = [" + ", ".join(f'"{term}"' for term in dict.fromkeys(terms)) + "]"

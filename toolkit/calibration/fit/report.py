@@ -1,0 +1,242 @@
+"""The report of a fit as a value: everything that `metrology` lists, one `FitReport` a load.
+
+Formulas: Cook and Weisberg, Residuals and Influence in Regression (1982), for influence; Allen, Technometrics
+16 (1974), for PRESS; Breusch and Pagan, Econometrica 47 (1979); Shapiro and Wilk, Biometrika 52 (1965).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from toolkit.calibration.fit.levels import LackOfFit, Reversal, lack_of_fit, load_levels, reversals
+from toolkit.calibration.fit.robust import robust_weights
+from toolkit.calibration.terms import term_matrix
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from numpy.typing import NDArray
+
+    from toolkit.calibration.fit.regression import TermFit
+    from toolkit.calibration.fit.session_fit import LoadResult, SessionFit
+
+COVERAGE = 0.95
+_SHAPIRO_ROWS = 5000
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Coefficient:
+    """One term. ``value``, ``standard_error`` and ``extent`` in the session's own units.
+
+    ``t`` = value / standard error. ``sign_confidence`` is the probability that the true coefficient has the
+    sign of ``value``: Student's distribution function at |t| with the fit's degrees of freedom (normal where
+    the covariance follows from stated uncertainties), for a flat prior; 0.5 tells nothing of the sign.
+    ``percent_fs`` is 100 |value| max|term| / max|load|: what the term is worth.
+    """
+
+    term: str
+    value: float
+    standard_error: float
+    t: float
+    sign_confidence: float
+    percent_fs: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class FitReport:
+    """One load's fit, told completely. Rows are those of the data file, in its order.
+
+    Parameters
+    ----------
+    load, unit, full_scale : name; unit; largest absolute reference load
+    coefficients, covariance, correlation : by term, in the order of ``coefficients``; (terms, terms)
+    n, dof, residual_sd, r_squared : rows; n - terms; [unit]; share of the load's variation explained
+    condition_number, condition_number_terms, vif : as `adequacy` defines them; ``vif`` one an indication
+    reference, fitted, residuals : [unit] (rows,); residual = reference - fitted
+    leverage, internal, external, cook : (rows,); studentised residuals by all rows, by the others alone
+    robust_weight : biweight (rows,), None where not judged; a small one points at the row
+    direction : up, down by row, None where the file has no such column
+    press : root mean square of the leave-one-out residuals [unit]
+    predicted_r_squared : 1 - sum of squared leave-one-out residuals / variation of the load
+    heteroscedasticity : Breusch-Pagan probability of scatter that does not depend on |load|; None under ten
+        rows or where the scatter is rounding
+    normality : (statistic W, probability) of Shapiro and Wilk on the internal residuals, None under eight
+        or over 5000 rows
+    lack_of_fit : see `levels`; None without replicated levels
+    levels, replicated_rows : load levels with two rows or more; rows in them
+    prediction_half_width : 95 % prediction interval's half width at the row of the largest load [unit]
+    check_reference, check_percent_fs : check loads [unit], 100 (fitted - reference) / full scale (checks,)
+    tolerance_percent_fs : that of the check loads
+    reversals, reversibility_percent_fs : loading against unloading by level; the largest in size
+    noise_free : the scatter is rounding, and no test says anything
+    """
+
+    load: str
+    unit: str
+    full_scale: float
+    coefficients: tuple[Coefficient, ...]
+    covariance: NDArray[np.float64]
+    correlation: NDArray[np.float64]
+    n: int
+    dof: int
+    residual_sd: float
+    r_squared: float
+    condition_number: float
+    condition_number_terms: float
+    vif: tuple[tuple[str, float], ...]
+    reference: NDArray[np.float64]
+    fitted: NDArray[np.float64]
+    residuals: NDArray[np.float64]
+    leverage: NDArray[np.float64]
+    internal: NDArray[np.float64]
+    external: NDArray[np.float64]
+    cook: NDArray[np.float64]
+    robust_weight: NDArray[np.float64] | None
+    outliers: tuple[int, ...]
+    direction: tuple[str, ...] | None
+    press: float
+    predicted_r_squared: float
+    heteroscedasticity: float | None
+    normality: tuple[float, float] | None
+    lack_of_fit: LackOfFit | None
+    levels: int
+    replicated_rows: int
+    prediction_half_width: float
+    check_reference: NDArray[np.float64] | None
+    check_percent_fs: NDArray[np.float64] | None
+    tolerance_percent_fs: float
+    reversals: tuple[Reversal, ...]
+    reversibility_percent_fs: float | None
+    noise_free: bool
+
+
+def report_session(fit: SessionFit) -> tuple[FitReport, ...]:
+    """Return the report of every load of a fitted session."""
+    table = fit.session.table
+    level = load_levels(table.matrix([load.name for load in fit.session.loads]))
+    return tuple(_report(fit, one, level) for one in fit.loads)
+
+
+def prediction_half_width(
+    fit: TermFit, columns: Mapping[str, NDArray[np.float64]], *, coverage: float = COVERAGE
+) -> NDArray[np.float64]:
+    """Return the half width of the prediction interval at indications (points,), in the load's unit.
+
+    t(coverage, dof) sqrt(s^2 + x' V x) with V the coefficients' covariance: where one further reading at
+    these indications will lie. s is the residual standard deviation; in a weighted fit the root mean square
+    of the stated uncertainties, with the normal quantile.
+    """
+    from scipy.special import ndtri, stdtrit
+
+    x = term_matrix(fit.terms, columns)
+    share = (1 + coverage) / 2
+    if fit.weights is None:
+        scatter, factor = fit.residual_sd**2, float(stdtrit(fit.dof, share))
+    else:
+        scatter, factor = float(np.mean(1 / fit.weights)), float(ndtri(share))
+    variance = np.einsum("ij,jk,ik->i", x, fit.covariance, x)
+    half: NDArray[np.float64] = factor * np.sqrt(scatter + np.maximum(variance, 0.0))
+    return half
+
+
+def coefficient_rows(fit: TermFit, extent: NDArray[np.float64], full_scale: float) -> tuple[Coefficient, ...]:
+    """Return the coefficients with what is known of each; ``extent`` is max|term| (terms,)."""
+    from scipy.special import ndtr, stdtr
+
+    value, error = np.asarray(fit.coefficients), fit.standard_errors
+    with np.errstate(divide="ignore", invalid="ignore"):
+        t = np.where(error > 0, value / error, np.where(value == 0, 0.0, np.copysign(np.inf, value)))
+    sure = ndtr(np.abs(t)) if fit.weights is not None else stdtr(fit.dof, np.abs(t))
+    worth = 100 * np.abs(value) * extent / full_scale
+    rows = zip(fit.terms, value, error, t, sure, worth, strict=True)
+    return tuple(
+        Coefficient(
+            term=name, value=float(c), standard_error=float(u), t=float(ratio),
+            sign_confidence=float(p), percent_fs=float(w),
+        )
+        for name, c, u, ratio, p, w in rows
+    )  # fmt: skip
+
+
+def _report(fit: SessionFit, one: LoadResult, level: NDArray[np.int64] | None) -> FitReport:
+    session, table, solved, more = fit.session, fit.session.table, one.fit, one.diagnostics
+    load = table.column(one.setting.name)
+    columns = table.columns(session.indications)
+    full = float(np.abs(load).max())
+    extent = np.abs(term_matrix(solved.terms, columns)).max(axis=0)
+    noise_free = solved.residual_sd <= 1e-12 * full
+    total, within, left_out = _sums(solved, load, weighted=session.method == "wls")
+    error = solved.standard_errors
+    size = np.where(error > 0, error, 1.0)
+    found = reversals(
+        residuals=solved.residuals, load=load, level=level, direction=table.direction, run=table.run
+    )
+    sizes = np.array([]) if level is None else np.bincount(level)
+    at = int(np.argmax(np.abs(load)))
+    check = session.check
+    return FitReport(
+        load=one.setting.name,
+        unit=one.setting.unit,
+        full_scale=full,
+        coefficients=coefficient_rows(solved, extent, full),
+        covariance=solved.covariance,
+        correlation=solved.covariance / np.outer(size, size),
+        n=len(load),
+        dof=solved.dof,
+        residual_sd=solved.residual_sd,
+        r_squared=1 - within / total,
+        condition_number=fit.condition_number,
+        condition_number_terms=fit.condition_number_terms,
+        vif=tuple(zip(session.indications, fit.vif, strict=True)),
+        reference=load,
+        fitted=load - solved.residuals,
+        residuals=solved.residuals,
+        leverage=solved.leverage,
+        internal=more.internal,
+        external=more.external,
+        cook=more.cook,
+        robust_weight=robust_weights(solved, columns=columns, load=load),
+        outliers=more.outliers,
+        direction=table.direction,
+        press=more.press,
+        predicted_r_squared=1 - left_out / total,
+        heteroscedasticity=more.heteroscedasticity,
+        normality=None if noise_free else _normality(more.internal),
+        lack_of_fit=None if noise_free else lack_of_fit(solved, level),
+        levels=int(np.count_nonzero(sizes > 1)),
+        replicated_rows=int(sizes[sizes > 1].sum()),
+        prediction_half_width=float(
+            prediction_half_width(solved, {name: column[[at]] for name, column in columns.items()})[0]
+        ),
+        check_reference=None if check is None else check.column(one.setting.name),
+        check_percent_fs=None if one.check_residuals is None else 100 * one.check_residuals / full,
+        tolerance_percent_fs=100 * one.setting.tolerance / full,
+        reversals=found,
+        reversibility_percent_fs=max((r.percent_fs for r in found), key=abs, default=None),
+        noise_free=noise_free,
+    )
+
+
+def _sums(fit: TermFit, load: NDArray[np.float64], *, weighted: bool) -> tuple[float, float, float]:
+    """Return the squares of the load about its mean, of the residuals, and of those left out."""
+    w = fit.weights if weighted and fit.weights is not None else np.ones(len(load))
+    # Without a constant the origin is the model's own zero.
+    middle = float(np.average(load, weights=w)) if fit.terms[-1] == "intercept" else 0.0
+    left_out = fit.residuals / (1 - np.minimum(fit.leverage, 1 - 1e-12))
+    return (
+        float(np.sum(w * (load - middle) ** 2)),
+        float(np.sum(w * fit.residuals**2)),
+        float(np.sum(w * left_out**2)),
+    )
+
+
+def _normality(internal: NDArray[np.float64]) -> tuple[float, float] | None:
+    if not 8 <= len(internal) <= _SHAPIRO_ROWS:
+        return None
+    from scipy.stats import shapiro
+
+    result = shapiro(internal)
+    return float(result.statistic), float(result.pvalue)
