@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from toolkit.cli.console import Calibrations, Home, Json, Quiet, answer, exit_code, finding_lines, table
+from toolkit.cli.fit_report import Figures, Full, check_folder, tell
 from toolkit.cli.home import calibrations_folder
 
 if TYPE_CHECKING:
@@ -20,6 +21,8 @@ def command(
     session: Annotated[Path, typer.Argument(help="SESSION.toml, with its CSV files beside it.")],
     calibrations: Calibrations = None,
     out: Annotated[Path | None, typer.Option("--out", help="Another name for --calibrations.")] = None,
+    full: Full = False,
+    figures: Figures = None,
     home: Home = None,
     as_json: Json = False,
     quiet: Quiet = False,
@@ -33,9 +36,17 @@ def command(
         registry = Registry(folder)
     else:
         registry = Registry(calibrations_folder(folder, home))
+    check_folder(figures)
     made = calibrate(session, registry)
     status = registry.status(made.record.id).state
-    answer(_payload(made, status), _text(made, status), as_json=as_json, quiet=quiet)
+    payload, text = _payload(made, status), _text(made, status)
+    if full or as_json or figures is not None:
+        told = tell(made.fit, title=made.record.id, full=full, figures=figures)
+        for name, report in told.loads.items():
+            payload["loads"][name]["report"] = report
+        payload |= told.payload
+        text += told.text
+    answer(payload, text, as_json=as_json, quiet=quiet)
     return 0 if made.existing else exit_code(made.findings)
 
 
