@@ -9,7 +9,8 @@ from toolkit.tires import Curve
 from toolkit.tires.mf61 import aligning, lateral
 from toolkit.tires.mf61_fit import fit_mf61
 from toolkit.tires.models.magic_formula import value
-from toolkit.tires.tir import read_tir, tir_text, write_tir
+from toolkit.tires.tir import read_tir
+from toolkit.tires.tir_write import tir_text, write_tir
 
 F0 = 4000.0
 P = {

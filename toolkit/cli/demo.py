@@ -252,7 +252,7 @@ def _tire_file(resolved: Resolved, path: Path) -> str:
     from toolkit.reduction.averaging import free_radius_m
     from toolkit.tires.mf61_fit import fit_mf61
     from toolkit.tires.model import Curve
-    from toolkit.tires.tir import write_tir
+    from toolkit.tires.tir_write import write_tir
 
     reduced = resolved.result.reduced
     curves = [

@@ -33,11 +33,16 @@ _SHAPE = "a header such as 'SA [deg],FZ [N],FY [N],MZ [N*m]' and rows of numbers
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class TireTable:
-    """A table in SI: ``columns`` by symbol (rows,), in the declared ``axes``; FZ is the positive load."""
+    """A table in SI: ``columns`` by symbol (rows,), in the declared ``axes``; FZ is the positive load.
+
+    ``header`` and ``cells`` are the same as written, so that a grid comes back with its own digits.
+    """
 
     path: Path
     axes: Axes
     columns: tuple[tuple[str, NDArray[np.float64]], ...]
+    header: tuple[str, ...] = ()
+    cells: tuple[tuple[str, ...], ...] = ()
 
     def get(self, symbol: str) -> NDArray[np.float64] | None:
         """Return a column [SI], None where the table has none."""
@@ -48,13 +53,16 @@ class TireTable:
         return dict(self.columns)[symbol]
 
 
-def read_table(path: Path, *, axes: str = "SAE", required: tuple[str, ...] = ("SA", "FZ")) -> TireTable:
+def read_table(
+    path: Path, *, axes: str = "SAE", required: tuple[str, ...] = ("SA", "FZ"), measured: bool = True
+) -> TireTable:
     """Read a table; all of it or nothing.
 
     Parameters
     ----------
     axes : the axis system that the table is in
-    required : columns that it must have; one of FY and MZ too, unless none is asked for besides SA and FZ
+    required : columns that it must have
+    measured : one of FY and MZ too; False for a grid, which has only slips and loads
 
     Raises
     ------
@@ -96,7 +104,7 @@ def read_table(path: Path, *, axes: str = "SAE", required: tuple[str, ...] = ("S
                 ", ".join(header),
                 f"{symbol} [unit]",
             )
-    if not {"FY", "MZ"} & set(symbols):
+    if measured and not {"FY", "MZ"} & set(symbols):
         _refuse(
             path, "missing-column", "the table has neither FY nor MZ", ", ".join(header), "FY [N] or MZ [N*m]"
         )
@@ -110,7 +118,13 @@ def read_table(path: Path, *, axes: str = "SAE", required: tuple[str, ...] = ("S
     for (symbol, factor, offset), column in zip(names, values, strict=True):
         si = column * factor + offset
         columns.append((symbol, np.abs(si) if symbol == "FZ" else si))
-    return TireTable(path=path, axes=_AXES[axes], columns=tuple(columns))
+    return TireTable(
+        path=path,
+        axes=_AXES[axes],
+        columns=tuple(columns),
+        header=tuple(cell.strip() for cell in header),
+        cells=tuple(tuple(cell.strip() for cell in cells) for _, cells in lines[1:]),
+    )
 
 
 def _cells(path: Path) -> list[tuple[int, list[str]]]:

@@ -1,50 +1,62 @@
-"""Tire property files (.tir): sections of NAME = VALUE, units in [UNITS]; written for MF 6.1.
+"""Tire property files (.tir): sections of NAME = VALUE, comments after ``$`` and ``!``, read whole.
 
-What is written: ISO-W axes, SI, FITTYP 61, the ranges of the fitted data, scale factors 1.
-What is read: any section and key, in their order, comments dropped; an unknown key is kept.
+Every line is kept in its order, so that a conversion loses nothing: entries that are known and that are
+not, comments, and the rows of tables. Names count without regard to case. Nothing is mirrored for TYRESIDE.
 """
 
 from __future__ import annotations
 
+import math
 import re
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from toolkit.errors import ConfigError, UnreadableError
-from toolkit.files import write_atomic
-from toolkit.tires.mf61 import ALIGNING, LATERAL
-from toolkit.tires.mf61_fit import TireFit
+from toolkit.errors import CellError, ConfigError, UnreadableError
 
 # What other programs write: 5, 6, 21 and 52 are MF 5.2, 60 to 62 are MF 6.x.
 _MF52, _MF6 = (5, 6, 21, 52), (60, 61, 62)
-_SCALES = tuple(
-    "LFZO LCX LMUX LEX LKX LHX LVX LCY LMUY LEY LKY LHY LVY LTR LRES "
-    "LXAL LYKA LVYKA LS LKYC LKZC LVMX LMX LMY LMP".split()
-)
-_LINE = re.compile(r"([A-Za-z_][A-Za-z0-9_]*)\s*=\s*('[^']*'|\"[^\"]*\"|[^$!]*)")
+_LINE = re.compile(r"([A-Za-z_][A-Za-z0-9_]*)\s*=\s*('[^']*'|\"[^\"]*\"|[^$!]*)(.*)")
+_NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eEdD][+-]?[0-9]{1,4})?")
+_LIMIT = 8_000_000  # bytes; a property file has some ten thousand
+_ALIASES = {"LFZ0": "LFZO"}
+_SHAPE = "sections such as [UNITS], [MODEL], [LATERAL_COEFFICIENTS]"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TirLine:
+    """One line: an entry with ``key`` and its comment in ``text``, else the whole line in ``text``."""
+
+    section: str
+    key: str = ""
+    value: str | float = ""
+    text: str = ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TirFile:
-    """A property file: ``sections`` as (name, ((key, value), ...)), values as text or number as written."""
+    """A property file, line by line; values are text or number as written, in the file's own units."""
 
-    sections: tuple[tuple[str, tuple[tuple[str, str | float], ...]], ...]
+    lines: tuple[TirLine, ...]
+    where: str = ""
+
+    @property
+    def sections(self) -> tuple[tuple[str, tuple[tuple[str, str | float], ...]], ...]:
+        """Entries as (section, ((key, value), ...)), in their order."""
+        found: dict[str, list[tuple[str, str | float]]] = {}
+        for line in self.lines:
+            if line.section:
+                found.setdefault(line.section, [])
+            if line.key:
+                found[line.section].append((line.key, line.value))
+        return tuple((name, tuple(entries)) for name, entries in found.items())
 
     def section(self, name: str) -> dict[str, str | float]:
         """Return a section's entries, empty where there is none."""
-        for one, entries in self.sections:
-            if one == name:
-                return dict(entries)
-        return {}
+        return {line.key: line.value for line in self.lines if line.key and line.section == name}
 
     def get(self, key: str) -> str | float | None:
         """Return the first value of a key in any section, None where it is absent."""
-        for _, entries in self.sections:
-            for name, value in entries:
-                if name == key:
-                    return value
-        return None
+        return next((line.value for line in self.lines if line.key == key), None)
 
     def number(self, key: str, default: float | None = None) -> float:
         """Return a number.
@@ -59,8 +71,8 @@ class TirFile:
             return default
         if not isinstance(value, float):
             raise ConfigError(
-                f"the tire file has no number {key}", got=value, expected=f"{key} = NUMBER",
-                next_step="add the entry to the tire file", rule="tir-missing-key",
+                f"the tire file has no number {key}", where=self.where or None, got=value,
+                expected=f"{key} = NUMBER", next_step="add the entry to the file", rule="tir-missing-key",
             )  # fmt: skip
         return value
 
@@ -74,26 +86,27 @@ class TirFile:
             FITTYP is none of 5, 6, 21, 52, 60, 61, 62
         """
         fittyp = self.get("FITTYP")
-        known_format = self.get("PROPERTY_FILE_FORMAT") in ("PAC2002", "MF_05")
+        known_format = str(self.get("PROPERTY_FILE_FORMAT")).upper() in ("PAC2002", "MF_05")
         if fittyp in _MF52 or (fittyp is None and known_format):
             return "5.2"
         if fittyp in _MF6:
             return "6.x"
         raise ConfigError(
             "the tire file's kind of Magic Formula is not known",
-            got=f"FITTYP = {fittyp}",
+            where=self.where or None,
+            got=f"FITTYP = {fittyp:g}" if isinstance(fittyp, float) else f"FITTYP = {fittyp}",
             expected="5, 6, 21 or 52 for MF 5.2; 60, 61 or 62 for MF 6.x",
             next_step="correct FITTYP in [MODEL]",
             rule="tir-fittyp",
         )
 
     def coefficients(self) -> dict[str, float]:
-        """Return every number of the coefficient and scaling sections by its name."""
-        found: dict[str, float] = {}
-        for name, entries in self.sections:
-            if name.endswith("COEFFICIENTS"):
-                found |= {key: value for key, value in entries if isinstance(value, float)}
-        return found
+        """Return every number of the coefficient and scaling sections by its name; LFZ0 is LFZO."""
+        return {
+            _ALIASES.get(line.key, line.key): line.value
+            for line in self.lines
+            if line.key and line.section.endswith("COEFFICIENTS") and isinstance(line.value, float)
+        }
 
 
 def read_tir(path: Path) -> TirFile:
@@ -102,80 +115,83 @@ def read_tir(path: Path) -> TirFile:
     Raises
     ------
     UnreadableError
-        the file cannot be read or has no section
+        the file cannot be read, is no text or has no section
+    CellError
+        a coefficient that is no finite number, or one that stands twice with different values
     """
     try:
-        text = path.read_text(encoding="utf-8", errors="replace")
+        data = path.read_bytes()
     except OSError as error:
         raise UnreadableError(
             "the tire file cannot be read", where=path, got=error.strerror, expected="a readable .tir file",
             next_step="check the path", rule="no-file",
         ) from error  # fmt: skip
-    sections: list[tuple[str, list[tuple[str, str | float]]]] = []
-    for line in text.splitlines():
+    if b"\0" in data or len(data) > _LIMIT:
+        raise _no_tir(path, "bytes that are no text" if b"\0" in data else f"{len(data)} bytes")
+    try:
+        text = data.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        text = data.decode("latin-1")  # comments of older programs; keys and numbers are ASCII
+    return parse_tir(text, where=str(path))
+
+
+def parse_tir(text: str, *, where: str = "") -> TirFile:
+    """Return the property file of a text; errors as `read_tir`."""
+    section, lines = "", []
+    for number, line in enumerate(text.splitlines(), start=1):
         bare = line.strip()
         if bare.startswith("[") and "]" in bare:
-            sections.append((bare[1 : bare.index("]")].strip().upper(), []))
-        elif sections and bare[:1] not in ("$", "!", "") and (match := _LINE.match(bare)):
-            sections[-1][1].append((match[1].upper(), _value(match[2].strip())))
-    if not sections:
-        raise UnreadableError(
-            "the file is no tire property file", where=path, got="no [SECTION]",
-            expected="sections such as [UNITS], [MODEL], [LATERAL_COEFFICIENTS]", next_step="check the path",
-            rule="not-a-tir",
-        )  # fmt: skip
-    return TirFile(sections=tuple((name, tuple(entries)) for name, entries in sections))
+            section = bare[1 : bare.index("]")].strip().upper()
+            lines.append(TirLine(section=section, text=bare))
+        elif section and bare[:1] not in ("$", "!", "") and (match := _LINE.match(bare)):
+            key = match[1].upper()
+            value = _value(match[2].strip(), f"{where}, line {number}", key, section)
+            lines.append(TirLine(section=section, key=key, value=value, text=match[3].strip()))
+        else:
+            lines.append(TirLine(section=section, text=line.rstrip()))
+    if not section:
+        raise _no_tir(where, "no [SECTION]")
+    found = TirFile(lines=tuple(lines), where=where)
+    _refuse_contradictions(found)
+    return found
 
 
-def tir_text(fit: TireFit, *, comments: Sequence[str] = (), side: str = "LEFT") -> str:
-    """Return the property file of a fit; ``comments`` stand at its head, ``side`` is TYRESIDE as tested."""
-    given = dict(fit.coefficients)
-    sections: list[tuple[str, list[tuple[str, str | float]]]] = [
-        ("MDI_HEADER", [("FILE_TYPE", "tir"), ("FILE_VERSION", 3.0), ("FILE_FORMAT", "ASCII")]),
-        (
-            "UNITS",
-            [
-                ("LENGTH", "meter"),
-                ("FORCE", "newton"),
-                ("ANGLE", "radians"),
-                ("MASS", "kg"),
-                ("TIME", "second"),
-            ],
-        ),
-        (
-            "MODEL",
-            [("PROPERTY_FILE_FORMAT", "USER"), ("USE_MODE", 2.0), ("FITTYP", 61.0), ("TYRESIDE", side)],
-        ),
-        ("DIMENSION", [("UNLOADED_RADIUS", fit.UNLOADED_RADIUS)]),
-        ("VERTICAL", [("FNOMIN", fit.FNOMIN)]),
-        ("SLIP_ANGLE_RANGE", [("ALPMIN", fit.SA_range[0]), ("ALPMAX", fit.SA_range[1])]),
-        ("INCLINATION_ANGLE_RANGE", [("CAMMIN", 0.0), ("CAMMAX", 0.0)]),
-        ("VERTICAL_FORCE_RANGE", [("FZMIN", fit.FZ_range[0]), ("FZMAX", fit.FZ_range[1])]),
-        ("SCALING_COEFFICIENTS", [(name, 1.0) for name in _SCALES]),
-        ("LATERAL_COEFFICIENTS", [(n, given.get(n, 2.0 if n == "PKY4" else 0.0)) for n in LATERAL]),
-        ("ALIGNING_COEFFICIENTS", [(name, given.get(name, 0.0)) for name in ALIGNING]),
-    ]
-    lines = [f"! {comment}" for comment in comments]
-    for name, entries in sections:
-        lines.append(f"[{name}]")
-        lines += [f"{key:<24}= {_shown(value)}" for key, value in entries]
-    return "\n".join(lines) + "\n"
+def _no_tir(where: object, got: str) -> UnreadableError:
+    return UnreadableError(
+        "the file is no tire property file", where=where, got=got, expected=_SHAPE,
+        next_step="check the path", rule="not-a-tir",
+    )  # fmt: skip
 
 
-def write_tir(path: Path, fit: TireFit, *, comments: Sequence[str] = (), side: str = "LEFT") -> None:
-    """Write the property file of a fit, whole or not at all."""
-    write_atomic(path, tir_text(fit, comments=comments, side=side))
-
-
-def _shown(value: str | float) -> str:
-    # repr gives the shortest digits that read back to the same number.
-    return f"'{value}'" if isinstance(value, str) else repr(int(value) if value.is_integer() else value)
-
-
-def _value(text: str) -> str | float:
+def _value(text: str, where: str, key: str, section: str) -> str | float:
     if text[:1] in ("'", '"'):
         return text[1:-1]
-    try:
-        return float(text)
-    except ValueError:
-        return text
+    if _NUMBER.fullmatch(text):
+        number = float(text.lower().replace("d", "e"))
+        if math.isfinite(number):
+            return number
+    if section.endswith("COEFFICIENTS") or _NUMBER.fullmatch(text) or text.lower().strip("+-") in _NO_NUMBERS:
+        raise CellError(
+            f"the tire file's {key} is no number", where=where, got=repr(text) if text else "nothing",
+            expected="a finite number with a decimal point", next_step="mend that line", rule="tir-number",
+        )  # fmt: skip
+    return text
+
+
+_NO_NUMBERS = ("nan", "inf", "infinity", "1.#inf", "1.#qnan", "1.#ind")
+
+
+def _refuse_contradictions(tir: TirFile) -> None:
+    seen: dict[tuple[str, str], str | float] = {}
+    for line in tir.lines:
+        if not isinstance(line.value, float):
+            continue
+        coefficient = line.section.endswith("COEFFICIENTS")
+        key = _ALIASES.get(line.key, line.key)
+        first = seen.setdefault(("COEFFICIENTS" if coefficient else line.section, key), line.value)
+        if first != line.value:
+            raise CellError(
+                f"the tire file gives {line.key} twice", where=f"{tir.where}, [{line.section}]",
+                got=f"{first!r} and {line.value!r}", expected=f"one {line.key}",
+                next_step="remove the one that is wrong", rule="tir-doubled",
+            )  # fmt: skip

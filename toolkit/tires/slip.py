@@ -1,0 +1,139 @@
+"""The state of a rolling tire as the Magic Formula of tire files takes it: slips, camber, load, pressure.
+
+Pacejka, Tire and Vehicle Dynamics, 3rd ed. (2012), 4.E1 to 4.E8: alpha* = tan(alpha) sgn(Vx) and
+gamma* = sin(gamma); ``raw`` leaves both angles as they are, as MF-Tyre does.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal, get_args
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+    Array = NDArray[np.float64]
+
+Angles = Literal["star", "raw"]
+ANGLES: tuple[Angles, ...] = get_args(Angles)
+
+TINY = 1e-12
+
+
+class Reader:
+    """Coefficients by name; what a file does not have is the default."""
+
+    def __init__(self, p: Mapping[str, float], default: float) -> None:
+        self._p, self._default = p, default
+
+    def __call__(self, name: str) -> float:
+        """Return the value of a name."""
+        return self._p.get(name, self._default)
+
+
+def readers(p: Mapping[str, float]) -> tuple[Reader, Reader]:
+    """Return a reader of coefficients (absent: 0) and one of scale factors (absent: 1)."""
+    return Reader(p, 0.0), Reader(p, 1.0)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class State:
+    """alpha* with the slip angle's cosine, gamma*, kappa [1], load [N] and its change from the nominal.
+
+    ``dp`` is (P - NOMPRES) / NOMPRES; ``mu_x``, ``mu_y`` the friction scale factors at the slip speed.
+    """
+
+    a: Array
+    cosine: Array
+    g: Array
+    kappa: Array
+    FZ: Array
+    F0: float
+    df: Array
+    dp: Array
+    mu_x: Array
+    mu_y: Array
+
+    def upright(self) -> State:
+        """Return the same state at zero camber."""
+        return State(
+            a=self.a,
+            cosine=self.cosine,
+            g=np.zeros_like(self.g),
+            kappa=self.kappa,
+            FZ=self.FZ,
+            F0=self.F0,
+            df=self.df,
+            dp=self.dp,
+            mu_x=self.mu_x,
+            mu_y=self.mu_y,
+        )
+
+
+def state(
+    p: Mapping[str, float],
+    *,
+    SA: ArrayLike,
+    FZ: ArrayLike,
+    FNOMIN: float,
+    IA: ArrayLike = 0.0,
+    KAPPA: ArrayLike = 0.0,
+    pressure_change: ArrayLike = 0.0,
+    V: ArrayLike = 1.0,
+    V0: float | None = None,
+    angles: Angles = "star",
+) -> State:
+    """Return the state at SA, IA [rad], FZ [N], KAPPA [1], V [m/s]; arrays broadcast.
+
+    Parameters
+    ----------
+    p : scale factors by their names in a tire file
+    V : its sign turns alpha*; zero counts as forward
+    V0 : the file's LONGVL [m/s]; with it and LMUV (4.E7) friction falls with the slip speed
+    """
+    s = Reader(p, 1.0)
+    angle, load, camber = (np.asarray(one, dtype=np.float64) for one in (SA, FZ, IA))
+    speed, kappa = np.asarray(V, dtype=np.float64), np.asarray(KAPPA, dtype=np.float64)
+    a = np.tan(angle) if angles == "star" else angle
+    F0 = FNOMIN * s("LFZO")
+    # LMUV is the one scale that is off when it is absent: it divides by 1 + LMUV Vs / V0.
+    decay = p.get("LMUV", 0.0)
+    fade: Array = np.asarray(1.0)
+    if decay and V0:
+        fade = 1 / (1 + decay * np.abs(speed) * np.hypot(kappa, np.tan(angle)) / V0)
+    return State(
+        a=np.where(speed < 0, -a, a),
+        cosine=np.cos(angle),
+        g=np.sin(camber) if angles == "star" else camber,
+        kappa=kappa,
+        FZ=load,
+        F0=F0,
+        df=(load - F0) / F0,
+        dp=np.asarray(pressure_change, dtype=np.float64),
+        mu_x=s("LMUX") * fade,
+        mu_y=s("LMUY") * fade,
+    )
+
+
+def nonzero(x: Array) -> Array:
+    """Return x with zeros moved to a tiny number of their sign, to divide by."""
+    return np.where(np.abs(x) < TINY, np.copysign(TINY, x), x)
+
+
+def sine(B: ArrayLike, C: ArrayLike, E: ArrayLike, x: ArrayLike) -> Array:
+    """Return sin(C arctan(Bx - E(Bx - arctan Bx)))."""
+    return np.sin(_inner(B, C, E, x))
+
+
+def cosine(B: ArrayLike, C: ArrayLike, E: ArrayLike, x: ArrayLike) -> Array:
+    """Return cos(C arctan(Bx - E(Bx - arctan Bx)))."""
+    return np.cos(_inner(B, C, E, x))
+
+
+def _inner(B: ArrayLike, C: ArrayLike, E: ArrayLike, x: ArrayLike) -> Array:
+    z = np.multiply(B, x)
+    inner: Array = np.multiply(C, np.arctan(z - np.multiply(E, z - np.arctan(z))))
+    return inner

@@ -1,0 +1,161 @@
+"""Forces and moments of a tire property file at given slips, loads, cambers, pressures; ISO-W, SI."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from toolkit.errors import ConfigError, FitError
+from toolkit.findings import Finding
+from toolkit.tires import mf52, mf61
+from toolkit.tires.mf_combined import Forces
+from toolkit.tires.slip import ANGLES, Angles, state
+from toolkit.tires.tir import TirFile
+from toolkit.tires.tir_units import factors, scale, si_number
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from numpy.typing import ArrayLike, NDArray
+
+_RANGES = (
+    ("SA", "ALPMIN", "ALPMAX", "rad"),
+    ("FZ", "FZMIN", "FZMAX", "N"),
+    ("IA", "CAMMIN", "CAMMAX", "rad"),
+    ("KAPPA", "KPUMIN", "KPUMAX", "1"),
+    ("P", "PRESMIN", "PRESMAX", "Pa"),
+)
+# Without these the Magic Formula gives nothing of that channel.
+_MAKES = {"FX": ("PCX1", "PDX1", "PKX1"), "FY": ("PCY1", "PDY1", "PKY1"), "MZ": ("QCZ1", "QDZ1", "QBZ1")}
+_EDGE = 1e-6  # of the range: limits are printed with five or six digits
+
+
+def evaluate_tir(
+    tir: TirFile,
+    *,
+    SA: ArrayLike,
+    FZ: ArrayLike,
+    IA: ArrayLike = 0.0,
+    KAPPA: ArrayLike = 0.0,
+    P: ArrayLike | None = None,
+    V: ArrayLike | None = None,
+    angles: Angles = "star",
+) -> tuple[Forces, tuple[Finding, ...]]:
+    """Return FX, FY [N], MZ [N·m] in ISO-W, and what should be known about them; arrays broadcast.
+
+    Parameters
+    ----------
+    SA, IA : slip and inclination angle [rad], ISO-W
+    FZ : load [N], not negative
+    KAPPA : longitudinal slip [1]
+    P : pressure [Pa]; without it the file's INFLPRES, else its NOMPRES
+    V : speed [m/s], for its sign and for LMUV; without it the file's LONGVL
+    angles : ``star`` for tan(alpha) and sin(gamma), ``raw`` for MF-Tyre's
+
+    Raises
+    ------
+    ConfigError
+        FITTYP is not known, or FNOMIN, UNLOADED_RADIUS are missing or not positive
+    UnitError
+        a unit of the file is not known
+    FitError
+        the result is not finite
+    """
+    if angles not in ANGLES:
+        raise ConfigError(
+            f"unknown kind of angles {angles!r}", where="--angles", got=angles, expected=", ".join(ANGLES),
+            next_step="name one of those expected", rule="unknown-angles",
+        )  # fmt: skip
+    version = tir.version
+    p = tir.coefficients()
+    FNOMIN, radius = _positive(tir, "FNOMIN"), _positive(tir, "UNLOADED_RADIUS")
+    speed = si_number(tir, "LONGVL", 0.0) or None
+    change, findings = _pressure_change(tir, version, P)
+    with np.errstate(all="ignore"):
+        q = state(
+            p, SA=SA, FZ=FZ, FNOMIN=FNOMIN, IA=IA, KAPPA=KAPPA, pressure_change=change,
+            V=(speed or 1.0) if V is None else V, V0=speed if version == "6.x" else None, angles=angles,
+        )  # fmt: skip
+        made = (mf52 if version == "5.2" else mf61).forces(p, q, UNLOADED_RADIUS=radius)
+    FX, FY, MZ, _ = np.broadcast_arrays(made.FX, made.FY, made.MZ, np.asarray(SA, dtype=np.float64))
+    result = Forces(FX=FX, FY=FY, MZ=MZ)
+    _refuse_infinite(tir, result)
+    given = {"SA": SA, "FZ": FZ, "IA": IA, "KAPPA": KAPPA} | ({} if P is None else {"P": P})
+    findings += [*_lacking(tir, p), *_beyond(tir, given)]
+    return result, tuple(findings)
+
+
+def _positive(tir: TirFile, key: str) -> float:
+    value = si_number(tir, key)
+    if value <= 0:
+        raise ConfigError(
+            f"the tire file's {key} is not positive", where=tir.where, got=value, expected=f"{key} > 0",
+            next_step="correct the entry", rule="tir-number",
+        )  # fmt: skip
+    return value
+
+
+def _pressure_change(
+    tir: TirFile, version: str, P: ArrayLike | None
+) -> tuple[NDArray[np.float64] | float, list[Finding]]:
+    nominal = si_number(tir, "NOMPRES", 0.0)
+    if version == "5.2" or nominal <= 0:
+        why = "MF 5.2 has no pressure terms" if version == "5.2" else "the file has no NOMPRES"
+        if P is None:
+            return 0.0, []
+        return 0.0, [_note("tir-no-pressure", tir, f"{why}: the column P changes nothing")]
+    if P is not None:
+        return np.asarray(P, dtype=np.float64) / nominal - 1, []
+    inflation = si_number(tir, "INFLPRES", nominal)
+    if inflation <= 0 or inflation == nominal:
+        return 0.0, []
+    text = f"no column P: the file's INFLPRES of {inflation:.6g} Pa is used, NOMPRES is {nominal:.6g} Pa"
+    return inflation / nominal - 1, [_note("tir-pressure", tir, text)]
+
+
+def _lacking(tir: TirFile, p: Mapping[str, float]) -> list[Finding]:
+    found = []
+    for channel, names in _MAKES.items():
+        absent = [name for name in names if name not in p]
+        if len(absent) == len(names):
+            text = f"the file has none of {', '.join(names)}: {channel} holds nothing of pure slip"
+            found.append(_note("tir-no-coefficients", tir, text))
+        elif absent:
+            text = f"the file has no {', '.join(absent)}, which count as zero: {channel} is doubtful"
+            found.append(Finding(rule="tir-no-coefficients", where=tir.where, message=text))
+    return found
+
+
+def _beyond(tir: TirFile, given: Mapping[str, ArrayLike]) -> list[Finding]:
+    found, units = [], factors(tir)
+    for channel, low_key, high_key, unit in _RANGES:
+        low, high = tir.get(low_key), tir.get(high_key)
+        if channel not in given or not isinstance(low, float) or not isinstance(high, float):
+            continue
+        low, high = low * (scale(low_key, units) or 1.0), high * (scale(high_key, units) or 1.0)
+        values = np.asarray(given[channel], dtype=np.float64)
+        edge = _EDGE * max(abs(low), abs(high))
+        outside = (values < low - edge) | (values > high + edge)
+        if outside.any():
+            text = (
+                f"{channel} from {values.min():.6g} to {values.max():.6g} {unit} leaves the file's range "
+                f"{low:.6g} to {high:.6g} {unit} in {int(outside.sum())} of {outside.size} rows: extrapolated"
+            )
+            found.append(Finding(rule="tir-range", where=tir.where, message=text))
+    return found
+
+
+def _refuse_infinite(tir: TirFile, result: Forces) -> None:
+    for name in ("FX", "FY", "MZ"):
+        bad = np.flatnonzero(~np.isfinite(getattr(result, name)))
+        if len(bad):
+            raise FitError(
+                f"the tire file gives no finite {name}", where=f"{tir.where}, row {bad[0] + 1} of the grid",
+                got=f"{len(bad)} rows without a number", expected="finite forces",
+                next_step="check that row and the file's coefficients", rule="not-finite",
+            )  # fmt: skip
+
+
+def _note(rule: str, tir: TirFile, message: str) -> Finding:
+    return Finding(rule=rule, where=tir.where, message=message, level="note")
