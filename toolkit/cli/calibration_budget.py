@@ -1,0 +1,280 @@
+"""`toolkit calibration budget`: the measurement uncertainty of a record's loads."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from toolkit.cli.console import Calibrations, Home, Json, Quiet, answer, exit_code, finding_lines, table
+from toolkit.cli.home import calibrations_folder
+from toolkit.errors import ConfigError, ToolkitError
+from toolkit.findings import Finding
+
+if TYPE_CHECKING:
+    from toolkit.calibration.records.record import CalibrationRecord, LoadFit
+    from toolkit.calibration.session.table import Table
+    from toolkit.calibration.uncertainty.conditions import Temperature
+    from toolkit.calibration.uncertainty.model import Budget
+    from toolkit.calibration.uncertainty.monte_carlo import MonteCarlo
+
+RANGE_POINTS = 11
+
+
+def command(
+    record_id: Annotated[str, typer.Argument(help="Record id, such as m15-r2.")],
+    load: Annotated[str | None, typer.Option("--load", help="One load; default: all of them.")] = None,
+    at: Annotated[
+        str | None,
+        typer.Option("--at", help="Load value, with a unit or in the record's; default: full scale."),
+    ] = None,
+    indications: Annotated[
+        str | None, typer.Option("--indications", help="Predict from D51=..,D52=.. in the record's units.")
+    ] = None,
+    temperature_range: Annotated[
+        float | None, typer.Option("--temperature-range", help="Use within +- this many K of the session.")
+    ] = None,
+    temperature_coefficient: Annotated[
+        float | None,
+        typer.Option(
+            "--temperature-coefficient", help="Relative, a kelvin; default: what the session states."
+        ),
+    ] = None,
+    trials: Annotated[
+        int | None, typer.Option("--monte-carlo", help="Check by this many trials; 0: until settled.")
+    ] = None,
+    seed: Annotated[int, typer.Option("--seed", help="Of the trials.")] = 0,
+    digits: Annotated[int, typer.Option("--digits", min=1, max=2, help="Digits of u that count.")] = 2,
+    figure: Annotated[
+        Path | None, typer.Option("--figure", help="Draw shares and U over the range: .png, .svg or .pdf.")
+    ] = None,
+    calibrations: Calibrations = None,
+    home: Home = None,
+    as_json: Json = False,
+    quiet: Quiet = False,
+) -> int:
+    """Tell the uncertainty of a record's loads: components with shares, U with k, U over the range."""
+    from toolkit.calibration.registry.registry import Registry
+    from toolkit.calibration.registry.stored import stored_check, stored_loads
+
+    registry = Registry(calibrations_folder(calibrations, home))
+    record = registry.load(record_id)
+    rows, check = stored_loads(registry.folder, record), stored_check(registry.folder, record)
+    if rows is None:
+        raise _wrong("the record has no data to make a budget of", record_id, "a legacy import",
+                     "a record that was fitted from reference loads")  # fmt: skip
+    if at is not None and (indications is not None or (load is None and len(record.loads) > 1)):
+        raise _wrong("--at needs one load, and no --indications", "--at", at, "--load NAME --at VALUE")
+    temperature = _temperature(temperature_range, temperature_coefficient)
+    names = [load] if load is not None else [one.load for one in record.loads]
+    if figure is not None and len(names) > 1:
+        raise _wrong("a figure shows one load", "--figure", ", ".join(names), "--load NAME")
+    found, findings = [], []
+    for name in names:
+        budget, more = _one(record, rows, check, name, at, indications, temperature)
+        result = None
+        if trials is not None:
+            from toolkit.calibration.uncertainty.monte_carlo import monte_carlo
+
+            result = monte_carlo(record, rows, budget, trials=trials or None, seed=seed, digits=digits)
+            more += _not_validated(record, budget, result)
+        found.append((budget, _over_range(record, rows, check, name, temperature), result))
+        findings += more
+    written = None
+    if figure is not None:
+        from toolkit.report.uncertainty_figure import write_figure
+
+        written = write_figure(figure, found[0][0], found[0][1])
+    payload = {
+        "record": record_id,
+        "sha256": record.sha256,
+        "loads": {budget.load: _payload(budget, curve, result) for budget, curve, result in found},
+        "figure": written,
+        "findings": [one.as_dict() for one in findings],
+    }
+    lines = [line for budget, curve, result in found for line in _lines(budget, curve, result)]
+    lines += [*finding_lines(findings), *([f"written: {written}"] if written else [])]
+    answer(payload, "\n".join(lines), as_json=as_json, quiet=quiet)
+    return exit_code(findings)
+
+
+def _one(
+    record: CalibrationRecord,
+    rows: Table,
+    check: Table | None,
+    name: str,
+    at: str | None,
+    indications: str | None,
+    temperature: Temperature | None,
+) -> tuple[Budget, list[Finding]]:
+    from toolkit.calibration.uncertainty.budget import calibration_budget, predict
+
+    if indications is None:
+        value = None if at is None else _value(at, record.load(name))
+        return calibration_budget(record, rows, check, name, value, temperature=temperature), []
+    made = predict(record, rows, check, name, _indications(indications), temperature=temperature)
+    findings = [
+        Finding(rule="beyond-range", where=f"{record.id}, {cell}",
+                message="the indication lies beyond those of the calibration: the record extrapolates")
+        for cell in made.beyond
+    ]  # fmt: skip
+    return made.budget, findings
+
+
+def _over_range(
+    record: CalibrationRecord, rows: Table, check: Table | None, name: str, temperature: Temperature | None
+) -> tuple[Budget, ...]:
+    from toolkit.calibration.uncertainty.budget import calibration_budget
+
+    one = record.load(name)
+    low, high = min(one.minimum or 0.0, 0.0), max(one.maximum or 0.0, 0.0)
+    # The ends as they are: a rounded one could lie outside the range.
+    steps = [low + (high - low) * i / (RANGE_POINTS - 1) for i in range(RANGE_POINTS - 1)] + [high]
+    return tuple(calibration_budget(record, rows, check, name, x, temperature=temperature) for x in steps)
+
+
+def _not_validated(record: CalibrationRecord, budget: Budget, result: MonteCarlo) -> list[Finding]:
+    if result.validated:
+        return []
+    off = max(result.low_difference, result.high_difference)
+    why = f"the ends of the intervals differ by {off:.3g} {budget.unit}, the tolerance is {result.delta:g}"
+    if not result.stable:
+        why += "; the trials did not settle"
+    return [Finding(rule="monte-carlo", where=f"{record.id}, {budget.load}", message=why)]
+
+
+def _payload(budget: Budget, curve: tuple[Budget, ...], result: MonteCarlo | None) -> dict[str, Any]:
+    from toolkit.calibration.uncertainty.rounding import round_uncertainty
+
+    return {
+        "unit": budget.unit,
+        "value": budget.at,
+        "indications": list(budget.indications),
+        "components": [
+            {
+                "name": one.name, "description": one.description, "type": one.type,
+                "distribution": one.distribution, "u": one.u, "dof": one.dof, "share": budget.share(one),
+                "source": one.source, "stated": one.stated,
+            }
+            for one in budget.components
+        ],
+        "u": budget.u,
+        "dof": budget.dof,
+        "k": budget.k,
+        "U": budget.U,
+        "U_rounded": round_uncertainty(budget.U),
+        "probability": budget.probability,
+        "not_stated": list(budget.not_stated),
+        "range": [{"value": one.at, "u": one.u, "k": one.k, "U": one.U} for one in curve],
+        "monte_carlo": None if result is None else {
+            "trials": result.trials, "seed": result.seed, "value": result.value, "u": result.u,
+            "low": result.low, "high": result.high, "budget_low": result.budget_low,
+            "budget_high": result.budget_high, "low_difference": result.low_difference,
+            "high_difference": result.high_difference, "digits": result.digits, "delta": result.delta,
+            "stable": result.stable, "validated": result.validated,
+        },
+    }  # fmt: skip
+
+
+def _lines(budget: Budget, curve: tuple[Budget, ...], result: MonteCarlo | None) -> list[str]:
+    from toolkit.calibration.uncertainty.rounding import round_to_uncertainty, round_uncertainty
+
+    unit = budget.unit
+    stated = [one for one in budget.components if one.stated]
+    largest = max((one.u for one in budget.components), default=0.0)
+    lines = [
+        f"{budget.record}  {budget.load} = {round_to_uncertainty(budget.at, budget.U)} {unit}",
+        "",
+        table(
+            ["component", "type", "distribution", f"u [{unit}]", "dof", "share", "", "from"],
+            [
+                [one.name, one.type, one.distribution, f"{one.u:.3g}", _dof(one.dof),
+                 f"{100 * budget.share(one):.1f} %", _bar(one.u, largest), one.description]
+                for one in stated
+            ],
+            align="<<<>>><<",
+        ),
+        "",
+        f"combined standard uncertainty  u = {budget.u:.3g} {unit}, effective dof {_dof(budget.dof)}",
+        f"expanded uncertainty           U = {round_uncertainty(budget.U)} {unit}, k = {budget.k:.2f}, "
+        f"coverage probability {100 * budget.probability:.0f} %",
+    ]  # fmt: skip
+    silent = [one for one in budget.components if not one.stated]
+    if silent:
+        lines += ["", "not stated, and therefore not in U:"]
+        lines += [f"  {one.name:<16}{one.description}" for one in silent]
+    if result is not None:
+        said = "validated" if result.validated else "NOT VALIDATED"
+        lines += [
+            "",
+            f"Monte Carlo, {result.trials} trials, seed {result.seed}: u = {result.u:.3g} {unit}",
+            f"  interval {result.low:.7g} to {result.high:.7g}, budget {result.budget_low:.7g} to "
+            f"{result.budget_high:.7g}",
+            f"  ends differ by {result.low_difference:.2g} and {result.high_difference:.2g}, tolerance "
+            f"{result.delta:g} ({result.digits} digits of u): {said}",
+        ]
+    over = [[f"{one.at:.6g}", f"{one.u:.3g}", f"{one.k:.2f}", round_uncertainty(one.U)] for one in curve]
+    head = [f"{budget.load} [{unit}]", "u", "k", f"U [{unit}]"]
+    return [*lines, "", "over the range:", table(head, over, align=">>>>"), ""]
+
+
+def _bar(u: float, largest: float) -> str:
+    return "" if not largest else "#" * max(round(12 * u / largest), 1 if u else 0)
+
+
+def _dof(dof: float) -> str:
+    return "inf" if math.isinf(dof) else f"{dof:.3g}" if dof < 1000 else f"{dof:.0f}"
+
+
+def _value(text: str, one: LoadFit) -> float:
+    """Read ``VALUE`` or ``VALUEunit`` into the load's unit."""
+    import re
+
+    from toolkit.units import si_scale, unit
+
+    match = re.fullmatch(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(\S.*)?", text)
+    if match is None:
+        raise _wrong(
+            "a load value cannot be read", "--at", text, f"a number, or one with a unit: 500{one.unit}"
+        )
+    value = float(match[1])
+    if match[2] is None:
+        return value
+    found = unit(one.unit)
+    return value * si_scale(match[2].strip(), found.dimension, where="--at") / found.factor
+
+
+def _indications(text: str) -> dict[str, float]:
+    found: dict[str, float] = {}
+    for part in text.split(","):
+        name, _, number = part.partition("=")
+        try:
+            value = float(number)
+        except ValueError as error:
+            raise _wrong("an indication cannot be read", "--indications", part, "NAME=NUMBER,...") from error
+        if name.strip() in found:
+            raise _wrong("an indication is given twice", "--indications", name.strip(), "each of them once")
+        found[name.strip()] = value
+    return found
+
+
+def _temperature(span: float | None, coefficient: float | None) -> Temperature | None:
+    from toolkit.calibration.uncertainty.conditions import Temperature
+
+    if span is None:
+        if coefficient is not None:
+            raise _wrong("a temperature coefficient needs the range of use", "--temperature-coefficient",
+                         coefficient, "--temperature-range K beside it")  # fmt: skip
+        return None
+    if not (math.isfinite(span) and span >= 0 and math.isfinite(coefficient or 0.0)):
+        raise _wrong("a temperature cannot be used", "--temperature-range", span, "a number, zero or more")
+    return Temperature(half_range_K=span, coefficient_per_K=coefficient)
+
+
+def _wrong(what: str, where: str, got: object, expected: str) -> ToolkitError:
+    return ConfigError(
+        what, where=where, got=got, expected=expected, next_step="see 'toolkit calibration budget --help'",
+        rule="budget",
+    )  # fmt: skip
