@@ -1,4 +1,4 @@
-"""Killed, full, read-only, or changed by one byte: the registry is whole afterwards, or `verify` says what is not."""
+"""Killed, full, read-only, or one byte changed: the registry is whole, or `verify` says what is not."""
 
 from __future__ import annotations
 
@@ -115,13 +115,14 @@ def test_a_full_disk_is_told_and_the_write_is_made_up_for(
 
     with monkeypatch.context() as patch:
         patch.setattr(Path, "write_bytes", full)
-        try:
-            step(registry)
-        except OutputError as error:
-            assert (error.exit_code, error.got) == (2, os.strerror(errno.ENOSPC))
-            assert all(error.as_dict().values())
+        # The journal, the files (an import has two), the ledger, the head: then nothing is left to write.
+        if at <= (5 if name == "import" else 3):
+            with pytest.raises(OutputError) as caught:
+                step(registry)
+            assert (caught.value.exit_code, caught.value.got) == (2, os.strerror(errno.ENOSPC))
+            assert all(caught.value.as_dict().values())
         else:
-            assert count[0] < at
+            step(registry)
     # With room again, a write whose journal stood is finished, one without was never made.
     made = len(registry.ledger("hub").entries) - before
     assert made == (0 if at == 1 else 1)
