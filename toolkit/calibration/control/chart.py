@@ -102,6 +102,7 @@ def control_chart(
     *,
     baseline: int | None = None,
     same_percent: float = SAME_PERCENT,
+    load: str | None = None,
 ) -> Chart:
     """Return the control charts of an instrument, every session in the order of the dates.
 
@@ -109,6 +110,7 @@ def control_chart(
     ----------
     baseline : the first sessions that the limits are taken from; None: all before the newest point
     same_percent : reference loads within this share of full scale are the same check load
+    load : the errors of this load only
 
     Raises
     ------
@@ -125,7 +127,11 @@ def control_chart(
                 for j, name in enumerate(first.names)
             )
         )
-        series += [_series(check_load, group, j, baseline) for j in range(len(first.names))]
+        series += [
+            _series(check_load, group, j, baseline)
+            for j, name in enumerate(first.names)
+            if load in (None, name)
+        ]
     return Chart(instrument=instrument, series=tuple(series), left_out=tuple(left_out))
 
 
@@ -143,7 +149,8 @@ def chart_findings(chart: Chart, session_record: str) -> tuple[Finding, ...]:
                     where=f"{one.load} at {one.check_load}",
                     message=f"rule {broken.rule.number} ({broken.rule.text}) is broken: error "
                     f"{point.error:+.4g} {one.unit} by {point.record}, centre {one.limits.centre:+.4g}, "
-                    f"limits {one.limits.lower:+.4g} to {one.limits.upper:+.4g} of {one.limits.points} sessions",
+                    f"limits {one.limits.lower:+.4g} to {one.limits.upper:+.4g} "
+                    f"of {one.limits.points} sessions",
                 )
             )
     return tuple(found)

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from toolkit.errors import RegistryError
 
 _TEXT = re.compile(r"\s*(?P<count>[1-9][0-9]{0,3})\s*(?P<unit>day|week|month|year)s?\s*\Z", re.IGNORECASE)
-_LONGEST_YEARS = 50
+_MOST = {"day": 18263, "week": 2609, "month": 600, "year": 50}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -49,7 +49,7 @@ def parse_interval(text: str) -> Interval:
     """
     match = _TEXT.match(text)
     found = None if match is None else Interval(count=int(match["count"]), unit=match["unit"].lower())
-    if found is None or found.after(dt.date(2000, 1, 1)) > dt.date(2000 + _LONGEST_YEARS, 1, 1):
+    if found is None or found.count > _MOST[found.unit]:
         raise RegistryError(
             "the recall interval cannot be used",
             where="--recall",

@@ -1,0 +1,204 @@
+"""One indication under one load: the rows of a session that a standard for one force may be applied to.
+
+ASTM E74 and ISO 376 know an instrument of one force and one indication. Of a session with several loads
+only the rows in which no other load acts belong to that; tension and compression are evaluated apart.
+Deflections are indications less the zero: the reading without load at the beginning of the run, else the
+session's [[zero]] before, else none in a tared session. Where no zero was read the indication stands for
+its deflection, and that is a reason against a class.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from toolkit.calibration.session.bridge import bridges_of
+from toolkit.calibration.session.reading_entries import Scope, creep_entries, zero_entries
+from toolkit.errors import SessionError
+from toolkit.units import unit
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from toolkit.calibration.records.record import Zero
+    from toolkit.calibration.session.statements import Statements
+    from toolkit.calibration.session.table import Table
+
+_NO_LOAD = 1e-6
+_OTHER_LOAD = 1e-3
+_CREEP_SECONDS = (30.0, 300.0)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class CellSource:
+    """A session's data as fitted: its rows, statements, settings (JSON), zero and names of the loads."""
+
+    table: Table
+    statements: Statements
+    settings: str
+    zero: Zero
+    loads: tuple[str, ...]
+    indications: tuple[str, ...]
+    where: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class CellRun:
+    """One run: forces (n,) > 0 of one sense and deflections (n,), in the order of the rows.
+
+    ``up`` (n,) tells increasing forces; ``u`` (n,) standard uncertainty of the force, None where not stated.
+    ``zero_before`` and ``zero_after`` are the readings without load, None where not read.
+    """
+
+    number: int
+    rotation_deg: float | None
+    force: NDArray[np.float64]
+    deflection: NDArray[np.float64]
+    up: NDArray[np.bool_]
+    u: NDArray[np.float64] | None
+    zero_before: float | None
+    zero_after: float | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class CellRows:
+    """The runs of one indication under one load in one sense; ``left_out`` rows had another load acting.
+
+    ``resolution`` in the indication's unit; ``creep`` readings at 30 s and 300 s; None where not stated.
+    """
+
+    load: str
+    load_unit: str
+    indication: str
+    indication_unit: str
+    sense: str
+    runs: tuple[CellRun, ...]
+    resolution: float | None
+    creep: tuple[float, float] | None
+    zero_read: bool
+    left_out: int
+
+
+def cell_rows(source: CellSource, load: str, indication: str) -> tuple[CellRows, ...]:
+    """Return the rows of an indication under a load, one result a sense (positive force first).
+
+    Raises
+    ------
+    SessionError
+        ``standard``: no such load or indication, or no row in which the load acts alone
+    """
+    for kind, name, known in (("load", load, source.loads), ("indication", indication, source.indications)):
+        if name not in known:
+            raise _refused(source.where, f"there is no {kind} {name}", name, ", ".join(known))
+    table = source.table
+    force, reading = table.column(load), table.column(indication)
+    alone = np.ones(table.rows, dtype=bool)
+    for other in source.loads:
+        if other != load:
+            values = np.abs(table.column(other))
+            alone &= values <= _OTHER_LOAD * values.max(initial=0.0)
+    acting = np.abs(force) > _NO_LOAD * np.abs(force).max()
+    if not (acting & alone).any():
+        raise _refused(
+            source.where, f"there is no row in which {load} acts alone", f"{table.rows} rows", "such rows"
+        )
+    before, after = _stated_zeros(source, indication)
+    creep = _creep(source, load, indication)
+    run = np.zeros(table.rows) if table.run is None else table.run
+    found = []
+    for sense, sign in (("positive", 1.0), ("negative", -1.0)):
+        mine = acting & alone & (np.sign(force) == sign)
+        runs = []
+        for number in dict.fromkeys(run[mine].tolist()):
+            rows = np.flatnonzero(mine & (run == number))
+            zero = np.flatnonzero(alone & ~acting & (run == number))
+            early, late = zero[zero < rows[0]], zero[zero > rows[-1]]
+            first = float(reading[early[-1]]) if early.size else before
+            last = float(reading[late[0]]) if late.size else after
+            runs.append(_run(table, load, rows, reading, int(number), first, last))
+        if runs:
+            found.append(
+                CellRows(
+                    load=load,
+                    load_unit=table.unit(load),
+                    indication=indication,
+                    indication_unit=table.unit(indication),
+                    sense=sense,
+                    runs=tuple(runs),
+                    resolution=source.statements.cell(indication).resolution,
+                    creep=creep,
+                    zero_read=source.zero == "tared" or all(one.zero_before is not None for one in runs),
+                    left_out=int((acting & ~alone).sum()),
+                )
+            )
+    return tuple(found)
+
+
+def _run(
+    table: Table,
+    load: str,
+    rows: NDArray[np.intp],
+    reading: NDArray[np.float64],
+    number: int,
+    before: float | None,
+    after: float | None,
+) -> CellRun:
+    name = f"u_{load}"
+    u = None
+    if table.has(name):
+        u = table.column(name)[rows] * (unit(table.unit(name)).factor / unit(table.unit(load)).factor)
+    direction = table.direction or ("up",) * table.rows
+    return CellRun(
+        number=number,
+        rotation_deg=None if table.rotation is None else float(table.rotation[rows[0]]),
+        force=np.abs(table.column(load)[rows]),
+        deflection=reading[rows] - (before or 0.0),
+        up=np.array([direction[i] == "up" for i in rows]),
+        u=u,
+        zero_before=before,
+        zero_after=after,
+    )
+
+
+def _scope(source: CellSource) -> Scope:
+    cells = json.loads(source.settings).get("cells", {})
+    return Scope(
+        bridges=bridges_of(cells, source.indications, where=source.where),
+        columns={name: source.statements.cell(name).column_unit for name in source.indications},
+        loads={name: source.table.unit(name) for name in source.loads},
+        where=source.where,
+    )
+
+
+def _stated_zeros(source: CellSource, indication: str) -> tuple[float | None, float | None]:
+    found: dict[str, float] = {}
+    for entry in zero_entries(list(source.statements.zero), _scope(source)):
+        found |= {entry.when.casefold(): dict(entry.values)[indication]} if indication in dict(
+            entry.values
+        ) else {}  # fmt: skip
+    return found.get("before"), found.get("after")
+
+
+def _creep(source: CellSource, load: str, indication: str) -> tuple[float, float] | None:
+    readings: dict[str, dict[float, float]] = {}
+    for entry in creep_entries(list(source.statements.creep), _scope(source)):
+        named = dict(entry.values)
+        if indication in named and (entry.load not in source.loads or entry.load == load):
+            readings.setdefault(entry.load, {})[entry.seconds] = named[indication]
+    early, late = _CREEP_SECONDS
+    pairs = [(one[early], one[late]) for one in readings.values() if early in one and late in one]
+    return max(pairs, key=lambda pair: abs(pair[1] - pair[0])) if pairs else None
+
+
+def _refused(where: object, what: str, got: object, expected: object) -> SessionError:
+    return SessionError(
+        what,
+        where=where,
+        got=got,
+        expected=expected,
+        next_step="name one of the record's with --load and --indication",
+        rule="standard",
+    )

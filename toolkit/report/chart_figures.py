@@ -1,0 +1,126 @@
+"""The picture of an instrument's control charts: one panel a check load, individuals above moving ranges."""
+
+from __future__ import annotations
+
+import io
+from typing import TYPE_CHECKING, Any
+
+from toolkit.report.figures import COLOURS
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from toolkit.calibration.control.chart import Chart, Series
+
+MOST_PANELS = 12
+_COLUMNS = 3
+_GREY, _RED, _BLUE = "#6b6b6b", COLOURS[1], COLOURS[0]
+_RC: Any = {
+    "font.family": "sans-serif",
+    "font.sans-serif": ["Carlito", "Calibri", "Liberation Sans", "DejaVu Sans"],
+    "font.size": 9.0,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    # Texts of an SVG are drawn, and its ids do not depend on the run.
+    "svg.hashsalt": "toolkit",
+}
+
+
+def panels(chart: Chart) -> tuple[Series, ...]:
+    """Return the series that are drawn: those that break a rule, then the nearest to a limit, 12 at most."""
+    ranked = sorted(enumerate(chart.series), key=lambda one: (-len(one[1].breaks), -_reach(one[1]), one[0]))
+    return tuple(one for _, one in sorted(ranked[:MOST_PANELS]))
+
+
+def draw_chart(chart: Chart, kind: str) -> bytes:
+    """Draw the charts as ``png`` or ``svg``."""
+    import matplotlib as mpl
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    drawn = panels(chart)
+    columns = min(_COLUMNS, len(drawn))
+    rows = -(-len(drawn) // columns)
+    with mpl.rc_context(_RC):
+        figure = Figure(figsize=(max(4.4 * columns, 7.0), 3.5 * rows + 0.9), dpi=150)
+        FigureCanvasAgg(figure)
+        height = figure.get_figheight()
+        outer = figure.add_gridspec(
+            rows, columns, left=0.62 / figure.get_figwidth(), right=1 - 0.55 / figure.get_figwidth(),
+            top=1 - 0.85 / height, bottom=0.62 / height, hspace=0.42, wspace=0.36,
+        )  # fmt: skip
+        for at, one in enumerate(drawn):
+            inner = outer[at // columns, at % columns].subgridspec(2, 1, height_ratios=(2.6, 1), hspace=0.12)
+            upper = figure.add_subplot(inner[0])
+            _individuals(upper, one)
+            _ranges(figure.add_subplot(inner[1], sharex=upper), one)
+        shown = "" if len(drawn) == len(chart.series) else f", {len(drawn)} of {len(chart.series)} charts"
+        figure.text(
+            0.5, 1 - 0.22 / height, f"{chart.instrument}: error of check loads by the record in force{shown}",
+            ha="center", va="center", fontsize=13, fontweight="bold",
+        )  # fmt: skip
+        figure.text(
+            0.5, 1 - 0.45 / height,
+            "solid: centre; dashed: 3 sigma limits; dotted: tolerance; orange ring: a run rule is broken "
+            "(Nelson's number)",
+            ha="center", va="center", fontsize=9, color=_GREY,
+        )  # fmt: skip
+        stream = io.BytesIO()
+        figure.savefig(stream, format=kind, metadata={"Date": None} if kind == "svg" else None)
+    return stream.getvalue()
+
+
+def _reach(one: Series) -> float:
+    if one.limits is None:
+        return abs(one.points[-1].error) / one.tolerance / 100
+    return abs(one.points[-1].error - one.limits.centre) / one.limits.sigma
+
+
+def _individuals(axes: Axes, one: Series) -> None:
+    errors = [point.error for point in one.points]
+    x = range(1, len(errors) + 1)
+    axes.plot(x, errors, "-o", color=_BLUE, lw=1, ms=4, zorder=3)
+    if one.limits is not None:
+        axes.axhspan(one.limits.lower, one.limits.upper, color=_BLUE, alpha=0.05, lw=0)
+        axes.axhline(one.limits.centre, color=_GREY, lw=1)
+        for value in (one.limits.lower, one.limits.upper):
+            axes.axhline(value, color=_RED, lw=1, ls=(0, (5, 3)))
+            axes.annotate(
+                f"{value:+.3g}", (1.01, value), xycoords=("axes fraction", "data"), va="center", fontsize=7.5
+            )
+    lowest, highest = axes.get_ylim()
+    for side in (-1, 1):
+        # A tolerance far outside would press the points into a line: it is told instead.
+        if lowest - (highest - lowest) < side * one.tolerance < highest + (highest - lowest):
+            axes.axhline(side * one.tolerance, color=_GREY, lw=1, ls=":")
+    broken: dict[int, list[str]] = {}
+    for b in one.breaks:
+        broken.setdefault(b.index, []).append(str(b.rule.number))
+    for index, numbers in broken.items():
+        axes.plot(index + 1, errors[index], "o", ms=10, mfc="none", mec=_RED, mew=1.6, zorder=4)
+        axes.annotate(
+            ",".join(numbers), (index + 1, errors[index]), xytext=(0, 8), textcoords="offset points",
+            ha="center", fontsize=8, color=_RED, fontweight="bold",
+        )  # fmt: skip
+    axes.margins(y=0.18)
+    axes.set_title(
+        f"{one.load} at {one.check_load}\ntolerance ±{one.tolerance:.3g} {one.unit}", fontsize=9, loc="left"
+    )
+    axes.set_ylabel(f"error [{one.unit}]")
+    axes.tick_params(labelbottom=False)
+
+
+def _ranges(axes: Axes, one: Series) -> None:
+    axes.plot(range(2, len(one.points) + 1), one.ranges, "-s", color=_BLUE, lw=1, ms=3)
+    if one.limits is not None:
+        axes.axhline(one.limits.mean_range, color=_GREY, lw=1)
+        axes.axhline(one.limits.upper_range, color=_RED, lw=1, ls=(0, (5, 3)))
+    axes.set_ylim(bottom=0)
+    axes.set_ylabel("range")
+    step = -(-len(one.points) // 6)
+    ticks = list(range(len(one.points) - 1, -1, -step))[::-1]
+    axes.set_xticks(
+        [at + 1 for at in ticks], [one.points[at].date.isoformat() for at in ticks], rotation=30, ha="right",
+        fontsize=7.5,
+    )  # fmt: skip
+    axes.set_xlim(0.5, len(one.points) + 0.5)
