@@ -8,6 +8,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from toolkit.cli import (
+    calibration_budget,
+    calibration_chart,
+    calibration_diff,
+    calibration_due,
+    calibration_report,
+    calibration_standard,
+)
 from toolkit.cli.console import Calibrations, Home, Json, Quiet, answer, exit_code, finding_lines, table
 from toolkit.cli.home import calibrations_folder
 from toolkit.errors import ConfigError
@@ -72,34 +80,17 @@ def show(
     as_json: Json = False,
     quiet: Quiet = False,
 ) -> int:
-    """Show one record: coefficients, issued digits, standard errors, state."""
+    """Show one record: its state, cells, ranges, coefficients, issued digits, check loads and files."""
+    from toolkit.cli.calibration_show import described
+
     registry = _registry(calibrations, home)
     record = registry.load(record_id)
     row = _row(record, registry.status(record_id, known_at=_day(known_at, "--known-at")))
     lines = [f"{key:<14}{value}" for key, value in row.items() if value not in (None, "", [])]
-    loads = {}
-    for one in record.loads:
-        errors = one.standard_errors or (None,) * len(one.terms)
-        loads[one.load] = {
-            "unit": one.unit,
-            "coefficients": dict(zip(one.terms, one.coefficients, strict=True)),
-            "issued": dict(zip(one.terms, one.issued, strict=True)),
-            "standard_errors": dict(zip(one.terms, errors, strict=True)) if one.covariance else None,
-            "residual_sd": one.residual_sd,
-            "dof": one.dof,
-        }
-        rows = [
-            [term, repr(c), repr(i), "-" if u is None else f"{u:.2g}"]
-            for term, c, i, u in zip(one.terms, one.coefficients, one.issued, errors, strict=True)
-        ]
-        lines += ["", f"{one.load} [{one.unit}]", table(["term", "coefficient", "issued", "std error"], rows)]
-    payload = {
-        "record": row,
-        "zero": record.zero,
-        "indication_units": dict(zip(record.indications, record.indication_units, strict=True)),
-        "loads": loads,
-        "data": [{"role": d.role, "file": d.file, "sha256": d.sha256} for d in record.data],
-    }
+    told, more = described(record, registry.folder)
+    head = registry.head(record.instrument)
+    lines += [f"{'ledger head':<14}{head}", *more]
+    payload = {"record": row, "head": head, **told}
     answer(payload, "\n".join(lines), as_json=as_json, quiet=quiet)
     return 0
 
@@ -124,35 +115,6 @@ def verify(
     )
     answer({"records": payload}, text or "no records", as_json=as_json, quiet=quiet)
     return 0 if all(row.ok for row in rows) else 1
-
-
-@app.command()
-def diff(
-    one: Id,
-    other: Id,
-    calibrations: Calibrations = None,
-    home: Home = None,
-    as_json: Json = False,
-    quiet: Quiet = False,
-) -> int:
-    """Compare two records term by term; exit code 1 where they differ."""
-    registry = _registry(calibrations, home)
-    first, second = registry.load(one), registry.load(other)
-    rows: list[dict[str, Any]] = []
-    for load in dict.fromkeys([o.load for o in first.loads] + [o.load for o in second.loads]):
-        before, after = _named(first, load), _named(second, load)
-        for term in dict.fromkeys([*before, *after]):
-            a, b = before.get(term), after.get(term)
-            change = None if a is None or b is None else b - a
-            rows.append({"load": load, "term": term, one: a, other: b, "change": change, "differs": a != b})
-    text = table(
-        ["load", "term", one, other, "change"],
-        [[r["load"], r["term"], _digits(r[one]), _digits(r[other]), _digits(r["change"])] for r in rows],
-        align="<<>>>",
-    )  # fmt: skip
-    differs = any(row["differs"] for row in rows)
-    answer({"records": [one, other], "terms": rows}, text, as_json=as_json, quiet=quiet)
-    return 1 if differs else 0
 
 
 @app.command()
@@ -292,6 +254,14 @@ def withdraw(
     return 0
 
 
+app.command("budget")(calibration_budget.command)
+app.command("diff")(calibration_diff.command)
+app.command("report")(calibration_report.command)
+app.command("standard")(calibration_standard.command)
+app.command("chart")(calibration_chart.command)
+app.command("due")(calibration_due.command)
+
+
 def _registry(calibrations: Path | None, home: Path | None) -> Registry:
     from toolkit.calibration.registry.registry import Registry
 
@@ -319,14 +289,6 @@ def _void(status: RecordStatus) -> str | None:
     if status.void_from is None or status.void_from == dt.date.min:
         return None
     return status.void_from.isoformat()
-
-
-def _digits(value: float | None) -> str:
-    return "-" if value is None else f"{value:.10g}"
-
-
-def _named(record: CalibrationRecord, load: str) -> dict[str, float]:
-    return next((dict(zip(o.terms, o.coefficients, strict=True)) for o in record.loads if o.load == load), {})
 
 
 def _row(record: CalibrationRecord, status: RecordStatus) -> dict[str, Any]:
