@@ -54,6 +54,11 @@ def check_agrees(record: CalibrationRecord, session: bytes, table: Table) -> Non
 def check_transcribed(record: CalibrationRecord, source: bytes) -> None:
     """Refuse a legacy record that is not what its stored source says: it cannot be refitted.
 
+    It carries no golden vectors. They would be computed from the digits of the very file that every
+    coefficient is compared with here, double for double: whoever changes both would compute them anew. And
+    the records entered without them are hashed so. What a rewritten source, record and ledger cannot meet
+    is a head that was printed earlier (`verify --head`).
+
     Raises
     ------
     RecordError
