@@ -11,9 +11,18 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from toolkit.calibration.fit.findings import session_findings
-from toolkit.calibration.fit.session_fit import LoadResult, SessionFit, fit_session, load_uncertainty
+from toolkit.calibration.fit.readings import SessionReadings, readings_of
+from toolkit.calibration.fit.readings_findings import readings_findings
+from toolkit.calibration.fit.session_fit import (
+    LoadResult,
+    SessionFit,
+    fit_session,
+    load_errors,
+    load_uncertainty,
+)
 from toolkit.calibration.records.exact import golden_inputs, predict_exactly, solve_exactly
 from toolkit.calibration.records.issue import issued_value
+from toolkit.calibration.records.precise import solve_gls_precisely, solve_odr_precisely
 from toolkit.calibration.records.record import (
     CalibrationRecord,
     DataFile,
@@ -38,7 +47,10 @@ from toolkit.files import sha256_bytes
 from toolkit.findings import Finding
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
+    from fractions import Fraction
+
+    from toolkit.calibration.session.read import LoadSetting
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -49,6 +61,7 @@ class Candidate:
     path: Path
     existing: bool
     fit: SessionFit
+    readings: SessionReadings
     findings: tuple[Finding, ...]
 
 
@@ -71,10 +84,17 @@ def calibrate(session_file: Path, registry: Registry) -> Candidate:
     existing = _recorded(folder, session, registry.ledger(session.instrument))
     findings = session_findings(fit)
     if existing is not None:
+        readings = readings_of(existing, session.table)
+        findings += readings_findings(readings, session.path.name)
         path = folder / f"{existing.id}.json"
-        return Candidate(record=existing, path=path, existing=True, fit=fit, findings=findings)
+        return Candidate(
+            record=existing, path=path, existing=True, fit=fit, readings=readings, findings=findings
+        )
     made: list[CalibrationRecord] = []
     unnumbered = _record(fit)
+    # Before anything is written: what cannot be evaluated must not leave a record behind.
+    readings = readings_of(unnumbered, session.table)
+    findings += readings_findings(readings, session.path.name)
 
     def build(ledger: Ledger) -> Change | None:
         # Under the lock: another writer may have recorded this very session meanwhile.
@@ -97,7 +117,12 @@ def calibrate(session_file: Path, registry: Registry) -> Candidate:
     if written:
         findings += history_findings(record, last)
     return Candidate(
-        record=record, path=folder / f"{record.id}.json", existing=not written, fit=fit, findings=findings
+        record=record,
+        path=folder / f"{record.id}.json",
+        existing=not written,
+        fit=fit,
+        readings=readings,
+        findings=findings,
     )
 
 
@@ -237,13 +262,7 @@ def _golden(session: Session, ranges: list[tuple[float, float]]) -> Golden:
     inputs = golden_inputs(ranges)
     outputs = []
     for setting in session.loads:
-        u = load_uncertainty(session, setting)
-        exact = solve_exactly(
-            terms=session.terms,
-            columns=columns,
-            load=session.table.column(setting.name).tolist(),
-            weights=None if u is None else (1.0 / u**2).tolist(),
-        )
+        exact = _precise(session, setting, columns)
         outputs.append(
             tuple(
                 predict_exactly(
@@ -253,6 +272,27 @@ def _golden(session: Session, ranges: list[tuple[float, float]]) -> Golden:
             )
         )
     return Golden(inputs=inputs, outputs=tuple(outputs))
+
+
+def _precise(
+    session: Session, setting: LoadSetting, columns: Mapping[str, Sequence[float]]
+) -> tuple[Fraction, ...]:
+    """Return a load's coefficients, computed apart from the fit."""
+    load = session.table.column(setting.name).tolist()
+    if session.method in ("ols", "wls"):
+        u = load_uncertainty(session, setting)
+        weights = None if u is None else (1.0 / u**2).tolist()
+        return solve_exactly(terms=session.terms, columns=columns, load=load, weights=weights)
+    errors = load_errors(session, setting)
+    each = None if errors.u is None else errors.u.tolist()
+    if session.method == "gls":
+        return solve_gls_precisely(
+            terms=session.terms, columns=columns, load=load, u=each, group=errors.group.tolist(),
+            u_shared=errors.u_shared, proportional=errors.proportional,
+        )  # fmt: skip
+    return solve_odr_precisely(
+        terms=session.terms, columns=columns, load=load, u=each or [], u_cells=errors.u_cells.tolist()
+    )
 
 
 def _software() -> tuple[tuple[str, str], ...]:

@@ -10,6 +10,7 @@ from typing import Any
 
 from toolkit.calibration.records.record import Zero
 from toolkit.calibration.session.bridge import Bridge, bridges_of, converted, fit_units
+from toolkit.calibration.session.known_errors import group_column
 from toolkit.calibration.session.settings import (
     Settings,
     date_of,
@@ -105,19 +106,13 @@ def read_session(path: Path) -> Session:
     raw = parse_session(session_bytes, where=path)
     settings = settings_of(raw, where=path)
     loads, indications = settings.loads, settings.indications
-    if settings.method in ("gls", "odr"):
-        raise SessionError(
-            f"method {settings.method!r} is not available yet",
-            where=path, got=settings.method, expected="ols, or wls with u_<LOAD> columns",
-            next_step='set method = "ols" or "wls"', rule="method",
-        )  # fmt: skip
     data_bytes = _file(path, raw.get("data"), "data")
     uncertainties = [f"u_{load}" for load in loads]
     recorded = read_table(
         data_bytes,
         where=path.parent / str(raw["data"]),
         required=[*indications, *loads, *(uncertainties if settings.method == "wls" else ())],
-        optional=uncertainties,
+        optional=[*uncertainties, *group_column(raw.get("reference", {}))],
     )
     check_columns(recorded, loads, path)
     check_statements(raw, recorded, loads, path)

@@ -81,7 +81,7 @@ def check_statements(raw: Mapping[str, Any], table: Table, loads: tuple[str, ...
     ConfigError, UnitError
         an unknown key, a number that is none, a unit that is unknown or of another dimension
     """
-    indications = [name for name in table.names if name not in loads and not name.startswith("u_")]
+    indications = list(raw["indications"])  # checked by `settings`; a list of readings is in this order
     for key, known in (("reference", _REFERENCE), ("cells", indications), ("certificate", None)):
         entry = raw.get(key, {})
         if not isinstance(entry, dict):

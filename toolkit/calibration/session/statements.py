@@ -13,7 +13,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from toolkit.calibration.session.bridge import bridge_of
+from toolkit.calibration.session.bridge import bridge_of, bridges_of
+from toolkit.calibration.session.reading_entries import Scope
 from toolkit.calibration.session.settings import zero_readings
 from toolkit.calibration.session.statement_checks import temperature_effect
 from toolkit.machine.definition import quantity
@@ -102,6 +103,17 @@ def statements_of(record: CalibrationRecord) -> Statements:
         date=dt.date.fromisoformat(record.date),
         where=record.id,
         columns=columns,
+    )
+
+
+def scope_of(record: CalibrationRecord) -> Scope:
+    """Return what the zero, shunt and creep entries of a record's settings are read against."""
+    cells = json.loads(record.settings).get("cells", {})
+    return Scope(
+        bridges=bridges_of(cells, record.indications, where=record.id),
+        columns={cell.name: cell.column_unit or cell.unit for cell in record.cells},
+        loads={one.load: one.unit for one in record.loads},
+        where=record.id,
     )
 
 

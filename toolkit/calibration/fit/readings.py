@@ -1,0 +1,380 @@
+"""What a session's own readings say of the instrument: zero, shunt, creep, reversibility.
+
+Everything follows from a record and its reference loads, so that a certificate or a budget of ten years ago
+is made from what is stored. Full scale of an indication is its largest deflection in the fitted data, X_N
+of ISO 376; full scale of a load is its largest reference load.
+
+- zero: after minus before, and what it is worth as a load (ISO 376 f0 relates it to X_N);
+- shunt: the step that a resistor across one arm makes, against the expected one. The step is the reading
+  with the shunt minus the last zero before it (as wind-tunnel balance laboratories do it);
+- creep c: change between 30 s and 300 s after loading or unloading, over X_N (ISO 376);
+- reversibility: mean error going up minus mean error going down, at equal reference loads of one run, so
+  that a reference load that is not quite the same twice does not count.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from toolkit.calibration.session.reading_entries import (
+    SHUNT_TOLERANCE_PERCENT,
+    CreepEntry,
+    Scope,
+    ZeroEntry,
+    creep_entries,
+    shunt_entry,
+    zero_entries,
+)
+from toolkit.calibration.session.settings import zero_readings
+from toolkit.calibration.session.statements import scope_of, statements_of
+from toolkit.calibration.terms import term_matrix
+from toolkit.units import unit
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from toolkit.calibration.records.record import CalibrationRecord, LoadFit
+    from toolkit.calibration.session.table import Table
+
+CREEP_FROM_S, CREEP_TO_S = 30.0, 300.0
+SAME_LOAD = 2e-3  # of full scale: reference loads that are called equal
+_NO_LOAD = 1e-6
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ZeroDrift:
+    """An indication's zero, ``after`` minus ``before`` (the entries' words), in its unit."""
+
+    name: str
+    unit: str
+    before: str
+    after: str
+    drift: float
+    percent_fs: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LoadDrift:
+    """What the drifts of the indications in ``cells`` are worth together, in the load's unit.
+
+    ``tolerance`` is that of the check loads; an indication without readings counts as not moved.
+    """
+
+    load: str
+    unit: str
+    cells: tuple[str, ...]
+    drift: float
+    percent_fs: float
+    tolerance: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ShuntCheck:
+    """A shunt step. ``difference_percent`` of the expected one; None where nothing can be compared.
+
+    ``source`` is the entry that was read; ``zero`` the reading that was subtracted, None where there was
+    none or the step itself was stated.
+    """
+
+    name: str
+    unit: str
+    source: str
+    measured: float
+    zero: float | None
+    expected: float | None
+    difference_percent: float | None
+    tolerance_percent: float
+
+    @property
+    def within(self) -> bool | None:
+        """Whether the step is inside its tolerance; None where nothing can be compared."""
+        found = self.difference_percent
+        return None if found is None else abs(found) <= self.tolerance_percent
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Creep:
+    """Change of an indication (or of a load that an indicator showed) from ``from_s`` to ``to_s`` [s].
+
+    ``percent_fs`` is its absolute value in % of full scale; ``unloaded``: recovery after the load was
+    taken off.
+    """
+
+    of: str
+    unit: str
+    load: str
+    unloaded: bool
+    from_s: float
+    to_s: float
+    change: float
+    percent_fs: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Reversibility:
+    """Up minus down at ``pairs`` equal reference loads: largest absolute and RMS, in the load's unit."""
+
+    load: str
+    unit: str
+    pairs: int
+    worst: float
+    rms: float
+    worst_percent_fs: float
+    rms_percent_fs: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SessionReadings:
+    """A session's readings. ``full_scale`` is X_N by indication, in its unit.
+
+    ``largest_ratio`` is the largest |output| [mV/V] by indication that is one; ``unscaled`` are indications
+    in counts with a scale that has no unit; ``creep_left_out`` are loads whose creep readings give nothing.
+    """
+
+    full_scale: tuple[tuple[str, float], ...]
+    zero: tuple[ZeroDrift, ...]
+    zero_loads: tuple[LoadDrift, ...]
+    shunts: tuple[ShuntCheck, ...]
+    creep: tuple[Creep, ...]
+    creep_left_out: tuple[str, ...]
+    reversibility: tuple[Reversibility, ...]
+    temperature_C: float | None
+    largest_ratio: tuple[tuple[str, float], ...]
+    unscaled: tuple[str, ...]
+
+
+def readings_of(record: CalibrationRecord, loads: Table) -> SessionReadings:
+    """Evaluate the readings of a record's session; ``loads`` are its reference loads in its units.
+
+    Raises
+    ------
+    ConfigError, UnitError
+        an entry of a record made before they were checked cannot be read
+    """
+    scope = scope_of(record)
+    settings = json.loads(record.settings)
+    cells = settings.get("cells", {})
+    zero = zero_entries(zero_readings(settings), scope)
+    creep = creep_entries(settings.get("creep", []), scope)
+    rest = _rest(record, loads)
+    columns = loads.columns(record.indications)
+    full = {name: float(np.abs(columns[name] - rest[name]).max()) for name in record.indications}
+    drifts = _zero_drifts(zero, scope, full)
+    series, left_out = _creeps(creep, scope, full, {one.load: one.largest for one in record.loads})
+    return SessionReadings(
+        full_scale=tuple(full.items()),
+        zero=drifts,
+        zero_loads=tuple(_load_drift(record, one, drifts, zero, rest) for one in record.loads if drifts),
+        shunts=tuple(_shunts(zero, cells, scope)),
+        creep=series,
+        creep_left_out=left_out,
+        reversibility=_reversibility(record, loads),
+        temperature_C=statements_of(record).temperature_C,
+        largest_ratio=tuple(
+            (name, 1e3 * unit(text).factor * float(np.abs(columns[name]).max()))
+            for name, text in zip(record.indications, record.indication_units, strict=True)
+            if unit(text).dimension == "bridge_ratio"
+        ),
+        unscaled=tuple(
+            name
+            for name, text in scope.columns.items()
+            if "scale" in cells.get(name, {})
+            and not isinstance(cells[name]["scale"], dict)
+            and unit(text).dimension == "count"
+        ),
+    )
+
+
+def readings_json(found: SessionReadings) -> dict[str, Any]:
+    """Return the readings as JSON values, by indication and load."""
+
+    def named(parts: Iterable[Any], key: str) -> dict[str, Any]:
+        made = [dataclasses.asdict(one) for one in parts]
+        return {one.pop(key): one for one in made}
+
+    return {
+        "full_scale": dict(found.full_scale),
+        "zero": named(found.zero, "name"),
+        "zero_loads": named(found.zero_loads, "load"),
+        "shunt": [{**dataclasses.asdict(one), "within": one.within} for one in found.shunts],
+        "creep": [dataclasses.asdict(one) for one in found.creep],
+        "reversibility": named(found.reversibility, "load"),
+        "temperature_C": found.temperature_C,
+    }
+
+
+def _rest(record: CalibrationRecord, table: Table) -> dict[str, float]:
+    """Return each indication without load: the mean of the unloaded rows, else by a line through all rows."""
+    matrix = table.matrix([one.load for one in record.loads])
+    cells = table.matrix(record.indications)
+    idle = (np.abs(matrix) <= _NO_LOAD * np.abs(matrix).max(axis=0)).all(axis=1)
+    if idle.any():
+        values = cells[idle].mean(axis=0)
+    else:
+        scaled = matrix / np.abs(matrix).max(axis=0)
+        values = np.linalg.lstsq(np.column_stack([np.ones(len(cells)), scaled]), cells, rcond=None)[0][0]
+    return dict(zip(record.indications, values.tolist(), strict=True))
+
+
+def _zero_drifts(zero: tuple[ZeroEntry, ...], scope: Scope, full: dict[str, float]) -> tuple[ZeroDrift, ...]:
+    made = []
+    for name in scope.indications:
+        told = [
+            (one.when, dict(one.values)[name]) for one in zero if not one.shunt and name in dict(one.values)
+        ]
+        if len(told) < 2:
+            continue
+        said = [when.casefold() for when, _ in told]
+        first = next((i for i, text in enumerate(said) if text.startswith("before")), 0)
+        last = max((i for i, text in enumerate(said) if text.startswith("after")), default=len(told) - 1)
+        drift = told[last][1] - told[first][1]
+        made.append(
+            ZeroDrift(
+                name=name, unit=scope.unit(name), before=told[first][0], after=told[last][0], drift=drift,
+                percent_fs=100 * drift / full[name],
+            )
+        )  # fmt: skip
+    return tuple(made)
+
+
+def _load_drift(
+    record: CalibrationRecord,
+    one: LoadFit,
+    drifts: tuple[ZeroDrift, ...],
+    zero: tuple[ZeroEntry, ...],
+    rest: dict[str, float],
+) -> LoadDrift:
+    start = dict(rest)
+    for entry in reversed(zero):
+        start |= {} if entry.shunt else dict(entry.values)
+    moved = start | {drift.name: start[drift.name] + drift.drift for drift in drifts}
+    points = {name: np.array([start[name], moved[name]]) for name in record.indications}
+    before, after = _equation(one, points).tolist()
+    tolerance = one.tolerance or 1e-3 * one.largest
+    return LoadDrift(
+        load=one.load, unit=one.unit, cells=tuple(drift.name for drift in drifts), drift=after - before,
+        percent_fs=100 * (after - before) / one.largest, tolerance=tolerance,
+    )  # fmt: skip
+
+
+def _shunts(zero: tuple[ZeroEntry, ...], cells: dict[str, Any], scope: Scope) -> Iterable[ShuntCheck]:
+    for name in scope.indications:
+        stated = shunt_entry(name, cells.get(name, {}), scope)
+        if stated is not None and stated.measured is not None:
+            yield _shunt_check(name, stated.unit, "shunt_measured", stated.measured, None, stated)
+        last: float | None = None
+        for entry in zero:
+            reading = dict(entry.values).get(name)
+            if reading is None:
+                continue
+            if not entry.shunt:
+                last = reading
+                continue
+            yield _shunt_check(name, scope.unit(name), entry.when, reading - (last or 0.0), last, stated)
+
+
+def _shunt_check(
+    name: str, text: str, source: str, measured: float, zero: float | None, stated: Any
+) -> ShuntCheck:
+    # A reading in newtons says nothing of a step that is told in mV/V.
+    comparable = stated is not None and stated.unit == text
+    return ShuntCheck(
+        name=name,
+        unit=text,
+        source=source,
+        measured=measured,
+        zero=zero,
+        expected=stated.expected if comparable else None,
+        difference_percent=100 * (measured / stated.expected - 1) if comparable else None,
+        tolerance_percent=SHUNT_TOLERANCE_PERCENT if stated is None else stated.tolerance_percent,
+    )
+
+
+def _creeps(
+    entries: tuple[CreepEntry, ...], scope: Scope, full: dict[str, float], largest: dict[str, float]
+) -> tuple[tuple[Creep, ...], tuple[str, ...]]:
+    series: dict[tuple[str, str, bool], dict[float, float]] = {}
+    told: dict[str, bool] = {}
+    for entry in entries:
+        told.setdefault(entry.load, False)
+        for name, value in (*entry.values, *([entry.shown] if entry.shown else ())):
+            series.setdefault((entry.load, name, entry.unloaded), {})[entry.seconds] = value
+    made = []
+    for (load, name, unloaded), values in series.items():
+        if len(values) < 2:
+            continue
+        standard = CREEP_FROM_S in values and CREEP_TO_S in values
+        first, last = (CREEP_FROM_S, CREEP_TO_S) if standard else (min(values), max(values))
+        change, of_load = values[last] - values[first], name in largest
+        made.append(
+            Creep(
+                of=name, unit=scope.loads[name] if of_load else scope.unit(name), load=load,
+                unloaded=unloaded, from_s=first, to_s=last, change=change,
+                percent_fs=100 * abs(change) / (largest[name] if of_load else full[name]),
+            )
+        )  # fmt: skip
+        told[load] = True
+    return tuple(made), tuple(load for load, used in told.items() if not used)
+
+
+def _reversibility(record: CalibrationRecord, table: Table) -> tuple[Reversibility, ...]:
+    if table.run is None or table.direction is None:
+        return ()
+    up = np.array([one == "up" for one in table.direction])
+    names = [one.load for one in record.loads]
+    matrix = table.matrix(names)
+    largest = np.abs(matrix).max(axis=0)
+    loaded = (np.abs(matrix) > SAME_LOAD * largest).any(axis=1)
+    if not (up & loaded).any() or not (~up & loaded).any():
+        return ()
+    _, key = np.unique(table.run[loaded], return_inverse=True)
+    for column, full in zip(matrix[loaded].T, largest, strict=True):
+        levels = _levels(column, SAME_LOAD * full)
+        # Brought back to few numbers at each step, so that the key stays far from its largest value.
+        _, key = np.unique(key * (int(levels.max()) + 1) + levels, return_inverse=True)
+    rises = up[loaded]
+    ups, downs = (np.bincount(key[which], minlength=int(key.max()) + 1) for which in (rises, ~rises))
+    both = (ups > 0) & (downs > 0)
+    if not both.any():
+        return ()
+    columns = table.columns(record.indications)
+    made = []
+    for one, full in zip(record.loads, largest.tolist(), strict=True):
+        error = (_equation(one, columns) - table.column(one.load))[loaded]
+        mean_up, mean_down = (
+            np.bincount(key[which], weights=error[which], minlength=len(ups))[both] / count[both]
+            for which, count in ((rises, ups), (~rises, downs))
+        )
+        apart = mean_up - mean_down
+        worst, rms = float(np.abs(apart).max()), float(np.sqrt(np.mean(apart**2)))
+        made.append(
+            Reversibility(
+                load=one.load, unit=one.unit, pairs=int(both.sum()), worst=worst, rms=rms,
+                worst_percent_fs=100 * worst / full, rms_percent_fs=100 * rms / full,
+            )
+        )  # fmt: skip
+    return tuple(made)
+
+
+def _levels(values: NDArray[np.float64], within: float) -> NDArray[np.int64]:
+    """Return which level each load belongs to: loads nearer than ``within`` are one, unless they chain."""
+    order = np.argsort(values, kind="stable")
+    steps = np.cumsum(np.diff(values[order], prepend=values[order[0]]) > within)
+    starts = np.searchsorted(steps, np.arange(steps[-1] + 1))
+    ends = np.append(starts[1:], len(values)) - 1
+    if (values[order][ends] - values[order][starts] > within).any():
+        return np.unique(values, return_inverse=True)[1].astype(np.int64)
+    made = np.empty(len(values), dtype=np.int64)
+    made[order] = steps
+    return made
+
+
+def _equation(one: LoadFit, columns: dict[str, NDArray[np.float64]]) -> NDArray[np.float64]:
+    value: NDArray[np.float64] = term_matrix(one.terms, columns) @ np.asarray(one.coefficients)
+    return value
