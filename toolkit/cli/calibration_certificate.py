@@ -1,0 +1,177 @@
+"""`toolkit calibration certificate`: Word, verified PDF and the digital certificate of one record."""
+
+from __future__ import annotations
+
+import re
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from toolkit.cli.console import (
+    Calibrations,
+    Home,
+    Json,
+    KnownAt,
+    Quiet,
+    answer,
+    day,
+    exit_code,
+    finding_lines,
+    progress,
+)
+from toolkit.cli.home import calibrations_folder, find_home, packaged_home
+
+if TYPE_CHECKING:
+    from toolkit.report.certificate.model import Certificate
+    from toolkit.report.deliver import Delivered
+
+NAME = "certificate"
+
+
+def command(
+    record_id: Annotated[str, typer.Argument(metavar="ID", help="Record id, such as m15-r2.")],
+    template: Annotated[
+        Path | None,
+        typer.Option("--template", help="Word template; default: report_templates/certificate.docx."),
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option("--out", help="Output folder; default: certificate-<ID> here.")
+    ] = None,
+    dcc: Annotated[bool, typer.Option("--dcc", help="Also write the DCC 3.3.0 file (XML).")] = False,
+    replaces: Annotated[
+        str | None, typer.Option("--replaces", help="Id of the certificate that this one replaces.")
+    ] = None,
+    amendment_reason: Annotated[
+        str | None, typer.Option("--amendment-reason", help="Why it is replaced; printed.")
+    ] = None,
+    draft: Annotated[
+        bool, typer.Option("--draft", help="Allow a record that is not approved; the paper says DRAFT.")
+    ] = False,
+    known_at: KnownAt = None,
+    keep: Annotated[
+        bool, typer.Option("--keep", help="Keep what was not verified in rejected/ of the folder.")
+    ] = False,
+    calibrations: Calibrations = None,
+    home: Home = None,
+    json: Json = False,
+    quiet: Quiet = False,
+) -> int:
+    """Make the calibration certificate of a record: Word, verified PDF, and with --dcc the XML.
+
+    A legacy import, a candidate and a withdrawn record have none. What nobody stated is a visible gap
+    (exit 1). --known-at is the day of issue, and of what was known.
+
+    Example: toolkit calibration certificate m15-r3 --out certificates --dcc
+    """
+    from toolkit.calibration.registry.registry import Registry
+    from toolkit.report.certificate.collect import collect
+    from toolkit.report.certificate.content import build_content
+    from toolkit.report.certificate.dcc import build_dcc
+    from toolkit.report.deliver import deliver
+    from toolkit.report.package import read_template
+    from toolkit.report.style import read_style, style_file
+
+    started = time.perf_counter()
+    opened = read_template(template or default_certificate(home))
+    style = read_style(style_file(opened.path))
+    with progress(None, "certificate", show=not (json or quiet)) as step:
+        step("record")
+        made = collect(
+            Registry(calibrations_folder(calibrations, home)),
+            record_id,
+            style,
+            issued=day(known_at),
+            draft=draft,
+            replaces=replaces,
+            amendment=amendment_reason,
+        )
+        delivered = deliver(
+            opened,
+            build_content(made, style),
+            out or Path.cwd() / f"certificate-{record_id}",
+            name=file_name(made.id),
+            companions={".xml": build_dcc(made)} if dcc else None,
+            keep=keep,
+            step=step,
+        )
+    payload = _payload(made, delivered) | {"timing": {"seconds": time.perf_counter() - started}}
+    answer(payload, _text(made, delivered), as_json=json, quiet=quiet)
+    return 1 if delivered.warnings else exit_code(made.findings)
+
+
+def default_certificate(home: Path | None) -> Path:
+    """Return ``report_templates/certificate.docx`` of the home; the packaged one where it has none."""
+    from toolkit.errors import ConfigError
+
+    packaged = packaged_home() / "report_templates" / "certificate.docx"
+    try:
+        own = find_home(home) / "report_templates" / "certificate.docx"
+    except ConfigError:
+        if home is not None:
+            raise
+        return packaged
+    return own if own.is_file() else packaged
+
+
+def file_name(identity: str) -> str:
+    """Return a certificate's id as a file's name.
+
+    >>> file_name("CAL 2026/017")
+    'CAL-2026-017'
+    """
+    return re.sub(r"[^\w.-]+", "-", identity).strip("-.")[:100] or "certificate"
+
+
+def _payload(made: Certificate, done: Delivered) -> dict[str, Any]:
+    return {
+        "certificate": made.id,
+        "record": {"id": made.record, "sha256": made.record_sha256, "status": made.status},
+        "head": made.ledger_head,
+        "issued": made.issued.isoformat(),
+        "draft": made.draft,
+        "withdrawn": made.withdrawn,
+        "replaces": made.replaces,
+        "docx": done.docx,
+        "pdf": done.pdf,
+        "dcc": done.companions[0] if done.companions else None,
+        "pages": done.pages,
+        "verified": True,
+        "checks": [check.as_dict() for check in done.checks],
+        "template_sha256": done.template_sha256,
+        "decision_rule": made.rule,
+        "loads": {one.load: _load(one) for one in made.loads},
+        "unverifiable": [f"{load}: {term}" for load, term in made.unverifiable],
+        "not_stated": list(made.gaps),
+        "figures": [{"tag": tag, "alt": alt} for tag, alt in done.filled.figures],
+        "manifest": [entry.as_dict() for entry in done.filled.manifest],
+        "warnings": list(done.warnings),
+        "findings": [finding.as_dict() for finding in made.findings],
+    }
+
+
+def _load(one: Any) -> dict[str, Any]:
+    full = one.full_scale
+    return {
+        "unit": one.unit,
+        "full_scale": full.at,
+        "U": full.U,
+        "k": full.k,
+        "probability": full.probability,
+        "dof": full.dof,
+        "tolerance": one.tolerance,
+        "verdict": one.verdict,
+    }
+
+
+def _text(made: Certificate, done: Delivered) -> str:
+    marks = "  DRAFT" if made.draft else "  WITHDRAWN" if made.withdrawn else ""
+    lines = [
+        f"certificate {made.id} of {made.record}{marks}",
+        *(f"{path}" for path in (done.pdf, done.docx, *done.companions)),
+        f"{done.pages} pages, {len(done.filled.manifest)} values verified",
+        *(f"  warning {one}" for one in done.warnings),
+        *finding_lines(made.findings),
+    ]
+    return "\n".join(lines)

@@ -1,0 +1,368 @@
+"""The certificate as a Digital Calibration Certificate: PTB's DCC 3.3.0 with D-SI 2.2.1.
+
+Values are in SI (``\\newton``, ``\\newton\\metre``, ``\\milli\\volt\\per\\volt``); a record's own unit
+outside SI is told as a ``nonSIUnit`` statement with its definition and in the descriptions. The
+same certificate and day of issue give the same bytes.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from toolkit import __version__
+from toolkit.calibration.uncertainty.rounding import round_to_uncertainty, round_uncertainty
+from toolkit.errors import ConfigError
+from toolkit.recording.marks import OWN_OUTPUT
+from toolkit.report.certificate import content as words
+from toolkit.report.certificate.dcc_units import dsi, dsi_of_term
+from toolkit.report.certificate.dcc_xml import Node, node, quantity, quantity_list, release, rich, text
+from toolkit.report.certificate.decision import RULES
+from toolkit.units import unit
+
+if TYPE_CHECKING:
+    from toolkit.report.certificate.model import Certificate, LoadResult
+
+VERSION = "3.3.0"
+
+
+def build_dcc(certificate: Certificate) -> bytes:
+    """Return the DCC as XML bytes.
+
+    Raises
+    ------
+    ConfigError
+        ``certificate-country``: no country of the laboratory is stated, which the schema demands
+    """
+    from lxml import etree
+
+    root = node(
+        "dcc:digitalCalibrationCertificate",
+        _administrative(certificate),
+        _results(certificate),
+        schemaVersion=VERSION,
+    )
+    place = "{http://www.w3.org/2001/XMLSchema-instance}schemaLocation"
+    root.set(place, f"https://ptb.de/dcc https://ptb.de/dcc/v{VERSION}/dcc.xsd")
+    root.insert(0, etree.Comment(f" {OWN_OUTPUT}; toolkit {__version__} "))
+    etree.indent(root, " ")
+    made: bytes = etree.tostring(root, xml_declaration=True, encoding="UTF-8")
+    return made + b"\n"
+
+
+def _administrative(c: Certificate) -> Node:
+    if c.country is None:
+        raise ConfigError(
+            "the digital certificate needs the laboratory's country",
+            where=f"{c.record}: [certificate] country",
+            got="nothing",
+            expected='an ISO 3166-1 code, such as country = "US"',
+            next_step="state it under [laboratory] of the style file beside the template, or leave out --dcc",
+            rule="certificate-country",
+        )
+    day = c.calibrated.isoformat()
+    return node(
+        "dcc:administrativeData",
+        node("dcc:dccSoftware", _software("toolkit", __version__)),
+        node(
+            "dcc:coreData",
+            node("dcc:countryCodeISO3166_1", c.country),
+            node("dcc:usedLangCodeISO639_1", "en"),
+            node("dcc:mandatoryLangCodeISO639_1", "en"),
+            node("dcc:uniqueIdentifier", ("DRAFT " if c.draft else "") + c.id),
+            node(
+                "dcc:identifications",
+                _identification("calibrationLaboratory", c.record, "Calibration record"),
+                _identification("calibrationLaboratory", c.record_sha256, "SHA-256 of the record"),
+                _identification("calibrationLaboratory", c.ledger_head, "Head of the ledger"),
+            ),
+            c.received and node("dcc:receiptDate", c.received.isoformat()),
+            node("dcc:beginPerformanceDate", day),
+            node("dcc:endPerformanceDate", day),
+            node("dcc:performanceLocation", "other" if c.place else "laboratory"),
+            node("dcc:issueDate", c.issued.isoformat()),
+            c.replaces
+            and node(
+                "dcc:reportAmendedSubstituted",
+                node("dcc:typeOfChange", "amended"),
+                node("dcc:replacedUniqueIdentifier", c.replaces),
+            ),
+        ),
+        node(
+            "dcc:items",
+            node(
+                "dcc:item",
+                text("dcc:name", c.item),
+                node(
+                    "dcc:identifications",
+                    _identification("calibrationLaboratory", c.instrument, "Instrument"),
+                    *(
+                        _identification("manufacturer", one.serial, f"Serial number of {one.name}")
+                        for one in c.cells
+                        if one.serial
+                    ),
+                ),
+            ),
+        ),
+        node("dcc:calibrationLaboratory", _contact("dcc:contact", c.laboratory, c.address)),
+        node("dcc:respPersons", *_persons(c)),
+        _contact("dcc:customer", c.customer, c.customer_address),
+        node("dcc:statements", *_statements(c)),
+    )
+
+
+def _persons(c: Certificate) -> list[Node]:
+    roles = [("calibrated", c.entered_by), ("checked", c.checked_by), ("approved", c.approved_by)]
+    told = [(role, name) for role, name in roles if name]
+    return [
+        node(
+            "dcc:respPerson",
+            node("dcc:person", text("dcc:name", name)),
+            node("dcc:role", role),
+            node("dcc:mainSigner", "true" if at == len(told) - 1 and not c.draft else "false"),
+        )
+        for at, (role, name) in enumerate(told)
+    ]
+
+
+def _statements(c: Certificate) -> list[Node]:
+    told: list[tuple[str, str | None]] = [
+        ("State", words.DRAFT if c.draft else None),
+        ("Withdrawal", c.withdrawn),
+        ("Items", "The results relate only to the items calibrated."),
+        ("Place", c.place),
+        ("Accreditation", c.accreditation),
+        ("Amendment", f"Replaces {c.replaces}. Reason: {c.amendment}" if c.replaces else None),
+        ("Metrological traceability", words.traceability(c)),
+        ("Decision rule", RULES[c.rule] if c.rule else None),
+        ("Conformity", words.conformity(c)),
+        ("Unverified terms", _unverified(c)),
+        ("Adjustment", c.adjustment),
+        ("Opinion, not a result", c.opinions),
+        ("Agreed with the customer", c.interval),
+        ("Not stated", "; ".join(c.gaps) or None),
+    ]
+    made = [
+        node("dcc:statement", text("dcc:name", name), rich("dcc:declaration", words_))
+        for name, words_ in told
+        if words_
+    ]
+    outside = dict.fromkeys(
+        one for one in [*(o.unit for o in c.loads), *(o.unit for o in c.cells)] if _not_si(one)
+    )
+    made += [
+        node(
+            "dcc:statement",
+            text("dcc:name", f"Unit {one} of the record"),
+            node("dcc:nonSIDefinition", f"1 {one} = {dsi(one).factor!r} {dsi(one).text}"),
+            node("dcc:nonSIUnit", f"|{one}"),
+        )
+        for one in outside
+    ]
+    return made
+
+
+def _unverified(c: Certificate) -> str:
+    names = ", ".join(f"{load}: {term}" for load, term in c.unverifiable)
+    return words.unverifiable(c) + (f" {names}." if names else "")
+
+
+def _not_si(name: str) -> bool:
+    return unit(name).dimension in ("force", "moment") and dsi(name).factor != 1.0
+
+
+def _results(c: Certificate) -> Node:
+    return node(
+        "dcc:measurementResults",
+        node(
+            "dcc:measurementResult",
+            text("dcc:name", f"Calibration of {c.instrument}"),
+            node(
+                "dcc:usedMethods",
+                node(
+                    "dcc:usedMethod",
+                    text("dcc:name", c.method or words.GAP),
+                    rich("dcc:description", c.model),
+                ),
+                node(
+                    "dcc:usedMethod",
+                    text("dcc:name", "Expanded uncertainty"),
+                    rich("dcc:description", words.uncertainty(c)),
+                    node("dcc:norm", "JCGM 100:2008"),
+                    refType="basic_uncertainty",
+                ),
+            ),
+            node("dcc:usedSoftware", _software("toolkit", __version__)),
+            c.reference
+            and node(
+                "dcc:measuringEquipments",
+                node(
+                    "dcc:measuringEquipment",
+                    text("dcc:name", c.reference),
+                    rich("dcc:description", f"certificate {c.reference_certificate or words.GAP}"),
+                    refType="basic_measurementStandard",
+                ),
+            ),
+            _conditions(c),
+            node("dcc:results", *(result for one in c.loads for result in _load(c, one))),
+        ),
+    )
+
+
+def _conditions(c: Certificate) -> Node | None:
+    if c.temperature_C is None:
+        return None
+    kelvin = f"{c.temperature_C + 273.15:.2f}"
+    data = node("dcc:data", quantity("Temperature", kelvin, r"\kelvin"))
+    status = {"as_found": "beforeAdjustment", "as_left": "afterAdjustment"}.get(c.phase or "")
+    return node(
+        "dcc:influenceConditions",
+        node(
+            "dcc:influenceCondition",
+            text("dcc:name", "Ambient temperature"),
+            status and node("dcc:status", status),
+            data,
+            refType="basic_temperature",
+        ),
+    )
+
+
+def _load(c: Certificate, one: LoadResult) -> list[Node]:
+    made = [_equation(c, one), _range(one)]
+    if one.checks:
+        made.append(_check(one))
+    if one.adjustment:
+        made.append(_adjustment(one))
+    return made
+
+
+def _equation(c: Certificate, one: LoadResult) -> Node:
+    units = {cell.name: cell.unit for cell in c.cells}
+    lines = []
+    for term in one.terms:
+        made = dsi_of_term(one.unit, term.term, units)
+        u = f"{abs(term.standard_error * made.factor):.2g}"
+        told = f"issued: {term.issued!r} {term.unit}; full: {term.full!r} {term.unit}"
+        lines.append(quantity(term.term, repr(term.full * made.factor), made.text, told=told, standard=u))
+    return node(
+        "dcc:result",
+        text("dcc:name", f"Coefficients of {one.load}"),
+        rich("dcc:description", f"{one.load} is the sum of coefficient x term; the terms are named below."),
+        node("dcc:data", *lines),
+    )
+
+
+def _range(one: LoadResult) -> Node:
+    made = dsi(one.unit)
+    at = [e.at * made.factor for e in one.range]
+    U = [e.U * made.factor for e in one.range]
+    return node(
+        "dcc:result",
+        text("dcc:name", f"Expanded uncertainty of {one.load} over the calibrated range"),
+        node(
+            "dcc:data",
+            quantity_list(
+                one.load,
+                [round_to_uncertainty(v, u) for v, u in zip(at, U, strict=True)],
+                made.text,
+                U=[round_uncertainty(u) for u in U],
+                k=[f"{e.k:.2f}" for e in one.range],
+                p=[f"{e.probability:g}" for e in one.range],
+                told=f"in the record: {one.unit}",
+            ),
+        ),
+    )
+
+
+def _check(one: LoadResult) -> Node:
+    made = dsi(one.unit)
+    U = [line.uncertainty.U * made.factor for line in one.checks]
+    rounded_U = [round_uncertainty(u) for u in U]
+    k = [f"{line.uncertainty.k:.2f}" for line in one.checks]
+    p = [f"{line.uncertainty.probability:g}" for line in one.checks]
+
+    def rounded(values: list[float]) -> list[str]:
+        return [round_to_uncertainty(v * made.factor, u) for v, u in zip(values, U, strict=True)]
+
+    deviation = quantity_list(
+        f"Deviation of {one.load}",
+        rounded([line.deviation for line in one.checks]),
+        made.text,
+        kind="basic_measurementError",
+        U=rounded_U,
+        k=k,
+        p=p,
+    )
+    stated = [line.verdict for line in one.checks]
+    if all(stated):
+        deviation.append(
+            node(
+                "dcc:measurementMetaData",
+                node(
+                    "dcc:metaData",
+                    rich("dcc:declaration", f"Tolerance {one.tolerance:.6g} {one.unit} by the decision rule"),
+                    node("dcc:conformityXMLList", " ".join(str(v) for v in stated)),
+                    refType="basic_conformity",
+                ),
+            )
+        )
+    return node(
+        "dcc:result",
+        text("dcc:name", f"Check loads, {one.load}"),
+        node(
+            "dcc:data",
+            node(
+                "dcc:list",
+                quantity_list(
+                    f"Reference {one.load}",
+                    [f"{line.reference * made.factor:.10g}" for line in one.checks],
+                    made.text,
+                    kind="basic_referenceValue",
+                ),
+                quantity_list(
+                    f"Result {one.load}",
+                    rounded([line.result for line in one.checks]),
+                    made.text,
+                    kind="basic_measuredValue",
+                    U=rounded_U,
+                    k=k,
+                    p=p,
+                ),
+                deviation,
+            ),
+        ),
+    )
+
+
+def _adjustment(one: LoadResult) -> Node:
+    told = one.adjustment
+    assert told is not None  # noqa: S101  the caller asked
+    made = dsi(one.unit)
+    U = one.full_scale.U * made.factor
+    lines = [("as found", told.as_found, "basic_beforeAdjustment")]
+    lines += [("as left", told.as_left, "basic_afterAdjustment")] if told.as_left is not None else []
+    return node(
+        "dcc:result",
+        text("dcc:name", f"Largest deviation of {one.load} before and after adjustment"),
+        node(
+            "dcc:data",
+            *(
+                quantity(name, round_to_uncertainty(value * made.factor, U), made.text, kind=kind)
+                for name, value, kind in lines
+            ),
+        ),
+    )
+
+
+def _software(name: str, version: str) -> Node:
+    return node("dcc:software", text("dcc:name", name), node("dcc:release", release(version)))
+
+
+def _identification(issuer: str, value: str, name: str) -> Node:
+    return node(
+        "dcc:identification", node("dcc:issuer", issuer), node("dcc:value", value), text("dcc:name", name)
+    )
+
+
+def _contact(tag: str, name: str | None, address: str | None) -> Node:
+    place = node("dcc:location", rich("dcc:further", address or words.GAP))
+    return node(tag, text("dcc:name", name or words.GAP), place)

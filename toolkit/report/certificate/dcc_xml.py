@@ -1,0 +1,103 @@
+"""Elements of a DCC: texts, single values and lists with their expanded uncertainties."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from typing import Any
+
+from lxml import etree
+
+from toolkit.report.xml import clean
+
+Node = Any
+SPACES = {"dcc": "https://ptb.de/dcc", "si": "https://ptb.de/si"}
+
+
+def node(tag: str, *children: Node | str | None, **attributes: str) -> Node:
+    """Return an element; a child that is None or empty is left out, a text has its white space collapsed."""
+    prefix, _, name = tag.partition(":")
+    made = etree.Element(f"{{{SPACES[prefix]}}}{name}", nsmap=SPACES)
+    for key, value in attributes.items():
+        made.set(key, value)
+    for child in children:
+        if child is None or (isinstance(child, str) and not child):
+            continue
+        if isinstance(child, str):
+            made.text = " ".join(clean(child).split())
+        else:
+            made.append(child)
+    return made
+
+
+def text(tag: str, words: str) -> Node:
+    """Return a dcc:textType in English."""
+    return node(tag, node("dcc:content", words, lang="en"))
+
+
+def rich(tag: str, words: str) -> Node:
+    """Return a dcc:richContentType in English."""
+    return text(tag, words)
+
+
+def quantity(name: str, value: str, unit: str, *, told: str = "", standard: str = "", kind: str = "") -> Node:
+    """Return one value; ``standard`` is its standard uncertainty, all as they are printed."""
+    real = node("si:real", node("si:value", plain(value)), node("si:unit", unit))
+    if standard:
+        mu = node("si:standardMU", node("si:valueStandardMU", plain(standard)))
+        real.append(node("si:measurementUncertaintyUnivariate", mu))
+    about = rich("dcc:description", told) if told else None
+    return node("dcc:quantity", text("dcc:name", name), about, real, **({"refType": kind} if kind else {}))
+
+
+def quantity_list(
+    name: str,
+    values: Sequence[str],
+    unit: str,
+    *,
+    U: Sequence[str] = (),
+    k: Sequence[str] = (),
+    p: Sequence[str] = (),
+    told: str = "",
+    kind: str = "",
+) -> Node:
+    """Return a list of values with expanded uncertainties, coverage factors and probabilities."""
+    made = node(
+        "si:realListXMLList",
+        node("si:valueXMLList", " ".join(map(plain, values))),
+        node("si:unitXMLList", unit),
+    )
+    if U:
+        made.append(
+            node(
+                "si:measurementUncertaintyUnivariateXMLList",
+                node(
+                    "si:expandedMUXMLList",
+                    node("si:valueExpandedMUXMLList", " ".join(map(plain, U))),
+                    node("si:coverageFactorXMLList", " ".join(k)),
+                    node("si:coverageProbabilityXMLList", " ".join(p)),
+                    node("si:distributionXMLList", "studentT"),
+                ),
+            )
+        )
+    about = rich("dcc:description", told) if told else None
+    return node("dcc:quantity", text("dcc:name", name), about, made, **({"refType": kind} if kind else {}))
+
+
+def plain(number: str) -> str:
+    """Return a number as the D-SI reads it: e-notation without a plus sign.
+
+    >>> plain("1e-05"), plain("+0.5"), plain("2.50")
+    ('1e-05', '0.5', '2.50')
+    """
+    return number.replace("e+", "e").lstrip("+")
+
+
+def release(version: str) -> str:
+    """Return a version as the DCC's rules want it: a letter and numbers.
+
+    >>> release("0.1.0"), release("1.2.dev3")
+    ('v0.1.0', 'v1.2')
+    """
+    found = re.match(r"\d{1,3}(\.\d{1,3}){0,3}", version)
+    return f"v{found[0]}" if found else "v0"
