@@ -26,12 +26,18 @@ from toolkit.simulation.tire import TireTruth
 from toolkit.units import unit
 
 Kind = Literal["test", "session"]
+Output = Literal["mV/V", "mV", "count"]
 T = TypeVar("T")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SessionTruth:
-    """The reference-load session: largest loads, runs, and how well the reference loads are known."""
+    """The reference-load session: largest loads, runs, and how well the reference loads are known.
+
+    ``output`` is what the files hold: the bridge's ratio, volts at ``excitation_V``, or counts of
+    ``count_V_V`` [V/V] each. ``readings`` writes zeros before and after, which drift by ``zero_drift_V_V``
+    in each cell, and shunt steps.
+    """
 
     FY_N: float = 6200.0
     MZ_Nm: float = 200.0
@@ -40,6 +46,11 @@ class SessionTruth:
     reference_FY_N: float = 0.4
     reference_MZ_Nm: float = 0.015
     reference_MX_Nm: float = 0.15
+    output: Output = "mV/V"
+    excitation_V: float = 10.0
+    count_V_V: float = 4e-10
+    readings: bool = False
+    zero_drift_V_V: float = 2e-8
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -107,6 +118,8 @@ _SESSION = {
     "reference_FY": ("reference_FY_N", "force"),
     "reference_MZ": ("reference_MZ_Nm", "moment"),
     "reference_MX": ("reference_MX_Nm", "moment"),
+    "scale": ("count_V_V", "bridge_ratio"),
+    "zero_drift": ("zero_drift_V_V", "bridge_ratio"),
 }
 _TOP = (
     "schema kind title date machine seed rotations slip_angles loads pressure file_name label "
@@ -241,12 +254,26 @@ def _acquisition(table: dict[str, Any], where: str) -> AcquisitionTruth:
 
 
 def _session(table: dict[str, Any], where: str) -> SessionTruth:
-    check_keys(table, (*_SESSION, "runs"), where=where)
+    check_keys(table, (*_SESSION, "runs", "output", "excitation", "readings"), where=where)
     numbers = {key: entry for key, entry in table.items() if key in _SESSION}
     made = _section(SessionTruth(), numbers, _SESSION, where)
+    _positive(made.count_V_V, f"{where}.scale")
+    changed: dict[str, Any] = {}
     if "runs" in table:
-        made = dataclasses.replace(made, runs=_whole(table["runs"], f"{where}.runs", least=1))
-    return made
+        changed["runs"] = _whole(table["runs"], f"{where}.runs", least=1)
+    if "output" in table:
+        changed["output"] = _choice(table["output"], ("mV/V", "mV", "count"), f"{where}.output")
+    if "excitation" in table:
+        volts = quantity(table["excitation"], unit("V").dimension, f"{where}.excitation")
+        changed["excitation_V"] = _positive(volts, f"{where}.excitation")
+    if "readings" in table:
+        if not isinstance(table["readings"], bool):
+            raise ConfigError(
+                "readings is neither true nor false", where=f"{where}.readings", got=table["readings"],
+                expected="true or false", next_step="correct it", rule="wrong-value",
+            )  # fmt: skip
+        changed["readings"] = table["readings"]
+    return dataclasses.replace(made, **changed)
 
 
 def _list(

@@ -20,9 +20,10 @@ from toolkit.units import from_si
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-INDICATION_UNIT = "mV/V"
+INDICATION_UNIT = "mV/V"  # of the fit, whatever the files hold
 LOAD_UNITS = {"FY": "lbf", "MZ": "lbf*ft", "MX": "lbf*ft"}
-INDICATION_DECIMALS = 6
+DECIMALS = {"mV/V": 6, "mV": 5, "count": 0}
+BRIDGE_OHM, SHUNT_OHM = 350.0, 87150.0
 LOAD_DECIMALS = {"FY": 1, "MZ": 2, "MX": 1}  # what the reference's certificate prints
 _AVERAGED = 10.0  # an indication is the mean of 100 samples
 
@@ -39,7 +40,9 @@ class Point:
 class VirtualSession:
     """A session's data in the units of its files.
 
-    ``indications`` (rows, 3) mV/V and ``loads`` (rows, 3) as the reference states them; ``run`` (rows,).
+    ``indications`` (rows, 3) in the plan's ``output`` unit and ``loads`` (rows, 3) as the reference states
+    them; ``run`` (rows,). ``zeros`` are (when, output of each cell), in the order in which they were read;
+    the shunt's are among them. They are empty where the plan asks for none.
     """
 
     plan: Plan
@@ -49,6 +52,7 @@ class VirtualSession:
     direction: tuple[str, ...]
     check_indications: NDArray[np.float64]
     check_loads: NDArray[np.float64]
+    zeros: tuple[tuple[str, tuple[float, ...]], ...] = ()
 
 
 def schedule() -> tuple[Point, ...]:
@@ -95,6 +99,7 @@ def simulate_session(plan: Plan) -> VirtualSession:
         direction=tuple(point.direction for _, point in points),
         check_indications=check_indications,
         check_loads=check_loads,
+        zeros=_zeros(plan) if plan.session.readings else (),
     )
 
 
@@ -121,7 +126,39 @@ def _measure(
     true = (stated + rng.standard_normal(stated.shape) * np.array([sd[load] for load in LOADS])) * scale
     noise = np.array([cell.noise_V_V for cell in plan.cells.all]) / _AVERAGED
     bridge = outputs(plan.cells, loads=true, tared=True) + rng.standard_normal(true.shape) * noise
-    return np.round(from_si(bridge, INDICATION_UNIT), INDICATION_DECIMALS), stated
+    return recorded(plan, bridge), stated
+
+
+def recorded(plan: Plan, bridge: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return bridge outputs [V/V] as the plan's files hold them: rounded mV/V, mV, or whole counts."""
+    output = plan.session.output
+    if output == "count":
+        return np.round(bridge / plan.session.count_V_V)
+    ratio = from_si(bridge, INDICATION_UNIT)
+    return np.round(ratio * (plan.session.excitation_V if output == "mV" else 1.0), DECIMALS[output])
+
+
+def shunt_step() -> float:
+    """Return the step [V/V] of a resistor across one arm of a full bridge: R / (4 R_s + 2 R).
+
+    From the divider of that arm: its resistance falls to R R_s / (R + R_s), the other divider stays at 1/2.
+
+    >>> round(1e3 * shunt_step(), 4)  # mV/V: half the rated output of a 2 mV/V cell
+    1.002
+    """
+    return BRIDGE_OHM / (4 * SHUNT_OHM + 2 * BRIDGE_OHM)
+
+
+def _zeros(plan: Plan) -> tuple[tuple[str, tuple[float, ...]], ...]:
+    # A stream of its own: the readings change no row of the session.
+    rng = np.random.default_rng([plan.seed, 1])
+    noise = np.array([cell.noise_V_V for cell in plan.cells.all]) / _AVERAGED
+    drift = plan.session.zero_drift_V_V
+    made = []
+    for when, level in (("before", 0.0), ("shunt", shunt_step()), ("after", drift)):
+        values = recorded(plan, level + rng.standard_normal(len(CELLS)) * noise) + 0.0
+        made.append((when, tuple(values.tolist())))
+    return tuple(made)
 
 
 def loads_csv(session: VirtualSession) -> str:
@@ -129,26 +166,30 @@ def loads_csv(session: VirtualSession) -> str:
     rows = [
         ",".join([*cells, str(run), direction])
         for cells, run, direction in zip(
-            _cells(session.indications, session.loads), session.run, session.direction, strict=True
+            _cells(session, session.indications, session.loads), session.run, session.direction, strict=True
         )
     ]
-    return "\n".join([",".join([*_header(), "run", "direction"]), *rows]) + "\n"
+    return "\n".join([",".join([*_header(session), "run", "direction"]), *rows]) + "\n"
 
 
 def check_csv(session: VirtualSession) -> str:
     """Return the check loads as CSV."""
-    rows = [",".join(cells) for cells in _cells(session.check_indications, session.check_loads)]
-    return "\n".join([",".join(_header()), *rows]) + "\n"
+    rows = [",".join(cells) for cells in _cells(session, session.check_indications, session.check_loads)]
+    return "\n".join([",".join(_header(session)), *rows]) + "\n"
 
 
-def _header() -> list[str]:
-    return [f"{name} [{INDICATION_UNIT}]" for name in CELLS] + [f"{x} [{LOAD_UNITS[x]}]" for x in LOADS]
+def _header(session: VirtualSession) -> list[str]:
+    output = session.plan.session.output
+    return [f"{name} [{output}]" for name in CELLS] + [f"{x} [{LOAD_UNITS[x]}]" for x in LOADS]
 
 
-def _cells(indications: NDArray[np.float64], loads: NDArray[np.float64]) -> list[list[str]]:
+def _cells(
+    session: VirtualSession, indications: NDArray[np.float64], loads: NDArray[np.float64]
+) -> list[list[str]]:
+    decimals = DECIMALS[session.plan.session.output]
     made = []
     for row, reference in zip(indications.tolist(), loads.tolist(), strict=True):
-        texts = [f"{value + 0.0:.{INDICATION_DECIMALS}f}" for value in row]
+        texts = [f"{value + 0.0:.{decimals}f}" for value in row]
         texts += [
             f"{value + 0.0:.{LOAD_DECIMALS[load]}f}" for value, load in zip(reference, LOADS, strict=True)
         ]

@@ -16,12 +16,14 @@ from toolkit.recording.labview import write_labview
 from toolkit.simulation.cells import CELLS, LOADS, true_coefficients
 from toolkit.simulation.run import VirtualTest
 from toolkit.simulation.session import (
+    DECIMALS,
     INDICATION_UNIT,
     LOAD_UNITS,
     VirtualSession,
     check_csv,
     loads_csv,
     reference_sd,
+    shunt_step,
 )
 from toolkit.simulation.truth import truth_document
 from toolkit.units import from_si, si_scale
@@ -110,7 +112,7 @@ def session_toml(session: VirtualSession) -> str:
         f"loads = [{quoted['l']}]",
         f"data = {_text(LOADS_CSV)}",
         f"check = {_text(CHECK_CSV)}",
-        'zero = "tared"  # the amplifier was zeroed before each run',
+        *([] if session.zeros else ['zero = "tared"  # the amplifier was zeroed before each run']),
         "",
         "[reference]",
         'standard = "simulated reference loads"',
@@ -123,12 +125,31 @@ def session_toml(session: VirtualSession) -> str:
         ),
     ]
     for name in CELLS:
-        lines += ["", f"[cells.{name}]", f"serial = {_text('VM15-' + name)}"]
+        lines += ["", f"[cells.{name}]", f"serial = {_text('VM15-' + name)}", *_electrics(session)]
+    if session.zeros:
+        lines += ["", "[zero]", 'fit = "tared"  # the amplifier was zeroed before each run']
+    for when, values in session.zeros:
+        listed = ", ".join(f"{value:.{DECIMALS[plan.session.output]}f}" for value in values)
+        lines += ["", "[[zero.readings]]", f"when = {_text(when)}", f"values = [{listed}]"]
     return _MARK + "\n".join(lines) + "\n"
 
 
+def _electrics(session: VirtualSession) -> list[str]:
+    truth = session.plan.session
+    lines = []
+    if truth.output == "mV":
+        lines.append(f'excitation = {{ value = {truth.excitation_V!r}, unit = "V" }}')
+    if truth.output == "count":
+        scale = float(from_si(truth.count_V_V, INDICATION_UNIT))
+        lines.append(f'scale = {{ value = {scale:.12g}, unit = "mV/V" }}  # of one count')
+    if session.zeros:
+        step = float(from_si(shunt_step(), INDICATION_UNIT))
+        lines.append(f'shunt_expected = {{ value = {step:.6f}, unit = "mV/V" }}')
+    return lines
+
+
 def session_truth(session: VirtualSession) -> dict[str, Any]:
-    """Return what a perfect fit of the session would find, in the units of its files."""
+    """Return what a perfect fit of the session would find, in mV/V and the units of its loads."""
     plan = session.plan
     per_unit = si_scale(INDICATION_UNIT)
     true = true_coefficients(plan.cells)
