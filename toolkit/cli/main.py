@@ -47,6 +47,7 @@ def _register() -> None:
         audit,
         calibrate,
         calibration,
+        convert,
         demo,
         doctor,
         evaluate,
@@ -64,7 +65,7 @@ def _register() -> None:
     for module in (demo, init, doctor, inspect, calibrate):
         app.command(module.NAME)(module.command)
     app.add_typer(calibration.app, name="calibration")
-    for module in (process, fit, evaluate, report):
+    for module in (process, fit, evaluate, convert, report):
         app.command(module.NAME)(module.command)
     app.add_typer(template.app, name="template")
     for module in (audit, simulate, explain, qualify):

@@ -1,0 +1,156 @@
+"""`toolkit evaluate`: a grid with forces, in every axis system, and what is refused."""
+
+import csv
+import json
+
+import pytest
+import typer
+from typer.testing import CliRunner
+
+from toolkit.channels import AXES, signs
+from toolkit.cli import evaluate
+from toolkit.errors import ToolkitError
+
+TIRE = """[UNITS]
+LENGTH = 'meter'
+FORCE = 'newton'
+ANGLE = 'radians'
+[MODEL]
+FITTYP = 61
+[DIMENSION]
+UNLOADED_RADIUS = 0.3
+[VERTICAL]
+FNOMIN = 4000
+[SLIP_ANGLE_RANGE]
+ALPMIN = -0.2
+ALPMAX = 0.2
+[LONGITUDINAL_COEFFICIENTS]
+PCX1 = 1.6
+PDX1 = 1.1
+PKX1 = 20
+[LATERAL_COEFFICIENTS]
+PCY1 = 1.3
+PDY1 = 1
+PKY1 = -20
+PKY2 = 1.6
+PHY1 = 0.002
+[ALIGNING_COEFFICIENTS]
+QCZ1 = 1.1
+QBZ1 = 9
+QDZ1 = 0.1
+"""
+
+
+def run(*arguments):
+    app = typer.Typer()
+    app.command()(evaluate.command)
+    result = CliRunner().invoke(app, [str(one) for one in arguments], standalone_mode=False)
+    if isinstance(result.exception, ToolkitError):
+        raise result.exception
+    assert result.exception is None, result.exception
+    return result.return_value, result.stdout
+
+
+@pytest.fixture
+def files(tmp_path):
+    (tmp_path / "x.tir").write_text(TIRE)
+    (tmp_path / "g.csv").write_text("SA [deg],FZ [N]\n-4,4000\n2,-4000\n4,4e3\n")
+    return tmp_path / "x.tir", tmp_path / "g.csv"
+
+
+def test_the_grid_comes_back_with_its_own_digits(files, tmp_path):
+    out = tmp_path / "out.csv"
+    assert run(*files, "--out", out)[0] == 0
+    rows = list(csv.reader(out.read_text().splitlines()))
+    assert rows[0] == ["SA [deg]", "FZ [N]", "FX [N]", "FY [N]", "MZ [N*m]"]
+    assert [row[:2] for row in rows[1:]] == [["-4", "4000"], ["2", "-4000"], ["4", "4e3"]]
+    code, printed = run(*files)
+    assert (code, printed) == (0, out.read_text())
+
+
+def test_json_holds_the_same_numbers(files):
+    answer = json.loads(run(*files, "--json")[1])
+    assert (answer["schema"], answer["axes"], answer["model"]) == (1, "ISO-W", "mf61")
+    assert answer["units"] == {"SA": "deg", "FZ": "N", "FX": "N", "FY": "N", "MZ": "N*m"}
+    assert [row["SA"] for row in answer["rows"]] == [-4.0, 2.0, 4.0]
+    # ISO-W: FY falls, MZ rises with the slip angle; FZ of either sign is the load.
+    assert answer["rows"][0]["FY"] > answer["rows"][1]["FY"] > answer["rows"][2]["FY"]
+    assert answer["rows"][0]["MZ"] < 0 < answer["rows"][2]["MZ"]
+
+
+@pytest.mark.parametrize("axes", AXES)
+def test_one_tire_in_every_axis_system(files, axes):
+    tire, grid = files
+    turn = signs("ISO-W", axes)
+    iso = json.loads(run(tire, grid, "--json")[1])["rows"]
+    grid.write_text("SA [deg],FZ [N]\n" + "".join(f"{turn['SA'] * row['SA']},{row['FZ']}\n" for row in iso))
+    turned = json.loads(run(tire, grid, "--axes", axes, "--json")[1])["rows"]
+    for one, other in zip(iso, turned, strict=True):
+        assert (other["FY"], other["MZ"]) == (turn["FY"] * one["FY"], turn["MZ"] * one["MZ"])
+    slope = turned[2]["FY"] - turned[0]["FY"]
+    assert (slope > 0) == ((turned[2]["SA"] > turned[0]["SA"]) == (axes == "adapted-SAE"))
+
+
+def test_slip_ratio_pressure_camber_and_speed_columns(files):
+    tire, grid = files
+    grid.write_text("SA [deg],FZ [kN],IA [deg],KAPPA [%],P [kPa],V [km/h]\n2,4,1,-5,250,60\n")
+    code, out = run(tire, grid, "--json")
+    answer = json.loads(out)
+    assert code == 0
+    assert answer["rows"][0]["FX"] < 0
+    assert "tir-no-pressure" in {finding["rule"] for finding in answer["findings"]}
+
+
+def test_beyond_the_range_ends_with_one_and_still_answers(files):
+    tire, grid = files
+    grid.write_text("SA [deg],FZ [N]\n15,4000\n")
+    code, out = run(tire, grid, "--json")
+    assert code == 1
+    assert [finding["rule"] for finding in json.loads(out)["findings"]] == ["tir-range"]
+    assert json.loads(out)["rows"][0]["FY"] < 0
+
+
+def test_raw_angles_differ_by_the_tangent(files):
+    star, raw = (
+        json.loads(run(*files, "--angles", a, "--json")[1])["rows"][2]["FY"] for a in ("star", "raw")
+    )
+    assert 0 < abs(star) - abs(raw) < 0.002 * abs(star)
+
+
+def test_columns_of_forces_in_the_grid_are_replaced_and_said(files):
+    tire, grid = files
+    grid.write_text("SA [deg],FZ [N],FY [N]\n2,4000,1\n")
+    answer = json.loads(run(tire, grid, "--json")[1])
+    assert answer["rows"][0]["FY"] < -100
+    assert [finding["rule"] for finding in answer["findings"]] == ["grid-columns"]
+
+
+@pytest.mark.parametrize(
+    ("grid_text", "options", "rule"),
+    [
+        ("SA [deg]\n1\n", [], "missing-column"),
+        ("FZ [N]\n1\n", [], "missing-column"),
+        ("SA,FZ [N]\n1,2\n", [], "unknown-unit"),
+        ("SA [deg],FZ [N]\n1,nan\n", [], "text-cell"),
+        ("SA [deg],FZ [N]\n", [], "no-data"),
+        ("SA [deg],FZ [N]\n1,2\n", ["--axes", "ISO"], "unknown-axes"),
+        ("SA [deg],FZ [N]\n1,2\n", ["--angles", "tan"], "unknown-angles"),
+        ("SA [deg],FZ [N]\n1,2\n", ["--out", "x.xlsx"], "output-name"),
+    ],
+)
+def test_bad_input_is_refused_and_writes_nothing(files, tmp_path, grid_text, options, rule):
+    tire, grid = files
+    grid.write_text(grid_text)
+    before = sorted(tmp_path.iterdir())
+    with pytest.raises(ToolkitError) as caught:
+        run(tire, grid, *options)
+    assert (caught.value.rule, caught.value.exit_code) == (rule, 2)
+    assert caught.value.next_step
+    assert sorted(tmp_path.iterdir()) == before
+
+
+def test_an_input_is_never_replaced(files):
+    tire, grid = files
+    with pytest.raises(ToolkitError) as caught:
+        run(tire, grid, "--out", grid)
+    assert caught.value.rule == "original"

@@ -1,0 +1,180 @@
+"""`toolkit convert`: between tire files, TYDEX files and tables."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from toolkit.cli.console import Json, Quiet, answer, exit_code, finding_lines
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from toolkit.channels import Axes
+    from toolkit.findings import Finding
+
+    Columns = dict[str, tuple[str, NDArray[np.float64]]]
+
+NAME = "convert"
+_KINDS = {".tir": "tir", ".csv": "csv", ".tdx": "tydex", ".tydex": "tydex", ".tyd": "tydex", ".xlsx": "test"}
+_PAIRS = {("tir", "tir"), ("tydex", "csv"), ("csv", "tydex"), ("test", "csv"), ("test", "tydex")}
+_WAYS = ".tir to .tir; .tdx to .csv; .csv to .tdx; a reduced test .xlsx to .csv or .tdx"
+
+
+def command(
+    source: Annotated[Path, typer.Argument(metavar="IN", help="A .tir, .tdx, .csv or reduced .xlsx.")],
+    target: Annotated[Path, typer.Argument(metavar="OUT", help="A .tir, .tdx or .csv.")],
+    axes: Annotated[
+        str, typer.Option("--axes", help="Axes of the .csv: SAE, adapted-SAE, ISO-W, machine.")
+    ] = "SAE",
+    json: Json = False,
+    quiet: Quiet = False,
+) -> int:
+    """Convert between the formats that are read and written; what the target cannot hold is named.
+
+    Example: toolkit convert tire.tdx tire.csv --axes SAE
+    """
+    from toolkit.channels import AXES
+    from toolkit.errors import ConfigError
+    from toolkit.files import write_atomic
+
+    started = time.perf_counter()
+    if axes not in AXES:
+        raise ConfigError(
+            f"unknown axis system {axes!r}", where="--axes", got=axes, expected=", ".join(AXES),
+            next_step="name one of those expected", rule="unknown-axes",
+        )  # fmt: skip
+    kinds = _kinds(source, target)
+    if kinds == ("tir", "tir"):
+        text, findings = _tir(source)
+    else:
+        columns, read_in, found = _read(source, kinds[0], axes)
+        text, more = _written(columns, read_in, kinds[1], axes, source)
+        findings = (*found, *more)
+    write_atomic(target, text)
+    shown = f"{target} written"
+    if findings:
+        shown += "\n\nfindings (toolkit explain RULE tells more):\n" + "\n".join(finding_lines(findings))
+    payload = {
+        "in": str(source),
+        "out": str(target),
+        "from": kinds[0],
+        "to": kinds[1],
+        "axes": axes if "csv" in kinds else "ISO-W",
+        "findings": [finding.as_dict() for finding in findings],
+        "timing": {"seconds": time.perf_counter() - started},
+    }
+    answer(payload, shown, as_json=json, quiet=quiet)
+    return exit_code(findings)
+
+
+def _kinds(source: Path, target: Path) -> tuple[str, str]:
+    from toolkit.errors import OutputError
+
+    kinds = (_KINDS.get(source.suffix.lower(), ""), _KINDS.get(target.suffix.lower(), ""))
+    if kinds not in _PAIRS:
+        raise OutputError(
+            "there is no such conversion", where=f"{source.name} to {target.name}",
+            got=f"{source.suffix or 'no ending'} to {target.suffix or 'no ending'}", expected=_WAYS,
+            next_step="choose a name with one of these endings", rule="output-name",
+        )  # fmt: skip
+    if source.resolve() == target.resolve():
+        raise OutputError(
+            "the output would replace the input", where="OUT", got=target, expected="another name",
+            next_step="choose another name", rule="original",
+        )  # fmt: skip
+    return kinds
+
+
+def _tir(source: Path) -> tuple[str, tuple[Finding, ...]]:
+    from toolkit.tires.tir import read_tir
+    from toolkit.tires.tir_write import file_text, in_si
+
+    file = read_tir(source)
+    _ = file.version  # a kind that cannot be evaluated is not passed on
+    converted, findings = in_si(file)
+    return file_text(converted), findings
+
+
+def _read(source: Path, kind: str, axes: str) -> tuple[Columns, Axes, tuple[Finding, ...]]:
+    # Columns in their own units, the axes that they are in, and what stays out.
+    from toolkit.findings import Finding
+    from toolkit.units import from_si, unit
+
+    if kind == "tydex":
+        from toolkit.tires.tydex import read_tydex
+
+        file = read_tydex(source)
+        columns = {one.symbol: (one.unit, one.values) for one in file.channels if one.symbol is not None}
+        out = [one.name for one in file.channels if one.symbol is None] + [
+            name for name in file.other if name != "RELEASE"
+        ]
+        note = Finding(
+            rule="not-converted", where=str(source), message=f"a table has no place for {', '.join(out)}"
+        )
+        return columns, "ISO-W", (*file.findings, *([note] if out else []))
+    if kind == "test":
+        return _of_test(source)
+    from toolkit.tires.table import read_table
+
+    table = read_table(source, axes=axes, required=("FZ",), measured=False)
+    units = [unit(cell.partition("[")[2].partition("]")[0]).text for cell in table.header]
+    columns = {
+        symbol: (name, from_si(values, name))
+        for name, (symbol, values) in zip(units, table.columns, strict=True)
+    }
+    return columns, table.axes, ()
+
+
+def _of_test(source: Path) -> tuple[Columns, Axes, tuple[Finding, ...]]:
+    import numpy as np
+
+    from toolkit.findings import Finding
+    from toolkit.testfile.read import read_test_file
+
+    every = read_test_file(source).reduced.conditions
+    conditions = [one for one in every if one.used]
+    reverse = sum(one.rotation == "reverse" for one in conditions)
+    columns = {
+        "SA": ("deg", np.degrees([one.SA for one in conditions])),
+        "FZ": ("N", np.array([one.FZ for one in conditions])),
+        "FY": ("N", np.array([one.FY for one in conditions])),
+        "MZ": ("N*m", np.array([one.MZ for one in conditions])),
+    }
+    text = "the uncertainties and the provenance of the reduced test"
+    if reverse:
+        text += f", and which {reverse} of {len(conditions)} rows ran in reverse"
+    if len(every) > len(conditions):
+        text += f", and {len(every) - len(conditions)} blocks that the reduction does not use"
+    note = Finding(
+        rule="not-converted", where=str(source), message=f"the target has no place for {text}", level="note"
+    )
+    return columns, "SAE", (note,)
+
+
+def _written(
+    columns: Columns, read_in: Axes, kind: str, axes: str, source: Path
+) -> tuple[str, tuple[Finding, ...]]:
+    from toolkit.channels import signs
+    from toolkit.findings import Finding
+    from toolkit.tires.tydex import NAMES, tydex_text
+
+    turn = signs(read_in, "ISO-W" if kind == "tydex" else axes)  # type: ignore[arg-type]
+    turned = {symbol: (name, turn.get(symbol, 1) * values) for symbol, (name, values) in columns.items()}
+    if kind == "csv":
+        lines = [",".join(f"{symbol} [{name}]" for symbol, (name, _) in turned.items())]
+        lines += [
+            ",".join(repr(float(value)) for value in row)
+            for row in zip(*(values for _, values in turned.values()), strict=True)
+        ]
+        return "\n".join(lines) + "\n", ()
+    out = [symbol for symbol in turned if symbol not in NAMES]
+    text, findings = tydex_text({symbol: column for symbol, column in turned.items() if symbol in NAMES})
+    if out:
+        message = f"TYDEX has no channel for {', '.join(out)}"
+        findings = (*findings, Finding(rule="not-converted", where=str(source), message=message))
+    return text, findings
