@@ -28,7 +28,7 @@ def command(
     quiet: Quiet = False,
 ) -> int:
     """Fit a session: a candidate record and its diagnostics."""
-    from toolkit.calibration.registry.candidate import calibrate
+    from toolkit.calibration.control.calibrate import calibrate
     from toolkit.calibration.registry.registry import Registry
 
     folder = calibrations or out
@@ -41,6 +41,9 @@ def command(
     status = registry.status(made.record.id).state
     payload, text = _payload(made, status), _text(made, status)
     if full or as_json or figures is not None:
+        from toolkit.calibration.standards.evaluation import evaluations
+
+        payload["standards"] = [one.as_dict() for one in evaluations(made.fit)]
         told = tell(made.fit, title=made.record.id, full=full, figures=figures)
         for name, report in told.loads.items():
             payload["loads"][name]["report"] = report
@@ -51,6 +54,8 @@ def command(
 
 
 def _payload(made: Candidate, status: str) -> dict[str, Any]:
+    from toolkit.calibration.fit.readings import readings_json
+
     record = made.record
     loads = {}
     for one in made.fit.loads:
@@ -81,6 +86,7 @@ def _payload(made: Candidate, status: str) -> dict[str, Any]:
             "path": str(made.path),
         },
         "findings": [finding.as_dict() for finding in made.findings],
+        "readings": readings_json(made.readings),
         "loads": loads,
     }
 
