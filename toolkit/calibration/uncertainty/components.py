@@ -82,13 +82,16 @@ def _reference(statements: Statements, one: LoadFit) -> Component:
     u = statements.reference.u(one.load)
     if u is None:
         return _absent("reference", "no uncertainty of the reference standard is stated", "session")
+    if one.method == "gls" and statements.reference.shared_group is not None:
+        text = "held by the fit's covariance: its rows share the reference's error (gls)"
+        return _part("reference", text, "B", "normal", 0.0, math.inf, "session")
     stated = next(s for s in statements.reference.uncertainties if s.load == one.load)
     text = f"certificate: U = {stated.U:.4g} {one.unit} with k = {stated.k:g}, u = U/k at every load"
     return _part("reference", text, "B", "normal", u, math.inf, "session")
 
 
 def _fit(record: CalibrationRecord, one: LoadFit, point: NDArray[np.float64]) -> Component:
-    known = one.method == "wls"  # the covariance follows from stated uncertainties alone
+    known = one.method != "ols"  # the covariance follows from stated uncertainties alone
     text = f"J V J^T of the {len(one.terms)} coefficients at {_point(record, point)}"
     return _part(
         "fit", text, "B" if known else "A", "normal" if known else "student", fit_u(record, one, point),

@@ -1,8 +1,8 @@
 """Monte Carlo check of a budget: propagation of distributions (JCGM 101:2008).
 
-Every trial refits the calibration: each row of the session gets its own error, the coefficients follow by
-the pseudo-inverse, X^+ (y + e), and the load is computed from them at indications that have errors of their
-own. Nothing is linearised. What the budget knows only as an amount of load is drawn as such, from its own
+Every trial refits the calibration: the rows of the session get new errors, the coefficients follow by the
+pseudo-inverse, X^+ (y + e), and the load is computed from them at indications that have errors of their own.
+Nothing is linearised. What the budget knows only as an amount of load is drawn as such, from its own
 distribution: normal (6.4.7), scaled and shifted t (6.4.9), rectangular (6.4.2).
 
 The interval is the probabilistically symmetric one (7.7). The budget's is *validated* (8.1) where both ends
@@ -186,14 +186,13 @@ def _refits(record: CalibrationRecord, loads: Table, budget: Budget) -> Draw:
             coefficients
             + _student(generator, generator.standard_normal((size, len(coefficients))) @ root.T, part.dof)
         )
-    # Errors of a row are far below float32's reach of the load itself: drawn so, they cost half the time.
-    back = (np.linalg.pinv(design / scale) / scale[:, None] * (one.residual_sd or 0.0)).T
-    near = np.asarray(back / np.abs(back).max(axis=0).clip(1e-300), dtype=np.float32)
-    size_of = np.abs(back).max(axis=0).clip(1e-300)
+    # X = U S V', and X^+ e = V S^-1 (U' e). Of independent normal errors of the rows U' e is again p
+    # independent ones, exactly: they are drawn in place of the rows, whose number then costs nothing.
+    _, values, right = np.linalg.svd(design / scale, full_matrices=False)
+    root = (right.T / values) / scale[:, None] * (one.residual_sd or 0.0)
 
     def refit(generator: np.random.Generator, size: int) -> NDArray[np.float64]:
-        rows = generator.standard_normal((size, len(design)), dtype=np.float32)
-        moved = np.asarray(rows @ near, dtype=np.float64) * size_of
+        moved = generator.standard_normal((size, len(coefficients))) @ root.T
         found: NDArray[np.float64] = coefficients + _student(generator, moved, part.dof)
         return found
 
