@@ -181,7 +181,9 @@ def test_numbers_too_large_for_the_arithmetic_are_refused(session: Path, tmp_pat
     values[3, 2] = 1e300
     values[7, 2] = -1e300
     (session.parent / "loads.csv").write_text(csv(values))
-    refused(session, tmp_path)
+    error = refused(session, tmp_path)
+    assert error.rule == "cell"
+    assert "row 4, column FY" in error.what
 
 
 def refused(session: Path, tmp_path: Path) -> ToolkitError:

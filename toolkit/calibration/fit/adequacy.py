@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 COLLINEAR_FINDING = 30.0
 COLLINEAR_REFUSED = 300.0
 RANK = 1e-10
+_LARGEST = 1e75  # its fourth power, a square's square, is still a double
 
 
 def condition_number(matrix: NDArray[np.float64]) -> float:
@@ -43,7 +44,8 @@ def check_adequate(session: Session) -> None:
     Raises
     ------
     SessionError
-        ``dof``: fewer rows than terms plus one; ``not-spanning``: a load is missing; ``collinear``: the
+        ``dof``: fewer rows than terms plus one; ``cell``: a number too large for the arithmetic;
+        ``not-spanning``: a load is missing; ``collinear``: the
         indications only move together; ``rank``: the terms are dependent
     """
     table, terms = session.table, session.terms
@@ -53,6 +55,13 @@ def check_adequate(session: Session) -> None:
             f"at least {len(terms) + 1} rows, better 30", "dof", "apply more reference loads",
         )  # fmt: skip
     names = [load.name for load in session.loads]
+    for name in (*session.indications, *names):
+        row = int(np.argmax(np.abs(table.column(name))))
+        if abs(value := float(table.column(name)[row])) > _LARGEST:
+            raise _refused(
+                session, f"row {row + 1}, column {name} holds a number that no cell reads", f"{value:g}",
+                f"at most {_LARGEST:g} in size", "cell", "correct the cell, or the unit in the header",
+            )  # fmt: skip
     loads = table.matrix(names)
     constant = [n for n, spread in zip(names, np.ptp(loads, axis=0), strict=True) if spread == 0]
     if constant:
