@@ -10,6 +10,7 @@ import typer
 
 from toolkit.cli import (
     calibration_budget,
+    calibration_certificate,
     calibration_chart,
     calibration_diff,
     calibration_due,
@@ -254,6 +255,7 @@ def withdraw(
     return 0
 
 
+app.command(calibration_certificate.NAME)(calibration_certificate.command)
 app.command("budget")(calibration_budget.command)
 app.command("diff")(calibration_diff.command)
 app.command("report")(calibration_report.command)
