@@ -43,6 +43,9 @@ def tags(
         Path | None, typer.Option("--template", help="Take units and required tags from its style file.")
     ] = None,
     calibration: Annotated[str | None, typer.Option("--calibration", help="Record id.")] = None,
+    kind: Annotated[
+        str, typer.Option("--kind", help="report, or certificate: the tags of that document.")
+    ] = "report",
     calibrations: Calibrations = None,
     home: Home = None,
     json: Json = False,
@@ -53,9 +56,13 @@ def tags(
     Example: toolkit template tags --test tests/2019-06-04
     """
     from toolkit.report.build import build_content
+    from toolkit.report.certificate.vocabulary import CERTIFICATE
     from toolkit.report.listing import list_tags
     from toolkit.report.style import read_style, style_file
+    from toolkit.report.vocabulary import REPORT
 
+    if kind not in ("report", "certificate") or (kind == "certificate" and test is not None):
+        raise typer.BadParameter("report, or certificate without --test", param_hint="--kind")
     style = read_style(style_file(template)) if template else read_style(None)
     content = None
     if test is not None:
@@ -63,7 +70,7 @@ def tags(
 
         resolved = resolve_test(test, calibration=calibration, calibrations=calibrations, home=home)
         content = build_content(resolved.result, resolved.record, findings=resolved.findings, style=style)
-    listed = list_tags(content, style)
+    listed = list_tags(content, style, CERTIFICATE if kind == "certificate" else REPORT)
     answer({"tags": listed}, _text(listed), as_json=json, quiet=quiet)
     return 0
 

@@ -42,12 +42,12 @@ def draw_chart(chart: Chart, kind: str) -> bytes:
     columns = min(_COLUMNS, len(drawn))
     rows = -(-len(drawn) // columns)
     with mpl.rc_context(_RC):
-        figure = Figure(figsize=(max(4.4 * columns, 7.0), 3.5 * rows + 0.9), dpi=150)
+        figure = Figure(figsize=(max(4.4 * columns, 7.0), 3.5 * rows + 1.1), dpi=150)
         FigureCanvasAgg(figure)
         height = figure.get_figheight()
         outer = figure.add_gridspec(
             rows, columns, left=0.62 / figure.get_figwidth(), right=1 - 0.55 / figure.get_figwidth(),
-            top=1 - 0.85 / height, bottom=0.62 / height, hspace=0.42, wspace=0.36,
+            top=1 - 1.1 / height, bottom=0.62 / height, hspace=0.42, wspace=0.36,
         )  # fmt: skip
         for at, one in enumerate(drawn):
             inner = outer[at // columns, at % columns].subgridspec(2, 1, height_ratios=(2.6, 1), hspace=0.12)
@@ -102,9 +102,14 @@ def _individuals(axes: Axes, one: Series) -> None:
             ",".join(numbers), (index + 1, errors[index]), xytext=(0, 8), textcoords="offset points",
             ha="center", fontsize=8, color=_RED, fontweight="bold",
         )  # fmt: skip
+    limits = "no limits yet" if one.limits is None else f"limits of {one.limits.points} sessions" + (
+        " (provisional)" if one.limits.provisional else ""
+    )  # fmt: skip
     axes.margins(y=0.18)
     axes.set_title(
-        f"{one.load} at {one.check_load}\ntolerance ±{one.tolerance:.3g} {one.unit}", fontsize=9, loc="left"
+        f"{one.load} at {one.check_load}\ntolerance ±{one.tolerance:.3g} {one.unit}, {limits}",
+        fontsize=9,
+        loc="left",
     )
     axes.set_ylabel(f"error [{one.unit}]")
     axes.tick_params(labelbottom=False)

@@ -160,17 +160,18 @@ def _legend(figure: Figure, plot: Plot) -> None:
         seen.add(key)
         colour = COLOURS[curve.group % len(COLOURS)]
         alone = curve.open and curve.style == "both" and not plot.legend_title
+        lines = {c.style for c in plot.curves if (c.label, c.group) == key} == {"line"}
         handles.append(
             Line2D(
                 [],
                 [],
                 color=colour,
-                marker=MARKERS[curve.group % len(MARKERS)],
+                marker="" if lines else MARKERS[curve.group % len(MARKERS)],
                 markersize=5,
                 linewidth=1.2,
                 label=curve.label.replace(", ", ",\n"),
                 mfc="white" if alone else colour,
-                linestyle=(0, (4, 2)) if alone else "solid",
+                linestyle=(0, (4, 2)) if alone or (lines and curve.open) else "solid",
             )
         )
     if len(handles) > 1 or plot.legend_title:

@@ -36,8 +36,9 @@ def round_to_uncertainty(value: float, U: float, *, digits: int = 2) -> str:
     if not (math.isfinite(U) and U > 0 and math.isfinite(value)):
         return repr(float(value))
     place = last_place(U, digits=digits)
-    whole = Decimal(repr(float(value))).scaleb(-place).to_integral_value(rounding=ROUND_HALF_EVEN)
-    return format(whole.scaleb(place) + 0, "f")
+    # int drops the exponent of a zero, which would print as 0 where its neighbours print 0.00.
+    whole = int(Decimal(repr(float(value))).scaleb(-place).to_integral_value(rounding=ROUND_HALF_EVEN))
+    return format(Decimal(whole).scaleb(place) + 0, "f")
 
 
 def last_place(U: float, *, digits: int = 2) -> int:

@@ -223,10 +223,11 @@ def _uncertainty(one: LoadResult) -> Iterable[list[str]]:
 
 def _budget(one: LoadResult) -> Iterable[list[str]]:
     for part in one.parts:
+        if not part.stated:
+            continue  # the statement about U names what it does not hold
         dof = f"{part.dof:.0f}" if math.isfinite(part.dof) and part.dof < 1e4 else "∞"
-        size = f"{part.u:.2g}" if part.stated else "not stated"
         yield [
-            one.load, part.name, part.evaluation, part.distribution, size, shown(one.unit), dof,
+            one.load, part.name, part.evaluation, part.distribution, f"{part.u:.2g}", shown(one.unit), dof,
             f"{100 * part.share:.1f}", part.source,
         ]  # fmt: skip
 

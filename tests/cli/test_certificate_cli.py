@@ -1,0 +1,71 @@
+"""`toolkit calibration certificate`: answers, exit codes, and nothing half-written."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+import typer
+
+from toolkit.cli import calibration_certificate
+from toolkit.errors import ToolkitError
+
+CHECKOUT = Path(__file__).resolve().parents[2]
+TEMPLATE = CHECKOUT / "report_templates" / "certificate.docx"
+Run = Callable[..., tuple[int, dict[str, Any]]]
+office_needed = pytest.mark.skipif(
+    not (shutil.which("soffice") and shutil.which("pdftotext")),
+    reason="LibreOffice or poppler is not installed",
+)
+
+
+@pytest.fixture
+def run(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Run:
+    root = typer.Typer()
+    root.command("certificate")(calibration_certificate.command)
+    root.command("other")(lambda: 0)
+
+    def call(*words: object) -> tuple[int, dict[str, Any]]:
+        arguments = ["certificate", *map(str, words), "--out", str(tmp_path / "out"), "--json"]
+        arguments += ["--calibrations", str(CHECKOUT / "calibrations")]
+        try:
+            code = root(args=arguments, standalone_mode=False)
+        except ToolkitError as error:
+            capsys.readouterr()
+            return error.exit_code, {"error": error.as_dict()}
+        return code, json.loads(capsys.readouterr().out)
+
+    return call
+
+
+@office_needed
+def test_a_certificate_is_delivered_whole(run: Run, tmp_path: Path) -> None:
+    code, answer = run("m15-virtual-r1", "--template", TEMPLATE, "--dcc", "--known-at", "2026-04-01")
+    assert (code, answer["verified"], answer["draft"]) == (1, True, False)
+    assert all(check["ok"] for check in answer["checks"])
+    names = {Path(answer[kind]).name for kind in ("docx", "pdf", "dcc")}
+    assert {one.name for one in (tmp_path / "out").iterdir()} == names
+    assert [one.name for one in tmp_path.iterdir()] == ["out"]
+    assert answer["warnings"] == []
+    assert {one["rule"] for one in answer["findings"]} == {"certificate-gap", "certificate-budget"}
+    assert len(answer["figures"]) == 3
+    assert answer["issued"] == "2026-04-01"
+
+
+@pytest.mark.parametrize(
+    ("record", "rule"), [("m15-r2", "certificate-unverified"), ("m15-r99", "missing"), ("none", "record-id")]
+)
+def test_no_such_certificate(run: Run, tmp_path: Path, record: str, rule: str) -> None:
+    code, answer = run(record, "--template", TEMPLATE)
+    assert (code, answer["error"]["rule"]) == (2, rule)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_report_template_is_no_certificate_template(run: Run, tmp_path: Path) -> None:
+    code, answer = run("m15-virtual-r1", "--template", TEMPLATE.with_name("org.docx"))
+    assert (code, answer["error"]["rule"]) == (2, "missing-required")
+    assert list(tmp_path.iterdir()) == []

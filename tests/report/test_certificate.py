@@ -1,0 +1,204 @@
+"""A certificate's content, template and digital twin; the record is that of a session of known truth."""
+
+from __future__ import annotations
+
+import datetime as dt
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from conftest import SHARED_DATA
+
+from toolkit.calibration.registry.approval import approve, withdraw
+from toolkit.calibration.registry.candidate import calibrate
+from toolkit.calibration.registry.registry import Registry
+from toolkit.errors import ConfigError, RecordError
+from toolkit.report.certificate.collect import collect
+from toolkit.report.certificate.content import GAP, build_content
+from toolkit.report.certificate.dcc import build_dcc
+from toolkit.report.certificate.template import build_certificate
+from toolkit.report.style import Style
+
+CHECKOUT = Path(__file__).resolve().parents[2]
+DAY = dt.date(2026, 3, 1)
+STYLE = Style(laboratory="Bench laboratory", country="US")
+FULL = (
+    '[certificate]\nnumber = "CAL-17"\ncustomer = "Customer & Co <x>"\naddress = "1 Drum Road"\n'
+    'place = "bay 3"\nmethod = "dead weights"\ndecision_rule = "guard_band"\ninterval = "12 months"\n{}\n'
+    '[reference]\nstandard = "force machine 1"\ncertificate = "FM-1"\ndue = 2026-12-31\n'
+    '[reference.uncertainty]\nFY = {{ U = 0.02, k = 2, unit = "lbf" }}\n'
+    'MZ = {{ U = 0.02, k = 2, unit = "lbf*ft" }}\n'
+    '[cells.A]\nserial = "SA1"\n[cells.B]\nserial = "SB2"\n'
+)
+
+
+def registry_of(folder: Path, more: str = FULL.format(""), *, approved: bool = True) -> Registry:
+    rng = np.random.default_rng(5)
+    for name, rows, tail in (("loads", 60, True), ("check", 6, False)):
+        s = rng.uniform(-2, 2, (rows, 2))
+        loads = s @ np.array([[100.0, 3.0], [20.0, -50.0]]) + [1.5, -2.0] + rng.normal(0, 0.01, (rows, 2))
+        lines = ["A [mV/V],B [mV/V],FY [lbf],MZ [lbf*ft]" + (",run,direction" if tail else "")]
+        for i, row in enumerate(np.column_stack([0.98 * s if not tail else s, loads]).tolist()):
+            if not tail:
+                row[:2] = s[i].tolist()
+            lines.append(
+                ",".join(map(repr, row)) + (f",{1 + i // 20},{'up' if i % 2 else 'down'}" if tail else "")
+            )
+        (folder / f"{name}.csv").write_text("\n".join(lines) + "\n")
+    (folder / "SESSION.toml").write_text(
+        'schema = 1\ninstrument = "pair"\ndate = 2026-02-01\noperator = "A"\nindications = ["A", "B"]\n'
+        'temperature = { value = 20.5, unit = "degC" }\nloads = ["FY", "MZ"]\ndata = "loads.csv"\n'
+        'check = "check.csv"\n' + more
+    )
+    (folder / "cal").mkdir()
+    registry = Registry(folder / "cal")
+    calibrate(folder / "SESSION.toml", registry)
+    if approved:
+        done = approve(
+            registry, "pair-r1", in_force_from=dt.date(2026, 2, 2), checked_by="B", approved_by="C",
+            known_on=dt.date(2026, 2, 2),
+        )  # fmt: skip
+        assert done.done, done.findings
+    return registry
+
+
+def test_the_items_of_17025_are_there(tmp_path: Path) -> None:
+    made = collect(registry_of(tmp_path), "pair-r1", STYLE, issued=DAY)
+    assert (made.id, made.gaps, made.draft) == ("CAL-17", (), False)
+    values = build_content(made, STYLE).values
+    assert not [path for path, value in values.items() if value.value == GAP]
+    said = {
+        name: str(values[f"certificate.{name}"].value) for name in ("traceability", "temperature", "customer")
+    }
+    assert "force machine 1" in said["traceability"]
+    assert "FM-1" in said["traceability"]
+    assert said["temperature"] == "20.5 °C"
+    signed = [values[f"certificate.{name}"].value for name in ("entered_by", "checked_by", "approved_by")]
+    assert signed == ["A", "B", "C"]
+
+
+def test_what_nobody_stated_is_a_visible_gap(tmp_path: Path) -> None:
+    made = collect(registry_of(tmp_path, ""), "pair-r1", Style(), issued=DAY)
+    assert {"customer", "reference standard", "place of the calibration"} <= set(made.gaps)
+    assert {one.rule for one in made.findings if one.level == "warning"} == {"certificate-gap"}
+    values = build_content(made).values
+    assert values["certificate.customer"].value == GAP
+    assert "No conformity is stated" in str(values["certificate.conformity"].value)
+    assert {line.verdict for one in made.loads for line in one.checks} == {None}
+
+
+def test_u_has_two_digits_and_the_value_its_places(tmp_path: Path) -> None:
+    content = build_content(collect(registry_of(tmp_path), "pair-r1", STYLE, issued=DAY), STYLE)
+    table = content.tables["uncertainty"]
+    at = [column.name for column in table.columns]
+    for row in table.rows:
+        told = dict(zip(at, map(str, row), strict=True))
+        digits = told["U"].replace(".", "").strip("0")
+        assert 1 <= len(digits) <= 2
+        places = len(told["U"].partition(".")[2])
+        assert len(told["at"].partition(".")[2]) == places
+        assert 1.9 < float(told["k"]) < 4
+        assert told["p"] == "95"
+
+
+@pytest.mark.parametrize(("agreed", "printed"), [("interval_agreed = true", True), ("", False)])
+def test_an_interval_stands_only_where_it_was_agreed(tmp_path: Path, agreed: str, printed: bool) -> None:
+    content = build_content(collect(registry_of(tmp_path, FULL.format(agreed)), "pair-r1", STYLE, issued=DAY))
+    words = " ".join(str(value.value) for value in content.values.values())
+    assert ("12 months" in words) is printed
+    assert content.conditions["interval_agreed"] is printed
+    assert "2026-12-31" not in words  # nor the reference's own last day
+
+
+def test_an_amended_certificate_has_its_own_id_and_names_the_other(tmp_path: Path) -> None:
+    registry = registry_of(tmp_path)
+    one = collect(registry, "pair-r1", STYLE, issued=DAY, replaces="CAL-17", amendment="a name was wrong")
+    two = collect(registry, "pair-r1", STYLE, issued=DAY, replaces="CAL-17-A1", amendment="again")
+    assert (one.id, two.id) == ("CAL-17-A1", "CAL-17-A2")
+    assert (one.replaces, one.amendment) == ("CAL-17", "a name was wrong")
+    with pytest.raises(ConfigError, match="amended"):
+        collect(registry, "pair-r1", STYLE, issued=DAY, replaces="CAL-17")
+
+
+def test_a_candidate_has_a_draft_at_most(tmp_path: Path) -> None:
+    registry = registry_of(tmp_path, approved=False)
+    with pytest.raises(RecordError) as caught:
+        collect(registry, "pair-r1", STYLE, issued=DAY)
+    assert caught.value.rule == "certificate-candidate"
+    made = collect(registry, "pair-r1", STYLE, issued=DAY, draft=True)
+    assert made.draft
+    assert build_content(made).marks[0][1].startswith("DRAFT")
+
+
+def test_a_withdrawn_record_is_refused_and_an_earlier_paper_says_so(tmp_path: Path) -> None:
+    registry = registry_of(tmp_path)
+    withdraw(registry, "pair-r1", on=dt.date(2026, 4, 1), void_from=None, reason="cell dropped", by="B")
+    with pytest.raises(RecordError) as caught:
+        collect(registry, "pair-r1", STYLE, issued=dt.date(2026, 4, 2))
+    assert caught.value.rule == "certificate-withdrawn"
+    assert "cell dropped" in str(collect(registry, "pair-r1", STYLE, issued=DAY).withdrawn)
+
+
+def test_a_legacy_import_has_none() -> None:
+    with pytest.raises(RecordError) as caught:
+        collect(Registry(CHECKOUT / "calibrations"), "m15-r2", STYLE)
+    assert caught.value.rule == "certificate-unverified"
+
+
+def test_the_packaged_template_is_what_the_code_builds() -> None:
+    assert (CHECKOUT / "report_templates" / "certificate.docx").read_bytes() == build_certificate()
+
+
+def test_the_dcc_is_deterministic_and_needs_a_country(tmp_path: Path) -> None:
+    registry = registry_of(tmp_path)
+    made = collect(registry, "pair-r1", STYLE, issued=DAY)
+    assert build_dcc(made) == build_dcc(collect(registry, "pair-r1", STYLE, issued=DAY))
+    with pytest.raises(ConfigError) as caught:
+        build_dcc(collect(registry, "pair-r1", Style(), issued=DAY))
+    assert caught.value.rule == "certificate-country"
+
+
+def test_the_dcc_converts_to_newtons(tmp_path: Path) -> None:
+    made = collect(registry_of(tmp_path), "pair-r1", STYLE, issued=DAY)
+    text = build_dcc(made).decode()
+    # 1 lbf = 0.45359237 kg x 9.80665 m/s^2, exactly; the truth of the session is 100 lbf a mV/V.
+    values = [float(v) for v in re.findall(r"<si:value>([^<]+)</si:value>\s*<si:unit>\\newton\\volt", text)]
+    assert values[0] == pytest.approx(100 * 0.45359237 * 9.80665, rel=1e-3)
+    assert "|lbf" in text
+    assert "<dcc:conformityXMLList>pass pass pass pass pass pass</dcc:conformityXMLList>" in text
+
+
+# The schema's own examples write \\per; dsiUnits reads it and advises negative powers.
+@pytest.mark.filterwarnings("ignore:The dsi string contains the token")
+@pytest.mark.skipif(not (SHARED_DATA / "dcc_schema").is_dir(), reason="the DCC schema is not here")
+@pytest.mark.parametrize("more", ["", FULL.format("interval_agreed = true")], ids=["gaps", "full"])
+def test_the_dcc_passes_schema_schematron_and_units(tmp_path: Path, more: str) -> None:
+    dsi_unit = pytest.importorskip("dsi_unit")
+    saxonche = pytest.importorskip("saxonche")
+    from lxml import etree
+
+    made = collect(
+        registry_of(tmp_path, more),
+        "pair-r1",
+        STYLE,
+        issued=DAY,
+        replaces="OLD-1",
+        amendment="a <reason> & more",
+    )
+    path = tmp_path / "dcc.xml"
+    path.write_bytes(build_dcc(made))
+    tree = etree.parse(path)
+    schema = etree.XMLSchema(etree.parse(SHARED_DATA / "dcc_schema" / "dcc" / "v3.3.0" / "dcc.xsd"))
+    assert schema.validate(tree), schema.error_log
+    with saxonche.PySaxonProcessor(license=False) as processor:
+        rules = processor.new_xslt30_processor().compile_stylesheet(
+            stylesheet_file=str(SHARED_DATA / "dcc_schema" / "schematron" / "dcc.svrl")
+        )
+        answer = etree.fromstring(rules.transform_to_string(source_file=str(path)).encode())
+    space = "{http://purl.oclc.org/dsdl/svrl}"
+    said = list(answer.iter(f"{space}successful-report", f"{space}failed-assert"))
+    assert [" ".join("".join(m.itertext()).split()) for m in said if m.get("role") == "error"] == []
+    units = {e.text for e in tree.iter("{https://ptb.de/si}unit", "{https://ptb.de/si}unitXMLList")}
+    assert units
+    assert all(dsi_unit.DsiUnit(text).valid for text in units)
