@@ -26,9 +26,10 @@ from toolkit.cli.console import (
 
 if TYPE_CHECKING:
     from toolkit.findings import Finding
-    from toolkit.tires.model import CurveFit, Loss, TireModel
+    from toolkit.tires.model import Curve, CurveFit, Loss, TireModel
 
 NAME = "fit"
+MODEL = "mf61"  # the model over all loads that a tire file can hold
 
 
 def command(
@@ -59,39 +60,61 @@ def command(
     from toolkit.tires.model import LOSSES
 
     started = time.perf_counter()
-    models = tuple(find(name) for name in dict.fromkeys(model or ["magic_formula"]))
+    names = list(dict.fromkeys(model or ["magic_formula"]))
+    models = tuple(find(name) for name in names if name != MODEL)
     if loss not in LOSSES:
         raise ConfigError(
             f"unknown loss {loss!r}", where="--loss", got=loss, expected=", ".join(LOSSES),
             next_step="name one of those expected", rule="unknown-loss",
         )  # fmt: skip
-    if tir is not None and all(one.per_load for one in models):
+    if tir is not None and MODEL not in names:
         raise ConfigError(
             "a tire file needs a model over all loads",
             where="--tir",
-            got=", ".join(one.name for one in models),
+            got=", ".join(names),
             expected="a global model: a .tir file has no place for curves of single loads",
-            next_step="add --model with a global model of those that are available",
+            next_step=f"add --model {MODEL}",
             rule="tir-needs-global",
         )
+    if tir is not None and tir.resolve() == source.resolve():
+        raise ConfigError(
+            "the tire file would replace the table", where="--tir", got=tir, expected="another name",
+            next_step="choose another name", rule="original",
+        )  # fmt: skip
+    if MODEL in names and loss != "linear":
+        raise ConfigError(
+            f"{MODEL} is fitted by least squares only", where="--loss", got=loss, expected="linear",
+            next_step="leave --loss away for this model", rule="unknown-loss",
+        )  # fmt: skip
     chosen: Loss = "robust" if loss == "robust" else "linear"
     if source.is_dir() or source.suffix.lower() != ".csv":
-        rows, findings = _of_test(
+        rows, findings, curves, radius = _of_test(
             source, models, axes=axes, loss=chosen, calibration=calibration,
             calibrations=calibrations, home=home, known_at=known_at,
         )  # fmt: skip
     else:
         from toolkit.tires.table import read_table
-        from toolkit.tires.table_fit import fit_table
+        from toolkit.tires.table_fit import fit_table, table_curves
 
-        result = fit_table(read_table(source, axes=axes), models, loss=chosen)
-        rows, findings = [(fit, None) for fit in result.fits], result.findings
+        measured = read_table(source, axes=axes)
+        curves, radius, rows, findings = table_curves(measured), None, [], ()
+        if models:
+            result = fit_table(measured, models, loss=chosen)
+            rows, findings = [(fit, None) for fit in result.fits], result.findings
+    entries: list[dict[str, Any]] = []
+    shown = ""
+    if MODEL in names:
+        from toolkit.cli.fit_tir import fit_global
+
+        entries, more, shown = fit_global(curves, radius_m=radius, source=source, tir=tir)
+        findings = (*findings, *more)
     payload = {
-        "fits": [fit_payload(fit, rotation) for fit, rotation in rows],
+        "fits": [*(fit_payload(fit, rotation) for fit, rotation in rows), *entries],
+        "tir": None if tir is None else str(tir),
         "findings": [finding.as_dict() for finding in findings],
         "timing": {"seconds": time.perf_counter() - started},
     }
-    answer(payload, _text(rows, findings), as_json=json, quiet=quiet)
+    answer(payload, "\n\n".join(filter(None, (shown, _text(rows, findings)))), as_json=json, quiet=quiet)
     return exit_code(findings)
 
 
@@ -105,10 +128,12 @@ def _of_test(
     calibrations: Path | None,
     home: Path | None,
     known_at: datetime | None,
-) -> tuple[list[tuple[CurveFit, str | None]], tuple[Finding, ...]]:
+) -> tuple[list[tuple[CurveFit, str | None]], tuple[Finding, ...], Sequence[Curve], float | None]:
+    # Fits with their rotation, findings, the forward run's curves and the tire's free radius [m].
     from toolkit.characteristics.groups import group
     from toolkit.cli.resolve import resolve_test
     from toolkit.errors import ConfigError
+    from toolkit.reduction.averaging import free_radius_m
     from toolkit.tires.fit import Curve, why_not
     from toolkit.tires.table_fit import fit_findings
 
@@ -142,7 +167,14 @@ def _of_test(
         fits = fit_model(one, [curve for curve, _ in made], loss=loss)
         rows += list(zip(fits, [rotation for _, rotation in made], strict=True))
     own = [finding for finding in fit_findings([fit for fit, _ in rows]) if finding.level == "note"]
-    return rows, (*resolved.findings, *own)
+    reduced = resolved.result.reduced
+    forward = [
+        Curve(SA=g.SA, y=g.values(channel), channel=channel, load_N=g.load_N)
+        for g in group(reduced)
+        if g.rotation == "forward"
+        for channel in ("FY", "MZ")
+    ]
+    return rows, (*resolved.findings, *own), forward, free_radius_m(reduced.info.tire_size)
 
 
 def fit_payload(fit: CurveFit, rotation: str | None = None) -> dict[str, Any]:

@@ -1,0 +1,81 @@
+"""`toolkit fit --model mf61 --tir`: the file gives the table's forces again."""
+
+import csv
+import json
+
+import numpy as np
+import pytest
+import typer
+from typer.testing import CliRunner
+
+from toolkit.cli import evaluate, fit
+from toolkit.errors import ToolkitError
+from toolkit.tires.models.magic_formula import value
+from toolkit.tires.tir import read_tir
+
+
+def run(command, *arguments):
+    app = typer.Typer()
+    app.command()(command)
+    result = CliRunner().invoke(app, [str(one) for one in arguments], standalone_mode=False)
+    if isinstance(result.exception, ToolkitError):
+        raise result.exception
+    assert result.exception is None, result.exception
+    return result.return_value, result.stdout
+
+
+@pytest.fixture
+def table(tmp_path):
+    lines = ["SA [deg],FZ [N],FY [N],MZ [N*m]"]
+    for FZ in (2000.0, 3500.0, 5000.0):
+        for degrees in np.arange(-10.0, 10.5, 1.0):
+            SA = np.radians(degrees)
+            FY = value((11.0, 1.3, -FZ, -0.5, 0.0, 0.0), SA)
+            MZ = value((10.0, 2.3, 0.03 * FZ, -1.0, 0.0, 0.0), SA)
+            lines.append(f"{degrees},{FZ},{FY:.4f},{MZ:.5f}")
+    path = tmp_path / "tire.csv"
+    path.write_text("\n".join(lines) + "\n")
+    return path
+
+
+def test_the_tire_file_gives_the_table_again_in_its_axes(table, tmp_path):
+    tir, out = tmp_path / "x.tir", tmp_path / "out.csv"
+    code, text = run(fit.command, table, "--model", "mf61", "--tir", tir, "--json")
+    answer = json.loads(text)
+    assert code in (0, 1)
+    assert [(one["channel"], one["load_N"]) for one in answer["fits"]] == [("FY", None), ("MZ", None)]
+    assert "tir-radius" in {finding["rule"] for finding in answer["findings"]}
+    file = read_tir(tir)
+    assert (file.number("FITTYP"), file.number("FNOMIN"), file.get("TYRESIDE")) == (61.0, 3500.0, "UNKNOWN")
+    run(evaluate.command, tir, table, "--axes", "SAE", "--out", out)
+    measured, made = (
+        np.array([[float(x) for x in row] for row in list(csv.reader(path.read_text().splitlines()))[1:]])
+        for path in (table, out)
+    )
+    error = np.linalg.norm(made[:, 3] - measured[:, 2]) / np.linalg.norm(measured[:, 2])
+    assert 100 * error == pytest.approx(answer["fits"][0]["error_percent"], rel=1e-6)
+    assert error < 0.01
+
+
+@pytest.mark.parametrize(
+    ("options", "rule"),
+    [
+        (["--tir", "x.tir"], "tir-needs-global"),
+        (["--model", "mf61", "--loss", "robust"], "unknown-loss"),
+    ],
+)
+def test_what_a_tire_file_cannot_hold_is_refused(table, options, rule):
+    with pytest.raises(ToolkitError) as caught:
+        run(fit.command, table, *options)
+    assert (caught.value.rule, caught.value.exit_code) == (rule, 2)
+
+
+def test_the_table_is_never_replaced_and_one_load_is_refused(table, tmp_path):
+    with pytest.raises(ToolkitError) as caught:
+        run(fit.command, table, "--model", "mf61", "--tir", table)
+    assert caught.value.rule == "original"
+    table.write_text("\n".join(table.read_text().splitlines()[:22]) + "\n")
+    with pytest.raises(ToolkitError) as caught:
+        run(fit.command, table, "--model", "mf61", "--tir", tmp_path / "x.tir")
+    assert caught.value.rule == "one-load"
+    assert not (tmp_path / "x.tir").exists()
