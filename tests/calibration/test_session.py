@@ -148,7 +148,7 @@ BAD_SETTINGS = [
     ({"degree": "2"}, ConfigError, "degree"),
     ({"model": '"polynomial"'}, ConfigError, "degree"),
     ({"method": '"ridge"'}, ConfigError, "ols | wls"),
-    ({"method": '"odr"'}, SessionError, "not available"),
+    ({"method": '"odr"'}, ConfigError, "uncertainty of FY is missing"),
     ({"method": '"wls"'}, SessionError, "u_FY"),
     ({"data": '"none.csv"'}, SessionError, "none.csv"),
     ({"data": "-"}, ConfigError, "data"),

@@ -117,3 +117,27 @@ def model_terms(
                 rule="term",
             )
     return tuple(name for name in names if name not in drop)
+
+
+def term_slopes(terms: Sequence[str], coefficients: Any, columns: Mapping[str, Any], zero: Any = 0.0) -> Any:
+    """Return the slope of sum of c_i term_i by each column, by name; any arithmetic type.
+
+    >>> term_slopes(["A^2", "A*B", "intercept"], [1.0, 2.0, 3.0], {"A": 5.0, "B": 7.0})
+    {'A': 24.0, 'B': 10.0}
+    """
+    found = dict.fromkeys(columns, zero)
+    for term, coefficient in zip(map(parse_term, terms), coefficients, strict=True):
+        factors: list[tuple[str, Any, Any]] = []
+        for name, power in term.powers:
+            x = columns[name]
+            factors.append((name, x**power, power if power == 1 else power * x ** (power - 1)))
+        for name in term.absolutes:
+            x = columns[name]
+            # |x| has no slope at 0; either side's mean is 0 there.
+            factors.append((name, abs(x), (x > zero) * 1 - (x < zero) * 1))
+        for i, (name, _, slope) in enumerate(factors):
+            product = coefficient * slope
+            for k, (_, value, _) in enumerate(factors):
+                product = product if k == i else product * value
+            found[name] = found[name] + product
+    return found

@@ -142,11 +142,11 @@ class Factor:
             design=design,
             exact=design.T.astype(np.longdouble),
             root=root,
-            q=q,
+            q=np.asarray(q, dtype=np.float64),
             r_inverse=r_inverse,
             inverse=r_inverse @ r_inverse.T,
             leverage=np.einsum("ij,ij->i", q, q),
-            singular_values=np.linalg.svd(of_design, compute_uv=False),
+            singular_values=np.asarray(np.linalg.svd(of_design, compute_uv=False), dtype=np.float64),
         )
 
     def solve(self, load: NDArray[np.float64]) -> tuple[NDArray[np.longdouble], NDArray[np.float64]]:

@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from toolkit.calibration.fit.adequacy import check_adequate, condition_number, terms_condition_number
-from toolkit.calibration.fit.diagnostics import Diagnostics, diagnose, variance_inflation
-from toolkit.calibration.fit.regression import TermFit, fit_terms
+from toolkit.calibration.fit.diagnostics import Diagnostics, diagnose, replicate_groups, variance_inflation
+from toolkit.calibration.fit.gls import fit_gls
+from toolkit.calibration.fit.odr import fit_odr
+from toolkit.calibration.fit.regression import TermFit, fit_loads, fit_terms
+from toolkit.calibration.session.known_errors import KnownErrors, known_errors, row_uncertainty
+from toolkit.calibration.session.settings import wrong
+from toolkit.calibration.session.statements import parse_statements
 from toolkit.calibration.terms import term_matrix
-from toolkit.units import unit
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -60,24 +65,53 @@ def fit_session(session: Session) -> SessionFit:
     columns = table.columns(session.indications)
     cells = table.matrix(session.indications)
     terms = term_matrix(session.terms, columns)
+    groups = replicate_groups(cells)
     return SessionFit(
         session=session,
-        loads=tuple(_fit_load(session, setting, cells, columns) for setting in session.loads),
+        loads=tuple(
+            _result(session, setting, fit, cells, groups)
+            for setting, fit in zip(session.loads, _solved(session, columns), strict=True)
+        ),
         condition_number=condition_number(cells),
         condition_number_terms=terms_condition_number(terms),
         vif=variance_inflation(cells),
     )
 
 
-def _fit_load(
+def _solved(session: Session, columns: dict[str, NDArray[np.float64]]) -> tuple[TermFit, ...]:
+    loads = [session.table.column(setting.name) for setting in session.loads]
+    if session.method == "ols":
+        return fit_loads(terms=session.terms, columns=columns, loads=loads)
+    found = []
+    for setting, load in zip(session.loads, loads, strict=True):
+        if session.method == "wls":
+            u = load_uncertainty(session, setting)
+            found.append(fit_terms(terms=session.terms, columns=columns, load=load, u=u))
+            continue
+        errors = load_errors(session, setting)
+        try:
+            if session.method == "gls":
+                found.append(fit_gls(terms=session.terms, columns=columns, load=load, errors=errors))
+            else:
+                u = np.ones(len(load)) if errors.u is None else errors.u
+                found.append(
+                    fit_odr(terms=session.terms, columns=columns, load=load, u=u, u_cells=errors.u_cells)
+                )
+        except ValueError as error:
+            expected = f"uncertainties that determine the fit, such as a column u_{setting.name}"
+            raise wrong(session.path, f"method {session.method}, {setting.name}", error, expected) from error
+    return tuple(found)
+
+
+def _result(
     session: Session,
     setting: LoadSetting,
+    fit: TermFit,
     cells: NDArray[np.float64],
-    columns: dict[str, NDArray[np.float64]],
+    groups: NDArray[np.intp],
 ) -> LoadResult:
     table = session.table
     load = table.column(setting.name)
-    fit = fit_terms(terms=session.terms, columns=columns, load=load, u=load_uncertainty(session, setting))
     residuals, percent = None, None
     if session.check is not None:
         check = session.check
@@ -87,7 +121,7 @@ def _fit_load(
     return LoadResult(
         setting=setting,
         fit=fit,
-        diagnostics=diagnose(fit, cells=cells, load=load, direction=table.direction),
+        diagnostics=diagnose(fit, cells=cells, load=load, direction=table.direction, replicates=groups),
         llf=max(LLF_FACTOR * fit.residual_sd, _resolution(session, fit)),
         check_residuals=residuals,
         check_max_percent_fs=percent,
@@ -96,11 +130,20 @@ def _fit_load(
 
 def load_uncertainty(session: Session, setting: LoadSetting) -> NDArray[np.float64] | None:
     """Return the standard uncertainties that weigh the rows, in the load's unit; None for plain OLS."""
-    if session.method != "wls":
-        return None
-    name = f"u_{setting.name}"
-    factor = unit(session.table.unit(name)).factor / unit(setting.unit).factor
-    return session.table.column(name) * factor
+    return row_uncertainty(session.table, setting.name) if session.method == "wls" else None
+
+
+def load_errors(session: Session, setting: LoadSetting) -> KnownErrors:
+    """Return what the session states about the errors of one load, for gls and odr."""
+    stated = parse_statements(
+        json.loads(session.settings),
+        indications={cell.name: cell.unit for cell in session.cells},
+        loads={load.name: load.unit for load in session.loads},
+        date=session.date,
+        where=session.path,
+        columns={cell.name: cell.column_unit or cell.unit for cell in session.cells},
+    )
+    return known_errors(session.method, stated, session.table, setting.name, session.path)
 
 
 def _resolution(session: Session, fit: TermFit) -> float:

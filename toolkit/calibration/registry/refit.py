@@ -1,6 +1,6 @@
 """Load-time gates: a record must reproduce from its own data, by another algorithm than the fit's.
 
-The fit is a QR decomposition in statsmodels; this is a singular value decomposition in numpy, on columns
+The fit is a QR decomposition; this is a singular value decomposition in numpy, on columns
 that are centred and scaled, so that a fault of one is not a fault of both. It is light to import: every
 command that touches a record runs it.
 
@@ -13,12 +13,13 @@ coefficient of a term that hardly matters.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from toolkit.calibration.records.issue import issued_value, term_reach
+from toolkit.calibration.registry.whitening import Whitener, errors_of, linearise, whitener
 from toolkit.calibration.session.table import Table
 from toolkit.calibration.terms import INTERCEPT, term_matrix
 from toolkit.errors import RecordError
@@ -66,6 +67,10 @@ def check_reproduces(record: CalibrationRecord, table: Table) -> None:
     shared: dict[tuple[str, ...], _Solver] = {}
     for at, one in enumerate(record.loads):
         _same_unit(record, one.load, table.unit(one.load), one.unit)
+        if one.method in ("gls", "odr"):
+            known = _known_errors_solver(record, one, table, points)
+            _check_load(record, at, one, known, table.column(one.load))
+            continue
         weights = _weights(one, table)
         solver = shared.get(one.terms) if weights is None else None
         if solver is None:
@@ -74,6 +79,29 @@ def check_reproduces(record: CalibrationRecord, table: Table) -> None:
             if weights is None:
                 shared[one.terms] = solver
         _check_load(record, at, one, solver, table.column(one.load))
+
+
+def _known_errors_solver(
+    record: CalibrationRecord, one: LoadFit, table: Table, points: dict[str, NDArray[np.float64]]
+) -> _Solver:
+    columns, loads = table.columns(record.indications), table.column(one.load)
+    terms, golden = term_matrix(one.terms, columns), term_matrix(one.terms, points)
+    has_constant = one.terms[-1] == INTERCEPT
+    errors = errors_of(record, one.load, table)
+    if one.method == "gls":
+        return _solver(terms, None, has_constant, golden, whiten=whitener(terms, loads, errors))
+    found = linearise(one.terms, columns, loads, errors)
+    solver = _solver(found.terms, found.weights, has_constant, golden)
+    solution, _ = solver.solve(found.load)
+    residuals = loads - terms @ (solver.back @ solution)
+    sd = math.sqrt(float(residuals @ residuals) / (len(loads) - len(one.terms)))
+    # Range and extent are those of the indications as observed, whose digits a certificate prints.
+    return replace(
+        solver,
+        solved=(solution, sd),
+        reach=term_reach(terms, has_constant),
+        extent=np.abs(terms).max(axis=0).tolist(),
+    )
 
 
 def polarity(coefficients: tuple[float, ...]) -> tuple[int, ...]:
@@ -119,7 +147,7 @@ def _check_load(
     stored = np.asarray(one.covariance)
     # By the record's own residual sd, which was just held against the refit's: of noise-free data it is
     # rounding, and the covariance is that rounding squared.
-    scale = (one.residual_sd or 0.0) ** 2 if solver.weights is None else 1.0
+    scale = (one.residual_sd or 0.0) ** 2 if not solver.known else 1.0
     # Its rounding grows with the square of the terms' condition number.
     slack = _SPREAD + 10 * np.finfo(float).eps * solver.condition**2
     _demand(
@@ -150,7 +178,8 @@ class _Solver:
     ``design`` (rows, terms) is centred and scaled; raw coefficients = ``back`` @ solution. ``inverse`` is
     the unscaled covariance in the raw terms and ``spread`` the products of its standard errors. ``golden``
     are the golden inputs' raw terms and ``golden_design`` the same in the columns of the design. ``reach``
-    and ``extent`` are each term's range and largest absolute value.
+    and ``extent`` are each term's range and largest absolute value. ``whiten`` takes the place of the weights
+    where rows share errors; ``solved`` is the answer where another iteration found it.
     """
 
     design: NDArray[np.float64]
@@ -165,13 +194,23 @@ class _Solver:
     golden_design: NDArray[np.float64]
     reach: NDArray[np.float64]
     extent: list[float]
+    whiten: Whitener | None = None
+    solved: tuple[NDArray[np.float64], float] | None = None
+
+    @property
+    def known(self) -> bool:
+        """Whether the errors are known: the covariance then follows from them, not from the residuals."""
+        return self.weights is not None or self.whiten is not None
 
     def solve(self, loads: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
         """Return the solution in the design's columns, and the residual standard deviation."""
+        if self.solved is not None:
+            return self.solved
         w = 1.0 if self.weights is None else self.weights
-        solution = self.pseudo @ (self.left.T @ (loads * w))
+        white = (lambda values: values * w) if self.whiten is None else self.whiten
+        solution = self.pseudo @ (self.left.T @ white(loads))
         # One step of refinement: the second solve works on the residuals and mends the first's rounding.
-        solution = solution + self.pseudo @ (self.left.T @ ((loads - self.design @ solution) * w))
+        solution = solution + self.pseudo @ (self.left.T @ white(loads - self.design @ solution))
         residuals = loads - self.design @ solution
         n, p = self.design.shape
         return solution, math.sqrt(float(residuals @ residuals) / (n - p))
@@ -182,6 +221,7 @@ def _solver(
     weights: NDArray[np.float64] | None,
     has_constant: bool,
     golden: NDArray[np.float64],
+    whiten: Whitener | None = None,
 ) -> _Solver:
     n, p = terms.shape
     k = p - 1 if has_constant else p
@@ -191,9 +231,8 @@ def _solver(
     scale = np.sqrt(np.einsum("ij,ij->j", design[:, :k], design[:, :k]))
     scale[scale == 0] = 1.0
     design[:, :k] /= scale
-    left, values, right = np.linalg.svd(
-        design if weights is None else design * weights[:, None], full_matrices=False
-    )
+    weighted = design if weights is None else design * weights[:, None]
+    left, values, right = np.linalg.svd(weighted if whiten is None else whiten(weighted), full_matrices=False)
     # Back to the raw terms: c = slope / scale, intercept = constant - centre . c
     back = np.zeros((p, p))
     back[:k, :k] = np.diag(1 / scale)
@@ -208,6 +247,7 @@ def _solver(
     return _Solver(
         design=design,
         weights=weights,
+        whiten=whiten,
         left=left,
         pseudo=right.T / values,
         back=back,

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from toolkit.calibration.session.bridge import Bridge, bridges_of, converted
+from toolkit.calibration.session.known_errors import group_column
 from toolkit.calibration.session.table import Table, read_table
 from toolkit.errors import RecordError, RegistryError, ToolkitError
 from toolkit.units import unit
@@ -58,7 +59,8 @@ def parse_loads(record: CalibrationRecord, data: bytes, folder: Path) -> Table:
     file = record.data_file("loads")
     where = folder / ("loads" if file is None else file.file)
     try:
-        table = read_table(data, where=where, required=needed, optional=uncertainties)
+        group = group_column(json.loads(record.settings).get("reference", {}))
+        table = read_table(data, where=where, required=needed, optional=[*uncertainties, *group])
         return _as_fitted(record, table, where)
     except RegistryError:
         raise
