@@ -167,3 +167,19 @@ def test_the_commands_import_nothing_heavy() -> None:
     code = "import sys, toolkit.cli.calibration; print(*sys.modules)"
     loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
     assert not {"numpy", "matplotlib", "scipy"} & set(loaded.split())
+
+
+def test_calibrate_answers_with_the_standards_and_what_the_history_says(
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    from toolkit.cli import calibrate as command
+
+    root = typer.Typer()
+    root.command()(command.command)
+    path = session(tmp_path / "newest", 2026, -0.9)
+    words = [str(path), "--calibrations", str(folder), "--json"]
+    assert root(args=words, standalone_mode=False) == 1
+    answer = json.loads(capsys.readouterr().out)
+    assert "chart" in [one["rule"] for one in answer["findings"]]
+    assert [one["standard"] for one in answer["standards"]] == ["e74", "iso376"]
+    assert answer["standards"][0]["class"] == "AA"
