@@ -7,13 +7,15 @@ from typing import Any
 
 import numpy as np
 
-from toolkit.calibration.fit.regression import fit_terms
+from toolkit.calibration.fit.inverse import StraightLine, x_from_y
+from toolkit.calibration.fit.odr import fit_odr
+from toolkit.calibration.fit.regression import TermFit, fit_terms
 from toolkit.calibration.standards.e74 import evaluate_e74
 from toolkit.errors import ToolkitError
 from toolkit.files import read_toml
 from toolkit.qualification.agreement import printed_check
-from toolkit.qualification.model import Check, NotCovered, not_run
-from toolkit.qualification.numbers import damaged, numbers, read_set
+from toolkit.qualification.model import Check, not_run
+from toolkit.qualification.numbers import damaged, number, numbers, read_set
 
 LINES = "ISO/TS 28037"
 E74 = "ASTM E74"
@@ -22,24 +24,15 @@ E74_FILE = "e74_pontius.toml"
 _BROKEN = (KeyError, TypeError, ValueError, AttributeError, np.linalg.LinAlgError)
 
 
-def check_lines(folder: Path) -> tuple[list[Check], list[NotCovered]]:
-    """Solve the straight lines with known uncertainties of y; name those that are not covered."""
-    checks: list[Check] = []
-    left: list[NotCovered] = []
+def check_lines(folder: Path) -> list[Check]:
+    """Solve the straight lines with known uncertainties, of y or of both variables, and predict by them."""
     try:
-        for one in read_toml(folder / LINES_FILE)["example"]:
-            if one["method"] == "wls":
-                checks += _line(one, folder / LINES_FILE)
-            else:
-                reason = "the toolkit has no fit with uncertainties in both variables yet"
-                left.append(NotCovered(name=f"{LINES}, {one['name']}", reason=reason))
-        reason = "x at a given y, with its uncertainty: the toolkit has no inverse prediction yet"
-        left.append(NotCovered(name=f"{LINES}, predictions", reason=reason))
+        examples = read_toml(folder / LINES_FILE)["example"]
+        return [check for one in examples for check in _line(one, folder / LINES_FILE)]
     except ToolkitError as error:
-        checks.append(not_run(LINES, "examples", str(error)))
+        return [not_run(LINES, "examples", str(error))]
     except _BROKEN as error:
-        checks.append(not_run(LINES, "examples", str(damaged(folder / LINES_FILE, repr(error)))))
-    return checks, left
+        return [not_run(LINES, "examples", str(damaged(folder / LINES_FILE, repr(error))))]
 
 
 def check_e74(folder: Path) -> list[Check]:
@@ -53,17 +46,37 @@ def check_e74(folder: Path) -> list[Check]:
 
 
 def _line(one: dict[str, Any], where: Path) -> list[Check]:
-    x, y, u = (numbers(one[key], where) for key in ("x", "y", "u_y"))
-    fit = fit_terms(terms=("x", "intercept"), columns={"x": x}, load=y, u=u)
-    b, a = fit.coefficients
-    u_b, u_a = fit.standard_errors.tolist()
+    name = str(one["name"])
+    fit = _solved(one, where)
+    line = StraightLine.of(fit)
     values = {
-        "a": a, "b": b, "u_a": u_a, "u_b": u_b, "cov_ab": float(fit.covariance[0, 1]),
-        "chi2": float(np.sum((fit.residuals / u) ** 2)),
+        "a": line.a, "b": line.b, "u_a": line.u_a, "u_b": line.u_b, "cov_ab": line.cov_ab,
+        "chi2": np.nan if fit.chi2 is None else fit.chi2,
     }  # fmt: skip
-    return [
-        printed_check(LINES, str(one["name"]), key, text, values[key]) for key, text in one["printed"].items()
-    ]
+    checks = [printed_check(LINES, name, key, text, values[key]) for key, text in one["printed"].items()]
+    if "prediction" in one:
+        told = one["prediction"]
+        at = number(told["y0"], where)
+        found = x_from_y(line, at, u_y0=number(told["u_y0"], where))
+        checks += [
+            printed_check(LINES, f"{name}, x at y = {at:g}", "x0", told["x0"], found.value),
+            printed_check(LINES, f"{name}, x at y = {at:g}", "u_x0", told["u_x0"], found.u),
+        ]
+    return checks
+
+
+def _solved(one: dict[str, Any], where: Path) -> TermFit:
+    x, y, u = (numbers(one[key], where) for key in ("x", "y", "u_y"))
+    terms, columns = ("x", "intercept"), {"x": x}
+    if one["method"] == "wls":
+        return fit_terms(terms=terms, columns=columns, load=y, u=u)
+    if one["method"] != "odr":
+        raise damaged(where, f"method {one['method']!r}")
+    u_x = set(numbers(one["u_x"], where).tolist())
+    if len(u_x) != 1:
+        # `fit_odr` knows one uncertainty an indication, as the published example has.
+        raise damaged(where, f"u_x {sorted(u_x)}")
+    return fit_odr(terms=terms, columns=columns, load=y, u=u, u_cells=np.array([*u_x]))
 
 
 def _e74(found: dict[str, Any], folder: Path) -> list[Check]:
