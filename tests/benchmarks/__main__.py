@@ -13,12 +13,13 @@ import tempfile
 from collections.abc import Callable
 from pathlib import Path
 
-from tests.benchmarks import help_time, monte_carlo, process_time, report_time, verify_records
+from tests.benchmarks import fit_rows, help_time, monte_carlo, process_time, report_time, verify_records
 
 BENCHES: dict[str, Callable[[Path, int], list[dict[str, object]]]] = {
     "help": help_time.run,
     "process": process_time.run,
     "report": report_time.run,
+    "fit": fit_rows.run,
     "verify": verify_records.run,
     "monte-carlo": monte_carlo.run,
 }

@@ -17,7 +17,7 @@ RECORDS = 1000
 # mV/V at the largest FY, MZ and MX (a load that the sessions vary and do not fit): a plausible hub.
 _SENSITIVITY = np.array([[1.0, 0.3, 0.2], [1.2, -0.3, 0.3], [0.5, 0.1, -0.6]])
 _LARGEST = (5000.0, 250.0)
-_SESSION = """\
+SESSION = """\
 schema = 1
 instrument = "bench"
 date = 2026-01-05
@@ -90,8 +90,8 @@ def enter_sessions(folder: Path, count: int) -> None:
     for number in range(1, count + 1):
         rng = np.random.default_rng(number)
         for name, rows, runs in (("loads", 60, True), ("check", 9, False)):
-            (work / f"{name}.csv").write_text(_table(rng, rows, runs))
-        (work / "SESSION.toml").write_text(_SESSION.format(number=number))
+            (work / f"{name}.csv").write_text(data_table(rng, rows, runs))
+        (work / "SESSION.toml").write_text(SESSION.format(number=number))
         session = read_session(work / "SESSION.toml")
         record = candidate._numbered(candidate._record(fit_session(session)), f"bench-r{number}", session)
         change = candidate.entering(record, candidate._contents(session, record), by=session.operator)
@@ -103,7 +103,7 @@ def enter_sessions(folder: Path, count: int) -> None:
     (home / HEAD).write_bytes(head_bytes(count, head))
 
 
-def _table(rng: np.random.Generator, rows: int, runs: bool) -> str:
+def data_table(rng: np.random.Generator, rows: int, runs: bool) -> str:
     shares = rng.uniform(-1, 1, (rows, 3))
     cells = shares @ _SENSITIVITY.T + rng.normal(0, 2e-5, (rows, 3))
     text = [
