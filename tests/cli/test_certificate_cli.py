@@ -44,7 +44,12 @@ def run(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Run:
 
 @office_needed
 def test_a_certificate_is_delivered_whole(run: Run, tmp_path: Path) -> None:
-    code, answer = run("m15-virtual-r1", "--template", TEMPLATE, "--dcc", "--known-at", "2026-04-01")
+    template = tmp_path.parent / f"{tmp_path.name} templates" / "certificate.docx"
+    template.parent.mkdir()
+    shutil.copy(TEMPLATE, template)
+    style = (TEMPLATE.parent / "org.toml").read_text()
+    (template.parent / "org.toml").write_text(style.replace("[laboratory]", '[laboratory]\ncountry = "DE"'))
+    code, answer = run("m15-virtual-r1", "--template", template, "--dcc", "--known-at", "2026-04-01")
     assert (code, answer["verified"], answer["draft"]) == (1, True, False)
     assert all(check["ok"] for check in answer["checks"])
     names = {Path(answer[kind]).name for kind in ("docx", "pdf", "dcc")}
@@ -54,6 +59,14 @@ def test_a_certificate_is_delivered_whole(run: Run, tmp_path: Path) -> None:
     assert {one["rule"] for one in answer["findings"]} == {"certificate-gap", "certificate-budget"}
     assert len(answer["figures"]) == 3
     assert answer["issued"] == "2026-04-01"
+
+
+def test_a_digital_certificate_without_a_country_is_refused_and_nothing_is_left(
+    run: Run, tmp_path: Path
+) -> None:
+    code, answer = run("m15-virtual-r1", "--template", TEMPLATE, "--dcc")
+    assert (code, answer["error"]["rule"]) == (2, "certificate-country")
+    assert not any(one.is_file() for one in tmp_path.rglob("*"))
 
 
 @pytest.mark.parametrize(

@@ -25,9 +25,8 @@ dates = "%Y-%m-%d"
 missing = "n/a"                       # what --allow-missing prints
 required = ["tk:calibration.hash", "tk:calibration.id", "tk:report.id", "tk:test.name"]
 
-[laboratory]                          # also: address, place, accreditation, as certificates print them
+[laboratory]                          # certificates: address, place, country (ISO 3166-1), accreditation
 name = "Tire Force and Moment Laboratory"
-country = "US"                        # ISO 3166-1: the machine-readable certificate needs it; yours
 
 [units]                               # force = "lbf", moment = "lbf*ft" for a report in those
 force = "N"

@@ -14,6 +14,7 @@ from toolkit.calibration.registry.registry import today
 from toolkit.calibration.registry.stored import stored_check, stored_loads
 from toolkit.calibration.session.statements import Statements, statements_of
 from toolkit.errors import ConfigError, RecordError, ToolkitError
+from toolkit.machine import load_machine, machine_names
 from toolkit.report.certificate.findings import gap_findings, gaps_of, result_findings, state_findings
 from toolkit.report.certificate.loads import load_results
 from toolkit.report.certificate.model import Certificate
@@ -87,6 +88,7 @@ def collect(
         approved_on=None if draft else status.known_on,
         in_force_from=None if draft else status.in_force_from,
         draft=draft,
+        simulated=_simulated(record.instrument),
         withdrawn=_withdrawn(later),
         replaces=replaces,
         amendment=amendment,
@@ -133,6 +135,10 @@ def collect(
             *state_findings(record, draft, later, _same_number(registry, record, stated)),
         ),
     )
+
+
+def _simulated(instrument: str) -> bool:
+    return instrument in machine_names() and load_machine(instrument).simulated
 
 
 def _admit(record: CalibrationRecord, status: RecordStatus, day: dt.date, draft: bool) -> bool:

@@ -15,6 +15,7 @@ from toolkit.report.content import Cell, ReportContent, Table, Value
 from toolkit.report.style import Style
 
 GAP = "NOT STATED"
+SIMULATED = "SIMULATED: the instrument is a virtual machine. No real load cell was calibrated."
 DRAFT = "DRAFT: the record is not approved. This paper is not a calibration certificate."
 UNCERTAINTY = (
     "The expanded uncertainty U is the standard uncertainty of the load multiplied by the coverage factor k "
@@ -48,6 +49,7 @@ def build_content(certificate: Certificate, style: Style | None = None) -> Repor
     conditions |= dict.fromkeys(plots, True)
     conditions |= {
         "draft": certificate.draft,
+        "simulated": certificate.simulated,
         "withdrawn": certificate.withdrawn is not None,
         "amended": certificate.replaces is not None,
         "interval_agreed": certificate.interval is not None,
@@ -56,6 +58,8 @@ def build_content(certificate: Certificate, style: Style | None = None) -> Repor
         "adjusted": bool(tables["adjustment"].rows),
     }
     marks = []
+    if certificate.simulated:
+        marks.append(("simulated", SIMULATED))
     if certificate.draft:
         marks.append(("draft", DRAFT))
     if certificate.withdrawn:

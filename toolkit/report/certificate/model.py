@@ -135,8 +135,9 @@ class LoadResult:
 class Certificate:
     """A calibration certificate's content.
 
-    ``draft``: the record is not approved, the paper is no certificate. ``rule`` is ``simple``,
-    ``guard_band`` or None where no decision rule was agreed: then no conformity is stated.
+    ``simulated``: the instrument is a virtual machine. ``draft``: the record is not approved, the paper is
+    no certificate. ``rule`` is ``simple``, ``guard_band`` or None where no decision rule was agreed: then no
+    conformity is stated.
     ``gaps`` names what a certificate should say and nobody stated; ``findings`` has them too.
     """
 
@@ -147,6 +148,7 @@ class Certificate:
     approved_on: dt.date | None
     in_force_from: dt.date | None
     draft: bool
+    simulated: bool
     withdrawn: str | None
     replaces: str | None
     amendment: str | None

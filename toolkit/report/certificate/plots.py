@@ -12,6 +12,8 @@ DRAFT = "DRAFT"
 def build_plots(certificate: Certificate) -> dict[str, Plot]:
     """Return the pictures by name, one a load, in the units of the record."""
     mark = DRAFT if certificate.draft else "WITHDRAWN" if certificate.withdrawn else None
+    if mark is None and certificate.simulated:
+        mark = "SIMULATED"
     return {name: _plot(name, one, mark) for name, one in zip(FIGURES, certificate.loads, strict=False)}
 
 

@@ -26,6 +26,7 @@ def _header(p: Pieces) -> str:
         p.inline("tk:certificate.laboratory", "laboratory")
         + "<w:r><w:tab/></w:r>"
         + p.block("tk:if.draft", run("DRAFT, NO CERTIFICATE", bold=True, style="Mark"))
+        + p.block("tk:if.simulated", run("  SIMULATED", bold=True, style="Mark"))
         + p.block("tk:if.withdrawn", run("  WITHDRAWN", bold=True, style="Mark"))
         + "<w:r><w:tab/></w:r>"
         + p.inline("tk:certificate.id", "certificate id")
@@ -67,6 +68,13 @@ def _first_page(p: Pieces) -> list[str]:
             "tk:if.draft",
             paragraph(
                 run("DRAFT: the record is not approved. This paper is not a calibration certificate."),
+                style="Notice",
+            ),
+        ),
+        p.block(
+            "tk:if.simulated",
+            paragraph(
+                run("SIMULATED: the instrument is a virtual machine. No real load cell was calibrated."),
                 style="Notice",
             ),
         ),

@@ -65,6 +65,7 @@ FIGURES = {
 }
 
 _CONDITIONS = {
+    "simulated": "the instrument is a virtual machine",
     "draft": "the record is not approved, and the paper is no certificate",
     "withdrawn": "the record is withdrawn",
     "amended": "the certificate replaces another one",
@@ -250,6 +251,7 @@ def _vocabulary() -> Vocabulary:
         required=tuple(f"tk:certificate.{name}" for name in REQUIRED),
         marks={
             "draft": frozenset({"if.draft"}),
+            "simulated": frozenset({"if.simulated"}),
             "withdrawn": frozenset({"if.withdrawn", "certificate.withdrawn"}),
             "amended": frozenset({"certificate.replaces"}),
         },
