@@ -27,14 +27,14 @@ def condition_number(matrix: NDArray[np.float64]) -> float:
     >>> condition_number(np.array([[0.0, 1.0], [1.0, 0.0], [2.0, 1.0]])).__round__(6)
     1.0
     """
-    values = np.linalg.svd(_scaled(matrix), compute_uv=False)
+    values = _singular_values(_scaled(matrix))
     return float(np.inf) if values[-1] == 0 else float(values[0] / values[-1])
 
 
 def terms_condition_number(matrix: NDArray[np.float64]) -> float:
     """Return the condition number of the full term matrix, each column scaled to unit length."""
     length = np.sqrt(np.einsum("ij,ij->j", matrix, matrix))
-    values = np.linalg.svd(matrix / np.where(length == 0, 1.0, length), compute_uv=False)
+    values = _singular_values(matrix / np.where(length == 0, 1.0, length))
     return float(np.inf) if values[-1] == 0 else float(values[0] / values[-1])
 
 
@@ -108,6 +108,12 @@ def check_adequate(session: Session) -> None:
             "terms that the data tell apart", "rank",
             'name those to leave out: drop = ["..."]; abs(X) equals X where X never changes sign',
         )  # fmt: skip
+
+
+def _singular_values(matrix: NDArray[np.float64]) -> NDArray[np.float64]:
+    # Those of R are those of the whole matrix: a decomposition of many rows is not made twice.
+    values: NDArray[np.float64] = np.linalg.svd(np.linalg.qr(matrix, mode="r"), compute_uv=False)
+    return values
 
 
 def _scaled(matrix: NDArray[np.float64]) -> NDArray[np.float64]:

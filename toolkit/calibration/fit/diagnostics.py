@@ -122,7 +122,7 @@ def _outliers(external: NDArray[np.float64], dof: int) -> tuple[int, ...]:
 
 
 def _reversibility(residuals: NDArray[np.float64], direction: tuple[str, ...] | None) -> float | None:
-    up = np.array([one == "up" for one in direction or ()], dtype=bool)
+    up = np.array(direction or (), dtype=np.str_) == "up"
     if not up.any() or up.all():
         return None
     return float(residuals[up].mean() - residuals[~up].mean())
