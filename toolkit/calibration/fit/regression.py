@@ -1,4 +1,4 @@
-"""Least squares as `metrology` demands it: QR on exactly centred, scaled columns, refined.
+"""Least squares as `metrology` demands it: statsmodels with QR on exactly centred, scaled columns, refined.
 
 A pseudo-inverse on raw columns gives six correct digits on the NIST load-cell set (Pontius); QR on scaled
 columns gives twelve. Refinement with the gradient A'(y - A x) in extended precision (corrected seminormal
@@ -122,7 +122,6 @@ class Factor:
     design: NDArray[np.float64]
     exact: NDArray[np.longdouble]
     root: NDArray[np.float64] | None
-    q: NDArray[np.float64]
     r_inverse: NDArray[np.float64]
     inverse: NDArray[np.float64]
     leverage: NDArray[np.float64]
@@ -142,7 +141,6 @@ class Factor:
             design=design,
             exact=design.T.astype(np.longdouble),
             root=root,
-            q=np.asarray(q, dtype=np.float64),
             r_inverse=r_inverse,
             inverse=r_inverse @ r_inverse.T,
             leverage=np.einsum("ij,ij->i", q, q),
@@ -151,8 +149,11 @@ class Factor:
 
     def solve(self, load: NDArray[np.float64]) -> tuple[NDArray[np.longdouble], NDArray[np.float64]]:
         """Return the solution (terms,) in extended precision, and the residuals (rows,)."""
+        from statsmodels.regression.linear_model import OLS
+
         weighted = load if self.root is None else load * self.root
-        first = self.r_inverse @ (self.q.T @ weighted)
+        weighted_design = self.design if self.root is None else self.design * self.root[:, None]
+        first = np.asarray(OLS(weighted, weighted_design).fit(method="qr").params, dtype=np.float64)
         solution = first.astype(np.longdouble)
         squared = None if self.root is None else self.root.astype(np.longdouble) ** 2
         rest = load - solution.dot(self.exact)
