@@ -1,0 +1,234 @@
+"""The interface of tire models over all loads: rows in, FY, MZ (and FX) out, parameters as a table.
+
+A model over all loads is one module ``toolkit/tires/models/<name>.py`` with one object ``MODEL``, a
+`GlobalModel`; the catalogue finds it there and `toolkit fit --model <name>` fits it. The module holds, or
+imports, a pure function
+
+    forces(values, rows) -> Responses
+
+- ``values`` is a sequence with one entry for each of ``parameters``, in their order and unit. An entry is a
+  float or an array (copies, 1): the fitter asks for many parameter sets at once, and every result then
+  has the shape (copies, rows). Written with plain numpy arithmetic this comes by itself; a further axis
+  of bristles is appended last: ``value[..., None]``.
+- ``rows`` are `Rows`: slips, load, camber, pressure and speed in SI, one entry a row, in the model's
+  own ``axes`` (the fitter converts; a model never asks in which axes the table was).
+- Results are finite everywhere within the bounds of the parameters, at zero slip and at zero load too.
+- FY, MZ are 0 for FZ = 0. A model without FX, or without MZ, leaves it None.
+
+A parameter has a start ``default``, hard bounds ``low`` and ``high``, and ``size``, a change that matters:
+the search is scaled by it. ``default`` is also what the parameter is fixed at where the data cannot
+support it, so that the parametrisation must make it neutral: write a dependence on load as a base value
+at FNOMIN and a change with dfz = FZ/FNOMIN - 1 whose default is 0, never as values at two loads.
+``needs`` names what must vary in the data before a parameter is searched at all.
+
+``stage`` is the channel whose rows determine the parameter. A model is fitted stage by stage, FX, FY, MZ:
+what an earlier stage has found is held in the later ones. A model whose parameters act on both
+channels at once says ``joint``: then all are fitted to FY and MZ together, each weighted by its own size.
+
+``starts(seeds)`` gives start values from what the Magic Formula finds at each load (`Seeds`): mappings of
+name to value, absent names start at their default. The fitter adds deterministic variations of its own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+
+from toolkit.channels import Axes
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    Array = NDArray[np.float64]
+
+Channel = Literal["FX", "FY", "MZ"]
+Need = Literal["two_loads", "three_loads", "camber", "pressure", "speed", "kappa", "alpha", "both_signs"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Rows:
+    """What a tire is asked: one entry a row (rows,), SI, with the nominal values that scale them.
+
+    ``SA``, ``IA`` [rad] slip and inclination angle, ``FZ`` [N] load, not negative, ``P`` [Pa] pressure,
+    ``V`` [m/s] speed, ``KAPPA`` [1] longitudinal slip. Where the data have no P, V it is the nominal value.
+    ``FNOMIN`` [N], ``NOMPRES`` [Pa], ``LONGVL`` [m/s], ``UNLOADED_RADIUS`` [m] as a tire file names them.
+    """
+
+    SA: Array
+    FZ: Array
+    IA: Array
+    P: Array
+    V: Array
+    KAPPA: Array
+    FNOMIN: float
+    NOMPRES: float = 200e3
+    LONGVL: float = 16.7
+    UNLOADED_RADIUS: float = 0.3
+
+    def __len__(self) -> int:
+        return len(self.SA)
+
+    @property
+    def dfz(self) -> Array:
+        """FZ / FNOMIN - 1."""
+        return self.FZ / self.FNOMIN - 1.0
+
+    @property
+    def dpi(self) -> Array:
+        """P / NOMPRES - 1."""
+        return self.P / self.NOMPRES - 1.0
+
+    def take(self, index: NDArray[Any]) -> Rows:
+        """Return some of the rows, by index or mask."""
+        return Rows(
+            SA=self.SA[index],
+            FZ=self.FZ[index],
+            IA=self.IA[index],
+            P=self.P[index],
+            V=self.V[index],
+            KAPPA=self.KAPPA[index],
+            FNOMIN=self.FNOMIN,
+            NOMPRES=self.NOMPRES,
+            LONGVL=self.LONGVL,
+            UNLOADED_RADIUS=self.UNLOADED_RADIUS,
+        )
+
+
+def make_rows(
+    SA: object,
+    FZ: object,
+    *,
+    FNOMIN: float,
+    IA: object = 0.0,
+    P: object = None,
+    V: object = None,
+    KAPPA: object = 0.0,
+    NOMPRES: float = 200e3,
+    LONGVL: float = 16.7,
+    UNLOADED_RADIUS: float = 0.3,
+) -> Rows:
+    """Return rows of SA, IA [rad], FZ [N], P [Pa], V [m/s], KAPPA [1]; scalars are repeated.
+
+    >>> len(make_rows([0.0, 0.1], 4000.0, FNOMIN=4000.0))
+    2
+    """
+    columns = np.broadcast_arrays(
+        *(
+            np.atleast_1d(np.asarray(one, dtype=np.float64))
+            for one in (SA, FZ, IA, NOMPRES if P is None else P, LONGVL if V is None else V, KAPPA)
+        )
+    )
+    a, z, g, p, v, k = columns
+    return Rows(
+        SA=a, FZ=z, IA=g, P=p, V=v, KAPPA=k,
+        FNOMIN=FNOMIN, NOMPRES=NOMPRES, LONGVL=LONGVL, UNLOADED_RADIUS=UNLOADED_RADIUS,
+    )  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Responses:
+    """FY [N], MZ [N·m] and FX [N] (rows,) or (copies, rows); None where a model has no such channel."""
+
+    FY: Array | None = None
+    MZ: Array | None = None
+    FX: Array | None = None
+
+    def __getitem__(self, channel: str) -> Array:
+        """Return a channel that the model has."""
+        found: Array | None = getattr(self, channel)
+        if found is None:
+            raise KeyError(channel)
+        return found
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GlobalParameter:
+    """One row of a model's parameter table; see the module's text for ``default``, ``size``, ``needs``.
+
+    ``unit`` is the unit of the value as `forces` takes it, in pint's spelling ("1" without dimension).
+    """
+
+    name: str
+    unit: str
+    default: float
+    low: float
+    high: float
+    size: float
+    text: str
+    stage: Channel = "FY"
+    needs: tuple[Need, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Seeds:
+    """What the Magic Formula finds at each load (loads,), ascending; positive for any tire, any axes.
+
+    ``load`` [N]; ``stiffness`` -dFY/dSA in SAE and ISO [N/rad]; ``peak`` largest |FY| that the curve reaches
+    within twice the measured angles [N]; ``peak_angle`` |SA| there [rad]; ``trail`` aligning over cornering
+    stiffness [m], NaN without MZ; ``FNOMIN`` [N]; ``reach`` the largest |SA| measured [rad].
+    """
+
+    load: Array
+    stiffness: Array
+    peak: Array
+    peak_angle: Array
+    trail: Array
+    FNOMIN: float
+    reach: float
+
+    def at_nominal(self, values: Array) -> tuple[float, float]:
+        """Return value at FNOMIN and change with dfz (a straight line; no change from one load)."""
+        good = np.isfinite(values)
+        dfz = self.load[good] / self.FNOMIN - 1.0
+        if good.sum() < 2:
+            return (float(values[good][0]), 0.0) if good.any() else (float("nan"), 0.0)
+        slope, base = np.polyfit(dfz, values[good], 1)
+        return float(base), float(slope)
+
+
+Forces = Callable[[Sequence[Any], Rows], Responses]
+Starts = Callable[[Seeds], Sequence[Mapping[str, float]]]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class GlobalModel:
+    """A model over all loads as the catalogue holds it; ``forces`` and ``starts`` as the module says.
+
+    ``valid`` states in words where the model holds; ``axes`` are those of its parameters and forces.
+    """
+
+    name: str
+    title: str
+    reference: str
+    valid: str
+    axes: Axes
+    channels: tuple[Channel, ...]
+    parameters: tuple[GlobalParameter, ...]
+    forces: Forces
+    starts: Starts
+    joint: bool = False
+    per_load: bool = False
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Parameter names in their order."""
+        return tuple(one.name for one in self.parameters)
+
+    def defaults(self) -> Array:
+        """Return the default of every parameter."""
+        return np.array([one.default for one in self.parameters])
+
+    def values(self, given: Mapping[str, float]) -> Array:
+        """Return a parameter set from names and values, defaults for the rest.
+
+        Raises
+        ------
+        KeyError
+            a name that the model does not have
+        """
+        if unknown := set(given) - set(self.names):
+            raise KeyError(sorted(unknown)[0])
+        return np.array([given.get(one.name, one.default) for one in self.parameters])
