@@ -10,6 +10,7 @@ from typing import cast
 
 from toolkit.errors import FitError
 from toolkit.tires import models
+from toolkit.tires.global_model import GlobalModel
 from toolkit.tires.model import Curve, CurveFit, Loss, TireModel
 
 
@@ -24,8 +25,8 @@ def model_names() -> tuple[str, ...]:
 
 
 @cache
-def model(name: str) -> TireModel:
-    """Return a model by name.
+def find(name: str) -> TireModel | GlobalModel:
+    """Return a model by name, of one load or of all.
 
     Raises
     ------
@@ -41,7 +42,24 @@ def model(name: str) -> TireModel:
             next_step="name one of those expected",
             rule="unknown-model",
         )
-    return cast("TireModel", import_module(f"{models.__name__}.{name}").MODEL)
+    return cast("TireModel | GlobalModel", import_module(f"{models.__name__}.{name}").MODEL)
+
+
+def model(name: str) -> TireModel:
+    """Return a model of one load by name.
+
+    Raises
+    ------
+    FitError
+        no model of that name is built, or it is one over all loads
+    """
+    found = find(name)
+    if isinstance(found, GlobalModel):
+        raise FitError(
+            f"{name} is a model over all loads", where=name, got=name, expected="a model of one load",
+            next_step="fit it by toolkit.tires.global_fit", rule="unknown-model",
+        )  # fmt: skip
+    return found
 
 
 def fit_model(one: TireModel, curves: Sequence[Curve], *, loss: Loss = "linear") -> tuple[CurveFit, ...]:

@@ -45,7 +45,10 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 Channel = Literal["FX", "FY", "MZ"]
-Need = Literal["two_loads", "three_loads", "camber", "pressure", "speed", "kappa", "alpha", "both_signs"]
+Need = Literal[
+    "two_loads", "three_loads", "camber", "pressure", "three_pressures", "speed", "both_signs",
+    "kappa", "both_kappas", "alpha_and_kappa",
+]  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -198,6 +201,8 @@ class GlobalModel:
     """A model over all loads as the catalogue holds it; ``forces`` and ``starts`` as the module says.
 
     ``valid`` states in words where the model holds; ``axes`` are those of its parameters and forces.
+    ``grid`` is how many inner points (bristles) a row costs: it bounds how much is asked at once.
+    ``moment_alone`` says that MZ does not use what FY's rows determine, so that MZ can be fitted without.
     """
 
     name: str
@@ -210,6 +215,8 @@ class GlobalModel:
     forces: Forces
     starts: Starts
     joint: bool = False
+    grid: int = 1
+    moment_alone: bool = False
     per_load: bool = False
 
     @property

@@ -1,0 +1,202 @@
+"""Measured rows for models over all loads: declared axes, load blocks, and what varies in them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from toolkit.channels import Axes, signs
+from toolkit.tires.blocks import load_blocks
+from toolkit.tires.global_model import Rows, make_rows
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from toolkit.tires.global_model import Array
+    from toolkit.tires.table import TireTable
+
+CHANNELS = ("FX", "FY", "MZ")
+_NO_LOAD = 1.0  # N: a block below stands in the air
+_FEW = 3  # distinct values that a square needs
+_CAMBER, _ANGLE = np.radians(0.5), np.radians(0.5)
+_PRESSURE, _SPEED, _SLIP, _LOAD = 0.02, 0.05, 0.01, 0.2  # relative, but for the slip
+_BIN = np.radians(0.25)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Measured:
+    """Rows with what was measured at them, all in ``axes``.
+
+    ``FX FY`` [N] ``MZ`` [N·m] (rows,), None where the table has no such column; ``block`` (rows,) numbers the
+    load blocks in ascending load and ``loads`` (blocks,) are their mean loads [N]. ``given`` names the
+    columns that the data had: pressure and speed that were not recorded hold a nominal value.
+    """
+
+    rows: Rows
+    axes: Axes
+    block: NDArray[np.intp]
+    loads: Array
+    given: frozenset[str]
+    FX: Array | None = None
+    FY: Array | None = None
+    MZ: Array | None = None
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """The channels that were measured."""
+        return tuple(name for name in CHANNELS if getattr(self, name) is not None)
+
+    def __getitem__(self, channel: str) -> Array:
+        """Return a channel that was measured."""
+        found: Array | None = getattr(self, channel)
+        if found is None:
+            raise KeyError(channel)
+        return found
+
+    def take(self, index: NDArray[np.intp] | NDArray[np.bool_]) -> Measured:
+        """Return some of the rows; blocks and loads keep their numbers."""
+        return Measured(
+            rows=self.rows.take(index), axes=self.axes, block=self.block[index], loads=self.loads,
+            given=self.given, **{name: self[name][index] for name in self.channels},
+        )  # fmt: skip
+
+    def turned(self, axes: Axes) -> Measured:
+        """Return the same rows in other axes."""
+        flip = signs(self.axes, axes)
+        r = self.rows
+        rows = make_rows(
+            flip["SA"] * r.SA, r.FZ, IA=r.IA, P=r.P, V=r.V, KAPPA=r.KAPPA, FNOMIN=r.FNOMIN,
+            NOMPRES=r.NOMPRES, LONGVL=r.LONGVL, UNLOADED_RADIUS=r.UNLOADED_RADIUS,
+        )  # fmt: skip
+        return Measured(
+            rows=rows, axes=axes, block=self.block, loads=self.loads, given=self.given,
+            **{name: flip.get(name, 1) * self[name] for name in self.channels},
+        )  # fmt: skip
+
+
+def measured(
+    columns: dict[str, Array],
+    *,
+    axes: Axes,
+    rated_load_N: float | None = None,
+    unloaded_radius_m: float = 0.3,
+) -> Measured:
+    """Return rows from columns in SI (FX FY MZ, SA FZ, optional IA P V KAPPA), blocks without load left out.
+
+    FNOMIN is the rated load, else the mean load of the block nearest the middle of the range; NOMPRES
+    and LONGVL are the medians of what was recorded.
+    """
+    FZ = columns["FZ"]
+    blocks = [one for one in load_blocks(FZ) if FZ[one].mean() >= _NO_LOAD]
+    kept = np.sort(np.concatenate(blocks)) if blocks else np.zeros(0, dtype=np.intp)
+    number = np.zeros(len(FZ), dtype=np.intp)
+    for index, one in enumerate(blocks):
+        number[one] = index
+    loads = np.array([FZ[one].mean() for one in blocks])
+    middle = (loads.min() + loads.max()) / 2 if len(loads) else 1.0
+    nominal = rated_load_N or (float(loads[np.argmin(np.abs(loads - middle))]) if len(loads) else 1.0)
+    pressure, speed = columns.get("P"), columns.get("V")
+    rows = make_rows(
+        columns["SA"][kept],
+        FZ[kept],
+        IA=columns["IA"][kept] if "IA" in columns else 0.0,
+        P=None if pressure is None else pressure[kept],
+        V=None if speed is None else np.abs(speed[kept]),
+        KAPPA=columns["KAPPA"][kept] if "KAPPA" in columns else 0.0,
+        FNOMIN=nominal,
+        NOMPRES=200e3 if pressure is None else float(np.median(pressure)),
+        LONGVL=16.7 if speed is None or not np.any(speed) else float(np.median(np.abs(speed))),
+        UNLOADED_RADIUS=unloaded_radius_m,
+    )
+    return Measured(
+        rows=rows, axes=axes, block=number[kept], loads=loads, given=frozenset(columns),
+        **{name: columns[name][kept] for name in CHANNELS if name in columns},
+    )  # fmt: skip
+
+
+def of_table(table: TireTable, *, rated_load_N: float | None = None, radius_m: float = 0.3) -> Measured:
+    """Return the rows of a table, in its axes."""
+    return measured(
+        dict(table.columns), axes=table.axes, rated_load_N=rated_load_N, unloaded_radius_m=radius_m
+    )
+
+
+def what_varies(data: Measured) -> frozenset[str]:
+    """Return which of a parameter's ``needs`` the rows meet (`toolkit.tires.global_model.Need`)."""
+    r, found = data.rows, set()
+    if not len(r):
+        return frozenset()
+    loads = len(np.unique(data.block))
+    sweeps = np.ptp(r.FZ) > _LOAD * r.FZ.max()
+    if loads >= 2 or sweeps:
+        found.add("two_loads")
+    if loads >= _FEW or (loads == 1 and sweeps):
+        found.add("three_loads")
+    if np.ptp(r.IA) > _CAMBER:
+        found.add("camber")
+    pressure = r.P / np.median(r.P)
+    if np.ptp(pressure) > _PRESSURE:
+        found.add("pressure")
+        if len(np.unique(np.rint(pressure / _PRESSURE))) >= _FEW:
+            found.add("three_pressures")
+    if np.ptp(r.V) > _SPEED * np.median(r.V):
+        found.add("speed")
+    if r.SA.min() < -_ANGLE and r.SA.max() > _ANGLE:
+        found.add("both_signs")
+    if np.ptp(r.KAPPA) > _SLIP:
+        found.add("kappa")
+        if r.KAPPA.min() < -_SLIP and r.KAPPA.max() > _SLIP:
+            found.add("both_kappas")
+        if np.ptp(r.SA[np.abs(r.KAPPA) > _SLIP]) > _ANGLE if np.any(np.abs(r.KAPPA) > _SLIP) else False:
+            found.add("alpha_and_kappa")
+    return frozenset(found)
+
+
+def cell(data: Measured) -> NDArray[np.intp]:
+    """Return a number a row (rows,) that is equal where load block, camber, pressure and slip are alike."""
+    r = data.rows
+    keys = np.stack([
+        data.block, np.rint(r.IA / _CAMBER), np.rint(r.P / np.median(r.P) / (2 * _PRESSURE)),
+        np.rint(r.KAPPA / _SLIP), np.rint(r.V / np.median(r.V) / (4 * _SPEED)),
+    ])  # fmt: skip
+    return np.unique(keys, axis=1, return_inverse=True)[1].reshape(-1)
+
+
+def binned(data: Measured, *, robust: bool = False) -> tuple[Measured, Array]:
+    """Return means of rows that share their cell and 0.25 deg of slip angle, and the rows each stands for.
+
+    ``robust`` takes medians, which outliers do not move. Few rows are returned as they are.
+    """
+    keys = np.stack([cell(data), np.rint(data.rows.SA / _BIN).astype(np.intp)])
+    unique, place = np.unique(keys, axis=1, return_inverse=True)
+    place = place.reshape(-1)
+    bins = unique.shape[1]
+    if bins > 0.7 * len(data):
+        return data, np.ones(len(data))
+    count = np.bincount(place, minlength=bins).astype(np.float64)
+    order = np.argsort(place, kind="stable")
+    cuts = np.cumsum(count[:-1]).astype(np.intp)
+
+    def middle(column: Array) -> Array:
+        if robust:
+            return np.array([np.median(part) for part in np.split(column[order], cuts)])
+        return np.bincount(place, column, bins) / count
+
+    r = data.rows
+    rows = make_rows(
+        middle(r.SA), middle(r.FZ), IA=middle(r.IA), P=middle(r.P), V=middle(r.V), KAPPA=middle(r.KAPPA),
+        FNOMIN=r.FNOMIN, NOMPRES=r.NOMPRES, LONGVL=r.LONGVL, UNLOADED_RADIUS=r.UNLOADED_RADIUS,
+    )  # fmt: skip
+    first = order[np.concatenate([[0], cuts])]
+    return (
+        Measured(
+            rows=rows, axes=data.axes, block=data.block[first], loads=data.loads, given=data.given,
+            **{name: middle(data[name]) for name in data.channels},
+        ),
+        count,
+    )  # fmt: skip

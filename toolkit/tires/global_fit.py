@@ -1,0 +1,200 @@
+"""Fit a model over all loads to measured rows, channel by channel, without start values."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from toolkit.channels import signs
+from toolkit.errors import FitError
+from toolkit.tires.global_checks import LACKS, why_not_global
+from toolkit.tires.global_data import CHANNELS, Measured, binned, what_varies
+from toolkit.tires.global_model import GlobalModel, Rows, Seeds
+from toolkit.tires.global_report import Report
+from toolkit.tires.global_result import ModelFit
+from toolkit.tires.global_seeds import seeds_of
+from toolkit.tires.global_stage import Found, Task, refit, run
+from toolkit.tires.model import LOSSES, Loss
+
+if TYPE_CHECKING:
+    from toolkit.tires.global_model import Array
+
+WEIGHTS = ("equal", "noise")
+_PREDICT_FROM = 3  # load blocks, so that two are left
+
+
+def fit_global(
+    model: GlobalModel,
+    data: Measured,
+    *,
+    loss: Loss = "linear",
+    weights: str = "equal",
+    seeds: Seeds | None = None,
+    predict: bool = True,
+) -> ModelFit:
+    """Fit every measured channel that the model has.
+
+    Parameters
+    ----------
+    data : rows in any axes
+    loss : ``linear`` is least squares; ``robust`` bounds the influence of outliers (Tukey's biweight)
+    weights : ``equal``, or ``noise``: each load block over its own residual's size in a first fit
+    seeds : of these rows, where they are known already
+    predict : leave every load out in turn, where there are three or more
+
+    Raises
+    ------
+    FitError
+        what `why_not_global` says, an unknown loss or weighting
+    """
+    for name, got, known in (("loss", loss, LOSSES), ("weights", weights, WEIGHTS)):
+        if got not in known:
+            raise FitError(
+                f"unknown {name} {got!r}", where=f"--{name}", got=got, expected=", ".join(known),
+                next_step="name one of those expected", rule=f"unknown-{name}",
+            )  # fmt: skip
+    if (problem := why_not_global(data, model)) is not None:
+        raise problem
+    if seeds is None:
+        seeds = seeds_of(data).seeds
+    return _Fitter(model, data, loss, weights, seeds).result(predict=predict)
+
+
+class _Fitter:
+    def __init__(self, model: GlobalModel, data: Measured, loss: Loss, weights: str, seeds: Seeds) -> None:
+        self.model, self.given, self.loss, self.weights = model, data, loss, weights
+        self.data = data.turned(model.axes)
+        self.flip = signs(model.axes, data.axes)
+        self.varies = what_varies(data)
+        self.starts = np.stack([self._start(one) for one in model.starts(seeds)])
+        self.values = self.starts[0].copy()
+        self.sigma: dict[str, Array] = {}
+
+    def _start(self, given: object) -> Array:
+        low = np.array([one.low for one in self.model.parameters])
+        high = np.array([one.high for one in self.model.parameters])
+        return np.clip(self.model.values(given), low, high)  # type: ignore[arg-type]
+
+    def stages(self) -> list[tuple[str, ...]]:
+        """Return the channels of each stage."""
+        have = [name for name in CHANNELS if name in self.data.channels and name in self.model.channels]
+        if "FX" in have and "kappa" not in self.varies:
+            have.remove("FX")
+        if self.model.joint and {"FY", "MZ"} <= set(have):
+            return [*(("FX",) if "FX" in have else ()), ("FY", "MZ")]
+        return [(name,) for name in have]
+
+    def result(self, *, predict: bool) -> ModelFit:
+        found: dict[tuple[str, ...], Found] = {}
+        for channels in self.stages():
+            free, fixed = self._free(channels)
+            stage = self._run(channels, free, self.data)
+            if self.weights == "noise":
+                self._weigh(channels, stage.values)
+                stage = self._run(channels, free, self.data, (stage.values,))
+            stage = replace(stage, fixed=(*fixed, *stage.fixed))
+            self.values = stage.values
+            found[channels] = stage
+        curves = self._curves(self.values, self.data)
+        report = Report(
+            model=self.model, given=self.given, data=self.data, values=self.values, curves=curves,
+            predicted=self._predict(found) if predict else {}, loss=self.loss, weights=self.weights,
+        )  # fmt: skip
+        fits = [report.fit(name, channels, stage) for channels, stage in found.items() for name in channels]
+        return ModelFit(
+            model=self.model.name, values=self.values, fits=tuple(fits), curves=tuple(curves.items())
+        )
+
+    def _free(self, channels: tuple[str, ...]) -> tuple[tuple[int, ...], tuple[tuple[int, str], ...]]:
+        # What a stage searches, and what it cannot, with the reason.
+        free, fixed = [], []
+        for place, one in enumerate(self.model.parameters):
+            if one.stage not in channels and not (self.model.joint and one.stage in ("FY", "MZ")):
+                continue
+            if self.model.joint and channels == ("FX",) and one.stage != "FX":
+                continue
+            lacks = [need for need in one.needs if need not in self.varies]
+            if lacks:
+                self.values[place] = one.default
+                self.starts[:, place] = one.default
+                fixed.append((place, f"{LACKS[lacks[0]]}: fixed at {one.default:g}"))
+            else:
+                free.append(place)
+        limit = len(self.data) * len(channels) - 2
+        while len(free) > limit:
+            place = next((p for p in reversed(free) if self.model.parameters[p].needs), free[-1])
+            free.remove(place)
+            fixed.append((place, f"fewer rows than parameters: fixed at {self.values[place]:.4g}"))
+        return tuple(free), tuple(fixed)
+
+    def _run(
+        self,
+        channels: tuple[str, ...],
+        free: tuple[int, ...],
+        data: Measured,
+        more: tuple[Array, ...] = (),
+    ) -> Found:
+        robust = self.loss == "robust"
+        coarse, count = binned(data, robust=robust)
+        task = Task(
+            model=self.model, data=data, channels=channels, values=self.values, free=free,
+            starts=np.concatenate([np.array(more).reshape(-1, len(self.values)), self.starts]),
+            sigma=self.sigma.get(channels[0]), robust=robust,
+        )  # fmt: skip
+        return run(task, coarse, count)
+
+    def _weigh(self, channels: tuple[str, ...], values: Array) -> None:
+        # Every load block by the size of its own residuals; none counts more than nine times another.
+        curves = self._curves(values, self.data)
+        size = np.zeros(len(self.data.loads))
+        for channel in channels:
+            square = (curves[channel] - self.given[channel]) ** 2 / np.mean(self.given[channel] ** 2)
+            rows = np.bincount(self.data.block, minlength=len(size))
+            size += np.bincount(self.data.block, square, len(size)) / np.maximum(rows, 1)
+        size = np.sqrt(size)
+        middle = np.median(size[size > 0]) if np.any(size > 0) else 1.0
+        self.sigma[channels[0]] = np.clip(size, middle / 3, middle * 3)[self.data.block]
+
+    def _curves(self, values: Array, data: Measured) -> dict[str, Array]:
+        made = self._forces(list(values), data.rows)
+        return {
+            name: np.broadcast_to(self.flip.get(name, 1) * made[name], len(data)).astype(np.float64)
+            for stage in self.stages()
+            for name in stage
+        }
+
+    def _forces(self, values: list[object], rows: Rows) -> dict[str, Array]:
+        with np.errstate(all="ignore"):
+            made = self.model.forces(values, rows)
+        return {name: made[name] for name in self.model.channels if getattr(made, name) is not None}
+
+    def _predict(self, found: dict[tuple[str, ...], Found]) -> dict[str, Array]:
+        # Every block predicted by a fit that never saw it, from where the whole fit ended.
+        blocks = np.unique(self.data.block)
+        if len(blocks) < _PREDICT_FROM:
+            return {}
+        predicted = {name: np.zeros(len(self.data)) for channels in found for name in channels}
+        kept_values, kept_starts, kept_sigma = self.values.copy(), self.starts, dict(self.sigma)
+        for block in blocks:
+            own = self.data.block == block
+            rest = self.data.take(~own)
+            self.values = kept_values.copy()
+            self.sigma = {name: one[~own] for name, one in kept_sigma.items()}
+            for channels, stage in found.items():
+                self.starts = self.values[None]
+                self.values = self._refit(channels, stage.left, rest)
+            curves = self._curves(self.values, self.data.take(own))
+            for name, column in predicted.items():
+                column[own] = curves[name]
+        self.values, self.starts, self.sigma = kept_values, kept_starts, kept_sigma
+        return predicted
+
+    def _refit(self, channels: tuple[str, ...], free: tuple[int, ...], data: Measured) -> Array:
+        coarse, count = binned(data, robust=self.loss == "robust")
+        task = Task(
+            model=self.model, data=data, channels=channels, values=self.values, free=free,
+            starts=self.starts, sigma=self.sigma.get(channels[0]), robust=self.loss == "robust",
+        )  # fmt: skip
+        return refit(task, coarse, count)

@@ -1,0 +1,90 @@
+"""What the Magic Formula finds at each load: where every search of a model over all loads begins."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+from toolkit.tires.fit import fit_curves, why_not
+from toolkit.tires.global_data import Measured, binned
+from toolkit.tires.global_model import Seeds
+from toolkit.tires.model import Curve, CurveFit
+from toolkit.tires.models.magic_formula import slope, value
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+_UPRIGHT = np.radians(0.75)  # of the least camber
+_FREE = 0.01  # longitudinal slip
+_BEYOND = 1.5  # times the largest angle: a peak further out is the model's, not the data's
+_NEAR = np.radians(2.5)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Found:
+    """Seeds with the fits they come from (upright, free rolling rows; in the data's axes)."""
+
+    seeds: Seeds
+    fits: tuple[CurveFit, ...]
+
+
+def seeds_of(data: Measured) -> Found:
+    """Return seeds of rows that have FY, MZ or both; loads at which no curve can be fitted give a line."""
+    base = data.turned("ISO-W")
+    r = base.rows
+    calm = (np.abs(np.abs(r.IA) - np.abs(r.IA).min()) <= _UPRIGHT) & (np.abs(r.KAPPA) <= _FREE)
+    if calm.sum() >= 4:
+        base = base.take(calm)
+    means, _ = binned(base)
+    curves: list[Curve] = []
+    for number, load in enumerate(base.loads):
+        own = means.block == number
+        channels: tuple[Literal["FY", "MZ"], ...] = ("FY", "MZ")
+        curves += [
+            _curve(means, own, one, float(load)) for one in channels if one in base.channels and own.any()
+        ]
+    good = [one for one in curves if why_not(one) is None]
+    fits = fit_curves(good) if good else ()
+    by_key = {(fit.channel, fit.load_N): fit for fit in fits}
+    loads, stiffness, peak, angle, trail = [], [], [], [], []
+    reach = float(np.abs(base.rows.SA).max()) if len(base) else 0.1
+    for curve in curves:
+        if curve.channel != "FY" or curve.load_N is None:
+            continue
+        fit = by_key.get(("FY", curve.load_N))
+        K, top, at = _read(fit, curve, reach)
+        other = by_key.get(("MZ", curve.load_N))
+        loads.append(curve.load_N)
+        stiffness.append(K)
+        peak.append(top)
+        angle.append(at)
+        trail.append(float(slope(other.values, 0.0)) / K if other is not None and K > 0 else np.nan)
+    if not loads:  # MZ alone: the sizes of a force are then of no consequence
+        loads = list(base.loads)
+        stiffness, peak = [12.0 * load for load in loads], list(loads)
+        angle, trail = [0.1] * len(loads), [0.03] * len(loads)
+    seeds = Seeds(
+        load=np.array(loads), stiffness=np.array(stiffness), peak=np.array(peak), peak_angle=np.array(angle),
+        trail=np.array(trail), FNOMIN=data.rows.FNOMIN, reach=reach,
+    )  # fmt: skip
+    return Found(seeds=seeds, fits=tuple(fits))
+
+
+def _curve(means: Measured, own: NDArray[np.bool_], channel: Literal["FY", "MZ"], load: float) -> Curve:
+    return Curve(SA=means.rows.SA[own], y=means[channel][own], channel=channel, load_N=load, axes="ISO-W")
+
+
+def _read(fit: CurveFit | None, curve: Curve, reach: float) -> tuple[float, float, float]:
+    # Stiffness [N/rad], peak [N] and its slip angle [rad]; never zero or negative, for they are divided by.
+    top = float(np.abs(curve.y).max())
+    if fit is None or not np.isfinite(fit.values).all():
+        near = np.abs(curve.SA) <= max(_NEAR, float(np.sort(np.abs(curve.SA))[min(2, len(curve.SA) - 1)]))
+        line = np.polyfit(curve.SA[near], curve.y[near], 1) if np.ptp(curve.SA[near]) > 0 else (-top / 0.1, 0)
+        return max(-float(line[0]), top), max(top, 1e-9), reach
+    grid = np.linspace(-_BEYOND * reach, _BEYOND * reach, 241)
+    y = np.abs(value(fit.values, grid) - fit.values[5])
+    at = int(np.argmax(y))
+    K = -float(slope(fit.values, 0.0))
+    return max(K, 0.1 * top), max(min(float(y[at]), _BEYOND * top), 1e-9), max(abs(float(grid[at])), 0.01)

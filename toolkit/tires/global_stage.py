@@ -1,0 +1,308 @@
+"""One stage of a global fit: the free parameters of one channel (or two) searched, then judged.
+
+The search starts from the model's own starts and deterministic variations of them. Few steps show which
+starts lose; the rest go on to the end. A parameter that the data do not determine is set to its neutral
+default where the cost allows it (four times the noise of one row: what a 95 % interval allows), else held
+where the search ended; what is left is then determined by itself.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from toolkit.estimate import coverage_factor
+from toolkit.tires.global_data import Measured
+from toolkit.tires.global_solver import Box, Descent, descend, linearise, spread_starts
+from toolkit.tires.uncertainty import autocorrelation_time
+
+if TYPE_CHECKING:
+    from toolkit.tires.global_model import Array, GlobalModel
+
+_SAME = 1e-3  # the files contract: starts that agree in cost to this are at one minimum
+_EXACT = 1e-18  # a cost below this share of the data's square is rounding
+_PLAN = (12, 6, 5, 60)  # starts, first steps, how many go on, steps to the end
+_PATIENT = (36, 8, 10, 90)
+_WIDE = (0.5, 5.0)  # an interval's half width beyond half of the value and five sizes says nothing
+_ALLOWED = 4.0  # of the variance of a row: the rise of the cost by which a default is as good as the fit
+_BIWEIGHT = 4.685  # 95 % efficiency on normal noise
+_POLISH = 4_000_000  # rows x inner points x copies that a polish on the rows may cost a step
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Task:
+    """A stage: channels, the free parameters' places, and all values (parameters,) with earlier stages' held.
+
+    ``sigma`` (rows,) standard deviation of a row relative to the others, None where all are alike.
+    """
+
+    model: GlobalModel
+    data: Measured
+    channels: tuple[str, ...]
+    values: Array
+    free: tuple[int, ...]
+    starts: Array
+    sigma: Array | None = None
+    robust: bool = False
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Found:
+    """What a stage found: ``values`` of all parameters, ``covariance`` of those in ``free`` that are left.
+
+    ``fixed`` (place, reason); ``bound`` places at a bound; ``undetermined`` places without a standard error;
+    ``time`` autocorrelation time of the residuals; ``dof`` degrees of freedom.
+    """
+
+    values: Array
+    left: tuple[int, ...]
+    covariance: Array
+    fixed: tuple[tuple[int, str], ...]
+    bound: tuple[int, ...]
+    undetermined: tuple[int, ...]
+    starts: int
+    agreeing: int
+    time: float
+    dof: float
+    on_rows: bool
+
+
+class Misfit:
+    """Residuals of parameter sets, each channel over its own size; weights multiply them."""
+
+    def __init__(self, task: Task, data: Measured, weight: Array, scale: dict[str, float]) -> None:
+        self.model, self.data, self.channels = task.model, data, task.channels
+        self.base, self.free, self.scale = task.values.copy(), list(task.free), scale
+        self.weight = np.concatenate([weight] * len(self.channels)) if len(weight) == len(data) else weight
+        self.y = np.concatenate([data[name] / scale[name] for name in self.channels])
+
+    def raw(self, x: Array) -> Array:
+        """Return unweighted residuals (copies, rows x channels) of free parameters (copies, p)."""
+        values: list[float | Array] = list(self.base.tolist())
+        for place, column in zip(self.free, x.T, strict=True):
+            values[place] = column[:, None]
+        with np.errstate(all="ignore"):
+            made = self.model.forces(values, self.data.rows)
+        shape = (len(x), len(self.data))
+        parts = [np.broadcast_to(made[name] / self.scale[name], shape) for name in self.channels]
+        r: Array = np.concatenate(parts, axis=1) - self.y
+        return np.nan_to_num(r, nan=1e3, posinf=1e3, neginf=-1e3)
+
+    def __call__(self, x: Array) -> Array:
+        """Return weighted residuals (copies, rows x channels)."""
+        return self.raw(x) * self.weight
+
+    def box(self) -> Box:
+        """Return bounds and sizes of the free parameters."""
+        own = [self.model.parameters[place] for place in self.free]
+        return Box(
+            low=np.array([one.low for one in own]),
+            high=np.array([one.high for one in own]),
+            size=np.array([one.size for one in own]),
+            cost_per_copy=len(self.data) * self.model.grid,
+        )
+
+    def hold(self, place: int, value: float) -> None:
+        """Take a parameter out of the search."""
+        self.base[place] = value
+        self.free.remove(place)
+
+
+def run(task: Task, coarse: Measured, count: Array) -> Found:
+    """Return what a stage finds; ``coarse`` are the bin means of the data, ``count`` the rows of each."""
+    scale = {name: float(np.sqrt(np.mean(task.data[name] ** 2))) or 1.0 for name in task.channels}
+    weight = np.ones(len(task.data)) if task.sigma is None else 1.0 / task.sigma
+    weight = weight / np.sqrt(np.mean(weight**2))
+    coarse_weight = np.sqrt(count)
+    if task.sigma is not None:
+        coarse_weight = coarse_weight * _coarse(task.data, coarse, weight)
+    search = Misfit(task, coarse, coarse_weight, scale)
+    rows = Misfit(task, task.data, weight, scale)
+    start = task.starts[:, list(task.free)]
+    descent, starts = _search(search, start)
+    floor = _EXACT * float(np.sum((search.y * search.weight) ** 2))
+    agreeing = descent.agreeing(_SAME, floor)
+    x = descent.x[:1]
+    on_rows = len(coarse) == len(task.data)
+    cheap = len(task.data) * task.model.grid * (len(task.free) + 1) <= _POLISH
+    if task.robust:
+        x, robust_weight = _reweight(rows if cheap else search, x)
+        (rows if cheap else search).weight = robust_weight
+        on_rows = on_rows or cheap
+    elif cheap and not on_rows:
+        x = descend(rows, x, rows.box(), steps=8).x
+        on_rows = True
+    misfit = rows if cheap else search
+    # Bin medians where outliers are many rows: their residuals are the noise then.
+    noisy = search if task.robust and not cheap else rows
+    time, variance, dof = _noise(noisy, x)
+    fixed: list[tuple[int, str]] = []
+    held: list[int] = []
+    misfit, x = _prune(misfit, x, variance, dof, fixed, held)
+    if fixed or held:
+        time, variance, dof = _noise(_same_free(noisy, misfit), x)
+    covariance, errors = _covariance(misfit, x, variance)
+    box = misfit.box()
+    factor = coverage_factor(dof)
+    bound = _at_bound(x[0], box)
+    wide = factor * errors > np.maximum(_WIDE[0] * np.abs(x[0]), _WIDE[1] * box.size)
+    undetermined = [p for p, at, too in zip(misfit.free, bound, wide, strict=True) if at or too]
+    values = misfit.base.copy()
+    values[misfit.free] = x[0]
+    return Found(
+        values=values,
+        left=tuple(misfit.free),
+        covariance=covariance,
+        fixed=tuple(fixed),
+        bound=tuple(p for p, at in zip(misfit.free, bound, strict=True) if at),
+        undetermined=tuple(sorted({*undetermined, *held})),
+        starts=starts,
+        agreeing=agreeing,
+        time=time,
+        dof=dof,
+        on_rows=on_rows,
+    )
+
+
+def _coarse(data: Measured, coarse: Measured, weight: Array) -> Array:
+    # Weights go by load block: each bin takes the mean weight of its block.
+    total = np.bincount(data.block, weight**2, len(data.loads))
+    rows = np.bincount(data.block, minlength=len(data.loads))
+    return np.sqrt(total / np.maximum(rows, 1))[coarse.block]
+
+
+def _search(misfit: Misfit, start: Array) -> tuple[Descent, int]:
+    box = misfit.box()
+    best: Descent | None = None
+    asked = 0
+    for (many, first, keep, last), reach in ((_PLAN, 3.0), (_PATIENT, 8.0)):
+        extra = max(many - len(start), 0)
+        x = np.concatenate([start, spread_starts(start, box, extra, reach=reach)])
+        asked += len(x)
+        early = descend(misfit, x, box, steps=first, tolerance=1e-4)
+        found = descend(misfit, early.x[:keep].copy(), box, steps=last, tolerance=1e-8)
+        if best is not None:
+            cost = np.concatenate([best.cost, found.cost])
+            order = np.argsort(cost, kind="stable")
+            found = Descent(x=np.concatenate([best.x, found.x])[order], cost=cost[order])
+        best = found
+        if found.agreeing(_SAME, _EXACT * float(np.sum(misfit.weight**2))) >= 2:
+            break
+    return found, asked
+
+
+def _reweight(misfit: Misfit, x: Array) -> tuple[Array, Array]:
+    # From least absolute values to Tukey's biweight: gross outliers would mislead a start by squares.
+    base = misfit.weight.copy()
+    box = misfit.box()
+    for width in (0.3, 0.1, 0.05, 0.05):
+        r = misfit.raw(x)[0] * base
+        middle = max(float(np.median(np.abs(r))), 1e-12)
+        misfit.weight = base / np.sqrt(np.sqrt(r**2 + (width * middle) ** 2) / middle)
+        x = descend(misfit, x, box, steps=6, tolerance=1e-6).x
+    sd = max(float(np.median(np.abs(misfit.raw(x)[0] * base))) / 0.6745, 1e-12)
+    for _ in range(20):
+        r = misfit.raw(x)[0] * base
+        share = np.clip(1.0 - (r / (_BIWEIGHT * sd)) ** 2, 0.0, None)
+        misfit.weight = base * np.maximum(share, 1e-9)
+        before = x.copy()
+        x = descend(misfit, x, box, steps=6, tolerance=1e-9).x
+        if np.all(np.abs(x - before) <= 1e-4 * box.size):
+            break
+    return x, misfit.weight
+
+
+def _noise(rows: Misfit, x: Array) -> tuple[float, float, float]:
+    # Autocorrelation time, variance of a row of weight one with it, degrees of freedom.
+    r = rows(x)[0]
+    time = max(autocorrelation_time(part) for part in np.split(r, len(rows.channels)))
+    used = float(np.count_nonzero(rows.weight > 1e-3 * rows.weight.max()))  # outliers are no rows
+    left = max(used - len(rows.free), 1.0)
+    return time, max(float(r @ r) / left, 1e-26) * time, max(used / time - len(rows.free), 1.0)
+
+
+def _same_free(rows: Misfit, misfit: Misfit) -> Misfit:
+    if rows is not misfit:
+        rows.base, rows.free = misfit.base.copy(), list(misfit.free)
+    return rows
+
+
+def _covariance(misfit: Misfit, x: Array, variance: float) -> tuple[Array, Array]:
+    # By sizes for the inverse; what the bounds alone say keeps it finite.
+    box = misfit.box()
+    if not len(misfit.free):
+        return np.zeros((0, 0)), np.zeros(0)
+    _, J = linearise(misfit, x, box, fine=True)
+    information = J[0] @ J[0].T / variance
+    information += np.diag(12.0 * (box.size / (box.high - box.low)) ** 2)
+    unit = 1.0 / np.sqrt(np.diag(information))
+    inverse = np.linalg.inv(information * np.outer(unit, unit)) * np.outer(unit, unit)
+    covariance = inverse * np.outer(box.size, box.size)
+    return covariance, np.sqrt(np.maximum(np.diag(covariance), 0.0))
+
+
+def _at_bound(x: Array, box: Box) -> Sequence[bool]:
+    margin = 1e-4 * box.size
+    return [bool(one) for one in (x <= box.low + margin) | (x >= box.high - margin)]
+
+
+def _prune(
+    misfit: Misfit, x: Array, variance: float, dof: float, fixed: list[tuple[int, str]], held: list[int]
+) -> tuple[Misfit, Array]:
+    # One at a time, the worst first: parameters that are not determined move together.
+    factor = coverage_factor(dof)
+    kept: set[int] = set()
+    r = misfit(x)[0]
+    cost = float(r @ r)
+    while misfit.free:
+        box = misfit.box()
+        _, errors = _covariance(misfit, x, variance)
+        allowed = np.maximum(_WIDE[0] * np.abs(x[0]), _WIDE[1] * box.size)
+        bound = np.array(_at_bound(x[0], box))
+        excess = np.where(bound, 10.0, factor * errors / allowed)
+        excess[[place in kept for place in misfit.free]] = 0.0
+        worst = int(np.argmax(excess))
+        if excess[worst] <= 1.0:
+            break
+        place = misfit.free[worst]
+        spec = misfit.model.parameters[place]
+        value = float(x[0, worst])
+        others = np.delete(x, worst, axis=1)
+        misfit.hold(place, spec.default)
+        trial = descend(misfit, others.copy(), misfit.box(), steps=12, tolerance=1e-7)
+        if trial.cost[0] <= cost + _ALLOWED * variance:
+            x, cost = trial.x, max(cost, float(trial.cost[0]))
+            fixed.append((place, f"not determined by these data, fixed at its default {spec.default:g}"))
+        elif bound[worst]:
+            # It means something, and the bound stops it: it stays in the fit, and its bound is told.
+            misfit.base[place] = value
+            misfit.free.insert(worst, place)
+            kept.add(place)
+        else:
+            misfit.base[place] = value
+            x = descend(misfit, others.copy(), misfit.box(), steps=6, tolerance=1e-8).x
+            r = misfit(x)[0]
+            cost = float(r @ r)
+            held.append(place)
+            fixed.append((place, f"not determined by these data, held at {value:.4g} where the search ended"))
+    return misfit, x
+
+
+def refit(task: Task, coarse: Measured, count: Array) -> Array:
+    """Return all values after a descent from the first start on other rows; nothing is judged."""
+    scale = {name: float(np.sqrt(np.mean(task.data[name] ** 2))) or 1.0 for name in task.channels}
+    weight = np.sqrt(count)
+    if task.sigma is not None:
+        weight = weight * _coarse(task.data, coarse, 1.0 / task.sigma)
+    misfit = Misfit(task, coarse, weight, scale)
+    x = task.starts[:1, list(task.free)].copy()
+    if task.robust:
+        x, _ = _reweight(misfit, x)
+    else:
+        x = descend(misfit, x, misfit.box(), steps=40, tolerance=1e-8).x
+    values = task.values.copy()
+    values[list(task.free)] = x[0]
+    return values

@@ -1,0 +1,166 @@
+"""The parameter tables of MF 5.2 and MF 6.x: names as in a tire file, bounds that keep a curve physical.
+
+Bounds follow the practice of the field (Pacejka 2012, appendix 3, prints typical sets; Besselink et al. 2010
+state that B, C, D, K and 1 - E must keep their sign), wide enough for bicycle to truck tires. PKY4 stays 2.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, cast
+
+from toolkit.tires.global_model import GlobalParameter
+
+if TYPE_CHECKING:
+    from toolkit.tires.global_model import Channel, Need
+
+# name, default, low, high, size, needs ("2" loads, "3" loads, "c"amber, "p"ressure, "s"igns, "k"appa), text
+_LATERAL = """
+PCY1  1.3    0.8   2.2  0.1   -    shape factor C
+PDY1  1.0    0.05  3.0  0.1   -    friction at the nominal load
+PDY2  0.0   -1.0   1.0  0.1   2    change of friction with load
+PDY3  0.0  -20.0  30.0  1.0   c    change of friction with camber squared
+PEY1  0.0  -15.0   1.0  0.5   -    curvature at the nominal load
+PEY2  0.0  -15.0  15.0  0.5   2    change of curvature with load
+PEY3  0.0   -1.0   1.0  0.2   s    asymmetry of curvature
+PEY4  0.0  -20.0  20.0  1.0   cs   change of that asymmetry with camber
+PKY1 -20.0 -200.0 -1.0  2.0   -    largest stiffness over the nominal load
+PKY2  2.0    0.1  20.0  0.3   2    load at the largest stiffness over the nominal load
+PKY3  0.0   -5.0   5.0  0.2   c    change of stiffness with camber
+PHY1  0.0   -0.05  0.05 0.001 -    horizontal shift
+PHY2  0.0   -0.05  0.05 0.001 2    change of horizontal shift with load
+PVY1  0.0   -0.3   0.3  0.01  -    vertical shift over load
+PVY2  0.0   -0.3   0.3  0.01  2    change of vertical shift with load
+PVY3  0.0   -3.0   3.0  0.1   c    change of vertical shift with camber
+PVY4  0.0   -3.0   3.0  0.1   2c   change of that with load
+"""
+_LATERAL_52 = """
+PHY3  0.0   -1.0   1.0  0.01  c    change of horizontal shift with camber
+"""
+_LATERAL_61 = """
+PEY5  0.0 -100.0 100.0  5.0   c    change of curvature with camber squared
+PKY5  0.0  -20.0  20.0  1.0   2c   change with camber of the load at the largest stiffness
+PKY6  0.0  -10.0  10.0  0.2   c    camber stiffness over load
+PKY7  0.0  -10.0  10.0  0.2   2c   change of camber stiffness with load
+PPY1  0.0   -3.0   3.0  0.1   p    change of stiffness with pressure
+PPY2  0.0   -3.0   3.0  0.1   2p   change with pressure of the load at the largest stiffness
+PPY3  0.0   -2.0   2.0  0.1   p    change of friction with pressure
+PPY4  0.0   -5.0   5.0  0.2   P    change of friction with pressure squared
+PPY5  0.0   -5.0   5.0  0.2   cp   change of camber stiffness with pressure
+"""
+_ALIGNING = """
+QBZ1   9.0    0.3  80.0  2.0   -   slope factor of the trail
+QBZ2   0.0  -60.0  60.0  2.0   2   change of the slope factor with load
+QBZ3   0.0  -60.0  60.0  2.0   3   change of the slope factor with load squared
+QBZ4   0.0   -5.0   5.0  0.2   c   change of the slope factor with camber
+QBZ5   0.0   -5.0   5.0  0.2   c   change of the slope factor with |camber|
+QBZ10  0.5    0.0   3.0  0.2   -   slope factor of the residual moment
+QCZ1   1.2    0.3   3.0  0.1   -   shape factor of the trail
+QDZ1   0.1    0.0   1.0  0.02  -   trail over the free radius at the nominal load
+QDZ2   0.0   -1.0   1.0  0.02  2   change of the trail with load
+QDZ3   0.0   -5.0   5.0  0.2   c   change of the trail with camber
+QDZ4   0.0  -50.0  50.0  2.0   c   change of the trail with camber squared
+QDZ6   0.0   -0.1   0.1  0.001 -   residual moment over load and radius
+QDZ7   0.0   -0.1   0.1  0.001 2   change of the residual moment with load
+QDZ8   0.0   -1.0   1.0  0.02  c   change of the residual moment with camber
+QDZ9   0.0   -1.0   1.0  0.02  2c  change of that with load
+QEZ1  -1.0  -20.0   1.0  0.5   -   curvature of the trail
+QEZ2   0.0  -20.0  20.0  0.5   2   change of the trail's curvature with load
+QEZ3   0.0  -20.0  20.0  0.5   3   change of the trail's curvature with load squared
+QEZ4   0.0   -2.0   2.0  0.2   s   asymmetry of the trail's curvature
+QEZ5   0.0  -20.0  20.0  1.0   cs  change of that asymmetry with camber
+QHZ1   0.0   -0.05  0.05 0.001 -   shift of the trail
+QHZ2   0.0   -0.05  0.05 0.001 2   change of the trail's shift with load
+QHZ3   0.0   -1.0   1.0  0.02  c   change of the trail's shift with camber
+QHZ4   0.0   -1.0   1.0  0.02  2c  change of that with load
+"""
+_ALIGNING_61 = """
+QDZ10  0.0  -10.0  10.0  0.2   c   residual moment with camber times |camber|
+QDZ11  0.0  -10.0  10.0  0.2   2c  change of that with load
+PPZ1   0.0   -3.0   3.0  0.1   p   change of the trail with pressure
+PPZ2   0.0   -5.0   5.0  0.2   cp  change with pressure of the residual moment of camber
+"""
+_LONGITUDINAL = """
+PCX1   1.6    0.8   2.5  0.1   k   shape factor C
+PDX1   1.1    0.05  3.0  0.1   k   friction at the nominal load
+PDX2   0.0   -1.0   1.0  0.1   2k  change of friction with load
+PDX3   0.0  -30.0  30.0  1.0   ck  change of friction with camber squared
+PEX1   0.0  -15.0   1.0  0.5   k   curvature at the nominal load
+PEX2   0.0  -15.0  15.0  0.5   2k  change of curvature with load
+PEX3   0.0  -15.0  15.0  0.5   3k  change of curvature with load squared
+PEX4   0.0   -1.0   1.0  0.2   K   asymmetry of curvature
+PKX1  20.0    1.0 150.0  2.0   k   slip stiffness over load
+PKX2   0.0 -100.0 100.0  2.0   2k  change of slip stiffness with load
+PKX3   0.0   -3.0   3.0  0.1   3k  exponent of that change
+PHX1   0.0   -0.05  0.05 0.001 k   horizontal shift
+PHX2   0.0   -0.05  0.05 0.001 2k  change of horizontal shift with load
+PVX1   0.0   -0.3   0.3  0.01  k   vertical shift over load
+PVX2   0.0   -0.3   0.3  0.01  2k  change of vertical shift with load
+RBX1  12.0    1.0  60.0  2.0   ka  slope factor of FX against slip angle
+RBX2 -10.0  -60.0  60.0  2.0   ka  change of that with slip
+RCX1   1.0    0.5   1.6  0.05  ka  shape factor of FX against slip angle
+REX1   0.0  -15.0   1.0  0.5   ka  curvature of FX against slip angle
+RHX1   0.0   -0.05  0.05 0.002 ka  shift of FX against slip angle
+"""
+_LONGITUDINAL_61 = """
+PPX1   0.0   -3.0   3.0  0.1   pk  change of slip stiffness with pressure
+PPX2   0.0   -5.0   5.0  0.2   Pk  change of slip stiffness with pressure squared
+PPX3   0.0   -2.0   2.0  0.1   pk  change of friction with pressure
+PPX4   0.0   -5.0   5.0  0.2   Pk  change of friction with pressure squared
+"""
+_COMBINED_LATERAL = """
+RBY1   7.0    0.5  60.0  1.0   ka  slope factor of FY against longitudinal slip
+RBY2   2.5  -40.0  40.0  1.0   ka  change of that with slip angle
+RBY3   0.0   -0.3   0.3  0.01  ka  shift of that change
+RCY1   1.0    0.5   1.6  0.05  ka  shape factor of FY against longitudinal slip
+REY1   0.0  -15.0   1.0  0.5   ka  curvature of FY against longitudinal slip
+REY2   0.0  -15.0  15.0  0.5   2ka change of that curvature with load
+RHY1   0.0   -0.1   0.1  0.005 ka  shift of FY against longitudinal slip
+RHY2   0.0   -0.1   0.1  0.005 2ka change of that shift with load
+RVY1   0.0   -1.0   1.0  0.02  ka  side force that longitudinal slip induces, over friction
+RVY2   0.0   -1.0   1.0  0.02  2ka change of that with load
+RVY4   0.0  -50.0  50.0  2.0   ka  change of that with slip angle
+RVY5   1.9    0.5   3.0  0.1   ka  shape factor of the induced force
+RVY6   0.0  -60.0  60.0  2.0   ka  slope factor of the induced force
+"""
+_COMBINED_ALIGNING = """
+SSZ1   0.0   -0.3   0.3  0.005 ka  arm of FX over the free radius
+SSZ2   0.0   -0.3   0.3  0.005 ka  change of the arm with FY
+SSZ3   0.0   -3.0   3.0  0.05  cka change of the arm with camber
+SSZ4   0.0   -3.0   3.0  0.05  2cka change of that with load
+"""
+_NEEDS: dict[str, str] = {
+    "2": "two_loads", "3": "three_loads", "c": "camber", "p": "pressure", "P": "three_pressures",
+    "s": "both_signs", "k": "kappa", "K": "both_kappas", "a": "alpha_and_kappa",
+}  # fmt: skip
+
+
+def _rows(text: str, stage: Channel) -> tuple[GlobalParameter, ...]:
+    made = []
+    for line in filter(None, text.splitlines()):
+        name, default, low, high, size, needs, words = line.split(maxsplit=6)
+        made.append(
+            GlobalParameter(
+                name=name,
+                unit="1",
+                default=float(default),
+                low=float(low),
+                high=float(high),
+                size=float(size),
+                text=words,
+                stage=stage,
+                needs=tuple(cast("Need", _NEEDS[mark]) for mark in needs.replace("-", "")),
+            )
+        )
+    return tuple(made)
+
+
+MF52 = (
+    *_rows(_LONGITUDINAL, "FX"),
+    *_rows(_LATERAL + _LATERAL_52 + _COMBINED_LATERAL, "FY"),
+    *_rows(_ALIGNING + _COMBINED_ALIGNING, "MZ"),
+)
+MF61 = (
+    *_rows(_LONGITUDINAL + _LONGITUDINAL_61, "FX"),
+    *_rows(_LATERAL + _LATERAL_61 + _COMBINED_LATERAL, "FY"),
+    *_rows(_ALIGNING + _ALIGNING_61 + _COMBINED_ALIGNING, "MZ"),
+)

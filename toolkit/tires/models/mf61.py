@@ -1,0 +1,20 @@
+"""Magic Formula 6.1 over load, camber, pressure and longitudinal slip; equations in `toolkit.tires.mf61`."""
+
+from __future__ import annotations
+
+from toolkit.tires.global_model import GlobalModel
+from toolkit.tires.mf61 import forces
+from toolkit.tires.mf_global import mf_forces, mf_starts
+from toolkit.tires.mf_parameters import MF61
+
+MODEL = GlobalModel(
+    name="mf61",
+    title="Magic Formula 6.1",
+    reference="Pacejka (2012), eq. 4.E1 to 4.E78; Besselink, Schmeitz, Pacejka (2010)",
+    valid="within the loads, angles, pressures and slips of the data",
+    axes="ISO-W",
+    channels=("FX", "FY", "MZ"),
+    parameters=MF61,
+    forces=mf_forces(MF61, forces),
+    starts=mf_starts,
+)

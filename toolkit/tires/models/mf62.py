@@ -1,0 +1,23 @@
+"""Magic Formula 6.2 over load, camber, pressure and longitudinal slip; equations in `toolkit.tires.mf61`.
+
+For FX, FY and MZ the equations of 6.2 are those of 6.1; the files differ in FITTYP.
+"""
+
+from __future__ import annotations
+
+from toolkit.tires.global_model import GlobalModel
+from toolkit.tires.mf61 import forces
+from toolkit.tires.mf_global import mf_forces, mf_starts
+from toolkit.tires.mf_parameters import MF61
+
+MODEL = GlobalModel(
+    name="mf62",
+    title="Magic Formula 6.2",
+    reference="Pacejka (2012), eq. 4.E1 to 4.E78; Besselink, Schmeitz, Pacejka (2010)",
+    valid="within the loads, angles, pressures and slips of the data",
+    axes="ISO-W",
+    channels=("FX", "FY", "MZ"),
+    parameters=MF61,
+    forces=mf_forces(MF61, forces),
+    starts=mf_starts,
+)
