@@ -1,0 +1,200 @@
+"""TMeasy: force against slip by initial slope, peak and sliding point; dynamic trail by three numbers.
+
+    0 to sM    F = dF0 s / (1 + n (n + dF0 sM/FM - 2)),   n = s/sM
+    sM to s*   F = FM - a (s - sM)^2,    a = (FM/sM)^2 / (dF0 sM),   s* = sM + (FM - FS)/(a (sS - sM))
+    s* to sS   F = FS + b (sS - s)^2,    b = a (s* - sM)/(sS - s*);   beyond sS  F = FS
+    (a cubic from FM to FS, level at both ends, where s* does not lie before sS)
+
+Combined slip: s = hypot(sx/hx, sy/hy), hx = sxM/(sxM + syM) + (FxM/dFx0)/(FxM/dFx0 + FyM/dFy0) and hy alike;
+with the direction cos, sin of (sx/hx, sy/hy) the five values of F are hypot(x value cos, y value sin), slips
+over and slopes times h; FX = F cos, FY = -F sin.
+
+    MZ = -n FY;   n/n0 = (1-w)(1-q) + w (1 - (3-2q) q^2),   q = |sy|/s0, w = s0/sE            up to s0
+                  n/n0 = -(1-w) (q-1) ((sE - |sy|)/(sE - s0))^2                               s0 to sE; then 0
+
+Source: Rill, Road Vehicle Dynamics (2012), 3.3 to 3.5; Rill, TMeasy - the handling tire model for all driving
+situations, DINAME (2013). Forces and slopes change quadratically and slips linearly with load, through
+their values at payload (FNOMIN) and twice payload: Y(FZ) = FZ/FNOMIN Y (1 + Y_Z dfz), with
+Y_Z = Y(2 FNOMIN)/(2 Y) - 1, and s(FZ) = s (1 + s_Z dfz), with s_Z = s(2 FNOMIN)/s - 1. The trail n0 is (n/L)0
+times the patch length, and that grows as the root of load. Forces are given over FNOMIN.
+
+Rill asks for dF0 >= 2 FM/sM; where a parameter set breaks it, sM is raised to 2 FM/dF0, since the slope at
+zero is what data know best. Camber acts as the lateral slip -K_IA sin(IA). SH, SV, SM as in the brush.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from toolkit.tires.contact import directed, slips
+from toolkit.tires.global_model import Channel, GlobalModel, GlobalParameter, Need, Responses, Rows, Seeds
+
+_LEAST = 0.05  # a quadratic in load turns over far out; no value falls below this part of its law
+
+
+def forces(values: Sequence[Any], rows: Rows) -> Responses:
+    """Return FX, FY [N] and MZ [N·m] in SAE axes; ``values`` as `MODEL.parameters`."""
+    p = dict(zip(MODEL.names, values, strict=True))
+
+    def law(name: str) -> Any:
+        return p[name] * np.maximum(1 + p[name + "_Z"] * rows.dfz, _LEAST)
+
+    x = [law("dFx0"), law("FxM"), law("sxM"), law("FxS"), law("sxS")]
+    y = [law("dFy0"), law("FyM"), law("syM"), law("FyS"), law("syS")]
+    sx, sy = slips(rows, p["SH"])
+    sy = sy - p["K_IA"] * np.sin(rows.IA)
+    x[2], y[2] = (np.maximum(one[2], 2 * one[1] / one[0]) for one in (x, y))
+    ratio = x[1] / x[0] / (x[1] / x[0] + y[1] / y[0])
+    hx, hy = x[2] / (x[2] + y[2]) + ratio, y[2] / (x[2] + y[2]) + 1 - ratio
+    slip, cos, sin = directed(sx / hx, sy / hy)
+    # The slip's direction at standstill is of no consequence, but the curve needs one.
+    sin_ = np.where(slip > 0, sin, 1.0)
+    F = rows.FZ * curve(
+        slip,
+        dF0=np.hypot(x[0] * hx * cos, y[0] * hy * sin_),
+        FM=np.hypot(x[1] * cos, y[1] * sin_),
+        sM=np.hypot(x[2] / hx * cos, y[2] / hy * sin_),
+        FS=np.hypot(np.minimum(x[3], x[1]) * cos, np.minimum(y[3], y[1]) * sin_),
+        sS=np.hypot(x[4] / hx * cos, y[4] / hy * sin_),
+    )
+    FY = -F * sin
+    s0 = law("sy0")
+    offset = law("n0") * np.sqrt(rows.FZ / rows.FNOMIN) * lever(sy, s0=s0, sE=np.maximum(law("syE"), s0))
+    return Responses(FX=F * cos, FY=FY + rows.FZ * p["SV"], MZ=-offset * FY + rows.FZ * p["SM"])
+
+
+def curve(s: Any, *, dF0: Any, FM: Any, sM: Any, FS: Any, sS: Any) -> Any:
+    """Return F of the slip s >= 0 in the unit of FM; arrays broadcast. sS is taken as 1.001 sM at least."""
+    sS = np.maximum(sS, 1.001 * sM)
+    n = s / sM
+    rising = dF0 * s / (1 + n * (n + dF0 * sM / FM - 2))
+    a = (FM / sM) ** 2 / (dF0 * sM)
+    turn = sM + (FM - FS) / (a * (sS - sM))
+    parabolas = turn < sS
+    b = a * (turn - sM) / np.where(parabolas, sS - turn, 1.0)
+    q = np.clip((s - sM) / (sS - sM), 0.0, 1.0)
+    falling = np.where(s <= turn, FM - a * (s - sM) ** 2, FS + b * (sS - s) ** 2)
+    falling = np.where(parabolas, falling, FM - (FM - FS) * q * q * (3 - 2 * q))
+    return np.where(s <= sM, rising, np.where(s < sS, falling, FS))
+
+
+def lever(sy: Any, *, s0: Any, sE: Any) -> Any:
+    """Return the dynamic trail over its value at zero slip; s0 > 0, sE >= s0."""
+    size = np.abs(sy)
+    w, q = s0 / sE, size / s0
+    near = (1 - w) * (1 - q) + w * (1 - (3 - 2 * q) * q * q)
+    to_end = (sE - size) / np.where(sE > s0, sE - s0, 1.0)
+    return np.where(q <= 1, near, np.where(size < sE, -(1 - w) * (q - 1) * to_end**2, 0.0))
+
+
+def from_payload(
+    at_payload: Mapping[str, float], at_double: Mapping[str, float], *, payload_N: float, length_m: float
+) -> dict[str, float]:
+    """Return parameters from the values at payload and twice payload as they are published.
+
+    Parameters
+    ----------
+    at_payload, at_double : dFx0, dFy0 [N], FxM, FxS, FyM, FyS [N], sxM, sxS, syM, syS, sy0, syE [1] and nL0
+        [1], the trail over the contact length; those that are absent are left out
+    payload_N : FNOMIN, to be given to the rows too
+    length_m : contact length at payload
+
+    >>> from_payload({"FyM": 4000.0}, {"FyM": 7200.0}, payload_N=4000.0, length_m=0.15)
+    {'FyM': 1.0, 'FyM_Z': -0.1}
+    """
+    made = {}
+    for name, one in at_payload.items():
+        two = at_double[name]
+        force = name[0] in "dF"
+        key, scale = ("n0", length_m) if name == "nL0" else (name, 1 / payload_N if force else 1.0)
+        made[key] = one * scale
+        made[f"{key}_Z"] = round(two / (2 * one) - 1 if force else two / one - 1, 15)
+    return made
+
+
+def starts(seeds: Seeds) -> tuple[Mapping[str, float], ...]:
+    """Return start values: slope, peak and its slip from the Magic Formula, three ways to slide."""
+    stiffness, slope = seeds.at_nominal(seeds.stiffness / seeds.load)
+    peak, fade = seeds.at_nominal(seeds.peak / seeds.load)
+    angle = seeds.at_nominal(np.tan(seeds.peak_angle))[0]
+    start = {
+        "dFy0": stiffness, "dFy0_Z": slope / stiffness, "FyM": peak, "FyM_Z": fade / peak,
+        "syM": max(angle, 2.2 * peak / stiffness), "FyS": 0.9 * peak, "FyS_Z": fade / peak,
+    }  # fmt: skip
+    trail = seeds.at_nominal(seeds.trail)[0]
+    if np.isfinite(trail) and trail > 0:
+        start["n0"] = trail
+    start |= {"syS": 3 * start["syM"], "sy0": 0.7 * start["syM"], "syE": 2 * start["syM"]}
+    wide = 1.6 * start["syM"]
+    return (
+        start,
+        {**start, "syM": wide, "syS": 2 * wide},
+        {**start, "FyS": 0.75 * peak, "syS": 1.5 * start["syM"], "syE": 1.1 * start["sy0"]},
+    )
+
+
+def _pair(
+    name: str, unit: str, default: float, low: float, high: float, size: float, text: str, stage: Channel
+) -> tuple[GlobalParameter, GlobalParameter]:
+    # A value at payload and its change with load.
+    first: tuple[Need, ...] = ("kappa",) if stage == "FX" else ()
+    return (
+        GlobalParameter(
+            name=name, unit=unit, default=default, low=low, high=high, size=size, text=text,
+            stage=stage, needs=first,
+        ),
+        GlobalParameter(
+            name=f"{name}_Z", unit="1", default=0.0, low=-0.8, high=1.5, size=0.1,
+            text=f"change of {name} with load", stage=stage, needs=(*first, "two_loads"),
+        ),
+    )  # fmt: skip
+
+
+def _axis(letter: str, slope: float, stage: Channel) -> tuple[GlobalParameter, ...]:
+    word = {"x": "longitudinal", "y": "lateral"}[letter]
+    return (
+        *_pair(f"dF{letter}0", "1", slope, 1.0, 300.0, 1.0, f"{word} slope at zero slip over FNOMIN", stage),
+        *_pair(f"F{letter}M", "1", 1.0, 0.05, 5.0, 0.05, f"largest {word} force over FNOMIN", stage),
+        *_pair(f"s{letter}M", "1", 0.15, 0.01, 2.0, 0.02, f"slip at the largest {word} force", stage),
+        *_pair(f"F{letter}S", "1", 0.8, 0.02, 5.0, 0.05, f"{word} sliding force over FNOMIN", stage),
+        *_pair(f"s{letter}S", "1", 0.8, 0.02, 5.0, 0.1, f"slip where all slides, {word}", stage),
+    )
+
+
+MODEL = GlobalModel(
+    name="tmeasy",
+    title="TMeasy",
+    reference="Rill, Road Vehicle Dynamics (2012), 3.3-3.5; Rill, DINAME 2013",
+    valid="loads to about three times the payload, camber to about 5 deg; one peak in FY and FX; the trail "
+    "does not depend on longitudinal slip",
+    axes="SAE",
+    channels=("FX", "FY", "MZ"),
+    parameters=(
+        *_axis("x", 20.0, "FX"),
+        *_axis("y", 15.0, "FY"),
+        *_pair("n0", "m", 0.03, 1e-4, 0.2, 2e-3, "dynamic trail at zero slip, (n/L)0 L", "MZ"),
+        *_pair("sy0", "1", 0.15, 0.01, 2.0, 0.02, "lateral slip where the trail changes sign", "MZ"),
+        *_pair("syE", "1", 0.4, 0.01, 5.0, 0.05, "lateral slip from which there is no trail", "MZ"),
+        GlobalParameter(
+            name="SH", unit="rad", default=0.0, low=-0.1, high=0.1, size=1e-3,
+            text="equivalent slip angle of plysteer and steering zero", needs=("both_signs",),
+        ),
+        GlobalParameter(
+            name="K_IA", unit="1", default=0.0, low=-0.5, high=1.0, size=0.02,
+            text="lateral slip of camber over sin(IA)", needs=("camber",),
+        ),
+        GlobalParameter(
+            name="SV", unit="1", default=0.0, low=-0.2, high=0.2, size=5e-3,
+            text="offset of FY over load (conicity)", needs=("both_signs",),
+        ),
+        GlobalParameter(
+            name="SM", unit="m", default=0.0, low=-0.05, high=0.05, size=5e-4,
+            text="offset of MZ over load", stage="MZ", needs=("both_signs",),
+        ),
+    ),
+    forces=forces,
+    starts=starts,
+)  # fmt: skip

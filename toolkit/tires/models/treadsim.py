@@ -1,0 +1,195 @@
+"""TreadSim: a brush with any pressure, a tread of finite width, and a carcass that yaws and bends.
+
+A bristle enters at the leading edge without deflection and is followed along the patch: it adheres while its
+force stays under mu q, else it slides back to that limit (`bristles`).
+
+    q(u)  (1 - |u|^N)(1 + SKEW u), u = x/a from 1 to -1, normalised to the load    (`contact.bulged`)
+    mu    MU (p/p0)^-MU_P / (1 + MU_V vs);  p the local pressure, p0 its mean at FNOMIN, vs the sliding speed
+    slip  tan(SA) - YAW' MZ + BEND' FY a u - camber (1 - EPS) sin(IA) x/R: the slope of the contact line
+    camber also rolls the right of the tread slower than the left: slip along (1 - EPS) sin(IA) y/R
+
+YAW and BEND say how soft the carcass is beside the tread: at FNOMIN the belt turns by 3 YAW/(C FNOMIN A) rad
+per N·m, and the contact line has the slope 3 BEND/(C FNOMIN) per N at the patch's ends. C is the stiffness of
+the tread alone; the tire's slope at zero is C/((1 + YAW)(1 + BEND)). LAT is the lateral compliance: the
+patch, and with it FX, moves aside.
+
+Source: Pacejka, Tire and Vehicle Dynamics, 3rd ed. (2012), 3.3, with its approximations that friction depends
+on the speed of the bristle's base and that a sliding bristle keeps its direction. The pressure's law and the
+dependence on load are ours. 64 bristles, and 5 lines over the width with camber or longitudinal slip: FX, FY
+and MZ come within 1e-3 of their largest values to what finer ones give.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from toolkit.tires.bristles import Tread, balance, middles
+from toolkit.tires.contact import bulged, half_length, slips, with_load
+from toolkit.tires.global_model import GlobalModel, GlobalParameter, Responses, Rows, Seeds
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    Array = NDArray[np.float64]
+
+BRISTLES = 64
+LINES = 5
+_THIN = 1e-2  # of the mean pressure: friction does not grow without end where the pressure vanishes
+
+
+def forces(values: Sequence[Any], rows: Rows, *, bristles: int = BRISTLES, lines: int = LINES) -> Responses:
+    """Return FX, FY [N] and MZ [N·m] in SAE axes; ``values`` as `MODEL.parameters`.
+
+    ``bristles`` are those along the patch, ``lines`` those over its width (only with camber).
+    """
+    p = dict(zip(MODEL.names, values, strict=True))
+    sx, sy = slips(rows, p["SH"])
+    a = half_length(p["A"], p["A_P"], rows)
+    load = rows.FZ / rows.FNOMIN
+    C = with_load(p["C"], p["C_Z"], rows.dfz)
+    tilt = (1 - p["EPS"]) * np.sin(rows.IA) / rows.UNLOADED_RADIUS
+    rolling = np.abs(rows.V * np.cos(rows.SA) * (1 + rows.KAPPA))
+    softness = 3 / p["C"] * load
+    cases = {
+        "half_C": 0.5 * C,
+        "fade": p["MU_V"] * rolling,
+        "yaw": p["YAW"] * softness * (a / p["A"]),
+        "bend": p["BEND"] * softness,
+        "curve": tilt * a,
+        "cone": -tilt * p["B"],
+        "edge": p["B"] / np.maximum(a, 1e-6),
+    }
+    shape, arrays = _flat({**cases, "sx": sx, "sy": sy})
+    sx, sy = arrays.pop("sx"), arrays.pop("sy")
+    limit = _limit(p, load, p["A_P"], shape, bristles)
+    FX, FY, moment = (
+        one.reshape(shape) for one in balance(Tread(limit=limit, **arrays), sx, sy, lines=lines)
+    )
+    FX, FY = FX * rows.FZ, FY * rows.FZ
+    MZ = moment * rows.FZ * a - FX * FY / rows.FNOMIN * p["LAT"]
+    return Responses(FX=FX, FY=FY + rows.FZ * p["SV"], MZ=MZ + rows.FZ * p["SM"])
+
+
+def _limit(p: Mapping[str, Any], load: Array, growth: Any, shape: tuple[int, ...], bristles: int) -> Array:
+    # (bristles, cases): friction at standstill times the pressure of each bristle, over FZ/a.
+    u = middles(bristles).reshape(-1, *(1 for _ in shape))
+    q = bulged(u, p["N"], p["SKEW"])
+    q = q / (q.mean(axis=0) * 2)
+    pressure = np.maximum(2 * q, _THIN) * np.power(np.maximum(load, _THIN), 1 - growth)
+    limit = p["MU"] * np.power(pressure, -p["MU_P"]) * q
+    return np.ascontiguousarray(np.broadcast_to(limit, (bristles, *shape))).reshape(bristles, -1)
+
+
+def _flat(arrays: Mapping[str, Any]) -> tuple[tuple[int, ...], dict[str, Array]]:
+    # All at one shape, then in one line of cases.
+    together = np.broadcast_arrays(*(np.asarray(one, dtype=np.float64) for one in arrays.values()))
+    shape = together[0].shape
+    return shape, {name: np.ravel(one) for name, one in zip(arrays, together, strict=True)}
+
+
+def starts(seeds: Seeds) -> tuple[Mapping[str, float], ...]:
+    """Return start values: stiffness, peak and trail of each load, with a stiff and two soft carcasses."""
+    stiffness, change = _law(seeds, seeds.stiffness / seeds.load)
+    friction, fade = _law(seeds, seeds.peak / seeds.load)
+    trail = seeds.at_nominal(seeds.trail)[0]
+    start = {
+        "C": 1.3 * stiffness, "C_Z": change, "MU": 1.1 * friction,
+        "MU_P": min(max(-2 * fade, 0.0), 0.5), "N": 3.0, "YAW": 0.1, "BEND": 0.1,
+    }  # fmt: skip
+    if np.isfinite(trail) and trail > 0:
+        start["A"] = 2.5 * trail
+    soft = {**start, "C": 1.8 * stiffness, "YAW": 0.4, "BEND": 0.2, "N": 4.0}
+    return start, soft, {**soft, "MU_V": 0.03, "SKEW": 0.3, "MU": 1.3 * friction}
+
+
+def _law(seeds: Seeds, ratio: Any) -> tuple[float, float]:
+    base, slope = seeds.at_nominal(np.log(ratio))
+    return float(np.exp(base)), slope
+
+
+MODEL = GlobalModel(
+    name="treadsim",
+    title="TreadSim",
+    reference="Pacejka, Tire and Vehicle Dynamics, 3rd ed. (2012), 3.3",
+    valid="steady rolling forward, camber to about 10 deg; a rectangular patch whose pressure is even over "
+    "its width; a sliding bristle keeps its direction",
+    axes="SAE",
+    channels=("FY", "MZ"),
+    joint=True,
+    grid=BRISTLES,
+    parameters=(
+        GlobalParameter(
+            name="C", unit="1/rad", default=20.0, low=1.0, high=300.0, size=1.0,
+            text="cornering stiffness of the tread over load at FNOMIN",
+        ),
+        GlobalParameter(
+            name="C_Z", unit="1", default=0.0, low=-2.0, high=2.0, size=0.1,
+            text="its change with load: C exp(C_Z dfz)", needs=("two_loads",),
+        ),
+        GlobalParameter(
+            name="A", unit="m", default=0.07, low=0.002, high=0.5, size=0.005,
+            text="half contact length at FNOMIN", stage="MZ",
+        ),
+        GlobalParameter(
+            name="A_P", unit="1", default=0.5, low=0.05, high=1.5, size=0.05,
+            text="its growth with load: a = A (FZ/FNOMIN)^A_P", stage="MZ", needs=("two_loads",),
+        ),
+        GlobalParameter(
+            name="N", unit="1", default=2.0, low=1.0, high=20.0, size=0.5,
+            text="exponent of the pressure: 2 a parabola, large an even one",
+        ),
+        GlobalParameter(
+            name="SKEW", unit="1", default=0.0, low=-0.9, high=0.9, size=0.1,
+            text="pressure at the leading edge against the trailing one", stage="MZ",
+        ),
+        GlobalParameter(
+            name="MU", unit="1", default=1.0, low=0.05, high=6.0, size=0.05,
+            text="friction at the mean pressure of FNOMIN without sliding",
+        ),
+        GlobalParameter(
+            name="MU_P", unit="1", default=0.0, low=-0.9, high=0.9, size=0.05,
+            text="fall of friction with local pressure, exponent", needs=("two_loads",),
+        ),
+        GlobalParameter(
+            name="MU_V", unit="s/m", default=0.0, low=0.0, high=1.0, size=0.01,
+            text="fall of friction with sliding speed",
+        ),
+        GlobalParameter(
+            name="YAW", unit="1", default=0.0, low=0.0, high=1.2, size=0.05,
+            text="yaw compliance of the carcass", stage="MZ",
+        ),
+        GlobalParameter(
+            name="BEND", unit="1", default=0.0, low=0.0, high=2.0, size=0.05,
+            text="bending compliance of the carcass", stage="MZ",
+        ),
+        GlobalParameter(
+            name="LAT", unit="m", default=0.0, low=0.0, high=0.2, size=2e-3,
+            text="lateral displacement of the patch for FY = FNOMIN", stage="MZ", needs=("alpha_and_kappa",),
+        ),
+        GlobalParameter(
+            name="B", unit="m", default=0.08, low=0.0, high=0.3, size=0.01,
+            text="half the width of the tread", stage="MZ", needs=("camber",),
+        ),
+        GlobalParameter(
+            name="EPS", unit="1", default=0.5, low=-0.5, high=1.0, size=0.1,
+            text="part of camber that the tire's deformation takes up", needs=("camber",),
+        ),
+        GlobalParameter(
+            name="SH", unit="rad", default=0.0, low=-0.1, high=0.1, size=1e-3,
+            text="equivalent slip angle of plysteer and steering zero", needs=("both_signs",),
+        ),
+        GlobalParameter(
+            name="SV", unit="1", default=0.0, low=-0.2, high=0.2, size=5e-3,
+            text="offset of FY over load (conicity)", needs=("both_signs",),
+        ),
+        GlobalParameter(
+            name="SM", unit="m", default=0.0, low=-0.05, high=0.05, size=5e-4,
+            text="offset of MZ over load", stage="MZ", needs=("both_signs",),
+        ),
+    ),
+    forces=forces,
+    starts=starts,
+)  # fmt: skip
