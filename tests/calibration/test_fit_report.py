@@ -138,7 +138,7 @@ def test_reversals_at_equal_loads_by_run() -> None:
         residuals=load - indicated,
         load=load,
         level=load_levels(load[:, None]),
-        direction=("up", "up", "down", "up", "up", "down"),
+        up=np.array([True, True, False, True, True, False]),
         run=np.array([1.0, 1, 1, 2, 2, 2]),
     )
     assert [(r.run, r.load) for r in found] == [(1, 50.0), (2, 50.0)]

@@ -83,7 +83,7 @@ def test_deletion_residuals_are_those_of_the_fit_without_the_row() -> None:
     expected = load[row] - x[row] @ c - told
     ours = fit.scaled[row] / np.sqrt(fit.weights[row]) / (1 - fit.leverage[row])
     assert ours == pytest.approx(expected, rel=1e-9)
-    assert diagnose(fit, cells=x[:, :2], load=load, direction=None).press > 0
+    assert diagnose(fit, cells=x[:, :2], load=load, up=None).press > 0
 
 
 def test_a_standard_behind_every_row_moves_no_coefficient_and_widens_the_scale() -> None:

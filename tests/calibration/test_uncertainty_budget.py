@@ -157,7 +157,7 @@ def test_without_repeated_loads_check_loads_tell_the_interpolation() -> None:
     record = record_of_table(table)
     assert "interpolation" in calibration_budget(record, table, None, "F").not_stated
     there = np.linspace(150, 950, 9)
-    check = dataclasses.replace(table_of((there + 3.0) / 500, there), run=None, direction=None)
+    check = dataclasses.replace(table_of((there + 3.0) / 500, there), run=None, up=None)
     part = calibration_budget(record, table, check, "F").component("interpolation")
     assert part.u == pytest.approx(3.0, rel=0.03)
 

@@ -24,7 +24,7 @@ def table_of(
     return Table(
         names=("S", "F"), units=("mV/V", "N"), values=np.column_stack([cells, load]),
         run=np.ones(len(load)) if run is None else run,
-        direction=direction or ("up",) * len(load), rotation=rotation,
+        up=np.array(direction or ("up",) * len(load)) == "up", rotation=rotation,
     )  # fmt: skip
 
 

@@ -77,7 +77,8 @@ def evaluate(term: Term, columns: Mapping[str, Any], one: Any) -> Any:
 def term_matrix(terms: Sequence[str], columns: Mapping[str, NDArray[np.float64]]) -> NDArray[np.float64]:
     """Return the terms' values (rows, terms), each in the raw indications."""
     rows = len(next(iter(columns.values())))
-    matrix = np.empty((rows, len(terms)))
+    # Column by column in memory, as it is filled and read.
+    matrix = np.empty((rows, len(terms)), order="F")
     for j, name in enumerate(terms):
         matrix[:, j] = 1.0 if name == INTERCEPT else evaluate(parse_term(name), columns, 1.0)
     return matrix

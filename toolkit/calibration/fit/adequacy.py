@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolkit.calibration.terms import term_matrix
+from toolkit.calibration.terms import INTERCEPT, term_matrix
 from toolkit.errors import ConfigError, SessionError
 
 if TYPE_CHECKING:
@@ -19,6 +20,17 @@ COLLINEAR_FINDING = 30.0
 COLLINEAR_REFUSED = 300.0
 RANK = 1e-10
 _LARGEST = 1e75  # its fourth power, a square's square, is still a double
+# Products of columns tell a condition number below 100 to ten digits; beyond it the columns are decomposed.
+_BY_PRODUCTS = 1e-4
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Adequacy:
+    """Condition number of the indications and of the term matrix; ``vif`` one value an indication."""
+
+    condition_number: float
+    condition_number_terms: float
+    vif: tuple[float, ...]
 
 
 def condition_number(matrix: NDArray[np.float64]) -> float:
@@ -27,18 +39,15 @@ def condition_number(matrix: NDArray[np.float64]) -> float:
     >>> condition_number(np.array([[0.0, 1.0], [1.0, 0.0], [2.0, 1.0]])).__round__(6)
     1.0
     """
-    values = _singular_values(_scaled(matrix))
-    return float(np.inf) if values[-1] == 0 else float(values[0] / values[-1])
+    return _condition(matrix - matrix.mean(axis=0))[0]
 
 
 def terms_condition_number(matrix: NDArray[np.float64]) -> float:
     """Return the condition number of the full term matrix, each column scaled to unit length."""
-    length = np.sqrt(np.einsum("ij,ij->j", matrix, matrix))
-    values = _singular_values(matrix / np.where(length == 0, 1.0, length))
-    return float(np.inf) if values[-1] == 0 else float(values[0] / values[-1])
+    return _condition(matrix)[0]
 
 
-def check_adequate(session: Session) -> None:
+def check_adequate(session: Session) -> Adequacy:
     """Refuse a session that cannot determine its coefficients.
 
     Raises
@@ -56,10 +65,12 @@ def check_adequate(session: Session) -> None:
         )  # fmt: skip
     names = [load.name for load in session.loads]
     for name in (*session.indications, *names):
-        row = int(np.argmax(np.abs(table.column(name))))
-        if abs(value := float(table.column(name)[row])) > _LARGEST:
+        column = table.column(name)
+        if max(-column.min(), column.max()) > _LARGEST:
+            row = int(np.argmax(np.abs(column)))
             raise _refused(
-                session, f"row {row + 1}, column {name} holds a number that no cell reads", f"{value:g}",
+                session, f"row {row + 1}, column {name} holds a number that no cell reads",
+                f"{float(column[row]):g}",
                 f"at most {_LARGEST:g} in size", "cell", "correct the cell, or the unit in the header",
             )  # fmt: skip
     loads = table.matrix(names)
@@ -68,12 +79,12 @@ def check_adequate(session: Session) -> None:
         raise _missing(
             session, constant, f"{', '.join(constant)} never var{'ies' if len(constant) == 1 else 'y'}"
         )
-    if len(names) > 1 and condition_number(loads) > COLLINEAR_REFUSED:
+    if len(names) > 1 and (together_by := condition_number(loads)) > COLLINEAR_REFUSED:
         tied = _tied(loads, names)
         together = f"{', '.join(tied)} only vary together"
         raise _refused(
             session, f"the reference loads do not span the unknowns: {together}",
-            f"{together} (condition number {condition_number(loads):.3g})",
+            f"{together} (condition number {together_by:.3g})",
             "each load varied independently of the others", "not-spanning",
             f"add rows in which {' or '.join(tied)} varies by itself",
         )  # fmt: skip
@@ -85,7 +96,7 @@ def check_adequate(session: Session) -> None:
             "an indication that follows the loads", "not-spanning",
             "check the cell's wiring, and apply a load that it answers to",
         )  # fmt: skip
-    number = condition_number(cells)
+    number, correlation = _condition(cells - cells.mean(axis=0))
     if number > COLLINEAR_REFUSED:
         tied = _tied(cells, session.indications)
         if len(names) < len(session.indications):
@@ -102,24 +113,44 @@ def check_adequate(session: Session) -> None:
             "change the load schedule so that each load is also applied by itself",
         )  # fmt: skip
     matrix = term_matrix(terms, table.columns(session.indications))
-    if terms_condition_number(_scaled_terms(matrix)) > 1 / RANK:
+    # The indications and a constant have just been found to be far from dependent.
+    plain = terms == (*session.indications, INTERCEPT)
+    if not plain and terms_condition_number(_scaled_terms(matrix)) > 1 / RANK:
         raise _refused(
             session, "the terms are dependent on these data", ", ".join(terms),
             "terms that the data tell apart", "rank",
             'name those to leave out: drop = ["..."]; abs(X) equals X where X never changes sign',
         )  # fmt: skip
+    return Adequacy(
+        condition_number=number,
+        condition_number_terms=terms_condition_number(matrix),
+        # Variance inflation factors: the diagonal of the inverse of the correlations.
+        vif=tuple(np.diag(np.linalg.inv(correlation)).tolist()),
+    )
 
 
-def _singular_values(matrix: NDArray[np.float64]) -> NDArray[np.float64]:
-    # Those of R are those of the whole matrix: a decomposition of many rows is not made twice.
-    values: NDArray[np.float64] = np.linalg.svd(np.linalg.qr(matrix, mode="r"), compute_uv=False)
-    return values
+def _condition(matrix: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]:
+    """Return the condition number of columns at unit length, and their products (columns, columns)."""
+    products, length = _products(matrix)
+    squares = np.linalg.eigvalsh(products)
+    if squares[0] > _BY_PRODUCTS * squares[-1]:
+        return float(np.sqrt(squares[-1] / squares[0])), products
+    # Singular values of R are those of the whole matrix: the long side is left behind.
+    values = np.linalg.svd(np.linalg.qr(matrix / length, mode="r"), compute_uv=False)
+    return (float(np.inf) if values[-1] == 0 else float(values[0] / values[-1])), products
+
+
+def _products(matrix: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the products of columns at unit length (columns, columns), and their lengths, 1 where 0."""
+    products = matrix.T @ matrix
+    length = np.sqrt(np.diag(products))
+    length = np.where(length == 0, 1.0, length)
+    return products / np.outer(length, length), length
 
 
 def _scaled(matrix: NDArray[np.float64]) -> NDArray[np.float64]:
     centred = matrix - matrix.mean(axis=0)
-    length = np.sqrt(np.einsum("ij,ij->j", centred, centred))
-    scaled: NDArray[np.float64] = centred / np.where(length == 0, 1.0, length)
+    scaled: NDArray[np.float64] = centred / _products(centred)[1]
     return scaled
 
 

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from toolkit.calibration.fit.inner import inner
 from toolkit.calibration.terms import INTERCEPT, Term, parse_term, term_matrix
 
 if TYPE_CHECKING:
@@ -70,9 +71,9 @@ def build_basis(terms: Sequence[str], columns: Mapping[str, NDArray[np.float64]]
     if constant:
         middle[:k] = [_anchor(column) for column in raw[:, :k].T]
         length[k] = _power_of_two(math.sqrt(n))
-    design = np.asfortranarray(raw)
+    design = raw
     design[:, :k] -= middle[:k]
-    length[:k] = [_power_of_two(math.sqrt(float(column @ column))) for column in design[:, :k].T]
+    length[:k] = [_power_of_two(math.sqrt(inner(column, column))) for column in design[:, :k].T]
     design /= length
     # design column j = (raw_j - middle_j) / length_j
     unscale = [[Fraction(0)] * p for _ in range(p)]

@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from toolkit.calibration.fit.inner import inner
+
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
@@ -44,58 +46,63 @@ def diagnose(
     *,
     cells: NDArray[np.float64],
     load: NDArray[np.float64],
-    direction: tuple[str, ...] | None,
+    up: NDArray[np.bool_] | None,
     replicates: NDArray[np.intp] | None = None,
 ) -> Diagnostics:
     """Return the diagnostics of a solved load.
 
-    ``cells`` (rows, indications), ``load`` (rows,); ``replicates`` as of `replicate_groups`, where they are
-    known already.
+    ``cells`` (rows, indications), ``load`` (rows,), ``up`` (rows,) where the direction is known;
+    ``replicates`` as of `replicate_groups`, where they are known already.
     """
     n, p = len(load), len(fit.terms)
-    w = np.ones(n) if fit.weights is None else np.sqrt(fit.weights)
+    w = None if fit.weights is None else np.sqrt(fit.weights)
     e, h = fit.scaled, np.minimum(fit.leverage, 1 - 1e-12)
-    sse, dof = float(e @ e) if fit.chi2 is None else fit.chi2, fit.dof
+    sse, dof = inner(e, e) if fit.chi2 is None else fit.chi2, fit.dof
     variance = sse / dof
     # Residuals at the level of rounding say nothing about the data.
-    floor = (1e-12 * float(np.abs(load * w).max())) ** 2
+    size = max(-load.min(), load.max()) if w is None else np.abs(load * w).max()
+    floor = (1e-12 * float(size)) ** 2
     tiny = max(floor, np.finfo(float).tiny)
-    internal = e / np.sqrt(max(variance, tiny) * (1 - h))
+    kept = 1 - h
+    freed = e / np.sqrt(kept)
+    internal = freed / np.sqrt(max(variance, tiny))
     if dof > 1:
-        left = np.maximum((sse - e**2 / (1 - h)) / (dof - 1), tiny)
-        external = e / np.sqrt(left * (1 - h))
+        left = sse - freed**2
+        left /= dof - 1
+        external = freed / np.sqrt(np.maximum(left, tiny, out=left))
     else:
         external = internal
+    deleted = e / kept
+    if w is not None:
+        deleted /= w
     quiet = variance <= floor
     return Diagnostics(
         internal=internal,
         external=external,
-        cook=internal**2 * h / (1 - h) / p,
-        press=float(np.sqrt(np.mean((e / w / (1 - h)) ** 2))),
+        cook=internal**2 * (h / (p * kept)),
+        press=float(np.sqrt(inner(deleted, deleted) / n)),
         outliers=() if quiet or dof < 2 else _outliers(external, dof - 1),
-        reversibility=_reversibility(fit.residuals, direction),
+        reversibility=_reversibility(fit.residuals, up),
         lack_of_fit=None if quiet else _lack_of_fit(fit, cells, load, replicates),
         heteroscedasticity=None if quiet or n < 10 else _breusch_pagan(e, load),
     )
-
-
-def variance_inflation(cells: NDArray[np.float64]) -> tuple[float, ...]:
-    """Return the variance inflation factor of each indication (1 where it is alone)."""
-    centred = cells - cells.mean(axis=0)
-    scaled = centred / np.sqrt(np.einsum("ij,ij->j", centred, centred))
-    return tuple(np.diag(np.linalg.inv(scaled.T @ scaled)).tolist())
 
 
 def replicate_groups(rows: NDArray[np.float64]) -> NDArray[np.intp]:
     """Return the number of each row's group of equal rows (rows,), groups counted from 0."""
     # Sorting rows is slow, sorting one mixed key a row is not. Equal rows have equal keys, so that rows
     # with a key of their own are alone; only the others are compared in full.
-    bits = np.ascontiguousarray(rows + 0.0).view(np.uint64)
+    bits = (np.ascontiguousarray(rows.T) + 0.0).view(np.uint64)  # -0.0 + 0.0 is 0.0
     key = np.zeros(len(rows), dtype=np.uint64)
-    for column in bits.T:
+    for column in bits:
         key = (key ^ (column ^ (column >> np.uint64(29)))) * np.uint64(0x9E3779B97F4A7C15)
         key ^= key >> np.uint64(32)
-    order = np.sort(key)
+    # Rows with a key of their own are told by counting keys cut to some bits, and the few that share a count
+    # by sorting.
+    size = np.uint64(len(rows).bit_length() + 2)
+    cut = (key >> (np.uint64(64) - size)).astype(np.intp)
+    few = np.flatnonzero(np.bincount(cut)[cut] > 1)
+    order = np.sort(key[few])
     again = np.unique(order[1:][order[1:] == order[:-1]])
     groups = np.arange(len(rows), dtype=np.intp)
     if not again.size:
@@ -121,11 +128,12 @@ def _outliers(external: NDArray[np.float64], dof: int) -> tuple[int, ...]:
     return tuple(int(i) + 1 for i in np.flatnonzero(np.abs(external) > limit))
 
 
-def _reversibility(residuals: NDArray[np.float64], direction: tuple[str, ...] | None) -> float | None:
-    up = np.array(direction or (), dtype=np.str_) == "up"
-    if not up.any() or up.all():
+def _reversibility(residuals: NDArray[np.float64], up: NDArray[np.bool_] | None) -> float | None:
+    ups = 0 if up is None else int(np.count_nonzero(up))
+    if up is None or ups in (0, len(up)):
         return None
-    return float(residuals[up].mean() - residuals[~up].mean())
+    rising = inner(residuals, up)
+    return rising / ups - (float(residuals.sum()) - rising) / (len(up) - ups)
 
 
 def _lack_of_fit(
@@ -147,14 +155,17 @@ def _lack_of_fit(
         return None
     from scipy.special import fdtrc
 
-    ratio = (float(fit.residuals @ fit.residuals) - pure) / lack_dof / (pure / pure_dof)
+    ratio = (inner(fit.residuals, fit.residuals) - pure) / lack_dof / (pure / pure_dof)
     return ratio, float(fdtrc(lack_dof, pure_dof, max(ratio, 0.0)))
 
 
 def _breusch_pagan(e: NDArray[np.float64], load: NDArray[np.float64]) -> float:
     from scipy.special import chdtrc
 
-    g = e**2 / np.mean(e**2) - 1
-    x = np.abs(load) - np.abs(load).mean()
-    spread = float(x @ x)
-    return float(chdtrc(1, 0.5 * float(x @ g) ** 2 / spread)) if spread > 0 else 1.0
+    g = e**2
+    g /= g.mean()
+    g -= 1
+    x = np.abs(load)
+    x -= x.mean()
+    spread = inner(x, x)
+    return float(chdtrc(1, 0.5 * inner(x, g) ** 2 / spread)) if spread > 0 else 1.0

@@ -67,7 +67,7 @@ def fit_gls(
 
     design = np.column_stack([shared(column / u, shrink) for column in basis.design.T])
     factor = Factor.of(np.asfortranarray(design), None)
-    solution, white = factor.solve(shared(load / u, shrink))
+    (solution,), (white,) = factor.solve(shared(load / u, shrink)[None, :])
     residuals = np.asarray(load - solution.dot(basis.design.T.astype(np.longdouble)), dtype=np.float64)
     diagonal = (1 - a * a / (1 + total)) / u**2
     pull = shared(residuals / u, 1 / (1 + total)) / u

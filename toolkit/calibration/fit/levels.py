@@ -14,8 +14,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from numpy.typing import NDArray
 
     from toolkit.calibration.fit.regression import TermFit
@@ -107,7 +105,7 @@ def reversals(
     residuals: NDArray[np.float64],
     load: NDArray[np.float64],
     level: NDArray[np.int64] | None,
-    direction: Sequence[str] | None,
+    up: NDArray[np.bool_] | None,
     run: NDArray[np.float64] | None,
 ) -> tuple[Reversal, ...]:
     """Return down minus up of the indicated load at each level that has both, by run.
@@ -115,10 +113,9 @@ def reversals(
     ``residuals`` = reference - indicated, so that unequal references of one level cancel. Levels without
     both directions in one run say nothing and are left out.
     """
-    if level is None or direction is None:
+    if level is None or up is None:
         return ()
     full = float(np.abs(load).max())
-    up = np.array([one == "up" for one in direction], dtype=bool)
     runs = np.zeros(len(load)) if run is None else run
     both, key = np.unique(np.column_stack([runs, level.astype(np.float64)]), axis=0, return_inverse=True)
     key = key.ravel()

@@ -89,7 +89,7 @@ def fit_odr(
         # At fixed slopes the problem is linear: its load is carried back to the observed indications.
         carried = load + (slope * delta).sum(axis=0)
         factor = Factor.of(at, 1 / spread)
-        solution, rest = factor.solve(carried)
+        (solution,), (rest,) = factor.solve(carried[None, :])
         moved = np.abs(at @ (np.asarray(solution, dtype=np.float64) - beta)).max()
         beta = np.asarray(solution, dtype=np.float64)
         adjusted = slope * u_cells[:, None] ** 2 * rest / spread**2

@@ -324,9 +324,9 @@ def _creeps(
 
 
 def _reversibility(record: CalibrationRecord, table: Table) -> tuple[Reversibility, ...]:
-    if table.run is None or table.direction is None:
+    if table.run is None or table.up is None:
         return ()
-    up = np.array([one == "up" for one in table.direction])
+    up = table.up
     names = [one.load for one in record.loads]
     matrix = table.matrix(names)
     largest = np.abs(matrix).max(axis=0)

@@ -1,13 +1,14 @@
 """Least squares as `metrology` demands it: statsmodels with QR on exactly centred, scaled columns, refined.
 
 A pseudo-inverse on raw columns gives six correct digits on the NIST load-cell set (Pontius); QR on scaled
-columns gives twelve. Refinement with the gradient A'(y - A x) in extended precision (corrected seminormal
-equations: Bjorck, Numerical Methods for Least Squares Problems, 1996, section 6.6.5) takes out what
-rounding of the solve is left, also where the residuals are large against the solution.
+columns gives twelve. Refinement with a gradient A'(y - A x) that does not round (`exact_products`; corrected
+seminormal equations: Bjorck, Numerical Methods for Least Squares Problems, 1996, section 6.6.5) takes out
+what rounding of the solve is left, also where the residuals are large against the solution.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
@@ -16,6 +17,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from toolkit.calibration.fit.basis import Basis, build_basis
+from toolkit.calibration.fit.exact_products import CutDesign, Residuals
+from toolkit.calibration.fit.inner import inner
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -87,10 +90,9 @@ def fit_loads(
     weights = None if u is None else 1.0 / u**2
     factor = Factor.of(basis.design, None if u is None else 1.0 / u)
     fits = []
-    for load in loads:
-        solution, residuals = factor.solve(load)
-        dof = len(load) - len(factor.inverse)
-        sd = float(np.sqrt(residuals @ residuals / dof))
+    for solution, residuals in zip(*factor.solve(np.array(loads)), strict=True):
+        dof = len(residuals) - len(factor.inverse)
+        sd = math.sqrt(inner(residuals, residuals) / dof)
         scaled = residuals if u is None else residuals / u
         covariance = covariance_of(basis, factor.inverse, sd**2 if u is None else 1.0)
         fits.append(
@@ -105,7 +107,7 @@ def fit_loads(
                 weights=weights,
                 singular_values=factor.singular_values,
                 scaled=scaled,
-                chi2=None if u is None else float(scaled @ scaled),
+                chi2=None if u is None else inner(scaled, scaled),
             )
         )
     return tuple(fits)
@@ -115,14 +117,14 @@ def fit_loads(
 class Factor:
     """One QR decomposition of a design (rows, terms), weighted row by row where ``root`` = 1/u is given.
 
-    ``inverse`` (terms, terms) is the inverse of the normal matrix, ``leverage`` (rows,), ``singular_values``
-    those of the design without weights.
+    ``q`` (rows, terms) and ``r`` (terms, terms) are its factors, ``inverse`` (terms, terms) that of the
+    normal matrix, ``leverage`` (rows,), ``singular_values`` those of the design without weights.
     """
 
     design: NDArray[np.float64]
-    exact: NDArray[np.longdouble]
     root: NDArray[np.float64] | None
-    r_inverse: NDArray[np.float64]
+    q: NDArray[np.float64]
+    r: NDArray[np.float64]
     inverse: NDArray[np.float64]
     leverage: NDArray[np.float64]
     singular_values: NDArray[np.float64]
@@ -130,42 +132,59 @@ class Factor:
     @classmethod
     def of(cls, design: NDArray[np.float64], root: NDArray[np.float64] | None) -> Factor:
         """Decompose; LinAlgError where the columns are dependent."""
-        from scipy.linalg import qr, solve_triangular
+        from scipy.linalg import qr
 
-        q, r = qr(design if root is None else design * root[:, None], mode="economic")
+        weighted = design if root is None else design * root[:, None]
+        found = qr(weighted, mode="economic", check_finite=False)
+        q, r = (np.asarray(one, dtype=np.float64) for one in found)
         if not np.abs(np.diag(r)).all():
             raise np.linalg.LinAlgError("the terms are exactly dependent")
-        r_inverse = np.asarray(solve_triangular(r, np.eye(len(r))), dtype=np.float64)
+        # Elimination has nothing to do in a triangle: this is back-substitution.
+        r_inverse = np.linalg.solve(r, np.eye(len(r)))
         of_design = r if root is None else np.linalg.qr(design, mode="r")
         return cls(
             design=design,
-            exact=design.T.astype(np.longdouble),
             root=root,
-            r_inverse=r_inverse,
+            q=q,
+            r=r,
             inverse=r_inverse @ r_inverse.T,
             leverage=np.einsum("ij,ij->i", q, q),
             singular_values=np.asarray(np.linalg.svd(of_design, compute_uv=False), dtype=np.float64),
         )
 
-    def solve(self, load: NDArray[np.float64]) -> tuple[NDArray[np.longdouble], NDArray[np.float64]]:
-        """Return the solution (terms,) in extended precision, and the residuals (rows,)."""
-        from statsmodels.regression.linear_model import OLS
-
-        weighted = load if self.root is None else load * self.root
-        weighted_design = self.design if self.root is None else self.design * self.root[:, None]
-        first = np.asarray(OLS(weighted, weighted_design).fit(method="qr").params, dtype=np.float64)
+    def solve(self, loads: NDArray[np.float64]) -> tuple[NDArray[np.longdouble], NDArray[np.float64]]:
+        """Return the solutions (loads, terms) in extended precision and the residuals, of (loads, rows)."""
+        cut = CutDesign.of(np.ascontiguousarray(self.design.T))
+        square = None if self.root is None else self.root**2
+        first = self._first(loads)
         solution = first.astype(np.longdouble)
-        squared = None if self.root is None else self.root.astype(np.longdouble) ** 2
-        rest = load - solution.dot(self.exact)
+        rest = cut.residuals(loads, solution)
         for _ in range(_REFINEMENTS):
-            gradient = [column.dot(rest if squared is None else rest * squared) for column in self.exact]
-            step = self.inverse @ np.asarray(gradient, dtype=np.float64)
+            # A weight rounds once a row, as if its uncertainty were stated to 53 bits.
+            weighed = rest if square is None else Residuals.of(square * (rest.high + rest.low), cut.bits)
+            step = np.asarray(cut.gradient(weighed), dtype=np.float64) @ self.inverse
             solution = solution + step
-            # A step is small: its product in doubles is exact enough for the extended residuals.
-            rest -= self.design @ step
+            # A step is small: its product in doubles is exact enough for the residuals' low part.
+            rest = Residuals(high=rest.high, low=rest.low - step @ self.design.T)
             if not (np.abs(step) > _SETTLED * np.abs(first)).any():
                 break
-        return solution, np.asarray(rest, dtype=np.float64)
+        return solution, rest.high + rest.low
+
+    def _first(self, loads: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return statsmodels' solution by QR (loads, terms).
+
+        It is given the triangle R and Q'y with the length of what is left over, in place of all rows: an
+        orthogonal change of the same problem, with the same solution and the same sum of squares.
+        """
+        from statsmodels.regression.linear_model import OLS
+
+        y = loads if self.root is None else loads * self.root
+        head = y @ self.q
+        left = y - head @ self.q.T
+        length = np.sqrt(np.einsum("ij,ij->i", left, left))
+        rows = np.vstack([self.r, np.zeros(len(self.r))])
+        found = [OLS(column, rows).fit(method="qr").params for column in np.column_stack([head, length])]
+        return np.asarray(found, dtype=np.float64)
 
 
 def raw_coefficients(basis: Basis, solution: NDArray[Any]) -> tuple[float, ...]:

@@ -171,9 +171,7 @@ def _report(fit: SessionFit, one: LoadResult, level: NDArray[np.int64] | None) -
     total, within, left_out = _sums(solved, load, weighted=session.method == "wls")
     error = solved.standard_errors
     size = np.where(error > 0, error, 1.0)
-    found = reversals(
-        residuals=solved.residuals, load=load, level=level, direction=table.direction, run=table.run
-    )
+    found = reversals(residuals=solved.residuals, load=load, level=level, up=table.up, run=table.run)
     sizes = np.array([]) if level is None else np.bincount(level)
     at = int(np.argmax(np.abs(load)))
     check = session.check

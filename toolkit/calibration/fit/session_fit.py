@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolkit.calibration.fit.adequacy import check_adequate, condition_number, terms_condition_number
-from toolkit.calibration.fit.diagnostics import Diagnostics, diagnose, replicate_groups, variance_inflation
+from toolkit.calibration.fit.adequacy import check_adequate
+from toolkit.calibration.fit.diagnostics import Diagnostics, diagnose, replicate_groups
 from toolkit.calibration.fit.gls import fit_gls
 from toolkit.calibration.fit.odr import fit_odr
 from toolkit.calibration.fit.regression import TermFit, fit_loads, fit_terms
@@ -60,11 +60,10 @@ def fit_session(session: Session) -> SessionFit:
     SessionError
         the data cannot determine the coefficients (see `adequacy`)
     """
-    check_adequate(session)
+    adequacy = check_adequate(session)
     table = session.table
     columns = table.columns(session.indications)
     cells = table.matrix(session.indications)
-    terms = term_matrix(session.terms, columns)
     groups = replicate_groups(cells)
     return SessionFit(
         session=session,
@@ -72,9 +71,9 @@ def fit_session(session: Session) -> SessionFit:
             _result(session, setting, fit, cells, groups)
             for setting, fit in zip(session.loads, _solved(session, columns), strict=True)
         ),
-        condition_number=condition_number(cells),
-        condition_number_terms=terms_condition_number(terms),
-        vif=variance_inflation(cells),
+        condition_number=adequacy.condition_number,
+        condition_number_terms=adequacy.condition_number_terms,
+        vif=adequacy.vif,
     )
 
 
@@ -121,7 +120,7 @@ def _result(
     return LoadResult(
         setting=setting,
         fit=fit,
-        diagnostics=diagnose(fit, cells=cells, load=load, direction=table.direction, replicates=groups),
+        diagnostics=diagnose(fit, cells=cells, load=load, up=table.up, replicates=groups),
         llf=max(LLF_FACTOR * fit.residual_sd, _resolution(session, fit)),
         check_residuals=residuals,
         check_max_percent_fs=percent,

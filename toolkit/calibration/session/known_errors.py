@@ -133,7 +133,7 @@ def _groups(entry: Any, table: Table, where: object) -> tuple[NDArray[np.intp], 
 
 def _column(name: str, table: Table) -> NDArray[Any] | None:
     if name == "direction":
-        return None if table.direction is None else np.asarray(table.direction)
+        return table.up
     if name in _LABELS:
         return table.run if name == "run" else table.rotation
     return table.column(name) if table.has(name) else None

@@ -31,20 +31,26 @@ _HEADER = re.compile(r"(?P<name>[^\[\]]+?)\s*(?:\[(?P<unit>[^\[\]]*)\])?\s*\Z")
 class Table:
     """A read file: ``names`` and ``units`` of the numeric columns, ``values`` (rows, columns) as written.
 
-    ``run`` (rows,), ``direction`` and ``rotation`` [deg] are None where the file has no such column.
+    ``run`` (rows,), ``up`` (rows,), True where the load was increased, and ``rotation`` [deg] are None where
+    the file has no such column.
     """
 
     names: tuple[str, ...]
     units: tuple[str, ...]
     values: NDArray[np.float64]
     run: NDArray[np.float64] | None
-    direction: tuple[str, ...] | None
+    up: NDArray[np.bool_] | None
     rotation: NDArray[np.float64] | None
 
     @property
     def rows(self) -> int:
         """Number of rows."""
         return len(self.values)
+
+    @property
+    def direction(self) -> tuple[str, ...] | None:
+        """The column ``direction`` in words."""
+        return None if self.up is None else tuple("up" if one else "down" for one in self.up.tolist())
 
     def has(self, name: str) -> bool:
         """Tell whether the file has a numeric column."""
@@ -84,7 +90,8 @@ class Table:
 
     def matrix(self, names: Sequence[str]) -> NDArray[np.float64]:
         """Return columns side by side (rows, names)."""
-        return self.values[:, [self.names.index(name) for name in names]]
+        # Column by column in memory, as every computation reads it.
+        return np.array([self.column(name) for name in names]).T
 
 
 def read_table(
@@ -135,14 +142,15 @@ def read_table(
                 header[names.index(name)], f"a header such as '{name} [N]' or '{name} [mV/V]'", "no-unit",
             )  # fmt: skip
         units.append(unit(match["unit"].strip(), where=f"{where}, column {name}").text)
-    direction = None
+    up = None
     if "direction" in cells:
-        direction = tuple(cells["direction"])
+        direction = cells["direction"]
         if not set(direction) <= {"up", "down"}:
             direction = tuple(cell.strip().lower() for cell in direction)
             for number, cell in enumerate(direction, start=1):
                 if cell not in ("up", "down"):
                     raise _cell(where, number, "direction", cell, "up or down")
+        up = np.array([cell == "up" for cell in direction])
     run = _numbers(cells["run"], "run", where) if "run" in cells else None
     if run is not None and (fraction := np.flatnonzero(run != np.floor(run))).size:
         at = int(fraction[0])
@@ -150,9 +158,9 @@ def read_table(
     return Table(
         names=tuple(numeric),
         units=tuple(units),
-        values=np.column_stack([_numbers(cells[name], name, where) for name in numeric]),
+        values=np.array([_numbers(cells[name], name, where) for name in numeric]).T,
         run=run,
-        direction=direction,
+        up=up,
         rotation=_numbers(cells["rotation"], "rotation", where) if "rotation" in cells else None,
     )
 

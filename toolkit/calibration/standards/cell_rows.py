@@ -150,13 +150,12 @@ def _run(
     u = None
     if table.has(name):
         u = table.column(name)[rows] * (unit(table.unit(name)).factor / unit(table.unit(load)).factor)
-    direction = table.direction or ("up",) * table.rows
     return CellRun(
         number=number,
         rotation_deg=None if table.rotation is None else float(table.rotation[rows[0]]),
         force=np.abs(table.column(load)[rows]),
         deflection=reading[rows] - (before or 0.0),
-        up=np.array([direction[i] == "up" for i in rows]),
+        up=np.ones(len(rows), dtype=bool) if table.up is None else table.up[rows],
         u=u,
         zero_before=before,
         zero_after=after,

@@ -157,7 +157,7 @@ def _fixed(
     if level is None:
         basis = np.linalg.qr(design / np.maximum(np.abs(design).max(axis=0), 1e-300))[0]
         return None, lambda columns: columns - basis @ (basis.T @ columns), design.shape[1]
-    down = np.array([one == "down" for one in table.direction or ("up",) * len(level)], dtype=np.int64)
+    down = np.zeros(len(level), dtype=np.int64) if table.up is None else (~table.up).astype(np.int64)
     cell = np.asarray(np.unique(2 * level + down, return_inverse=True)[1].ravel(), dtype=np.int64)
     count = np.bincount(cell)
 
@@ -202,12 +202,12 @@ def _reversal(
     residuals: NDArray[np.float64], level: NDArray[np.int64] | None, table: Table, variance: float
 ) -> tuple[float, int]:
     """Return half the root mean square difference of the directions, freed of the scatter within."""
-    if level is None or table.direction is None:
+    if level is None or table.up is None:
         return 0.0, 0
-    up = np.array([one == "up" for one in table.direction], dtype=bool)
     size = int(level.max()) + 1
-    n = [np.bincount(level[side], minlength=size) for side in (up, ~up)]
-    sums = [np.bincount(level[side], weights=residuals[side], minlength=size) for side in (up, ~up)]
+    sides = (table.up, ~table.up)
+    n = [np.bincount(level[side], minlength=size) for side in sides]
+    sums = [np.bincount(level[side], weights=residuals[side], minlength=size) for side in sides]
     both = (n[0] > 0) & (n[1] > 0)
     count = int(both.sum())
     if not count:
