@@ -98,11 +98,11 @@ MODEL = GlobalModel(
             text="equivalent slip angle of camber, per rad", needs=("camber",),
         ),
         GlobalParameter(
-            name="SV", unit="1", default=0.0, low=-0.2, high=0.2, size=5e-3,
+            name="SV", unit="1", default=0.0, low=-0.2, high=0.2, size=0.01,
             text="offset of FY over load (conicity)", needs=("both_signs",),
         ),
         GlobalParameter(
-            name="SM", unit="m", default=0.0, low=-0.05, high=0.05, size=5e-4,
+            name="SM", unit="m", default=0.0, low=-0.05, high=0.05, size=1e-3,
             text="offset of MZ over load", stage="MZ", needs=("both_signs",),
         ),
     ),

@@ -134,15 +134,16 @@ MODEL = GlobalModel(
             text="its change with load: mu = MU exp(MU_Z dfz)", needs=("two_loads",),
         ),
         GlobalParameter(
-            name="R", unit="1", default=1.0, low=0.1, high=1.0, size=0.05,
+            name="R", unit="1", default=1.0, low=0.3, high=1.0, size=0.05,
             text="Coulomb over static friction",
         ),
         GlobalParameter(
-            name="VS", unit="m/s", default=5.0, low=0.1, high=100.0, size=1.0, text="Stribeck speed",
+            name="VS", unit="m/s", default=5.0, low=0.5, high=100.0, size=1.0, text="Stribeck speed",
         ),
         GlobalParameter(
-            name="S2", unit="s/m", default=0.0, low=0.0, high=0.3, size=5e-3,
-            text="viscous friction over load and speed",
+            name="S2", unit="s/m", default=0.0, low=0.0, high=0.02, size=2e-3,
+            text="viscous friction over load and speed; a curve of one speed cannot tell it from shape",
+            needs=("speed",),
         ),
         GlobalParameter(
             name="L", unit="m", default=0.16, low=0.005, high=1.0, size=0.01,
@@ -169,11 +170,11 @@ MODEL = GlobalModel(
             text="equivalent slip angle of camber, per rad", needs=("camber",),
         ),
         GlobalParameter(
-            name="SV", unit="1", default=0.0, low=-0.2, high=0.2, size=5e-3,
+            name="SV", unit="1", default=0.0, low=-0.2, high=0.2, size=0.01,
             text="offset of FY over load (conicity)", needs=("both_signs",),
         ),
         GlobalParameter(
-            name="SM", unit="m", default=0.0, low=-0.05, high=0.05, size=5e-4,
+            name="SM", unit="m", default=0.0, low=-0.05, high=0.05, size=1e-3,
             text="offset of MZ over load", stage="MZ", needs=("both_signs",),
         ),
     ),
