@@ -1,0 +1,110 @@
+"""A case: the simulation as declared, the recordings, and nothing that names an effect."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal, get_args
+
+from toolkit.channels import Axes
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+Role = Literal["time", "input", "output", "covariate"]
+Kind = Literal["machine", "python", "ode", "columns"]
+ROLES: tuple[Role, ...] = get_args(Role)
+KINDS: tuple[Kind, ...] = get_args(Kind)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CaseParameter:
+    """A parameter of the simulation in its own unit; without ``sd`` it is known exactly."""
+
+    name: str
+    value: float
+    unit: str
+    sd: float | None = None
+    bounds: tuple[float, float] | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CaseChannel:
+    """A column that is used: its unit, its role, and its total sensor noise where it is stated."""
+
+    name: str
+    unit: str
+    role: Role
+    sd: float | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Run:
+    """One continuous recording: columns in the recording's units, shape (n,), NaN where a sample is missing.
+
+    ``t`` is the time [s]; without a time channel the row's number. ``simulated`` has the other program's
+    output of a case of kind ``columns``; ``declared`` the run's table as written.
+    """
+
+    name: str
+    t: NDArray[np.float64]
+    columns: Mapping[str, NDArray[np.float64]]
+    conditions: Mapping[str, str]
+    declared: Mapping[str, Any]
+    simulated: Mapping[str, NDArray[np.float64]]
+
+    @property
+    def rows(self) -> int:
+        """Number of rows."""
+        return len(self.t)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Simulation:
+    """What a case says of its simulation; fields of other kinds are empty."""
+
+    kind: Kind
+    machine: str = ""
+    calibration: str = ""
+    tire: Path | None = None
+    path: Path | None = None
+    function: str = ""
+    states: tuple[str, ...] = ()
+    force_terms: tuple[tuple[str, str], ...] = ()
+    simulated: tuple[tuple[str, str], ...] = ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Case:
+    """A case, read whole; ``sha256`` covers the case file and every file that it names."""
+
+    path: Path
+    title: str
+    simulation: Simulation
+    parameters: tuple[CaseParameter, ...]
+    axes: Axes
+    has_time: bool
+    channels: tuple[CaseChannel, ...]
+    runs: tuple[Run, ...]
+    predict: tuple[Run, ...]
+    sha256: str
+
+    @property
+    def outputs(self) -> tuple[CaseChannel, ...]:
+        """Channels that the simulation is judged on."""
+        return tuple(one for one in self.channels if one.role == "output")
+
+    @property
+    def drivers(self) -> tuple[CaseChannel, ...]:
+        """Inputs and covariates."""
+        return tuple(one for one in self.channels if one.role in ("input", "covariate"))
+
+    def channel(self, name: str) -> CaseChannel:
+        """Return a channel by name; KeyError where the case has none."""
+        return {one.name: one for one in self.channels}[name]
+
+    def unit(self, name: str) -> str:
+        """Return the unit of a channel, or that of the output which a simulated column stands for."""
+        return self.channel(name).unit

@@ -1,0 +1,118 @@
+"""The hub's load cells in a case: FY and MZ from them by a record, and effects on single cells."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from toolkit.calibration.apply import apply_record
+from toolkit.diagnosis.kinds.channels import channel_places, undone
+from toolkit.diagnosis.model import Active, Output
+from toolkit.effects.effect import Effect
+from toolkit.effects.signals import Setting
+from toolkit.errors import ConfigError
+from toolkit.units import unit
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from toolkit.calibration.records.record import CalibrationRecord
+    from toolkit.diagnosis.case import Case, Run
+
+
+class Cells:
+    """Recorded cells and the record that turns them into loads, with the tare of the case's tare runs."""
+
+    def __init__(self, case: Case, record: CalibrationRecord) -> None:
+        declared = {one.name: one for one in case.channels}
+        missing = [name for name in record.indications if name not in declared]
+        if missing:
+            raise ConfigError(
+                "the calibration needs a cell that the recording has not",
+                where=f"{case.path}: recording.channels", got=", ".join(missing),
+                expected=", ".join(record.indications), next_step="add the channels, or judge FY and MZ directly",
+                rule="case",
+            )  # fmt: skip
+        self.case, self.record = case, record
+        self.names = record.indications
+        self.loads = tuple(one.load for one in record.loads if one.load in ("FY", "MZ"))
+        self._units = {name: declared[name].unit for name in self.names}
+        self._noise = {name: declared[name].sd for name in self.names}
+        self._recorded_unit = dict(zip(record.indications, record.indication_units, strict=True))
+        tares = [run for run in case.runs if run.conditions.get("phase") == "tare"]
+        self._tare = (
+            None
+            if not tares
+            else {
+                name: float(np.nanmean(np.concatenate([self._cell(run, name) for run in tares])))
+                for name in self.names
+            }
+        )
+
+    def _cell(self, run: Run, name: str) -> NDArray[np.float64]:
+        here, there = unit(self._units[name]), unit(self._recorded_unit[name])
+        if here.dimension != there.dimension:
+            raise ConfigError(
+                "a cell's unit is not the calibration's", where=f"{self.case.path}: {name}", got=here.text,
+                expected=there.text, next_step="correct the unit, or name the right calibration", rule="case",
+            )  # fmt: skip
+        return run.columns[name] * (here.factor / there.factor)
+
+    def load(self, run: Run, name: str) -> NDArray[np.float64]:
+        """Return FY [N] or MZ [N·m] from the recorded cells, (n,)."""
+        return self.loads_of(run, {cell: self._cell(run, cell) for cell in self.names})[name]
+
+    def loads_of(self, run: Run, cells: dict[str, NDArray[np.float64]]) -> dict[str, NDArray[np.float64]]:
+        """Return FY and MZ [SI] of cells in the record's units."""
+        return apply_record(self.record, cells, units=self._recorded_unit, tare=self._tare, only=self.loads)
+
+    def noise(self, load: str) -> float | None:
+        """Return a load's noise from the cells' stated noise, None where a cell has none."""
+        fit = self.record.load(load)
+        known = dict(zip(fit.terms, fit.coefficients, strict=True))
+        total = 0.0
+        for name in self.names:
+            sd = self._noise[name]
+            if sd is None or name not in known:
+                return None
+            factor = unit(self._units[name]).factor / unit(self._recorded_unit[name]).factor
+            total += (known[name] * sd * factor) ** 2
+        return float(np.sqrt(total)) * unit(fit.unit).factor
+
+    def places(self, effect: Effect, drivers: set[str]) -> list[tuple[str | None, str | None]]:
+        """Return the cells on which an effect could act."""
+        if effect.name in ("crosstalk", "channel_swap", "unit_error"):
+            return []
+        return channel_places(effect, [(name, self._units[name]) for name in self.names], (), drivers)
+
+    def disturbed(
+        self,
+        values: dict[str, NDArray[np.float64]],
+        active: Sequence[Active],
+        run: Run,
+        setting: Setting,
+        outputs: Sequence[Output],
+    ) -> dict[str, NDArray[np.float64]]:
+        """Return the loads that the record makes of disturbed cells.
+
+        What the cells truly carried is the recording with the effect undone; the difference to what they
+        showed, by the record, is what the effect adds to the simulation.
+        """
+        here = [one for one in active if one.channel in self.names and one.acts_in(run)]
+        if not here:
+            return values
+        recorded = {name: self._cell(run, name) for name in self.names}
+        true = dict(recorded)
+        for one in reversed(here):
+            name = str(one.channel)
+            true[name] = undone(true[name], one, setting, true)
+        shown, without = self.loads_of(run, recorded), self.loads_of(run, true)
+        made = dict(values)
+        for output in outputs:
+            if output.name in self.loads:
+                made[output.name] = made[output.name] + (shown[output.name] - without[output.name]) / unit(
+                    output.unit
+                ).factor
+        return made

@@ -1,0 +1,115 @@
+"""Effects on single channels after the physics: load cells and acquisition, in the channel's own unit."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from toolkit.diagnosis.kinds.setting import dimension
+from toolkit.diagnosis.model import Active
+from toolkit.effects.effect import STAGES, Effect
+from toolkit.effects.signals import Setting
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from toolkit.diagnosis.case import Case, Run
+
+_FORCE_LIKE = ("force", "moment", "bridge_ratio", "count")
+_STEPS = 8
+
+
+def channel_places(
+    effect: Effect, outputs: Sequence[tuple[str, str]], others: Sequence[tuple[str, str]], drivers: set[str]
+) -> list[tuple[str | None, str | None]]:
+    """Return where a channel effect could act.
+
+    Parameters
+    ----------
+    outputs : name and unit of every channel that the effect may act on
+    others : name and unit of further channels that may leak into them
+    drivers : names of the channels that a setting has
+    """
+    if effect.channel is None:
+        return []
+    if effect.any_of and not drivers & set(effect.any_of):
+        return []
+    if effect.name == "channel_swap":
+        names = [name for name, _ in outputs]
+        units = dict(outputs)
+        return [
+            (a, b) for i, a in enumerate(names) for b in names[i + 1 :]
+            if dimension(units[a]) == dimension(units[b]) or _both_loads(units[a], units[b])
+        ]  # fmt: skip
+    if effect.name == "wrong_calibration":
+        return []
+    if effect.name == "crosstalk":
+        return [
+            (to, source)
+            for to, to_unit in outputs
+            for source, unit in (*outputs, *others)
+            if source != to and (_both_loads(to_unit, unit) or dimension(unit) == dimension(to_unit))
+        ]
+    return [(name, None) for name, _ in outputs]
+
+
+def _both_loads(one: str, other: str) -> bool:
+    return dimension(one) in _FORCE_LIKE and dimension(other) in _FORCE_LIKE
+
+
+def through_channels(
+    values: Mapping[str, NDArray[np.float64]],
+    active: Sequence[Active],
+    run: Run,
+    setting: Setting,
+    observed: Mapping[str, NDArray[np.float64]],
+) -> dict[str, NDArray[np.float64]]:
+    """Return channels with their effects, stage by stage; each channel in its own unit."""
+    made = dict(values)
+    here = [one for one in active if one.effect.channel is not None and one.acts_in(run)]
+    for one in sorted(here, key=lambda each: STAGES.index(each.effect.stage)):
+        if one.channel is None or one.channel not in made:
+            continue
+        if one.effect.name == "channel_swap":
+            other = str(one.source)
+            made[one.channel], made[other] = made[other], made[one.channel]
+            continue
+        seen = setting
+        if one.source is not None:
+            source = made.get(one.source, observed.get(one.source))
+            if source is None:
+                continue
+            seen = dataclasses.replace(setting, channels={**setting.channels, "from": source})
+        made[one.channel] = one.effect.channel(made[one.channel], one.values, seen)
+    return made
+
+
+def undone(
+    recorded: NDArray[np.float64], one: Active, setting: Setting, others: Mapping[str, NDArray[np.float64]]
+) -> NDArray[np.float64]:
+    """Return what a channel would have shown without an effect: the hook's inverse by fixed point."""
+    assert one.effect.channel is not None
+    if one.effect.name == "channel_sign":
+        return -recorded
+    if one.effect.name == "unit_error":
+        return recorded / one.values["factor"]
+    if one.effect.name == "sensitivity_error":
+        return recorded / (1 + one.values["gain_error"])
+    seen = setting
+    if one.source is not None:
+        seen = dataclasses.replace(setting, channels={**setting.channels, "from": others[one.source]})
+    guess = recorded
+    for _ in range(_STEPS):
+        guess = guess + (recorded - one.effect.channel(guess, one.values, seen))
+    return np.where(np.isfinite(guess), guess, recorded)
+
+
+def spread(case: Case, name: str) -> float:
+    """Return the largest magnitude of a channel over all runs, in its unit; 1 where it is empty."""
+    values = [run.columns[name] for run in case.runs if name in run.columns]
+    whole = np.concatenate(values) if values else np.array([1.0])
+    whole = np.abs(whole[np.isfinite(whole)])
+    return float(whole.max()) if len(whole) and whole.max() > 0 else 1.0

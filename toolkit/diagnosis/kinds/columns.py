@@ -1,0 +1,123 @@
+"""Kind ``columns``: another program's output beside the recording; it cannot be run again.
+
+Effects on single channels act on the recorded output as it is. Effects on road, carriage and tire need the
+output at other slip angles and loads: a smooth surface through the simulated columns gives the difference.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from toolkit.diagnosis.kinds.channels import channel_places, through_channels
+from toolkit.diagnosis.kinds.motion import Motion, motion_of
+from toolkit.diagnosis.kinds.setting import NOMINAL_SPEED, nominal_load, setting
+from toolkit.diagnosis.kinds.surface import Surface
+from toolkit.diagnosis.kinds.tire import base_drive, through_tire, tire_places, tire_signs
+from toolkit.diagnosis.model import Active, Output
+from toolkit.effects.effect import Effect
+from toolkit.effects.signals import Drive, Setting, TireForces
+from toolkit.errors import ConfigError
+from toolkit.units import unit
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from toolkit.diagnosis.case import Case, Run
+
+
+class ColumnsModel:
+    """Simulated columns; a parameter named like an output plus ``_gain`` or ``_offset`` scales or shifts it."""
+
+    def __init__(self, case: Case) -> None:
+        self.case = case
+        named = dict(case.simulation.simulated)
+        missing = [one.name for one in case.outputs if one.name not in named]
+        if missing:
+            raise ConfigError(
+                "an output has no simulated column", where=f"{case.path}: simulation.simulated",
+                got=", ".join(missing), expected="a column for every output", next_step="name it, or drop the output",
+                rule="case",
+            )  # fmt: skip
+        allowed = {f"{name}_{what}" for name in named for what in ("gain", "offset")}
+        unknown = [one.name for one in case.parameters if one.name not in allowed]
+        if unknown:
+            raise ConfigError(
+                "a simulation that cannot be run again has no such parameter",
+                where=f"{case.path}: simulation.parameters", got=", ".join(unknown), expected=", ".join(sorted(allowed)),
+                next_step="remove it, or give the simulation as kind python", rule="case",
+            )  # fmt: skip
+        self.parameters = case.parameters
+        self.outputs = tuple(Output(name=one.name, unit=one.unit, sd=one.sd) for one in case.outputs)
+        self._load = nominal_load(case)
+        self._settings: dict[str, Setting] = {}
+        drivers = {one.name for one in case.drivers}
+        is_tire = bool(drivers & {"SA", "SA_CMD"}) and bool({"FY", "MZ"} & set(named))
+        self._surface = Surface(case) if is_tire else None
+        self.motion: Motion | None = None if is_tire else motion_of(case)
+
+    def observed(self, run: Run) -> dict[str, NDArray[np.float64]]:
+        """Return what was recorded of every output."""
+        return {one.name: run.columns[one.name] for one in self.outputs if one.name in run.columns}
+
+    def simulate(
+        self, run: Run, p: Mapping[str, float], active: Sequence[Active]
+    ) -> dict[str, NDArray[np.float64]]:
+        """Return every output of a run with effects in it."""
+        here = self.setting(run)
+        made = {
+            one.name: run.simulated[one.name] * p.get(f"{one.name}_gain", 1.0) + p.get(f"{one.name}_offset", 0.0)
+            for one in self.outputs
+        }
+        if self._surface is not None and any(one.effect.drive is not None and one.acts_in(run) for one in active):
+            made = self._tire(run, made, active, here)
+        forces = [one for one in active if one.effect.stage == "dynamics" and one.acts_in(run)]
+        if forces and self.motion is not None:
+            made = self.motion.disturbed(made, forces, run)
+        return through_channels(made, active, run, here, run.columns)
+
+    def places(self, effect: Effect) -> list[tuple[str | None, str | None]]:
+        """Return where an effect could act."""
+        found: list[tuple[str | None, str | None]] = []
+        drivers = {one.name for one in self.case.drivers}
+        if self._surface is not None and self._surface.good:
+            found += tire_places(
+                effect, has_IA=False, has_P=False,
+                varies={"load_commanded": "FZ_CMD" in drivers and "FZ" not in drivers},
+            )  # fmt: skip
+        if self.motion is not None:
+            found += self.motion.places(effect)
+        others = [(one.name, one.unit) for one in self.case.drivers]
+        return found + channel_places(effect, [(one.name, one.unit) for one in self.outputs], others, drivers)
+
+    def setting(self, run: Run) -> Setting:
+        """Return a run's setting."""
+        if run.name not in self._settings:
+            self._settings[run.name] = setting(self.case, run, nominal_load_N=self._load, speed_m_s=NOMINAL_SPEED)
+        return self._settings[run.name]
+
+    def _tire(
+        self, run: Run, made: dict[str, NDArray[np.float64]], active: Sequence[Active], here: Setting
+    ) -> dict[str, NDArray[np.float64]]:
+        assert self._surface is not None
+        surface, case = self._surface, self.case
+        start = base_drive(case, run, load_N=self._load)
+        turn, back = tire_signs(case.axes, "machine", run), tire_signs("machine", case.axes, run)
+        units = {name: unit(case.unit(name)).factor for name in ("FY", "MZ") if name in made}
+        zero = np.zeros(run.rows)
+
+        def steady(SA: NDArray[np.float64], drive: Drive) -> TireForces:
+            # The surface gives the difference to the row's own slip angle and load: nothing where neither moved.
+            got = {
+                name: turn[name] * units[name] * (made[name] + surface.difference(name, run, SA, drive.FZ, start))
+                for name in units
+            }
+            return TireForces(FY=got.get("FY", zero), MZ=got.get("MZ", zero))
+
+        forces = through_tire(start, steady, active, run, here)
+        result = dict(made)
+        for name in units:
+            result[name] = getattr(forces, name) * back[name] / units[name]
+        return result

@@ -1,0 +1,156 @@
+"""Kind ``machine``: a tire file on the machine, judged on FY and MZ (from the cells where they are recorded)."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from toolkit.diagnosis.kinds.cells import Cells
+from toolkit.diagnosis.kinds.channels import channel_places, through_channels
+from toolkit.diagnosis.kinds.setting import nominal_load, setting, si
+from toolkit.diagnosis.kinds.tire import base_drive, first_of, rotation, through_tire, tire_places, tire_signs
+from toolkit.diagnosis.kinds.tir_tire import TirTire
+from toolkit.diagnosis.model import Active, Output
+from toolkit.effects.effect import Effect
+from toolkit.effects.filters import lag
+from toolkit.effects.signals import Drive, TireForces
+from toolkit.errors import ConfigError
+from toolkit.units import unit
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from toolkit.calibration.records.record import CalibrationRecord
+    from toolkit.diagnosis.case import Case, Run
+    from toolkit.tires.tir import TirFile
+
+_FORCES = {"FY": "N", "MZ": "N*m"}
+
+
+class MachineModel:
+    """A tire file of the Magic Formula on a machine definition, with the cells' calibration."""
+
+    def __init__(self, case: Case, tir: TirFile, record: CalibrationRecord | None, speed_m_s: float) -> None:
+
+        self.case = case
+        self._tire = TirTire(tir)
+        self._speed = speed_m_s
+        self._load = self._tire.FNOMIN
+        self.cells = None if record is None else Cells(case, record)
+        self.parameters = case.parameters
+        for one in case.parameters:
+            if one.name not in self._tire.names:
+                near = difflib.get_close_matches(one.name, sorted(self._tire.names), n=1)
+                raise ConfigError(
+                    f"the simulation has no parameter {one.name!r}", where=f"{case.path}: simulation.parameters",
+                    got=one.name, expected="a coefficient or scale factor of the tire file",
+                    next_step=f"did you mean {near[0]!r}?" if near else "correct the name", rule="case",
+                )  # fmt: skip
+        self.outputs = self._outputs()
+        self._settings: dict[str, Any] = {}
+
+    def _outputs(self) -> tuple[Output, ...]:
+        made = []
+        direct = {one.name: one for one in self.case.outputs}
+        for name, text in _FORCES.items():
+            if name in direct:
+                made.append(Output(name=name, unit=direct[name].unit, sd=direct[name].sd))
+            elif self.cells is not None and name in self.cells.loads:
+                made.append(Output(name=name, unit=text, sd=self.cells.noise(name)))
+        if "FZ" in direct:
+            made.append(Output(name="FZ", unit=direct["FZ"].unit, sd=direct["FZ"].sd))
+        known = {one.name for one in made} | (set(self.cells.names) if self.cells else set())
+        unknown = [name for name in direct if name not in known]
+        if unknown or not made:
+            raise ConfigError(
+                "an output is nothing that the machine simulates", where=f"{self.case.path}: recording.channels",
+                got=", ".join(unknown) or "no output", expected="FY, MZ, FZ, or D51, D52, E5 with a calibration",
+                next_step="change the channel's role, or name the calibration", rule="case",
+            )  # fmt: skip
+        return tuple(made)
+
+    def observed(self, run: Run) -> dict[str, NDArray[np.float64]]:
+        """Return FY and MZ as recorded, or from the cells by the calibration; FZ where it is judged."""
+        made = {}
+        for one in self.outputs:
+            if one.name in run.columns:
+                made[one.name] = run.columns[one.name]
+            elif self.cells is not None:
+                made[one.name] = self.cells.load(run, one.name) / unit(one.unit).factor
+        return made
+
+    def simulate(
+        self, run: Run, p: Mapping[str, float], active: Sequence[Active]
+    ) -> dict[str, NDArray[np.float64]]:
+        """Return every output of a run with effects in it."""
+        case, here = self.case, self._setting(run)
+        start = base_drive(case, run, load_N=self._load, speed_m_s=self._speed)
+        reverse = rotation(run) == "reverse"
+        pressure = first_of(case, run, "P_INFL", "P")
+
+        def steady(SA: NDArray[np.float64], drive: Drive) -> TireForces:
+            FY, MZ = self._tire(
+                p, SA=-SA, FZ=drive.FZ, IA=-drive.IA if reverse else drive.IA, V=drive.V,
+                P=pressure, pressure_error=drive.pressure_error,
+            )  # fmt: skip
+            return TireForces(FY=FY if reverse else -FY, MZ=-MZ)
+
+        forces = through_tire(start, steady, active, run, here)
+        turn = tire_signs("machine", case.axes, run)
+        made = {}
+        for one in self.outputs:
+            if one.name in _FORCES:
+                made[one.name] = turn[one.name] * getattr(forces, one.name) / unit(one.unit).factor
+            else:
+                made["FZ"] = self._load_output(run, active) / unit(one.unit).factor
+        values = through_channels(made, active, run, here, run.columns)
+        return values if self.cells is None else self.cells.disturbed(values, active, run, here, self.outputs)
+
+    def _load_output(self, run: Run, active: Sequence[Active]) -> NDArray[np.float64]:
+        commanded = first_of(self.case, run, "FZ_CMD")
+        if commanded is None:
+            return np.abs(si(self.case, "FZ", run.columns["FZ"]))
+        for one in active:
+            if one.effect.name == "load_lag" and one.acts_in(run):
+                commanded = lag(run.t, commanded, one.values["time_constant"])
+        return commanded
+
+    def places(self, effect: Effect) -> list[tuple[str | None, str | None]]:
+        """Return where an effect could act: on the machine, on an output, or on a cell."""
+        case = self.case
+        names = {one.name for one in case.channels}
+        drivers = {one.name for one in case.drivers}
+        found = tire_places(
+            effect, has_IA=self._tire.has_camber, has_P=self._tire.has_pressure,
+            varies={"load_commanded": "FZ_CMD" in names},
+        )  # fmt: skip
+        others = [(one.name, one.unit) for one in case.drivers if one.name in ("FZ", "FZ_CMD", "FX")]
+        if "FZ" in {one.name for one in self.outputs}:
+            others = [one for one in others if one[0] != "FZ"]
+        found += channel_places(effect, [(one.name, one.unit) for one in self.outputs], others, drivers)
+        if self.cells is not None:
+            found += self.cells.places(effect, drivers)
+        return found
+
+    def _setting(self, run: Run) -> Any:
+        if run.name not in self._settings:
+            self._settings[run.name] = setting(
+                self.case, run, nominal_load_N=self._load, speed_m_s=self._speed, work_kJ=self._work_before(run)
+            )
+        return self._settings[run.name]
+
+    def _work_before(self, run: Run) -> float:
+        total = 0.0
+        values = {one.name: one.value for one in self.parameters}
+        for one in self.case.runs:
+            if one.name == run.name:
+                break
+            start = base_drive(self.case, one, load_N=self._load, speed_m_s=self._speed)
+            FY, _ = self._tire(values, SA=-start.SA, FZ=start.FZ, IA=start.IA, V=start.V, P=None, pressure_error=0.0)
+            power = np.abs(FY * start.V * np.sin(start.SA)) * 1e-3
+            total += float(np.sum(0.5 * (power[1:] + power[:-1]) * np.diff(one.t))) if one.rows > 1 else 0.0
+        return total
+

@@ -1,0 +1,155 @@
+"""Equations of motion behind a simulator that cannot be opened: force-like terms on its outputs.
+
+Two shapes are told apart by units. An output that is a force or a moment, beside a recorded velocity, is
+the sum of the terms of the equation: a missing one is added to it. An output that is a position or a
+velocity moves by the simulator's own acceleration along its trajectory; a missing term changes that
+acceleration, and the motion is integrated anew (exact where the simulator's acceleration depends on time
+alone, as in a free fall).
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from toolkit.diagnosis.kinds.setting import dimension
+from toolkit.diagnosis.model import Active
+from toolkit.effects.effect import Effect
+from toolkit.units import unit
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from toolkit.diagnosis.case import Case, Run
+
+_LENGTHS, _SPEEDS = ("length", "angle"), ("speed", "rad/s", "angular_speed")
+_SUBSTEPS = 4
+
+
+@dataclasses.dataclass(frozen=True, slots=True, kw_only=True)
+class Motion:
+    """Which output a term enters, and which channels are its position and velocity."""
+
+    case: Case
+    kind: str
+    output: str
+    position: str | None
+    velocity: str | None
+
+    def places(self, effect: Effect) -> list[tuple[str | None, str | None]]:
+        """Return the output that a dynamic effect could enter."""
+        if effect.stage != "dynamics":
+            return []
+        if effect.name in ("cubic_stiffness", "periodic_ripple") and self.position is None:
+            return []
+        if effect.name == "overflow":
+            return []
+        needs_v = effect.name in ("coulomb_friction", "viscous_damping", "quadratic_drag")
+        if needs_v and self.velocity is None and self.kind == "force":
+            return []
+        return [(self.output, None)]
+
+    def disturbed(
+        self, made: Mapping[str, NDArray[np.float64]], forces: Sequence[Active], run: Run
+    ) -> dict[str, NDArray[np.float64]]:
+        """Return the outputs with force-like terms in the equation of motion."""
+        result = dict(made)
+        if self.kind == "force":
+            zero = np.zeros(run.rows)
+            x = zero if self.position is None else run.columns[self.position]
+            v = zero if self.velocity is None else run.columns[self.velocity]
+            result[self.output] = made[self.output] + _resisting(forces, x, v, on_output=True)
+            return result
+        return self._moved(result, forces, run)
+
+    def _moved(
+        self, made: dict[str, NDArray[np.float64]], forces: Sequence[Active], run: Run
+    ) -> dict[str, NDArray[np.float64]]:
+        from scipy.interpolate import CubicSpline
+
+        if run.rows < 4:
+            return made
+        t = run.t
+        is_position = self.kind == "position"
+        if is_position:
+            spline = CubicSpline(t, made[self.output])
+            x0, v0 = float(spline(t[0])), float(spline(t[0], 1))
+            acceleration = spline.derivative(2)
+        else:
+            spline = CubicSpline(t, made[self.output])
+            x0, v0 = 0.0, float(spline(t[0]))
+            acceleration = spline.derivative(1)
+        x, v = np.empty(run.rows), np.empty(run.rows)
+        x[0], v[0] = x0, v0
+        for i in range(run.rows - 1):
+            h = (t[i + 1] - t[i]) / _SUBSTEPS
+            a, b, at = x[i], v[i], t[i]
+            for _ in range(_SUBSTEPS):
+                a, b = _step(acceleration, forces, at, h, a, b)
+                at += h
+            x[i + 1], v[i + 1] = a, b
+        result = dict(made)
+        result[self.output] = x if is_position else v
+        if is_position and self.velocity in result:
+            result[str(self.velocity)] = v
+        return result
+
+
+def _step(acceleration, forces, t, h, x, v):  # type: ignore[no-untyped-def]
+    def rate(at: float, position: float, speed: float) -> tuple[float, float]:
+        pull = sum(one.effect.force(position, speed, one.values) for one in forces)
+        return speed, float(acceleration(at)) - pull
+
+    k1 = rate(t, x, v)
+    k2 = rate(t + h / 2, x + h / 2 * k1[0], v + h / 2 * k1[1])
+    k3 = rate(t + h / 2, x + h / 2 * k2[0], v + h / 2 * k2[1])
+    k4 = rate(t + h, x + h * k3[0], v + h * k3[1])
+    return (
+        x + h / 6 * (k1[0] + 2 * k2[0] + 2 * k3[0] + k4[0]),
+        v + h / 6 * (k1[1] + 2 * k2[1] + 2 * k3[1] + k4[1]),
+    )
+
+
+def _resisting(
+    forces: Sequence[Active], x: NDArray[np.float64], v: NDArray[np.float64], *, on_output: bool
+) -> NDArray[np.float64]:
+    total = np.zeros(len(x))
+    for one in forces:
+        assert one.effect.force is not None
+        # A constant is reported as the term that stands in the output's own equation.
+        sign = -1.0 if on_output and one.effect.name in ("constant_force", "periodic_ripple") else 1.0
+        force, values = one.effect.force, one.values
+        total += sign * np.fromiter(
+            (force(a, b, values) for a, b in zip(x.tolist(), v.tolist(), strict=True)), np.float64, len(x)
+        )
+    return total
+
+
+def motion_of(case: Case) -> Motion | None:
+    """Return how dynamic terms could enter a case, None where its units show no motion."""
+    inputs = {one.name: dimension(one.unit) for one in case.drivers}
+    outputs = {one.name: dimension(one.unit) for one in case.outputs}
+    velocity = next((name for name, kind in inputs.items() if _is_speed(case, name, kind)), None)
+    position = next((name for name, kind in inputs.items() if kind in _LENGTHS), None)
+    force = next((name for name, kind in outputs.items() if kind in ("force", "moment")), None)
+    if force is not None and (velocity is not None or position is not None):
+        return Motion(case=case, kind="force", output=force, position=position, velocity=velocity)
+    if not case.has_time:
+        return None
+    moved = next((name for name, kind in outputs.items() if kind in _LENGTHS), None)
+    speed = next((name for name, kind in outputs.items() if _is_speed(case, name, kind)), None)
+    if moved is not None:
+        return Motion(case=case, kind="position", output=moved, position=moved, velocity=speed)
+    if speed is not None:
+        return Motion(case=case, kind="velocity", output=speed, position=None, velocity=speed)
+    return None
+
+
+def _is_speed(case: Case, name: str, kind: str) -> bool:
+    if kind in _SPEEDS:
+        return True
+    text = unit(case.unit(name))
+    return text.si in ("m/s", "rad/s", "1/s*rad")

@@ -1,0 +1,250 @@
+"""Kind ``ode``: the simulation's own differential equation, integrated over the whole run."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from toolkit.diagnosis.kinds.channels import channel_places, through_channels
+from toolkit.diagnosis.kinds.setting import nominal_load, setting
+from toolkit.diagnosis.model import Active, Output
+from toolkit.effects.effect import Effect
+from toolkit.effects.signals import Setting
+from toolkit.errors import ConfigError, FitError
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from toolkit.diagnosis.case import Case, Run
+
+RTOL, ATOL = 1e-7, 1e-9
+_POSITIONS = ("cubic_stiffness", "periodic_ripple")
+
+
+class OdeModel:
+    """``rhs(t, x, u, p)``, ``outputs(x, u, p)`` and ``initial(p[, run])`` of a Python file."""
+
+    def __init__(
+        self, case: Case, rhs: Callable[..., Any], outputs: Callable[..., Any], initial: Callable[..., Any]
+    ) -> None:
+        self.case, self._rhs, self._outputs, self._initial = case, rhs, outputs, initial
+        self.parameters = case.parameters
+        self.outputs = tuple(Output(name=one.name, unit=one.unit, sd=one.sd) for one in case.outputs)
+        self._drivers = tuple(one.name for one in case.drivers)
+        self._settings: dict[str, Setting] = {}
+        self._kept: dict[Any, dict[str, NDArray[np.float64]]] = {}
+        p = {one.name: one.value for one in case.parameters}
+        start = self._start(case.runs[0], p)
+        names = case.simulation.states or tuple(f"x{i}" for i in range(len(start)))
+        if len(names) != len(start):
+            raise ConfigError(
+                "states and initial do not agree", where=f"{case.path}: simulation.states",
+                got=f"{len(names)} names, {len(start)} initial values", expected="one name for each",
+                next_step="correct the list of states", rule="case",
+            )  # fmt: skip
+        self.states = names
+        terms = dict(case.simulation.force_terms)
+        unknown = [name for name in terms if name not in names]
+        if unknown:
+            raise ConfigError(
+                "a force term names no state", where=f"{case.path}: simulation.force_terms", got=", ".join(unknown),
+                expected=", ".join(names), next_step="correct the name", rule="case",
+            )  # fmt: skip
+        self._derivative_of = self._kinematics(p)
+        self.force_units = terms or {
+            name: "" for i, name in enumerate(names) if i not in self._derivative_of.values()
+        }
+        self.scale = self._sizes(p)
+
+    def _start(self, run: Run, p: Mapping[str, float]) -> NDArray[np.float64]:
+        import inspect
+
+        try:
+            wanted = getattr(self._initial, "function", self._initial)
+            many = len(inspect.signature(wanted).parameters) > 1
+            given = self._initial(dict(p), _as_dict(run)) if many else self._initial(dict(p))
+            return np.atleast_1d(np.asarray(given, dtype=np.float64)).astype(np.float64)
+        except Exception as error:
+            raise _failed(self.case, run, f"initial: {type(error).__name__}: {error}") from error
+
+    def _kinematics(self, p: Mapping[str, float]) -> dict[int, int]:
+        """Return velocity state -> position state where one state's rate is another state as it is."""
+        rng = np.random.default_rng(0)
+        run = self.case.runs[0]
+        u = {name: float(run.columns[name][0]) for name in self._drivers}
+        found: dict[int, int] = {}
+        start = self._start(run, p)
+        size = np.maximum(np.abs(start), 1.0)
+        rates, points = [], []
+        for _ in range(4):
+            x = start + size * rng.normal(size=len(start))
+            try:
+                rates.append(np.asarray(self._rhs(float(run.t[0]), x.copy(), u, dict(p)), dtype=np.float64))
+            except Exception as error:
+                raise _failed(self.case, run, f"rhs: {type(error).__name__}: {error}") from error
+            points.append(x)
+        for i in range(len(start)):
+            for j in range(len(start)):
+                if i != j and all(abs(r[i] - x[j]) <= 1e-9 * (1 + abs(x[j])) for r, x in zip(rates, points, strict=True)):
+                    found[j] = i
+        return found
+
+    def _sizes(self, p: Mapping[str, float]) -> dict[str, tuple[float, float]]:
+        """Return for every state that a term may enter: spread of its rate, and of itself."""
+        run = self.case.runs[0]
+        x = self._integrate(run, p, ())
+        rates = np.gradient(x, run.t, axis=1) if run.rows > 2 else np.zeros_like(x)
+        made = {}
+        for i, name in enumerate(self.states):
+            made[name] = (float(np.std(rates[i])) or 1.0, float(np.std(x[i])) or float(np.abs(x[i]).max()) or 1.0)
+        return made
+
+    def observed(self, run: Run) -> dict[str, NDArray[np.float64]]:
+        """Return what was recorded of every output."""
+        return {one.name: run.columns[one.name] for one in self.outputs if one.name in run.columns}
+
+    def simulate(
+        self, run: Run, p: Mapping[str, float], active: Sequence[Active]
+    ) -> dict[str, NDArray[np.float64]]:
+        """Return every output of a free simulation over the whole run."""
+        forces = [one for one in active if one.effect.stage == "dynamics" and one.acts_in(run)]
+        key = (run.name, tuple(p.values()), tuple((one.effect.name, one.channel, tuple(one.values.values())) for one in forces))
+        if key not in self._kept:
+            if len(self._kept) > 400:
+                self._kept.clear()
+            self._kept[key] = self._made(run, p, self._integrate(run, p, forces))
+        return through_channels(self._kept[key], active, run, self.setting(run), run.columns)
+
+    def _integrate(self, run: Run, p: Mapping[str, float], forces: Sequence[Active]) -> NDArray[np.float64]:
+        from scipy.integrate import solve_ivp
+
+        values = dict(p)
+        rhs = self._with(forces, values, _Inputs(run, self._drivers))
+        start = self._start(run, p)
+        if run.rows == 1:
+            return start[:, None]
+        try:
+            made = solve_ivp(
+                rhs, (run.t[0], run.t[-1]), start, method="LSODA", t_eval=run.t, rtol=RTOL,
+                atol=ATOL * np.maximum(np.abs(start), 1.0), max_step=_longest(run),
+            )  # fmt: skip
+        except FitError:
+            raise
+        except Exception as error:
+            raise _failed(self.case, run, f"rhs: {type(error).__name__}: {error}") from error
+        if not made.success or made.y.shape[1] != run.rows or not np.isfinite(made.y).all():
+            raise _failed(self.case, run, f"the integration ended early: {made.message}")
+        return np.asarray(made.y, dtype=np.float64)
+
+    def _with(self, forces: Sequence[Active], p: dict[str, float], u: _Inputs) -> Callable[..., Any]:
+        plain = self._rhs
+        if not forces:
+            return lambda t, x: np.asarray(plain(t, x, u(t), p), dtype=np.float64)
+        terms = []
+        for one in forces:
+            i = self.states.index(str(one.channel))
+            terms.append((i, self._derivative_of.get(i, i), one))
+
+        def rhs(t: float, x: NDArray[np.float64]) -> NDArray[np.float64]:
+            rate = np.array(plain(t, x, u(t), p), dtype=np.float64)
+            for i, j, one in terms:
+                if one.effect.name == "overflow":
+                    width = 1e-3 * self.scale[self.states[i]][1]
+                    if rate[i] > 0:
+                        rate[i] *= min(max((one.values["level"] - x[i]) / width, 0.0), 1.0)
+                else:
+                    assert one.effect.force is not None
+                    rate[i] -= one.effect.force(float(x[j]), float(x[i]), one.values)
+            return rate
+
+        return rhs
+
+    def _made(self, run: Run, p: Mapping[str, float], x: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
+        values = dict(p)
+        inputs = _Inputs(run, self._drivers)
+        rows: dict[str, list[float]] = {one.name: [] for one in self.outputs}
+        for k in range(run.rows):
+            try:
+                made = self._outputs(x[:, k].copy(), inputs.row(k), values)
+            except Exception as error:
+                raise _failed(self.case, run, f"outputs: {type(error).__name__}: {error}") from error
+            for name, column in rows.items():
+                if name not in made:
+                    raise _failed(self.case, run, f"outputs gives no {name!r}; it gives {', '.join(made)}")
+                column.append(float(made[name]))
+        result = {name: np.array(column) for name, column in rows.items()}
+        for name, column in result.items():
+            if not np.isfinite(column).all():
+                raise _failed(self.case, run, f"no number in output {name!r}")
+        return result
+
+    def places(self, effect: Effect) -> list[tuple[str | None, str | None]]:
+        """Return the states and outputs on which an effect could act."""
+        drivers = set(self._drivers)
+        if effect.stage == "dynamics":
+            if effect.name == "overflow":
+                return [(name, None) for i, name in enumerate(self.states) if i not in self._derivative_of]
+            if effect.name in _POSITIONS:
+                return [
+                    (name, None) for name in self.force_units if self.states.index(name) in self._derivative_of
+                ] or ([(name, None) for name in self.force_units] if effect.name == "cubic_stiffness" else [])
+            return [(name, None) for name in self.force_units]
+        others = [(one.name, one.unit) for one in self.case.drivers]
+        return channel_places(effect, [(one.name, one.unit) for one in self.outputs], others, drivers)
+
+    def setting(self, run: Run) -> Setting:
+        """Return a run's setting."""
+        if run.name not in self._settings:
+            self._settings[run.name] = setting(self.case, run, nominal_load_N=nominal_load(self.case))
+        return self._settings[run.name]
+
+
+class _Inputs:
+    """Inputs between rows: linear, as a dict of floats."""
+
+    def __init__(self, run: Run, names: Sequence[str]) -> None:
+        self._t = run.t.tolist()
+        self._columns = [(name, run.columns[name].tolist()) for name in names]
+        self._at = 0
+        self._last = len(self._t) - 1
+
+    def __call__(self, t: float) -> dict[str, float]:
+        """Return the inputs at a time."""
+        if not self._columns:
+            return {}
+        times, i = self._t, self._at
+        while i > 0 and t < times[i]:
+            i -= 1
+        while i < self._last - 1 and t >= times[i + 1]:
+            i += 1
+        self._at = i
+        if self._last == 0:
+            return self.row(0)
+        w = (t - times[i]) / (times[i + 1] - times[i])
+        w = 0.0 if w < 0 else (1.0 if w > 1 else w)
+        return {name: (1 - w) * column[i] + w * column[i + 1] for name, column in self._columns}
+
+    def row(self, k: int) -> dict[str, float]:
+        """Return the inputs of a row."""
+        return {name: column[k] for name, column in self._columns}
+
+
+def _longest(run: Run) -> float:
+    # A step never jumps over more than a few rows: a solver must not miss a pulse of the inputs.
+    steps = np.diff(run.t)
+    return float(max(8 * np.median(steps), steps.max())) if len(steps) else np.inf
+
+
+def _as_dict(run: Run) -> dict[str, Any]:
+    first = {name: float(values[0]) for name, values in run.columns.items()}
+    return {**first, **run.declared}
+
+
+def _failed(case: Case, run: Run, got: str) -> FitError:
+    return FitError(
+        "the simulation cannot be integrated", where=f"{case.simulation.path}, {run.name}", got=got,
+        expected="rhs, outputs and initial that give finite numbers over the whole run",
+        next_step="run the equation on that file by itself and mend it", rule="simulator",
+    )  # fmt: skip

@@ -1,0 +1,204 @@
+"""Kind ``python``: any simulator as a function of its inputs and parameters."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from toolkit.diagnosis.kinds.channels import channel_places, through_channels
+from toolkit.diagnosis.kinds.motion import Motion, motion_of
+from toolkit.diagnosis.kinds.setting import NOMINAL_SPEED, nominal_load, setting
+from toolkit.diagnosis.kinds.tire import base_drive, through_tire, tire_places, tire_signs
+from toolkit.diagnosis.model import Active, Output
+from toolkit.effects.effect import Effect
+from toolkit.effects.signals import Drive, Setting, TireForces
+from toolkit.errors import ConfigError, FitError
+from toolkit.units import unit
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from toolkit.diagnosis.case import Case, Run
+
+# Drive's field -> the channel that a simulator takes it from.
+_FIELDS = (("SA", ("SA", "SA_CMD")), ("FZ", ("FZ", "FZ_CMD")), ("IA", ("IA",)), ("V", ("V",)))
+
+
+class PythonModel:
+    """A simulator in Python: ``simulate(inputs, p)`` returns one row for each row of inputs."""
+
+    def __init__(self, case: Case, function: Callable[..., Any]) -> None:
+        self.case, self._function = case, function
+        self.parameters = case.parameters
+        self.outputs = tuple(Output(name=one.name, unit=one.unit, sd=one.sd) for one in case.outputs)
+        self._names = {one.name for one in case.channels}
+        self._load = nominal_load(case)
+        self._settings: dict[str, Setting] = {}
+        drivers = {one.name for one in case.drivers}
+        self._is_tire = bool(drivers & {"SA", "SA_CMD"}) and bool({"FY", "MZ"} & {one.name for one in self.outputs})
+        self.motion: Motion | None = None if self._is_tire else motion_of(case)
+
+    def observed(self, run: Run) -> dict[str, NDArray[np.float64]]:
+        """Return what was recorded of every output."""
+        return {one.name: run.columns[one.name] for one in self.outputs if one.name in run.columns}
+
+    def simulate(
+        self, run: Run, p: Mapping[str, float], active: Sequence[Active]
+    ) -> dict[str, NDArray[np.float64]]:
+        """Return every output of a run with effects in it."""
+        here = self.setting(run)
+        if self._is_tire and any(one.effect.drive is not None and one.acts_in(run) for one in active):
+            made = self._tire(run, p, active, here)
+        else:
+            made = self.call(run, p, {})
+        forces = [one for one in active if one.effect.stage == "dynamics" and one.acts_in(run)]
+        if forces and self.motion is not None:
+            made = self.motion.disturbed(made, forces, run)
+        return through_channels(made, active, run, here, run.columns)
+
+    def call(
+        self, run: Run, p: Mapping[str, float], changed: Mapping[str, NDArray[np.float64]]
+    ) -> dict[str, NDArray[np.float64]]:
+        """Return the simulator's own outputs with some of its inputs changed, checked."""
+        import pandas as pd
+
+        columns: dict[str, NDArray[np.float64]] = {}
+        for one in self.case.channels:
+            if one.role == "output" or one.name not in run.columns:
+                continue
+            columns[one.name] = np.array(changed.get(one.name, run.columns[one.name]))
+        inputs = pd.DataFrame(columns)
+        try:
+            made = self._function(inputs, dict(p))
+        except Exception as error:
+            raise _failed(self.case, run, f"{type(error).__name__}: {error}") from error
+        if not isinstance(made, pd.DataFrame):
+            raise _failed(self.case, run, f"a {type(made).__name__}, not a pandas.DataFrame")
+        if len(made) != run.rows:
+            raise _failed(self.case, run, f"{len(made)} rows for {run.rows} rows of inputs")
+        result = {}
+        for one in self.outputs:
+            if one.name not in made.columns:
+                raise _failed(self.case, run, f"no column {one.name!r}; it has {', '.join(map(str, made.columns))}")
+            values = np.asarray(made[one.name], dtype=np.float64)
+            if not np.isfinite(values).all():
+                raise _failed(self.case, run, f"no number in column {one.name!r}, row {_first_bad(values)}")
+            result[one.name] = values
+        return result
+
+    def places(self, effect: Effect) -> list[tuple[str | None, str | None]]:
+        """Return where an effect could act."""
+        found: list[tuple[str | None, str | None]] = []
+        drivers = {one.name for one in self.case.drivers}
+        if self._is_tire:
+            found += tire_places(
+                effect, has_IA="IA" in drivers, has_P=bool({"P", "P_INFL"} & drivers),
+                varies={"load_commanded": "FZ_CMD" in drivers and "FZ" not in drivers},
+            )  # fmt: skip
+        if self.motion is not None:
+            found += self.motion.places(effect)
+        others = [(one.name, one.unit) for one in self.case.drivers]
+        return found + channel_places(effect, [(one.name, one.unit) for one in self.outputs], others, drivers)
+
+    def setting(self, run: Run) -> Setting:
+        """Return a run's setting."""
+        if run.name not in self._settings:
+            self._settings[run.name] = setting(self.case, run, nominal_load_N=self._load, speed_m_s=NOMINAL_SPEED)
+        return self._settings[run.name]
+
+    def _tire(
+        self, run: Run, p: Mapping[str, float], active: Sequence[Active], here: Setting
+    ) -> dict[str, NDArray[np.float64]]:
+        case = self.case
+        start = base_drive(case, run, load_N=self._load)
+        to_case, to_machine = tire_signs("SAE", case.axes, run), tire_signs(case.axes, "machine", run)
+        units = {name: unit(case.unit(name)).factor for name in ("FY", "MZ") if name in self._names}
+
+        def raw(SA: NDArray[np.float64], drive: Drive) -> dict[str, NDArray[np.float64]]:
+            changed = {}
+            for field, names in _FIELDS:
+                value = SA * to_case["SA"] if field == "SA" else getattr(drive, field)
+                for name in names:
+                    if name in self._names:
+                        changed[name] = value / unit(case.unit(name)).factor
+            for name in ("P_INFL", "P"):
+                if name in self._names:
+                    changed[name] = run.columns[name] + drive.pressure_error / unit(case.unit(name)).factor
+            return self.call(run, p, changed)
+
+        def steady(SA: NDArray[np.float64], drive: Drive) -> TireForces:
+            made = raw(SA, drive)
+            zero = np.zeros(run.rows)
+            return TireForces(
+                FY=made["FY"] * units["FY"] * to_machine["FY"] if "FY" in made else zero,
+                MZ=made["MZ"] * units["MZ"] * to_machine["MZ"] if "MZ" in made else zero,
+            )
+
+        forces = through_tire(start, steady, active, run, here)
+        back = tire_signs("machine", case.axes, run)
+        made = dict(self.call(run, p, {}))
+        for name in ("FY", "MZ"):
+            if name in made:
+                made[name] = getattr(forces, name) * back[name] / units[name]
+        return made
+
+
+def load_function(path: Path, name: str) -> Callable[..., Any]:
+    """Return a function of a Python file.
+
+    Raises
+    ------
+    ConfigError
+        the file raises, or has no such function
+    """
+    import runpy
+
+    try:
+        space = runpy.run_path(str(path))
+    except Exception as error:
+        raise ConfigError(
+            "the simulator cannot be loaded", where=path, got=f"{type(error).__name__}: {error}",
+            expected=f"a Python file with {name}(..)", next_step="run the file by itself and mend it",
+            rule="simulator",
+        ) from error  # fmt: skip
+    function = space.get(name)
+    if not callable(function):
+        raise ConfigError(
+            f"the simulator has no function {name!r}", where=path,
+            got=", ".join(key for key, one in space.items() if callable(one) and not key.startswith("_")),
+            expected=f"def {name}(..)", next_step="name the function in the case", rule="simulator",
+        )  # fmt: skip
+    return dataclasses.replace(_Called(), function=function)
+
+
+@dataclasses.dataclass(frozen=True, slots=True)
+class _Called:
+    """A simulator's function, whose printing stays out of our output."""
+
+    function: Callable[..., Any] = print
+
+    def __call__(self, *arguments: Any) -> Any:
+        """Call it with its standard output silenced."""
+        import contextlib
+        import io
+
+        with contextlib.redirect_stdout(io.StringIO()), np.errstate(all="ignore"):
+            return self.function(*arguments)
+
+
+def _failed(case: Case, run: Run, got: str) -> FitError:
+    return FitError(
+        "the simulation gives no usable output", where=f"{case.simulation.path}, {run.name}", got=got,
+        expected="a pandas.DataFrame with every output, a finite number in each row, in the inputs' order",
+        next_step="run the simulator on that file by itself and mend it", rule="simulator",
+    )  # fmt: skip
+
+
+def _first_bad(values: NDArray[np.float64]) -> int:
+    return int(np.flatnonzero(~np.isfinite(values))[0]) + 1
+
+

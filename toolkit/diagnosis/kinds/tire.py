@@ -1,0 +1,89 @@
+"""A tire test of any kind of simulation: what drives the tire, and its forces with effects in them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from toolkit.channels import Axes, Rotation, signs
+from toolkit.diagnosis.kinds.setting import NOMINAL_SPEED, si
+from toolkit.diagnosis.model import Active
+from toolkit.effects.effect import STAGES, Effect
+from toolkit.effects.signals import Drive, Setting, TireForces, drive
+from toolkit.effects.similarity import Steady, similar
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from toolkit.diagnosis.case import Case, Run
+
+STAGE_OF_TIRE = ("road", "carriage", "tire")
+
+
+def rotation(run: Run) -> Rotation:
+    """Return the drum's direction in a run."""
+    return "reverse" if run.conditions.get("rotation") == "reverse" else "forward"
+
+
+def tire_signs(source: Axes, target: Axes, run: Run) -> dict[str, int]:
+    """Return the factor of SA, FY and MZ from one axis system to another in a run."""
+    return signs(source, target, rotation(run))
+
+
+def first_of(case: Case, run: Run, *names: str) -> NDArray[np.float64] | None:
+    """Return the first of these drivers, or of these outputs, in SI; None where the run has none."""
+    for name in names:
+        if name in run.columns and any(one.name == name for one in case.channels):
+            values = si(case, name, run.columns[name])
+            if np.isfinite(values).all():
+                return values
+    return None
+
+
+def base_drive(case: Case, run: Run, *, load_N: float, speed_m_s: float = NOMINAL_SPEED) -> Drive:
+    """Return what drives the tire in a run: measured columns where recorded, else the commanded ones."""
+    turn = tire_signs(case.axes, "SAE", run)
+    zero = np.zeros(run.rows)
+    SA = first_of(case, run, "SA", "SA_CMD")
+    FZ = first_of(case, run, "FZ", "FZ_CMD")
+    IA = first_of(case, run, "IA")
+    V = first_of(case, run, "V")
+    return drive(
+        run.t,
+        zero if SA is None else turn["SA"] * SA,
+        zero + load_N if FZ is None else np.abs(FZ),
+        IA=0.0 if IA is None else IA,
+        V=speed_m_s if V is None else V,
+    )
+
+
+def through_tire(
+    start: Drive, steady: Steady, active: Sequence[Active], run: Run, setting: Setting
+) -> TireForces:
+    """Return the forces in the machine's axes with every effect on road, carriage and tire."""
+
+    def tire(one: Drive) -> TireForces:
+        return similar(steady, one)
+
+    here = [one for one in active if one.effect.drive is not None and one.acts_in(run)]
+    for one in sorted(here, key=lambda each: STAGES.index(each.effect.stage)):
+        assert one.effect.drive is not None
+        start = one.effect.drive(start, one.values, setting, tire)
+    return tire(start)
+
+
+def tire_places(
+    effect: Effect, *, has_IA: bool, has_P: bool, varies: dict[str, bool]
+) -> list[tuple[str | None, str | None]]:
+    """Return where an effect on road, carriage or tire could act: nowhere, or in the one machine."""
+    if effect.drive is None:
+        return []
+    if effect.name == "camber_offset" and not has_IA:
+        return []
+    if effect.name == "pressure_change" and not has_P:
+        return []
+    if effect.name == "load_lag" and not varies.get("load_commanded", False):
+        return []
+    return [(None, None)]

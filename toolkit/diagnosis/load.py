@@ -1,0 +1,71 @@
+"""From a case to the model of its kind."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from toolkit.diagnosis.model import Model
+
+if TYPE_CHECKING:
+    from toolkit.calibration.records.record import CalibrationRecord
+    from toolkit.diagnosis.case import Case
+
+
+def model_of(case: Case, calibrations: Path | None) -> Model:
+    """Return the simulation of a case, ready to run.
+
+    Raises
+    ------
+    ConfigError
+        the simulator, tire file or calibration cannot be used
+    """
+    kind = case.simulation.kind
+    if kind == "python":
+        from toolkit.diagnosis.kinds.python import PythonModel, load_function
+
+        assert case.simulation.path is not None
+        return PythonModel(case, load_function(case.simulation.path, case.simulation.function))
+    if kind == "ode":
+        from toolkit.diagnosis.kinds.ode import OdeModel
+        from toolkit.diagnosis.kinds.python import load_function
+
+        path = case.simulation.path
+        assert path is not None
+        return OdeModel(case, *(load_function(path, name) for name in ("rhs", "outputs", "initial")))
+    if kind == "columns":
+        from toolkit.diagnosis.kinds.columns import ColumnsModel
+
+        return ColumnsModel(case)
+    return _machine(case, calibrations)
+
+
+def _machine(case: Case, calibrations: Path | None) -> Model:
+    from toolkit.diagnosis.kinds.machine import MachineModel
+    from toolkit.machine import load_machine
+    from toolkit.tires.tir import read_tir
+
+    machine = load_machine(case.simulation.machine)
+    record = record_of(case, calibrations) if case.simulation.calibration else None
+    assert case.simulation.tire is not None
+    return MachineModel(case, read_tir(case.simulation.tire), record, machine.drum.speed_m_s)
+
+
+def record_of(case: Case, calibrations: Path | None) -> CalibrationRecord:
+    """Return the calibration that a case names: a path beside the case file, or a registry's id."""
+    from toolkit.calibration.records.record import from_bytes
+    from toolkit.calibration.registry.registry import Registry
+    from toolkit.errors import ConfigError
+    from toolkit.files import read_bytes
+
+    named = case.simulation.calibration
+    path = case.path.parent / named
+    if path.is_file():
+        return from_bytes(read_bytes(path), where=path)
+    if calibrations is None:
+        raise ConfigError(
+            "the case names a calibration and there is no registry", where=f"{case.path}: simulation.calibration",
+            got=named, expected="the path of a record beside the case, or a home with calibrations/",
+            next_step="give --calibrations DIR", rule="case",
+        )  # fmt: skip
+    return Registry(calibrations).load(named)

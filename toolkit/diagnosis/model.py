@@ -1,0 +1,68 @@
+"""What every kind of simulation offers to the search, and an effect that is switched on."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Protocol
+
+from toolkit.effects.effect import Effect
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from toolkit.diagnosis.case import CaseParameter, Run
+
+    Arrays = dict[str, NDArray[np.float64]]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Output:
+    """A channel that is judged: name, unit, and its stated total sensor noise."""
+
+    name: str
+    unit: str
+    sd: float | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Active:
+    """An effect that is switched on: where it acts, with which values, in which runs.
+
+    ``channel`` is the channel or state that it acts on, ``source`` the other channel that it takes,
+    ``runs`` the names of the runs in which it acts, None for all.
+    """
+
+    effect: Effect
+    channel: str | None = None
+    source: str | None = None
+    runs: frozenset[str] | None = None
+    values: Mapping[str, float] = field(default_factory=dict)
+
+    def acts_in(self, run: Run) -> bool:
+        """Tell whether the effect acts in a run."""
+        return self.runs is None or run.name in self.runs
+
+
+class Model(Protocol):
+    """A simulation that can be run with effects in it.
+
+    ``places`` says for an effect where it could act: pairs of channel and source. An effect without a
+    place is not applicable to this case, and ``why_not`` says why.
+    """
+
+    outputs: tuple[Output, ...]
+    parameters: tuple[CaseParameter, ...]
+
+    def observed(self, run: Run) -> Arrays:
+        """Return what was recorded of every output, (n,), NaN where a sample is missing."""
+        ...
+
+    def simulate(self, run: Run, p: Mapping[str, float], active: Sequence[Active]) -> Arrays:
+        """Return what the simulation says of every output, (n,), free over the whole run."""
+        ...
+
+    def places(self, effect: Effect) -> Sequence[tuple[str | None, str | None]]:
+        """Return where an effect could act in this case."""
+        ...

@@ -1,0 +1,181 @@
+"""Coloured noise: an autoregression per output, fitted by Burg over all runs, and exact whitening with it.
+
+Residuals of steady models are autocorrelated; a test that takes them as white names an effect in nearly
+every clean recording. Here a residual is judged by its innovations: what its own past does not predict.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+_GAP = 3.0  # median steps of time, beyond which a series begins anew
+_FEWEST = 24  # values of a segment below which nothing can be told of its colour
+_ORDERS = 8
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Noise:
+    """An autoregression: reflection coefficients, and the innovations' standard deviation.
+
+    ``reflection`` has one entry an order; white noise has none. ``sd`` is in the output's unit.
+    """
+
+    reflection: tuple[float, ...]
+    sd: float
+
+    @property
+    def marginal_sd(self) -> float:
+        """Standard deviation of the noise itself."""
+        keep = math.prod(1 - k * k for k in self.reflection)
+        return self.sd / math.sqrt(max(keep, 1e-12))
+
+    @property
+    def correlation_rows(self) -> float:
+        """Rows to one independent value of the noise's mean: its spectrum at zero over its variance."""
+        polynomial = predictor(self.reflection)[-1]
+        at_zero = (self.sd / max(abs(1 - float(np.sum(polynomial))), 1e-6)) ** 2
+        return max(1.0, at_zero / max(self.marginal_sd**2, 1e-300))
+
+
+def predictor(reflection: Sequence[float]) -> list[NDArray[np.float64]]:
+    """Return the predictor of every order 0..p: value = sum a_j * value[-j] (Levinson's recursion)."""
+    made: list[NDArray[np.float64]] = [np.zeros(0)]
+    for k in reflection:
+        last = made[-1]
+        made.append(np.concatenate([last - k * last[::-1], [k]]))
+    return made
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Layout:
+    """Where the values of one output stand in all its runs: segments without a gap, and what is masked.
+
+    ``index`` are places of the kept values among all rows of all runs; ``segments`` slices of them.
+    """
+
+    index: NDArray[np.int64]
+    segments: tuple[slice, ...]
+
+    @property
+    def n(self) -> int:
+        """Number of kept values."""
+        return len(self.index)
+
+
+def layout(times: Sequence[NDArray[np.float64]], kept: Sequence[NDArray[np.bool_]]) -> Layout:
+    """Return the layout of one output.
+
+    Parameters
+    ----------
+    times : of each run [s], shape (n_run,)
+    kept : of each run, which values count
+    """
+    index, segments, offset, start = [], [], 0, 0
+    for t, good in zip(times, kept, strict=True):
+        at = np.flatnonzero(good)
+        if len(at):
+            steps = np.diff(t[at])
+            usual = np.median(np.diff(t)) if len(t) > 1 else 1.0
+            breaks = np.flatnonzero(steps > _GAP * usual) + 1
+            for piece in np.split(at, breaks):
+                segments.append(slice(start, start + len(piece)))
+                start += len(piece)
+            index.append(at + offset)
+        offset += len(t)
+    whole = np.concatenate(index) if index else np.zeros(0, dtype=np.int64)
+    return Layout(whole.astype(np.int64), tuple(segments))
+
+
+def fit_noise(
+    residual: NDArray[np.float64], where: Layout, *, floor: float, sd: float | None = None, used: int = 0
+) -> Noise:
+    """Return the noise of a residual: Burg's method over all segments, the order by BIC.
+
+    Parameters
+    ----------
+    residual : kept values, (n,)
+    floor : smallest standard deviation that can be [unit of the output], the resolution of the numbers
+    sd : total sensor noise that a certificate states; the innovations are never taken as smaller than what
+        it leaves
+    used : parameters that were fitted to the residual
+    """
+    n = where.n
+    if n == 0:
+        return Noise(reflection=(), sd=floor)
+    variance = float(np.mean(residual**2))
+    reflection: list[float] = []
+    best, best_score = 0, math.log(max(variance, 1e-300))
+    usable = [one for one in where.segments if one.stop - one.start >= _FEWEST]
+    if usable:
+        forward = [residual[one].copy() for one in usable]
+        backward = [residual[one].copy() for one in usable]
+        left = variance
+        for order in range(1, _ORDERS + 1):
+            top = bottom = 0.0
+            for i, (f, b) in enumerate(zip(forward, backward, strict=True)):
+                forward[i], backward[i] = f[1:], b[:-1]
+                top += float(forward[i] @ backward[i])
+                bottom += float(forward[i] @ forward[i]) + float(backward[i] @ backward[i])
+            if bottom <= 0:
+                break
+            k = max(min(2 * top / bottom, 0.9999), -0.9999)
+            for i, (f, b) in enumerate(zip(forward, backward, strict=True)):
+                forward[i], backward[i] = f - k * b, b - k * f
+            reflection.append(k)
+            left *= 1 - k * k
+            score = math.log(max(left, 1e-300)) + order * math.log(n) / n
+            if score < best_score - 1e-12:
+                best, best_score = order, score
+    chosen = tuple(reflection[:best])
+    white = whiten(residual, where, Noise(reflection=chosen, sd=1.0))
+    dof = max(n - used, 1)
+    made = math.sqrt(float(np.sum(white**2)) / dof)
+    if sd is not None:
+        made = max(made, sd * math.sqrt(math.prod(1 - k * k for k in chosen)) if not chosen else made)
+    return Noise(reflection=chosen, sd=max(made, floor))
+
+
+def whiten(values: NDArray[np.float64], where: Layout, noise: Noise) -> NDArray[np.float64]:
+    """Return innovations over their standard deviation; ``values`` (n,) or (n, columns).
+
+    Exact for a stationary autoregression: the first values of a segment are predicted by lower orders.
+    """
+    from scipy.signal import lfilter
+
+    orders = predictor(noise.reflection)
+    p = len(noise.reflection)
+    if p == 0:
+        return values / noise.sd
+    filter_ = np.concatenate([[1.0], -orders[p]])
+    early = [
+        math.sqrt(math.prod(1 - noise.reflection[j] ** 2 for j in range(k, p))) for k in range(p)
+    ]  # innovation sd of order p over that of order k
+    made = np.empty_like(values)
+    for one in where.segments:
+        x = values[one]
+        y = lfilter(filter_, [1.0], x, axis=0)
+        for k in range(min(p, len(x))):
+            past = orders[k] @ x[:k][::-1] if k else 0.0
+            y[k] = (x[k] - past) * early[k]
+        made[one] = y
+    return made / noise.sd
+
+
+def log_likelihood(residual: NDArray[np.float64], where: Layout, noise: Noise) -> float:
+    """Return the Gaussian log-likelihood of a residual under a noise (natural logarithm)."""
+    white = whiten(residual, where, noise)
+    p = len(noise.reflection)
+    shorter = 0.0
+    if p:
+        tails = [math.log(math.prod(1 - noise.reflection[j] ** 2 for j in range(k, p))) / 2 for k in range(p)]
+        shorter = sum(sum(tails[: min(p, one.stop - one.start)]) for one in where.segments)
+    n = where.n
+    return float(-0.5 * np.sum(white**2) - n * math.log(noise.sd) - 0.5 * n * math.log(2 * math.pi) + shorter)

@@ -1,0 +1,80 @@
+"""Effect: what one piece of physics is, says and does; results of one file in this folder.
+
+An effect acts in one of three ways, and belongs to one stage:
+
+* ``drive``: it changes what the tire is driven by, or how the tire answers (carriage, road, tire);
+* ``channel``: it changes one channel after the physics (load cells, acquisition);
+* ``force``: it is a force-like term in an equation of motion (dynamics).
+
+All three are pure functions of signals and of the effect's parameters in their own units.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from toolkit.effects.signals import Drive, Setting, Tire
+
+Stage = Literal["acquisition", "load_cells", "carriage", "tire", "road", "dynamics"]
+STAGES: tuple[Stage, ...] = ("road", "carriage", "tire", "load_cells", "acquisition", "dynamics")
+Values = Mapping[str, float]
+
+DriveHook = Callable[["Drive", Values, "Setting", "Tire"], "Drive"]
+ChannelHook = Callable[["NDArray[np.float64]", Values, "Setting"], "NDArray[np.float64]"]
+# (position, velocity, parameters) -> force-like term, of the arrays' shape or scalars
+ForceHook = Callable[[float, float, Values], float]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class EffectParameter:
+    """One parameter: name, unit, what it means, where it is usually found.
+
+    ``unit`` may name the affected channel: ``{channel}`` and ``{from}`` are put in by the user of the
+    effect, ``{force}``, ``{velocity}`` and ``{position}`` for a dynamic term. ``off`` is the value at which
+    the effect is not there (None: it has no such value, another parameter switches it off); ``typical`` the
+    range in ``unit``, in which a search starts; where ``relative`` it is in units of the channel's spread.
+    """
+
+    name: str
+    unit: str
+    text: str
+    typical: tuple[float, float]
+    off: float | None = 0.0
+    bounds: tuple[float, float] = (-float("inf"), float("inf"))
+    relative: bool = False
+    starts: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Effect:
+    """One effect of the catalogue.
+
+    ``needs`` are channels without which the effect cannot be told at all, ``any_of`` channels of which one
+    is needed; ``confined_by`` the conditions of a run by which the effect may be confined to some runs.
+    """
+
+    name: str
+    stage: Stage
+    statement: str
+    equation: str
+    reference: str
+    signature: str
+    separates: str
+    parameters: tuple[EffectParameter, ...]
+    drive: DriveHook | None = None
+    channel: ChannelHook | None = None
+    force: ForceHook | None = None
+    needs: tuple[str, ...] = ()
+    any_of: tuple[str, ...] = ()
+    confined_by: tuple[str, ...] = ()
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the parameters, in their order."""
+        return tuple(one.name for one in self.parameters)

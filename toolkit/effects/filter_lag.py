@@ -1,0 +1,40 @@
+"""The lag of a filter in the acquisition."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from toolkit.effects.effect import Effect, EffectParameter, Values
+from toolkit.effects.filters import lag
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from toolkit.effects.signals import Setting
+
+
+def _filtered(y: NDArray[np.float64], values: Values, setting: Setting) -> NDArray[np.float64]:
+    return lag(setting.t, y, values["time_constant"])
+
+
+EFFECT = Effect(
+    name="filter_lag",
+    stage="acquisition",
+    statement="A filter makes the channel late and smooth.",
+    equation="time_constant * y' + y = y_model",
+    reference="Oppenheim and Schafer, Discrete-Time Signal Processing, 2010",
+    signature="fast changes late and smaller, slow ones hardly",
+    separates="a step that is recorded with and without the filter",
+    parameters=(
+        EffectParameter(
+            name="time_constant",
+            unit="s",
+            text="of the filter",
+            typical=(0.01, 1.0),
+            bounds=(0.0, 1000.0),
+            starts=(0.02, 0.1, 0.5, 3.0),
+        ),
+    ),
+    channel=_filtered,
+)

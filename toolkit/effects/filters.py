@@ -1,0 +1,57 @@
+"""First-order lag, delay and play of a sampled signal, linear between rows; time may be irregular."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+
+def lag(
+    t: NDArray[np.float64], x: NDArray[np.float64], time_constant: ArrayLike, start: float | None = None
+) -> NDArray[np.float64]:
+    """Return y of ``time_constant`` dy/dt + y = x, shape (n,), exact for an x that is linear between rows.
+
+    Parameters
+    ----------
+    t : time [s], rising, shape (n,)
+    time_constant : [s], one number or shape (n,), not negative; an interval uses the value at its end
+    start : y at the first row; x there by default
+    """
+    tau = np.maximum(np.broadcast_to(np.asarray(time_constant, dtype=np.float64), t.shape), 1e-12)[1:]
+    ratio = np.diff(t) / tau
+    decay = np.exp(-ratio)
+    # Response to a ramp: y1 = decay*y0 + (1 - decay)*x0 + (1 - (1 - decay)/ratio)*(x1 - x0)
+    ramp = np.where(ratio > 1e-6, 1 + np.expm1(-ratio) / np.maximum(ratio, 1e-300), 0.5 * ratio)
+    drive = -np.expm1(-ratio) * x[:-1] + ramp * np.diff(x)
+    y = np.empty_like(x)
+    y[0] = x[0] if start is None else start
+    if len(ratio) and np.ptp(decay) <= 1e-9 * decay.max():
+        from scipy.signal import lfilter
+
+        y[1:] = lfilter([1.0], [1.0, -decay[0]], drive, zi=[decay[0] * y[0]])[0]
+        return y
+    last = float(y[0])
+    for i, (keep, add) in enumerate(zip(decay.tolist(), drive.tolist(), strict=True), start=1):
+        last = keep * last + add
+        y[i] = last
+    return y
+
+
+def delayed(t: NDArray[np.float64], x: NDArray[np.float64], delay: float) -> NDArray[np.float64]:
+    """Return x(t - delay) by linear interpolation; beyond the ends the end value."""
+    return np.interp(t - delay, t, x)
+
+
+def play(x: NDArray[np.float64], width: float) -> NDArray[np.float64]:
+    """Return the play operator's output for a gap of full ``width``, starting in the middle of the gap."""
+    half = 0.5 * abs(width)
+    y = np.empty_like(x)
+    last = float(x[0]) if len(x) else 0.0
+    for i, value in enumerate(x.tolist()):
+        last = min(max(last, value - half), value + half)
+        y[i] = last
+    return y

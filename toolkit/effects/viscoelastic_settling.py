@@ -1,0 +1,50 @@
+"""Viscoelastic settling: the force relaxes with time after each step, whatever the distance rolled."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import TYPE_CHECKING
+
+from toolkit.effects.effect import Effect, EffectParameter, Values
+from toolkit.effects.filters import lag
+
+if TYPE_CHECKING:
+    from toolkit.effects.signals import Drive, Setting, Tire
+
+
+def _settled(drive: Drive, values: Values, setting: Setting, tire: Tire) -> Drive:
+    forces, f, tau = tire(drive), values["fraction"], values["time_constant"]
+    return dataclasses.replace(
+        drive,
+        FY=drive.FY + f * (forces.FY - lag(drive.t, forces.FY, tau)),
+        MZ=drive.MZ + f * (forces.MZ - lag(drive.t, forces.MZ, tau)),
+    )
+
+
+EFFECT = Effect(
+    name="viscoelastic_settling",
+    stage="tire",
+    statement=(
+        "The tire settles with time after each step, longer than the revolutions that were waited for."
+    ),
+    equation="F = F_inf + fraction * (F_inf - lag(F_inf, time_constant))",
+    reference="Ferry, Viscoelastic Properties of Polymers, 1980",
+    signature="log time and not distance: it goes on after 2.5 revolutions at any speed",
+    separates="a dwell of a minute, or the same steps at another speed",
+    parameters=(
+        EffectParameter(
+            name="fraction", unit="1", text="overshoot after a step", typical=(0.01, 0.05), bounds=(-0.9, 0.9)
+        ),
+        EffectParameter(
+            name="time_constant",
+            unit="s",
+            text="of the decay",
+            typical=(1.0, 100.0),
+            off=None,
+            bounds=(0.05, 2000.0),
+            starts=(1.0, 8.0, 60.0),
+        ),
+    ),
+    drive=_settled,
+    confined_by=("repeat_of", "date", "order"),
+)
