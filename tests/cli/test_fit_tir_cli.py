@@ -61,13 +61,20 @@ def test_the_tire_file_gives_the_table_again_in_its_axes(table, tmp_path):
     ("options", "rule"),
     [
         (["--tir", "x.tir"], "tir-needs-global"),
-        (["--model", "mf61", "--loss", "robust"], "unknown-loss"),
+        (["--model", "pacejka94", "--tir", "x.tir"], "tir-needs-global"),
+        (["--model", "mf52", "--model", "mf61", "--tir", "x.tir"], "tir-needs-global"),
+        (["--model", "mf61", "--tir", "x.tir", "--side", "top"], "unknown-side"),
+        (["--model", "mf61", "--weights", "heavy"], "unknown-weights"),
+        (["--model", "mf61", "--rated-load", "-1"], "wrong-value"),
     ],
 )
-def test_what_a_tire_file_cannot_hold_is_refused(table, options, rule):
+def test_what_a_tire_file_cannot_hold_is_refused(table, tmp_path, monkeypatch, options, rule):
+    monkeypatch.chdir(tmp_path)
     with pytest.raises(ToolkitError) as caught:
         run(fit.command, table, *options)
     assert (caught.value.rule, caught.value.exit_code) == (rule, 2)
+    assert caught.value.next_step
+    assert not (tmp_path / "x.tir").exists()
 
 
 def test_the_table_is_never_replaced_and_one_load_is_refused(table, tmp_path):
@@ -79,3 +86,34 @@ def test_the_table_is_never_replaced_and_one_load_is_refused(table, tmp_path):
         run(fit.command, table, "--model", "mf61", "--tir", tmp_path / "x.tir")
     assert caught.value.rule == "one-load"
     assert not (tmp_path / "x.tir").exists()
+
+
+@pytest.mark.parametrize(("model", "fittyp"), [("mf52", 6.0), ("mf62", 61.0)])
+def test_the_file_tells_its_formula_side_rated_load_radius_and_ranges(table, tmp_path, model, fittyp):
+    tir = tmp_path / "x.tir"
+    code, text = run(
+        fit.command, table, "--model", model, "--tir", tir, "--side", "left", "--rated-load", "4000",
+        "--radius", "0.32", "--json",
+    )  # fmt: skip
+    file = read_tir(tir)
+    assert code in (0, 1)
+    assert file.number("FITTYP") == fittyp
+    assert (file.number("FNOMIN"), file.number("UNLOADED_RADIUS")) == (4000.0, 0.32)
+    assert file.get("TYRESIDE") == "LEFT"
+    assert (file.number("FZMIN"), file.number("FZMAX")) == (2000.0, 5000.0)
+    assert file.number("ALPMAX") == pytest.approx(np.radians(10.0))
+    assert file.get("NOMPRES") is None  # the table has no pressure
+    rules = {finding["rule"] for finding in json.loads(text)["findings"]}
+    assert "tir-conditions" in rules
+    assert not {"tir-radius", "tir-side"} & rules
+    out = tmp_path / "out.csv"
+    run(evaluate.command, tir, table, "--axes", "SAE", "--out", out)
+    measured, made = (
+        np.array([[float(x) for x in row] for row in list(csv.reader(path.read_text().splitlines()))[1:]])
+        for path in (table, out)
+    )
+    for column, channel in ((3, "FY"), (4, "MZ")):
+        error = 100 * np.linalg.norm(made[:, column] - measured[:, column - 1])
+        error /= np.linalg.norm(measured[:, column - 1])
+        one = next(f for f in json.loads(text)["fits"] if f["channel"] == channel)
+        assert error == pytest.approx(one["error_percent"], rel=1e-6)

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from toolkit.errors import FitError
 from toolkit.tires import Curve, estimate_at, fit_curves, slope_at, slope_estimate_at, value_at, zero_crossing
 from toolkit.tires.blocks import load_blocks
-from toolkit.tires.catalog import model, model_names
+from toolkit.tires.catalog import find, model, model_names
 from toolkit.tires.models.magic_formula import value
 from toolkit.tires.quality import error_percent, scatter_floor_percent
 
@@ -66,13 +66,18 @@ def test_loads_part_the_bins():
 
 
 def test_catalogue_finds_the_models_by_their_files():
-    assert "magic_formula" in model_names()
+    # The names that the files contract gives.
+    assert set(model_names()) == set(
+        "magic_formula pacejka94 mf52 mf61 mf62 tmeasy treadsim lugre brush".split()
+    )
     for name in model_names():
-        assert model(name).name == name
-        assert model(name).reference
+        assert find(name).name == name
+        assert find(name).reference
     with pytest.raises(FitError, match="not available") as caught:
-        model("magic_formla")
+        find("magic_formla")
     assert "magic_formula" in caught.value.expected
+    with pytest.raises(FitError, match="over all loads"):
+        model("brush")
 
 
 # Nominal loads of the machine's protocol [lbf], a spread of 3 % as its simulated tests have it.

@@ -248,28 +248,30 @@ def _resolved(stage: Path) -> Resolved:
 
 def _tire_file(resolved: Resolved, path: Path) -> str:
     """Write MF 6.1 over all loads of the forward run, and tell how well it fits."""
+    import numpy as np
+
     from toolkit.characteristics.groups import group
     from toolkit.reduction.averaging import free_radius_m
-    from toolkit.tires.mf61_fit import fit_mf61
-    from toolkit.tires.model import Curve
-    from toolkit.tires.tir_write import write_tir
+    from toolkit.tires.global_data import measured
+    from toolkit.tires.global_fit import fit_global
+    from toolkit.tires.models.mf61 import MODEL
+    from toolkit.tires.tir_write import tire_fit, write_tir
 
     reduced = resolved.result.reduced
-    curves = [
-        Curve(SA=one.SA, y=one.values(channel), channel=channel, load_N=one.load_N)
-        for one in group(reduced)
-        if one.rotation == "forward"
-        for channel in ("FY", "MZ")
-    ]
+    run = [one for one in group(reduced) if one.rotation == "forward"]
     radius = free_radius_m(reduced.info.tire_size)
     if radius is None:
         raise ValueError("the packaged plan names a tire size that gives its radius")
-    fit = fit_mf61(curves, unloaded_radius_m=radius)
-    write_tir(path, fit, comments=["simulated: the virtual M-15, drum forward"])
-    return (
-        f"tire.tir: MF 6.1 over all loads, error FY {fit.error_percent_FY:.2f} %, "
-        f"MZ {fit.error_percent_MZ or 0.0:.2f} %"
-    )
+    columns = {
+        "SA": np.concatenate([one.SA for one in run]),
+        "FZ": np.concatenate([np.full(len(one.SA), one.load_N) for one in run]),
+        **{name: np.concatenate([one.values(name) for one in run]) for name in ("FY", "MZ")},
+    }
+    data = measured(columns, axes="SAE", rated_load_N=reduced.info.rated_load_N, unloaded_radius_m=radius)
+    fit = fit_global(MODEL, data, predict=False)
+    write_tir(path, tire_fit(MODEL, fit, data), comments=["simulated: the virtual M-15, drum forward"])
+    errors = ", ".join(f"{one.channel} {one.error_percent:.2f} %" for one in fit.fits)
+    return f"tire.tir: MF 6.1 over all loads, error {errors}"
 
 
 def _figures(resolved: Resolved, stage: Path) -> list[str]:

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
-from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -20,16 +18,15 @@ from toolkit.cli.console import (
     answer,
     day,
     exit_code,
-    finding_lines,
-    table,
 )
 
 if TYPE_CHECKING:
-    from toolkit.findings import Finding
-    from toolkit.tires.model import Curve, CurveFit, Loss, TireModel
+    from collections.abc import Sequence
+
+    from toolkit.cli.fit_models import Fitted
+    from toolkit.tires.model import Loss
 
 NAME = "fit"
-MODEL = "mf61"  # the model over all loads that a tire file can hold
 
 
 def command(
@@ -37,13 +34,36 @@ def command(
         Path, typer.Argument(metavar="TEST|TABLE.csv", help="A test (folder or reduced .xlsx) or a table.")
     ],
     model: Annotated[
-        list[str] | None, typer.Option("--model", help="Tire model; may be repeated. Default: magic_formula.")
+        list[str] | None,
+        typer.Option(
+            "--model",
+            help="Tire model; may be repeated: magic_formula (per load, the default), pacejka94, mf52, mf61, "
+            "mf62, tmeasy, treadsim, lugre, brush; 'all' is every one.",
+        ),
     ] = None,
-    tir: Annotated[Path | None, typer.Option("--tir", help="Write a tire file of a global model.")] = None,
+    tir: Annotated[
+        Path | None, typer.Option("--tir", help="Write a tire file of mf52, mf61 or mf62.")
+    ] = None,
+    figures: Annotated[
+        Path | None, typer.Option("--figures", help="Folder for figures: curves, residuals, comparison.")
+    ] = None,
     axes: Annotated[
         str, typer.Option("--axes", help="Axes of the table: SAE, adapted-SAE, ISO-W, machine.")
     ] = "SAE",
     loss: Annotated[str, typer.Option("--loss", help="linear (least squares) or robust.")] = "linear",
+    weights: Annotated[
+        str,
+        typer.Option("--weights", help="Of global models: equal, or noise (each load by its own residuals)."),
+    ] = "equal",
+    rated_load: Annotated[
+        float | None, typer.Option("--rated-load", help="Rated load [N] of a table's tire: FNOMIN.")
+    ] = None,
+    radius: Annotated[
+        float | None, typer.Option("--radius", help="Free radius [m] of a table's tire: UNLOADED_RADIUS.")
+    ] = None,
+    side: Annotated[
+        str, typer.Option("--side", help="TYRESIDE as tested: LEFT, RIGHT, SYMMETRIC, UNKNOWN.")
+    ] = "UNKNOWN",
     calibration: CalibrationId = None,
     known_at: KnownAt = None,
     calibrations: Calibrations = None,
@@ -51,205 +71,91 @@ def command(
     json: Json = False,
     quiet: Quiet = False,
 ) -> int:
-    """Fit tire models to every load of a test or a table; no start values.
+    """Fit tire models to a test or a table, every load by itself or all of them at once; no start values.
 
-    Example: toolkit fit tire.csv --axes ISO-W --json
+    Example: toolkit fit tire.csv --model magic_formula --model mf61 --model brush --figures figures
     """
-    from toolkit.errors import ConfigError
-    from toolkit.tires.catalog import model as find
-    from toolkit.tires.model import LOSSES
+    from toolkit.cli.fit_models import fit_table_models, fit_test_models
+    from toolkit.cli.fit_text import payload, text
+    from toolkit.cli.fit_tir import check_tir, write_fit
 
     started = time.perf_counter()
-    names = list(dict.fromkeys(model or ["magic_formula"]))
-    models = tuple(find(name) for name in names if name != MODEL)
-    if loss not in LOSSES:
-        raise ConfigError(
-            f"unknown loss {loss!r}", where="--loss", got=loss, expected=", ".join(LOSSES),
-            next_step="name one of those expected", rule="unknown-loss",
-        )  # fmt: skip
-    if tir is not None and MODEL not in names:
-        raise ConfigError(
-            "a tire file needs a model over all loads",
-            where="--tir",
-            got=", ".join(names),
-            expected="a global model: a .tir file has no place for curves of single loads",
-            next_step=f"add --model {MODEL}",
-            rule="tir-needs-global",
-        )
-    if tir is not None and tir.resolve() == source.resolve():
-        raise ConfigError(
-            "the tire file would replace the table", where="--tir", got=tir, expected="another name",
-            next_step="choose another name", rule="original",
-        )  # fmt: skip
-    if MODEL in names and loss != "linear":
-        raise ConfigError(
-            f"{MODEL} is fitted by least squares only", where="--loss", got=loss, expected="linear",
-            next_step="leave --loss away for this model", rule="unknown-loss",
-        )  # fmt: skip
-    chosen: Loss = "robust" if loss == "robust" else "linear"
+    names = _names(model or ["magic_formula"])
+    chosen = _options(loss, weights, rated_load, radius)
+    into = check_tir(tir, source, names) if tir is not None else None
+    if figures is not None:
+        from toolkit.cli.fit_report import check_folder
+
+        check_folder(figures)
     if source.is_dir() or source.suffix.lower() != ".csv":
-        rows, findings, curves, radius = _of_test(
-            source, models, axes=axes, loss=chosen, calibration=calibration,
-            calibrations=calibrations, home=home, known_at=known_at,
+        fitted = fit_test_models(
+            source, names, axes=axes, loss=chosen, weights=weights, rated_load_N=rated_load, radius_m=radius,
+            calibration=calibration, calibrations=calibrations, home=home, known_at=day(known_at),
         )  # fmt: skip
     else:
-        from toolkit.tires.table import read_table
-        from toolkit.tires.table_fit import fit_table, table_curves
-
-        measured = read_table(source, axes=axes)
-        curves, radius, rows, findings = table_curves(measured), None, [], ()
-        if models:
-            result = fit_table(measured, models, loss=chosen)
-            rows, findings = [(fit, None) for fit in result.fits], result.findings
-    entries: list[dict[str, Any]] = []
-    shown = ""
-    if MODEL in names:
-        from toolkit.cli.fit_tir import fit_global
-
-        entries, more, shown = fit_global(curves, radius_m=radius, source=source, tir=tir)
-        findings = (*findings, *more)
-    payload = {
-        "fits": [*(fit_payload(fit, rotation) for fit, rotation in rows), *entries],
+        fitted = fit_table_models(
+            source, names, axes=axes, loss=chosen, weights=weights, rated_load_N=rated_load, radius_m=radius
+        )
+    findings = fitted.findings
+    if tir is not None:
+        one = next(fit for fit in fitted.globals if fit.model == into)
+        findings += write_fit(
+            tir, one, fitted.data, source=source, side=side.upper(), radius_m=fitted.radius_m
+        )
+    written = _draw(fitted, figures, source) if figures is not None else []
+    told: dict[str, Any] = {
+        **payload(fitted),
         "tir": None if tir is None else str(tir),
+        "figures": written,
         "findings": [finding.as_dict() for finding in findings],
         "timing": {"seconds": time.perf_counter() - started},
     }
-    answer(payload, "\n\n".join(filter(None, (shown, _text(rows, findings)))), as_json=json, quiet=quiet)
+    lines = text(fitted, findings)
+    if tir is not None:
+        lines += f"\n\n{tir} written: {into}"
+    if written:
+        lines += f"\n\n{len(written)} figures in {figures}"
+    answer(told, lines, as_json=json, quiet=quiet)
     return exit_code(findings)
 
 
-def _of_test(
-    test: Path,
-    models: Sequence[TireModel],
-    *,
-    axes: str,
-    loss: Loss,
-    calibration: str | None,
-    calibrations: Path | None,
-    home: Path | None,
-    known_at: datetime | None,
-) -> tuple[list[tuple[CurveFit, str | None]], tuple[Finding, ...], Sequence[Curve], float | None]:
-    # Fits with their rotation, findings, the forward run's curves and the tire's free radius [m].
-    from toolkit.characteristics.groups import group
-    from toolkit.cli.resolve import resolve_test
+def _names(given: Sequence[str]) -> tuple[str, ...]:
+    # Unknown names are refused before anything is read.
+    from toolkit.tires.catalog import find, model_names
+
+    names = [name for one in given for name in (model_names() if one == "all" else (one,))]
+    for name in names:
+        find(name)
+    return tuple(dict.fromkeys(names))
+
+
+def _options(loss: str, weights: str, rated_load: float | None, radius: float | None) -> Loss:
+    import math
+
     from toolkit.errors import ConfigError
-    from toolkit.reduction.averaging import free_radius_m
-    from toolkit.tires.fit import Curve, why_not
-    from toolkit.tires.table_fit import fit_findings
+    from toolkit.tires.global_fit import WEIGHTS
+    from toolkit.tires.model import LOSSES
 
-    if axes != "SAE":
-        raise ConfigError(
-            "a test is reduced to SAE axes", where="--axes", got=axes, expected="SAE for a test",
-            next_step="leave --axes away; it declares the axes of a table", rule="axes-of-test",
-        )  # fmt: skip
-    resolved = resolve_test(
-        test,
-        calibration=calibration,
-        calibrations=calibrations,
-        home=home,
-        known_at=day(known_at),
-    )
-    rows: list[tuple[CurveFit, str | None]] = []
-    for one in models:
-        if one.name == "magic_formula" and loss == "linear":
-            # The characteristics stand on these fits already.
-            for direction in resolved.result.characteristics.fits:
-                rows += [(fit, direction.rotation) for fit in (direction.FY, direction.MZ) if fit is not None]
-            continue
-        from toolkit.tires.catalog import fit_model
-
-        made = [
-            (Curve(SA=g.SA, y=g.values(channel), channel=channel, load_N=g.load_N), g.rotation)
-            for g in group(resolved.result.reduced)
-            for channel in ("FY", "MZ")
-        ]
-        made = [(curve, rotation) for curve, rotation in made if why_not(curve) is None]
-        fits = fit_model(one, [curve for curve, _ in made], loss=loss)
-        rows += list(zip(fits, [rotation for _, rotation in made], strict=True))
-    own = [finding for finding in fit_findings([fit for fit, _ in rows]) if finding.level == "note"]
-    reduced = resolved.result.reduced
-    forward = [
-        Curve(SA=g.SA, y=g.values(channel), channel=channel, load_N=g.load_N)
-        for g in group(reduced)
-        if g.rotation == "forward"
-        for channel in ("FY", "MZ")
-    ]
-    return rows, (*resolved.findings, *own), forward, free_radius_m(reduced.info.tire_size)
+    for name, got, known in (("loss", loss, LOSSES), ("weights", weights, WEIGHTS)):
+        if got not in known:
+            raise ConfigError(
+                f"unknown {name} {got!r}", where=f"--{name}", got=got, expected=", ".join(known),
+                next_step="name one of those expected", rule=f"unknown-{name}",
+            )  # fmt: skip
+    for option, value, unit in (("--rated-load", rated_load, "N"), ("--radius", radius, "m")):
+        if value is not None and not (math.isfinite(value) and value > 0):
+            raise ConfigError(
+                f"{option} is no positive number", where=option, got=value,
+                expected=f"a number of {unit} above 0", next_step="mend the option", rule="wrong-value",
+            )  # fmt: skip
+    return "robust" if loss == "robust" else "linear"
 
 
-def fit_payload(fit: CurveFit, rotation: str | None = None) -> dict[str, Any]:
-    """Return one fit as the JSON answer of the files contract."""
-    from toolkit.tires.table_fit import slope_sign
+def _draw(fitted: Fitted, folder: Path, source: Path) -> list[str]:
+    from toolkit.files import write_atomic
+    from toolkit.report.fit_figures import fit_figures
 
-    stiffness = None
-    if fit.slope_at_zero is not None:
-        sign = slope_sign(fit.axes, fit.channel)  # type: ignore[arg-type]
-        stiffness = {"value": sign * fit.slope_at_zero.value, "standard_error": fit.slope_at_zero.u}
-    return {
-        "model": fit.model,
-        "channel": fit.channel,
-        "load_N": fit.load_N,
-        "rotation": rotation,
-        "axes": fit.axes,
-        "n": fit.n,
-        "dof": fit.dof,
-        "parameters": {p.name: p.value for p in fit.parameters},
-        "standard_errors": {p.name: p.standard_error for p in fit.parameters},
-        "units": {p.name: p.unit for p in fit.parameters},
-        "not_determined": list(fit.not_determined),
-        "at_bound": list(fit.at_bound),
-        "error_percent": fit.error_percent,
-        "scatter_floor_percent": fit.scatter_floor_percent,
-        "cornering_stiffness_N_per_rad": stiffness if fit.channel == "FY" else None,
-        "aligning_stiffness_Nm_per_rad": stiffness if fit.channel == "MZ" else None,
-        "loss": fit.loss,
-        "converged": fit.converged,
-        "message": fit.message,
-    }
-
-
-def _text(rows: Sequence[tuple[CurveFit, str | None]], findings: Sequence[Finding]) -> str:
-    parts = []
-    for channel, factor_name in (("FY", "C_FY [N/deg]"), ("MZ", "C_MZ [N·m/deg]")):
-        lines = [_line(fit, rotation) for fit, rotation in rows if fit.channel == channel]
-        if lines:
-            names = [p.name for p in next(f for f, _ in rows if f.channel == channel).parameters]
-            head = ["model", "FZ [N]", "drum", "n", "error %", "floor %", factor_name, *names, "converged"]
-            parts.append(f"{channel}\n{table(head, lines)}")
-    text = "\n\n".join(parts)
-    if rows:
-        axes = ", ".join(dict.fromkeys(fit.axes for fit, _ in rows))
-        text += (
-            f"\n\naxes {axes}; parameters in SI (B 1/rad, Sh rad, D and Sv in N or N·m); "
-            "± is one standard error, (value) is not determined by the data"
-        )
-    if findings:
-        text += "\n\nfindings (toolkit explain RULE tells more):\n" + "\n".join(finding_lines(findings))
-    return text
-
-
-def _line(fit: CurveFit, rotation: str | None) -> list[str]:
-    stiffness = "-"
-    if fit.slope_at_zero is not None:
-        from toolkit.tires.table_fit import slope_sign
-
-        sign = slope_sign(fit.axes, fit.channel)  # type: ignore[arg-type]
-        per_degree = 3.141592653589793 / 180
-        stiffness = (
-            f"{sign * fit.slope_at_zero.value * per_degree:.4g} ± {fit.slope_at_zero.u * per_degree:.2g}"
-        )
-    shown = [
-        f"({p.value:.4g})" if p.standard_error is None else f"{p.value:.4g} ± {p.standard_error:.2g}"
-        for p in fit.parameters
-    ]
-    return [
-        fit.model,
-        "all" if fit.load_N is None else f"{fit.load_N:.0f}",
-        rotation or "-",
-        str(fit.n),
-        f"{fit.error_percent:.2f}",
-        "-" if fit.scatter_floor_percent is None else f"{fit.scatter_floor_percent:.2f}",
-        stiffness,
-        *shown,
-        "yes" if fit.converged else "no",
-    ]
+    made = fit_figures(fitted.data, fitted.curves, fitted.globals, fitted.comparison, title=source.stem)
+    for name, data in made.items():
+        write_atomic(folder / name, data)
+    return sorted(made)

@@ -1,75 +1,95 @@
-"""`toolkit fit --model mf61`: one Magic Formula 6.1 over all loads, and its tire file."""
+"""`toolkit fit --tir`: the tire file of a model over all loads, and what it does not know."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
+from toolkit.errors import ConfigError
 from toolkit.findings import Finding
 
 if TYPE_CHECKING:
-    from toolkit.tires.mf61_fit import TireFit
-    from toolkit.tires.model import Curve
+    from toolkit.tires.global_data import Measured
+    from toolkit.tires.global_result import ModelFit
 
-MODEL = "mf61"
-_STAND_IN = 0.3  # m; the forces of a tire file do not depend on it, only how QDZ is written
+STAND_IN_RADIUS = 0.3  # m; the forces of a tire file do not depend on it, only how QDZ is written
 
 
-def fit_global(
-    curves: Sequence[Curve], *, radius_m: float | None, source: Path, tir: Path | None
-) -> tuple[list[dict[str, Any]], tuple[Finding, ...], str]:
-    """Fit, write the tire file where one is asked for, and return JSON entries, findings, text."""
-    from toolkit.tires.mf61_fit import fit_mf61
-    from toolkit.tires.tir_write import write_tir
+def check_tir(tir: Path, source: Path, names: Sequence[str]) -> str:
+    """Return which of the models goes into the file; refuse what it cannot hold, before anything is fitted.
 
-    fit = fit_mf61(curves, unloaded_radius_m=radius_m or _STAND_IN)
-    findings = []
-    if radius_m is None and tir is not None:
-        text = (
-            f"no tire size is known: UNLOADED_RADIUS is set to {_STAND_IN} m; FX, FY, MZ of the tire file do "
-            "not depend on it, a vehicle model's geometry does"
+    Raises
+    ------
+    ConfigError
+        none of the models has a tire file, or more than one; the file would replace the table
+    """
+    from toolkit.tires.tir_write import FITTYP
+
+    fitting = [name for name in names if name in FITTYP]
+    if len(fitting) != 1:
+        raise ConfigError(
+            "a tire file holds one Magic Formula over all loads",
+            where="--tir",
+            got=", ".join(names),
+            expected=f"one of {', '.join(FITTYP)}: a .tir file has no place for other models or single loads",
+            next_step=f"give --model {fitting[0] if fitting else 'mf61'}, and no second of them",
+            rule="tir-needs-global",
         )
-        findings.append(Finding(rule="tir-radius", where=str(source), message=text, level="note"))
-    if not fit.converged:
-        text = "no two starts of mf61 ended at the same lowest cost"
-        findings.append(Finding(rule="not-converged", where=str(source), message=text))
-    if fit.at_bound:
-        text = f"mf61: {', '.join(fit.at_bound)} stand at their bounds"
-        findings.append(Finding(rule="at-bound", where=str(source), message=text, level="note"))
-    if tir is not None:
-        write_tir(tir, fit, comments=[f"MF 6.1 fitted to {source.name}"], side="UNKNOWN")
-    channels = ["FY", *(["MZ"] if fit.error_percent_MZ is not None else [])]
-    shown = f"mf61 over all loads (ISO-W): error FY {fit.error_percent_FY:.2f} %"
-    if fit.error_percent_MZ is not None:
-        shown += f", MZ {fit.error_percent_MZ:.2f} %"
-    if tir is not None:
-        shown += f"; {tir} written"
-    return [_payload(fit, channel, curves) for channel in channels], tuple(findings), shown
+    if tir.resolve() == source.resolve():
+        raise ConfigError(
+            "the tire file would replace the table", where="--tir", got=tir, expected="another name",
+            next_step="choose another name", rule="original",
+        )  # fmt: skip
+    return fitting[0]
 
 
-def _payload(fit: TireFit, channel: str, curves: Sequence[Curve]) -> dict[str, Any]:
-    prefix = "P" if channel == "FY" else "Q"
-    parameters = {name: value for name, value in fit.coefficients if name.startswith(prefix)}
-    n = sum(len(one.y) for one in curves if one.channel == channel)
-    return {
-        "model": MODEL,
-        "channel": channel,
-        "load_N": None,
-        "rotation": None,
-        "axes": "ISO-W",
-        "n": n,
-        "dof": n - len(parameters),
-        "parameters": parameters,
-        "standard_errors": dict.fromkeys(parameters),
-        "units": dict.fromkeys(parameters, "1"),
-        "not_determined": [],
-        "at_bound": [name for name in fit.at_bound if name in parameters],
-        "error_percent": fit.error_percent_FY if channel == "FY" else fit.error_percent_MZ,
-        "scatter_floor_percent": None,
-        "cornering_stiffness_N_per_rad": None,
-        "aligning_stiffness_Nm_per_rad": None,
-        "loss": "linear",
-        "converged": fit.converged,
-        "message": "standard errors and the scatter floor are not computed for mf61",
-    }
+def write_fit(
+    tir: Path, fit: ModelFit, data: Measured, *, source: Path, side: str, radius_m: float | None
+) -> tuple[Finding, ...]:
+    """Write the tire file and return what should be known about it.
+
+    Raises
+    ------
+    FitError
+        the data have one load: its change would be invented
+    """
+    from toolkit.errors import FitError
+    from toolkit.tires.catalog import find
+    from toolkit.tires.global_data import what_varies
+    from toolkit.tires.global_model import GlobalModel
+    from toolkit.tires.tir_write import tire_fit, write_tir
+
+    varies = what_varies(data)
+    if "two_loads" not in varies:
+        raise FitError(
+            "a tire file needs two loads or more", where=source, got=f"one load, {data.loads[0]:.0f} N",
+            expected="two loads or more, five for a load sensitivity to trust",
+            next_step="measure more loads; without --tir the model is fitted at this load", rule="one-load",
+        )  # fmt: skip
+    model = find(fit.model)
+    assert isinstance(model, GlobalModel)  # noqa: S101  only such a model reaches here
+    write_tir(
+        tir, tire_fit(model, fit, data, side=side),
+        comments=[f"{model.title} fitted to {source.name}", f"{len(data)} rows, {len(data.loads)} loads"],
+    )  # fmt: skip
+    notes = []
+    if radius_m is None:
+        notes.append((
+            "tir-radius",
+            f"no tire size is known: UNLOADED_RADIUS is set to {STAND_IN_RADIUS} m; FX, FY, MZ of the tire "
+            "file do not depend on it, a vehicle model's geometry does",
+        ))  # fmt: skip
+    if fixed := [
+        word
+        for word in ("camber", "pressure")
+        if word not in varies and (word, fit.model) != ("pressure", "mf52")
+    ]:
+        notes.append((
+            "tir-conditions",
+            f"{' and '.join(fixed)} did not vary: the coefficients that say what they change are zero in the "
+            "tire file, which means not known, not without effect",
+        ))  # fmt: skip
+    if side == "UNKNOWN":
+        notes.append(("tir-side", "TYRESIDE is UNKNOWN: say --side LEFT, RIGHT or SYMMETRIC as tested"))
+    return tuple(Finding(rule=rule, where=str(tir), message=message, level="note") for rule, message in notes)

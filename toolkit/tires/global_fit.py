@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -9,6 +10,7 @@ import numpy as np
 
 from toolkit.channels import signs
 from toolkit.errors import FitError
+from toolkit.findings import Finding
 from toolkit.tires.global_checks import LACKS, why_not_global
 from toolkit.tires.global_data import CHANNELS, Measured, binned, what_varies
 from toolkit.tires.global_model import GlobalModel, Rows, Seeds
@@ -60,6 +62,41 @@ def fit_global(
     if seeds is None:
         seeds = seeds_of(data).seeds
     return _Fitter(model, data, loss, weights, seeds).result(predict=predict)
+
+
+def global_findings(fit: ModelFit) -> list[Finding]:
+    """Return a finding for each channel whose minimum is not confirmed, a note for what data do not say."""
+    found = []
+    for one in fit.fits:
+        where = f"{one.model} {one.channel} over all loads"
+        if not one.converged:
+            found.append(Finding(rule="not-converged", where=where, message=one.message))
+        lacking = tuple(LACKS.values())
+        open_ = [name for name, why in one.fixed if not why.startswith(lacking)]
+        open_ += [name for name in one.not_determined if name not in dict(one.fixed)]
+        if one.converged and open_:
+            text = f"not determined by these data: {', '.join(open_)}"
+            found.append(Finding(rule="not-determined", where=where, message=text, level="note"))
+        if one.at_bound:
+            text = f"{', '.join(one.at_bound)}: the search ended at the bound"
+            found.append(Finding(rule="at-bound", where=where, message=text, level="note"))
+    return found
+
+
+def not_varied(fits: Sequence[ModelFit], where: str) -> list[Finding]:
+    """Return one note on what did not vary in the data, though the models ask for it."""
+    reasons: dict[str, list[str]] = {}
+    for fit in fits:
+        for one in fit.fits:
+            for _, why in one.fixed:
+                text = next((lack for lack in LACKS.values() if why.startswith(lack)), None)
+                if text is not None and fit.model not in reasons.setdefault(text, []):
+                    reasons[text].append(fit.model)
+    if not reasons:
+        return []
+    parts = [f"{why} ({', '.join(models)})" for why, models in reasons.items()]
+    message = f"{'; '.join(parts)}: parameters that say what it changes are fixed, see 'fixed' of each fit"
+    return [Finding(rule="not-varied", where=where, message=message, level="note")]
 
 
 class _Fitter:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from toolkit.channels import Axes
+from toolkit.channels import Axes, signs
 from toolkit.errors import FitError
 from toolkit.findings import Finding
 from toolkit.tires.blocks import load_blocks
@@ -94,9 +95,7 @@ def fit_table(table: TireTable, models: tuple[TireModel, ...], *, loss: Loss = "
         )
         for one in refused
     ]
-    return TableFits(
-        fits=tuple(fits), findings=(*findings, *fit_findings(fits), *_axes_findings(table, fits))
-    )
+    return TableFits(fits=tuple(fits), findings=(*findings, *fit_findings(fits), *axes_findings(table, fits)))
 
 
 def _no_load(curve: Curve) -> FitError | None:
@@ -125,7 +124,8 @@ def fit_findings(fits: list[CurveFit]) -> list[Finding]:
     return found
 
 
-def _axes_findings(table: TireTable, fits: list[CurveFit]) -> list[Finding]:
+def axes_findings(table: TireTable, fits: Sequence[CurveFit]) -> list[Finding]:
+    """Return a finding for a channel whose slopes at small angles contradict the axes of the table."""
     found = []
     for channel in ("FY", "MZ"):
         votes = []
@@ -133,7 +133,7 @@ def _axes_findings(table: TireTable, fits: list[CurveFit]) -> list[Finding]:
             if fit.channel == channel and fit.load_N is not None:
                 slope = slope_estimate_at(fit, 0.0)
                 if abs(slope.value) > _SURE * slope.u:
-                    votes.append(int(np.sign(slope.value)))
+                    votes.append(int(np.sign(slope.value)) * _turn(fit.axes, table.axes, channel))
         expected = slope_sign(table.axes, channel)
         against = votes.count(-expected)
         if against and 2 * against > len(votes):
@@ -147,3 +147,9 @@ def _axes_findings(table: TireTable, fits: list[CurveFit]) -> list[Finding]:
                 )
             )
     return found
+
+
+def _turn(source: Axes | str, target: Axes, channel: str) -> int:
+    # The factor by which a slope changes between two axis systems.
+    flip = signs(source, target)  # type: ignore[arg-type]
+    return flip[channel] * flip["SA"]

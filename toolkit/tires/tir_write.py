@@ -1,65 +1,154 @@
-"""Tire property files written: a fit of MF 6.1, or a file that was read, in SI.
+"""Tire property files written: a fit of MF 5.2, 6.1 or 6.2, or a file that was read, in SI.
 
-A fit: ISO-W axes, SI, FITTYP 61, the ranges of the fitted data, scale factors 1. A file that was read keeps
-its Magic Formula, its order, its unknown entries, its comments and the rows of its tables.
+A fit: ISO-W axes, SI, FITTYP 6 or 61, the ranges of the fitted data, scale factors 1. A file that was read
+keeps its Magic Formula, its order, its unknown entries, its comments and the rows of its tables.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
+from toolkit.errors import ConfigError
 from toolkit.files import write_atomic
 from toolkit.findings import Finding
-from toolkit.tires.mf61 import ALIGNING, LATERAL
-from toolkit.tires.mf61_fit import TireFit
+from toolkit.tires.global_data import Measured
+from toolkit.tires.global_model import GlobalModel, GlobalParameter
+from toolkit.tires.global_result import ModelFit
 from toolkit.tires.tir import TirFile, TirLine
 from toolkit.tires.tir_units import SI, factors, scale
 
-_SCALES = tuple(
-    "LFZO LCX LMUX LEX LKX LHX LVX LCY LMUY LEY LKY LHY LVY LTR LRES "
-    "LXAL LYKA LVYKA LS LKYC LKZC LVMX LMX LMY LMP".split()
-)
+FITTYP = {"mf52": 6.0, "mf61": 61.0, "mf62": 61.0}
+SIDES = ("LEFT", "RIGHT", "SYMMETRIC", "UNKNOWN")
+_SCALES = {
+    6.0: "LFZO LCX LMUX LEX LKX LHX LVX LGAX LCY LMUY LEY LKY LHY LVY LGAY LTR LRES LGAZ LXAL LYKA LVYKA LS",
+    61.0: "LFZO LCX LMUX LEX LKX LHX LVX LCY LMUY LEY LKY LHY LVY LTR LRES "
+    "LXAL LYKA LVYKA LS LKYC LKZC LVMX LMX LMY LMP",
+}
+_SECTIONS = {"FX": "LONGITUDINAL_COEFFICIENTS", "FY": "LATERAL_COEFFICIENTS", "MZ": "ALIGNING_COEFFICIENTS"}
 
 
-def tir_text(fit: TireFit, *, comments: Sequence[str] = (), side: str = "LEFT") -> str:
-    """Return the property file of a fit; ``comments`` stand at its head, ``side`` is TYRESIDE as tested."""
-    given = dict(fit.coefficients)
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TireFit:
+    """What a property file of a fit holds [ISO-W, SI].
+
+    ``coefficients`` by channel (name, value); ``*_range`` smallest and largest of the fitted data;
+    ``NOMPRES`` and ``LONGVL`` None where pressure and speed are not known; ``TYRESIDE`` as tested.
+    """
+
+    FITTYP: float
+    coefficients: tuple[tuple[str, tuple[tuple[str, str | float], ...]], ...]
+    FNOMIN: float
+    UNLOADED_RADIUS: float
+    SA_range: tuple[float, float]
+    FZ_range: tuple[float, float]
+    IA_range: tuple[float, float]
+    KAPPA_range: tuple[float, float] | None = None
+    P_range: tuple[float, float] | None = None
+    NOMPRES: float | None = None
+    LONGVL: float | None = None
+    TYRESIDE: str = "UNKNOWN"
+
+
+def tire_fit(model: GlobalModel, fit: ModelFit, data: Measured, *, side: str = "UNKNOWN") -> TireFit:
+    """Return what the property file of a fit holds; channels and slips that were not measured stay out.
+
+    Raises
+    ------
+    ConfigError
+        the model has no property file, the tire's side is none
+    """
+    if model.name not in FITTYP:
+        raise ConfigError(
+            f"{model.name} cannot be written to a tire file", where="--tir", got=model.name,
+            expected=f"{', '.join(FITTYP)}: the Magic Formulas that .tir files hold",
+            next_step="name one of those with --model", rule="tir-needs-global",
+        )  # fmt: skip
+    if side not in SIDES:
+        raise ConfigError(
+            f"unknown side of the tire {side!r}", where="--side", got=side, expected=", ".join(SIDES),
+            next_step="name one of those expected", rule="unknown-side",
+        )  # fmt: skip
+    turned = data.turned("ISO-W").rows
+    values = dict(zip(model.names, fit.values.tolist(), strict=True))
+    slips = bool(np.ptp(turned.KAPPA))
+    made: list[tuple[str, tuple[tuple[str, str | float], ...]]] = []
+    for channel in _SECTIONS:
+        if any(one.channel == channel for one in fit.fits):
+            own = [one for one in model.parameters if one.stage == channel and (slips or not _of_slip(one))]
+            extra: list[tuple[str, str | float]] = (
+                [("PKY4", 2.0)] if channel == "FY" and FITTYP[model.name] > 60 else []
+            )
+            made.append((channel, (*((one.name, values[one.name]) for one in own), *extra)))
+    return TireFit(
+        FITTYP=FITTYP[model.name],
+        coefficients=tuple(made),
+        FNOMIN=turned.FNOMIN,
+        UNLOADED_RADIUS=turned.UNLOADED_RADIUS,
+        SA_range=_range(turned.SA),
+        FZ_range=_range(turned.FZ),
+        IA_range=_range(turned.IA),
+        KAPPA_range=_range(turned.KAPPA) if slips else None,
+        P_range=_range(turned.P) if "P" in data.given else None,
+        NOMPRES=turned.NOMPRES if "P" in data.given else None,
+        LONGVL=turned.LONGVL if "V" in data.given else None,
+        TYRESIDE=side,
+    )
+
+
+def _of_slip(one: GlobalParameter) -> bool:
+    return bool({"kappa", "both_kappas", "alpha_and_kappa"} & set(one.needs))
+
+
+def _range(values: np.ndarray) -> tuple[float, float]:
+    return float(values.min()), float(values.max())
+
+
+def tir_text(fit: TireFit, *, comments: Sequence[str] = ()) -> str:
+    """Return the property file of a fit; ``comments`` stand at its head."""
+    pressures: list[tuple[str, str | float]] = (
+        [] if fit.NOMPRES is None else [("INFLPRES", fit.NOMPRES), ("NOMPRES", fit.NOMPRES)]
+    )
+    model: list[tuple[str, str | float]] = [
+        ("PROPERTY_FILE_FORMAT", "USER"),
+        ("USE_MODE", 4.0 if fit.KAPPA_range else 2.0),
+    ]
+    model += [("FITTYP", fit.FITTYP), ("TYRESIDE", fit.TYRESIDE)]
+    if fit.LONGVL is not None:
+        model.append(("LONGVL", fit.LONGVL))
     sections: list[tuple[str, list[tuple[str, str | float]]]] = [
         ("MDI_HEADER", [("FILE_TYPE", "tir"), ("FILE_VERSION", 3.0), ("FILE_FORMAT", "ASCII")]),
-        (
-            "UNITS",
-            [
-                ("LENGTH", "meter"),
-                ("FORCE", "newton"),
-                ("ANGLE", "radians"),
-                ("MASS", "kg"),
-                ("TIME", "second"),
-            ],
-        ),
-        (
-            "MODEL",
-            [("PROPERTY_FILE_FORMAT", "USER"), ("USE_MODE", 2.0), ("FITTYP", 61.0), ("TYRESIDE", side)],
-        ),
+        ("UNITS", [(key, unit) for key, unit in SI.items() if key != "PRESSURE" or fit.NOMPRES is not None]),
+        ("MODEL", model),
         ("DIMENSION", [("UNLOADED_RADIUS", fit.UNLOADED_RADIUS)]),
+        ("OPERATING_CONDITIONS", pressures),
         ("VERTICAL", [("FNOMIN", fit.FNOMIN)]),
-        ("SLIP_ANGLE_RANGE", [("ALPMIN", fit.SA_range[0]), ("ALPMAX", fit.SA_range[1])]),
-        ("INCLINATION_ANGLE_RANGE", [("CAMMIN", 0.0), ("CAMMAX", 0.0)]),
-        ("VERTICAL_FORCE_RANGE", [("FZMIN", fit.FZ_range[0]), ("FZMAX", fit.FZ_range[1])]),
-        ("SCALING_COEFFICIENTS", [(name, 1.0) for name in _SCALES]),
-        ("LATERAL_COEFFICIENTS", [(n, given.get(n, 2.0 if n == "PKY4" else 0.0)) for n in LATERAL]),
-        ("ALIGNING_COEFFICIENTS", [(name, given.get(name, 0.0)) for name in ALIGNING]),
+        ("LONG_SLIP_RANGE", _limits("KPU", fit.KAPPA_range)),
+        ("SLIP_ANGLE_RANGE", _limits("ALP", fit.SA_range)),
+        ("INCLINATION_ANGLE_RANGE", _limits("CAM", fit.IA_range)),
+        ("VERTICAL_FORCE_RANGE", _limits("FZ", fit.FZ_range)),
+        ("INFLATION_PRESSURE_RANGE", _limits("PRES", fit.P_range)),
+        ("SCALING_COEFFICIENTS", [(name, 1.0) for name in _SCALES[fit.FITTYP].split()]),
+        *((_SECTIONS[channel], list(given)) for channel, given in fit.coefficients),
     ]
     lines = [f"! {comment}" for comment in comments]
     for name, entries in sections:
-        lines.append(f"[{name}]")
-        lines += [f"{key:<24}= {_shown(value)}" for key, value in entries]
+        if entries:
+            lines.append(f"[{name}]")
+            lines += [f"{key:<24}= {_shown(value)}" for key, value in entries]
     return "\n".join(lines) + "\n"
 
 
-def write_tir(path: Path, fit: TireFit, *, comments: Sequence[str] = (), side: str = "LEFT") -> None:
+def _limits(name: str, limits: tuple[float, float] | None) -> list[tuple[str, str | float]]:
+    return [] if limits is None else [(f"{name}MIN", limits[0]), (f"{name}MAX", limits[1])]
+
+
+def write_tir(path: Path, fit: TireFit, *, comments: Sequence[str] = ()) -> None:
     """Write the property file of a fit, whole or not at all."""
-    write_atomic(path, tir_text(fit, comments=comments, side=side))
+    write_atomic(path, tir_text(fit, comments=comments))
 
 
 def file_text(tir: TirFile) -> str:

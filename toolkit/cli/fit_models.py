@@ -1,0 +1,210 @@
+"""From a test or a table and the names of models to their fits, findings and comparison."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import date
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from toolkit.errors import ConfigError, FitError
+from toolkit.findings import Finding
+
+if TYPE_CHECKING:
+    from toolkit.tires.comparison import Comparison
+    from toolkit.tires.global_data import Measured
+    from toolkit.tires.global_model import GlobalModel
+    from toolkit.tires.global_result import ModelFit
+    from toolkit.tires.model import CurveFit, Loss, TireModel
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Fitted:
+    """Everything that was fitted to one source.
+
+    ``curves`` are the fits of single loads with their ``rotations``; ``globals`` those over all loads, of the
+    rows in ``data``; ``radius_m`` the tire's free radius where it is known.
+    """
+
+    data: Measured
+    curves: tuple[CurveFit, ...]
+    rotations: tuple[str | None, ...]
+    globals: tuple[ModelFit, ...]
+    comparison: Comparison
+    findings: tuple[Finding, ...]
+    radius_m: float | None
+
+
+def fit_table_models(
+    table: Path,
+    names: Sequence[str],
+    *,
+    axes: str,
+    loss: Loss,
+    weights: str,
+    rated_load_N: float | None,
+    radius_m: float | None,
+) -> Fitted:
+    """Return the fits of a table.
+
+    Raises
+    ------
+    ToolkitError
+        the table cannot be read; no curve of it can be fitted; a model cannot be fitted to it
+    """
+    from toolkit.cli.fit_tir import STAND_IN_RADIUS
+    from toolkit.tires.global_data import of_table
+    from toolkit.tires.table import read_table
+    from toolkit.tires.table_fit import axes_findings, fit_table
+
+    measured = read_table(table, axes=axes)
+    data = of_table(measured, rated_load_N=rated_load_N, radius_m=radius_m or STAND_IN_RADIUS)
+    single, every = _split(names)
+    curves: tuple[CurveFit, ...] = ()
+    findings: tuple[Finding, ...] = ()
+    if single:
+        result = fit_table(measured, single, loss=loss)
+        curves, findings = result.fits, result.findings
+    made, more, found = _global(data, every, loss, weights, str(table))
+    if not single:
+        findings = tuple(axes_findings(measured, found))
+    return _fitted(data, curves, (None,) * len(curves), made, (*findings, *more), radius_m)
+
+
+def fit_test_models(
+    test: Path,
+    names: Sequence[str],
+    *,
+    axes: str,
+    loss: Loss,
+    weights: str,
+    rated_load_N: float | None,
+    radius_m: float | None,
+    calibration: str | None,
+    calibrations: Path | None,
+    home: Path | None,
+    known_at: date | None,
+) -> Fitted:
+    """Return the fits of a test: single loads in both directions, models over all loads of the forward run.
+
+    Raises
+    ------
+    ToolkitError
+        the test cannot be resolved; a model cannot be fitted to it
+    """
+    import numpy as np
+
+    from toolkit.characteristics.groups import group
+    from toolkit.cli.fit_tir import STAND_IN_RADIUS
+    from toolkit.cli.resolve import resolve_test
+    from toolkit.reduction.averaging import free_radius_m
+    from toolkit.tires.catalog import fit_model
+    from toolkit.tires.fit import Curve, why_not
+    from toolkit.tires.global_data import measured
+    from toolkit.tires.table_fit import fit_findings
+
+    if axes != "SAE":
+        raise ConfigError(
+            "a test is reduced to SAE axes", where="--axes", got=axes, expected="SAE for a test",
+            next_step="leave --axes away; it declares the axes of a table", rule="axes-of-test",
+        )  # fmt: skip
+    resolved = resolve_test(
+        test, calibration=calibration, calibrations=calibrations, home=home, known_at=known_at
+    )
+    groups = group(resolved.result.reduced)
+    single, every = _split(names)
+    rows: list[tuple[CurveFit, str]] = []
+    for one in single:
+        if one.name == "magic_formula" and loss == "linear":
+            # The characteristics stand on these fits already.
+            for direction in resolved.result.characteristics.fits:
+                rows += [(fit, direction.rotation) for fit in (direction.FY, direction.MZ) if fit is not None]
+            continue
+        made = [
+            (Curve(SA=g.SA, y=g.values(channel), channel=channel, load_N=g.load_N), g.rotation)
+            for g in groups
+            for channel in ("FY", "MZ")
+        ]
+        made = [(curve, rotation) for curve, rotation in made if why_not(curve) is None]
+        fits = fit_model(one, [curve for curve, _ in made], loss=loss)
+        rows += list(zip(fits, [rotation for _, rotation in made], strict=True))
+    own = [finding for finding in fit_findings([fit for fit, _ in rows]) if finding.level == "note"]
+    info = resolved.result.reduced.info
+    radius = radius_m or free_radius_m(info.tire_size)
+    run = [
+        g
+        for g in groups
+        if g.rotation == ("forward" if any(g.rotation == "forward" for g in groups) else g.rotation)
+    ]
+    columns = {
+        "SA": np.concatenate([g.SA for g in run]),
+        "FZ": np.concatenate([np.full(len(g.SA), g.load_N) for g in run]),
+        "FY": np.concatenate([g.values("FY") for g in run]),
+        "MZ": np.concatenate([g.values("MZ") for g in run]),
+    }
+    if info.pressure_Pa:
+        columns["P"] = np.full(len(columns["SA"]), info.pressure_Pa)
+    if info.speed_m_s:
+        columns["V"] = np.full(len(columns["SA"]), info.speed_m_s)
+    data = measured(
+        columns, axes="SAE", rated_load_N=rated_load_N or info.rated_load_N,
+        unloaded_radius_m=radius or STAND_IN_RADIUS,
+    )  # fmt: skip
+    fits_all, more, _ = _global(data, every, loss, weights, str(test))
+    findings = (*resolved.findings, *own, *more)
+    return _fitted(
+        data, tuple(fit for fit, _ in rows), tuple(turn for _, turn in rows), fits_all, findings, radius
+    )
+
+
+def _split(names: Sequence[str]) -> tuple[tuple[TireModel, ...], tuple[GlobalModel, ...]]:
+    from toolkit.tires.catalog import find
+    from toolkit.tires.global_model import GlobalModel
+
+    found = [find(name) for name in names]
+    every = tuple(one for one in found if isinstance(one, GlobalModel))
+    return tuple(one for one in found if not isinstance(one, GlobalModel)), every
+
+
+def _global(
+    data: Measured, models: Sequence[GlobalModel], loss: Loss, weights: str, where: str
+) -> tuple[tuple[ModelFit, ...], tuple[Finding, ...], tuple[CurveFit, ...]]:
+    from toolkit.tires.global_checks import why_not_global
+    from toolkit.tires.global_fit import fit_global, global_findings, not_varied
+    from toolkit.tires.global_seeds import seeds_of
+
+    if not models:
+        return (), (), ()
+    for model in models:
+        if (problem := why_not_global(data, model)) is not None:
+            raise FitError(
+                problem.what, where=f"{where}, {problem.where}", got=problem.got, expected=problem.expected,
+                next_step=problem.next_step, rule=problem.rule,
+            )  # fmt: skip
+    found = seeds_of(data)
+    fits = tuple(fit_global(model, data, loss=loss, weights=weights, seeds=found.seeds) for model in models)
+    findings = [finding for fit in fits for finding in global_findings(fit)]
+    return fits, (*not_varied(fits, where), *findings), found.fits
+
+
+def _fitted(
+    data: Measured,
+    curves: tuple[CurveFit, ...],
+    rotations: tuple[str | None, ...],
+    fits: tuple[ModelFit, ...],
+    findings: tuple[Finding, ...],
+    radius_m: float | None,
+) -> Fitted:
+    from toolkit.tires.comparison import compare
+
+    forward = [fit for fit, turn in zip(curves, rotations, strict=True) if turn in (None, "forward")]
+    return Fitted(
+        data=data,
+        curves=curves,
+        rotations=rotations,
+        globals=fits,
+        comparison=compare(data, forward, fits),
+        findings=findings,
+        radius_m=radius_m,
+    )

@@ -1,0 +1,153 @@
+"""Models side by side on one data set: the form of the thesis's table 3.1, with floor and prediction."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from toolkit.channels import signs
+from toolkit.tires.evaluate import value_at
+from toolkit.tires.global_data import CHANNELS, Measured, cell
+from toolkit.tires.global_model import GlobalModel, make_rows
+from toolkit.tires.global_result import ModelFit, pooled_percent
+from toolkit.tires.model import CurveFit
+from toolkit.tires.quality import scatter_floor_percent
+
+if TYPE_CHECKING:
+    from toolkit.tires.global_model import Array
+
+_FREE = 0.005  # longitudinal slip up to which a row is of pure side slip
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ComparisonRow:
+    """One model on one channel under one condition, ``pure`` or ``combined`` slip.
+
+    ``error_percent`` = 100 sqrt(sum(model - measured)^2 / sum(measured^2)) over ``n`` rows; curves of single
+    loads are pooled. ``prediction_error_percent``: every load by a fit without it, None where there is
+    none (a curve of one load predicts no other). ``parameters`` counts those that were fitted.
+    """
+
+    model: str
+    channel: str
+    condition: str
+    n: int
+    parameters: int
+    error_percent: float
+    prediction_error_percent: float | None
+    converged: bool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Comparison:
+    """All models on one data set; ``floors`` (channel, percent) is what no model could remove."""
+
+    rows: tuple[ComparisonRow, ...]
+    floors: tuple[tuple[str, float | None], ...]
+
+    @property
+    def models(self) -> tuple[str, ...]:
+        """Model names in their order."""
+        return tuple(dict.fromkeys(row.model for row in self.rows))
+
+    @property
+    def conditions(self) -> tuple[tuple[str, str], ...]:
+        """(condition, channel) in their order: pure before combined."""
+        found = dict.fromkeys((row.condition, row.channel) for row in self.rows)
+        return tuple(sorted(found, key=lambda one: (one[0] != "pure", CHANNELS.index(one[1]))))
+
+    def get(self, model: str, condition: str, channel: str) -> ComparisonRow | None:
+        """Return one entry of the table, None where the model has none."""
+        for row in self.rows:
+            if (row.model, row.condition, row.channel) == (model, condition, channel):
+                return row
+        return None
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the JSON form."""
+        return {
+            "rows": [{name: getattr(row, name) for name in ComparisonRow.__slots__} for row in self.rows],
+            "scatter_floor_percent": dict(self.floors),
+        }
+
+
+def compare(data: Measured, curves: Sequence[CurveFit], models: Sequence[ModelFit]) -> Comparison:
+    """Return the table of the models that were fitted to these rows; ``curves`` are of single loads."""
+    made = []
+    for name in dict.fromkeys(one.model for one in curves):
+        own = [one for one in curves if one.model == name]
+        for channel in ("FY", "MZ"):
+            if channel in data.channels and any(one.channel == channel for one in own):
+                made += _of_curves(data, [one for one in own if one.channel == channel])
+    for fit in models:
+        for one in fit.fits:
+            y, model = data[one.channel], fit.at_rows(one.channel)
+            free = sum(p.name not in dict(one.fixed) for p in one.parameters)
+            made += _rows(
+                data, one.model, one.channel, y, model, np.isfinite(y), free,
+                one.prediction_error_percent, one.converged,
+            )  # fmt: skip
+    floors = {
+        channel: scatter_floor_percent(data.rows.SA, data[channel], cell(data)) for channel in data.channels
+    }
+    return Comparison(rows=tuple(made), floors=tuple(floors.items()))
+
+
+def _of_curves(data: Measured, fits: Sequence[CurveFit]) -> list[ComparisonRow]:
+    channel = fits[0].channel
+    y, model = data[channel], np.full(len(data), np.nan)
+    for fit in fits:
+        if fit.load_N is not None:
+            own = data.block == int(np.argmin(np.abs(data.loads - fit.load_N)))
+            model[own] = value_at(fit, data.rows.SA[own])
+    count = sum(len(fit.parameters) for fit in fits)
+    converged = all(fit.converged for fit in fits)
+    return _rows(data, fits[0].model, channel, y, model, np.isfinite(model), count, None, converged)
+
+
+def _rows(
+    data: Measured,
+    name: str,
+    channel: str,
+    y: Array,
+    model: Array,
+    known: np.ndarray,
+    parameters: int,
+    prediction: float | None,
+    converged: bool,
+) -> list[ComparisonRow]:
+    pure = np.abs(data.rows.KAPPA) <= _FREE
+    made = []
+    for condition, own in (("pure", known & pure), ("combined", known & ~pure)):
+        if own.any():
+            made.append(
+                ComparisonRow(
+                    model=name,
+                    channel=channel,
+                    condition=condition,
+                    n=int(own.sum()),
+                    parameters=parameters,
+                    error_percent=pooled_percent(model[own] - y[own], y[own]),
+                    prediction_error_percent=prediction if condition == "pure" or not pure.any() else None,
+                    converged=converged,
+                )
+            )
+    return made
+
+
+def model_curve(
+    model: GlobalModel, fit: ModelFit, data: Measured, channel: str, *, SA: Array, load_N: float
+) -> Array:
+    """Return a fitted model at slip angles [rad] and a load [N] in the data's axes, upright, free rolling."""
+    flip = signs(data.axes, model.axes)
+    r = data.rows
+    rows = make_rows(
+        flip["SA"] * np.asarray(SA), load_N, FNOMIN=r.FNOMIN, NOMPRES=r.NOMPRES, LONGVL=r.LONGVL,
+        UNLOADED_RADIUS=r.UNLOADED_RADIUS,
+    )  # fmt: skip
+    with np.errstate(all="ignore"):
+        made = model.forces(fit.values.tolist(), rows)[channel]
+    return np.asarray(flip.get(channel, 1) * np.broadcast_to(made, len(rows)))
