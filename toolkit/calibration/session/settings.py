@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from typing import Any, cast
 
 from toolkit.calibration.records.record import Zero, canonical
+from toolkit.calibration.session.plain_toml import plain_toml
 from toolkit.calibration.terms import INTERCEPT, MODELS, NAME, model_terms
 from toolkit.errors import ConfigError, ToolkitError
 from toolkit.files import check_keys, parse_toml, sha256_bytes
@@ -86,7 +87,8 @@ def parse_session(data: bytes, *, where: object) -> dict[str, Any]:
         ``not-toml``, with a hint where ``check`` stands as a value and as a table; ``unknown-key``
     """
     try:
-        raw = parse_toml(data, where=where)
+        plain = plain_toml(data)
+        raw = parse_toml(data, where=where) if plain is None else plain
     except ToolkitError as error:
         text = data.decode("utf-8", "replace")
         if not (_CHECK_VALUE.search(text) and _CHECK_TABLE.search(text)):

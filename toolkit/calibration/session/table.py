@@ -14,11 +14,13 @@ import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolkit.errors import SessionError
+from toolkit.calibration.session.separators import HOW_TO_SAVE, has_decimal_comma, separator_seen
+from toolkit.errors import SessionError, ToolkitError
 from toolkit.units import si_scale, unit
 
 if TYPE_CHECKING:
@@ -113,25 +115,63 @@ def read_table(
     UnitError
         a unit is unknown
     """
-    rows = _rows(data, where)
-    header, body = rows[0], rows[1:]
+    plain = _plain_columns(data)
+    rows = [] if plain is not None else _rows(data, where)
+    header = rows[0] if plain is None else plain[0]
+    head = _head(tuple(header), tuple(required), tuple(optional), runs, where)
+    columns = _turned(rows[1:], len(header), where) if plain is None else plain[1]
+    if not columns[0]:
+        raise _error(where, "the file has no rows", "0 rows", "one row a reference load", "no-data")
+    cells = dict(zip(head.names, columns, strict=True))
+    up = None
+    if "direction" in cells:
+        direction = cells["direction"]
+        if not set(direction) <= {"up", "down"}:
+            direction = tuple(cell.strip().lower() for cell in direction)
+            for number, cell in enumerate(direction, start=1):
+                if cell not in ("up", "down"):
+                    raise _cell(where, number, "direction", cell, "up or down")
+        up = np.array([cell == "up" for cell in direction])
+    labels = [name for name in ("run", "rotation") if name in cells]
+    found = _numbers({name: cells[name] for name in (*head.numeric, *labels)}, where)
+    values, told = found[: len(head.numeric)].T, dict(zip(labels, found[len(head.numeric) :], strict=True))
+    run = told.get("run")
+    if run is not None and (fraction := np.flatnonzero(run != np.floor(run))).size:
+        at = int(fraction[0])
+        raise _cell(where, at + 1, "run", cells["run"][at], "a whole number")
+    return Table(
+        names=head.numeric, units=head.units, values=values, run=run, up=up, rotation=told.get("rotation")
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Head:
+    """``names`` of all columns, ``numeric`` and ``units`` of those that are loads, cells, uncertainties."""
+
+    names: tuple[str, ...]
+    numeric: tuple[str, ...]
+    units: tuple[str, ...]
+
+
+def _head(
+    header: tuple[str, ...], required: tuple[str, ...], optional: tuple[str, ...], runs: bool, where: object
+) -> _Head:
+    try:
+        return _known_head(header, required, optional, runs)
+    except ToolkitError:
+        # Said again with the file's name.
+        return _read_head(header, required, optional, runs, where)
+
+
+def _read_head(
+    header: tuple[str, ...], required: tuple[str, ...], optional: tuple[str, ...], runs: bool, where: object
+) -> _Head:
     parsed = [_HEADER.match(cell.strip()) for cell in header]
     names = [
         match["name"].strip() if match else cell.strip() for match, cell in zip(parsed, header, strict=True)
     ]
     extra = ("run", "direction", "rotation") if runs else ()
-    _check_header(names, header, [*required, *(extra[:2])], [*optional, *extra], where)
-    if not body:
-        raise _error(where, "the file has no rows", "0 rows", "one row a reference load", "no-data")
-    wide = set(map(len, body)) == {len(names)}
-    for number, row in enumerate(() if wide else body, start=1):
-        if len(row) != len(names):
-            raise _error(
-                f"{where}, row {number} (line {number + 1})",
-                "a row has another number of cells than the header",
-                f"{len(row)} cells", f"{len(names)} cells", "columns",
-            )  # fmt: skip
-    cells = dict(zip(names, zip(*body, strict=True), strict=True))
+    _check_header(names, list(header), [*required, *(extra[:2])], [*optional, *extra], where)
     numeric = [name for name in names if name not in ("run", "direction", "rotation")]
     units = []
     for name in numeric:
@@ -142,27 +182,52 @@ def read_table(
                 header[names.index(name)], f"a header such as '{name} [N]' or '{name} [mV/V]'", "no-unit",
             )  # fmt: skip
         units.append(unit(match["unit"].strip(), where=f"{where}, column {name}").text)
-    up = None
-    if "direction" in cells:
-        direction = cells["direction"]
-        if not set(direction) <= {"up", "down"}:
-            direction = tuple(cell.strip().lower() for cell in direction)
-            for number, cell in enumerate(direction, start=1):
-                if cell not in ("up", "down"):
-                    raise _cell(where, number, "direction", cell, "up or down")
-        up = np.array([cell == "up" for cell in direction])
-    run = _numbers(cells["run"], "run", where) if "run" in cells else None
-    if run is not None and (fraction := np.flatnonzero(run != np.floor(run))).size:
-        at = int(fraction[0])
-        raise _cell(where, at + 1, "run", cells["run"][at], "a whole number")
-    return Table(
-        names=tuple(numeric),
-        units=tuple(units),
-        values=np.array([_numbers(cells[name], name, where) for name in numeric]).T,
-        run=run,
-        up=up,
-        rotation=_numbers(cells["rotation"], "rotation", where) if "rotation" in cells else None,
-    )
+    return _Head(names=tuple(names), numeric=tuple(numeric), units=tuple(units))
+
+
+@lru_cache(maxsize=256)
+def _known_head(
+    header: tuple[str, ...], required: tuple[str, ...], optional: tuple[str, ...], runs: bool
+) -> _Head:
+    # The files of a history have one header.
+    return _read_head(header, required, optional, runs, "")
+
+
+def _turned(rows: list[list[str]], width: int, where: object) -> list[Sequence[str]]:
+    """Return rows as columns."""
+    for number, row in enumerate(rows, start=1):
+        if len(row) != width:
+            raise _error(
+                f"{where}, row {number} (line {number + 1})",
+                "a row has another number of cells than the header",
+                f"{len(row)} cells: {', '.join(row)}", f"{width} cells", "columns",
+                "correct the file (a number with a decimal comma makes two cells: "
+                f"{HOW_TO_SAVE})" if len(row) > width else "correct the file; nothing was written",
+            )  # fmt: skip
+    return [[row[at] for row in rows] for at in range(width)]
+
+
+def _plain_columns(data: bytes) -> tuple[list[str], list[Sequence[str]]] | None:
+    """Return the header and the columns that `csv` reads, without it.
+
+    None where there are quotes, blank rows, rows of another length, or bytes that are no text.
+    """
+    try:
+        text = data.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        return None
+    if '"' in text or "\r" in text or "\0" in text:
+        return None
+    lines = text.removesuffix("\n").split("\n")
+    commas = lines[0].count(",")
+    if not commas or {line.count(",") for line in lines} != {commas}:
+        return None
+    cells = ",".join(lines).split(",")
+    width = commas + 1
+    # A row of empty cells is no row, and begins with one.
+    if not all(map(str.strip, cells[::width])):
+        return None
+    return cells[:width], [cells[width + at :: width] for at in range(width)]
 
 
 def _rows(data: bytes, where: object) -> list[list[str]]:
@@ -182,6 +247,12 @@ def _rows(data: bytes, where: object) -> list[list[str]]:
 def _check_header(
     names: list[str], header: list[str], required: list[str], optional: list[str], where: object
 ) -> None:
+    seen = separator_seen(header)
+    if seen is not None and not set(required) <= set(names):
+        raise _error(
+            where, f"the file's cells are separated by {seen}", ", ".join(header),
+            "commas between the cells, a point in the numbers", "columns", HOW_TO_SAVE,
+        )  # fmt: skip
     for name in names:
         if names.count(name) > 1:
             raise _error(
@@ -203,16 +274,21 @@ def _check_header(
             )  # fmt: skip
 
 
-def _numbers(cells: Sequence[str], name: str, where: object) -> NDArray[np.float64]:
+def _numbers(columns: Mapping[str, Sequence[str]], where: object) -> NDArray[np.float64]:
+    """Return the columns' numbers (columns, rows)."""
     try:
-        values = np.array(list(map(float, cells)))
+        values = np.array([list(map(float, cells)) for cells in columns.values()])
+        # float() reads 1_0 as ten; in a table an underscore is a slip.
+        if np.isfinite(values).all() and not any("_" in "".join(cells) for cells in columns.values()):
+            return values
     except ValueError:
-        values = np.array([_number(cell, at, name, where) for at, cell in enumerate(cells, start=1)])
-    # float() reads 1_0 as ten; in a table an underscore is a slip.
-    if not np.isfinite(values).all() or "_" in "".join(cells):
-        for at, cell in enumerate(cells, start=1):
-            _number(cell, at, name, where)
-    return values
+        pass
+    return np.array(
+        [
+            [_number(cell, at, name, where) for at, cell in enumerate(cells, start=1)]
+            for name, cells in columns.items()
+        ]
+    )
 
 
 def _number(cell: str, at: int, name: str, where: object) -> float:
@@ -231,7 +307,9 @@ def _cell(where: object, row: int, name: str, got: str, expected: str) -> Sessio
         where=f"{where}, row {row} (line {row + 1}), column {name}",
         got=repr(got),
         expected=expected,
-        next_step="correct the cell, or remove the whole row with a reason in the laboratory's notes",
+        next_step=f"the number has a decimal comma: {HOW_TO_SAVE}"
+        if has_decimal_comma(got)
+        else "correct the cell, or remove the whole row with a reason in the laboratory's notes",
         rule="cell",
     )
 
