@@ -19,9 +19,11 @@ from typing import Literal, get_args
 
 Axes = Literal["SAE", "adapted-SAE", "ISO-W", "machine"]
 Rotation = Literal["forward", "reverse"]
+Reversal = Literal["drum", "tire"]
 
 AXES: tuple[Axes, ...] = get_args(Axes)
 ROTATIONS: tuple[Rotation, ...] = get_args(Rotation)
+REVERSALS: tuple[Reversal, ...] = get_args(Reversal)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -91,6 +93,18 @@ def signs(source: Axes, target: Axes, rotation: Rotation = "forward") -> dict[st
     """
     one, other = _from_sae(source, rotation), _from_sae(target, rotation)
     return {symbol: one[symbol] * other[symbol] for symbol in one}
+
+
+def seen_by_cells(rotation: Rotation, reversal: Reversal) -> Rotation:
+    """Return the direction of a run as cells in the carriage see it.
+
+    A tire can roll backwards in two ways: the drum is reversed, or the tire is turned round on the hub
+    and the drum goes on. In the second the axes of the cells still follow the travel.
+
+    >>> seen_by_cells("reverse", "tire")
+    'forward'
+    """
+    return "forward" if reversal == "tire" else rotation
 
 
 def _from_sae(axes: Axes, rotation: Rotation) -> dict[str, int]:

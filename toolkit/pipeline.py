@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
@@ -17,7 +18,7 @@ from toolkit.reduction.tare import tare_of_file
 
 if TYPE_CHECKING:
     from toolkit.calibration.records.record import CalibrationRecord
-    from toolkit.machine import Machine
+    from toolkit.machine import Machine, Protocol
     from toolkit.recording.folder import TestFolder
     from toolkit.recording.model import Recording
 
@@ -52,9 +53,25 @@ def read_test(
     return tuple(found)
 
 
-def process(folder: TestFolder, recordings: tuple[Recording, ...], record: CalibrationRecord) -> TestResult:
-    """Reduce, fit and characterise the recordings of a test with one calibration record."""
+def machine_of(folder: TestFolder, protocol: Protocol | None = None) -> Machine:
+    """Return a test's machine with the protocol that applies: ``protocol``, the test's own, the machine's."""
     machine = load_machine(folder.info.machine)
+    chosen = protocol or folder.protocol
+    return machine if chosen is None else dataclasses.replace(machine, protocol=chosen)
+
+
+def process(
+    folder: TestFolder,
+    recordings: tuple[Recording, ...],
+    record: CalibrationRecord,
+    *,
+    protocol: Protocol | None = None,
+) -> TestResult:
+    """Reduce, fit and characterise the recordings of a test with one calibration record.
+
+    ``protocol`` goes before the test's own, and that before the machine's.
+    """
+    machine = machine_of(folder, protocol)
     reduced = reduce_test(
         info=folder.info,
         machine=machine,

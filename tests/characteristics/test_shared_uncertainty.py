@@ -12,9 +12,9 @@ import pytest
 from toolkit.calibration.registry.registry import Registry
 from toolkit.calibration.uncertainty.propagation import record_covariance
 from toolkit.characteristics.characterise import characterise
-from toolkit.characteristics.shared import Shared, slope_weights, weights_at_zero
+from toolkit.characteristics.shared import Shared
 from toolkit.cli.home import packaged_home
-from toolkit.machine import load_machine
+from toolkit.machine import TypeB, load_machine
 from toolkit.pipeline import TestResult, process, read_test
 from toolkit.recording.folder import read_test_folder
 
@@ -22,6 +22,8 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from toolkit.calibration.records.record import CalibrationRecord
+    from toolkit.characteristics.groups import Group
+    from toolkit.reduction.model import Condition
 
 MACHINE = load_machine("m15-virtual")
 STATED: dict[str, Any] = {
@@ -47,7 +49,23 @@ def result(virtual_test: Path, fitted: CalibrationRecord) -> TestResult:
 
 
 def shared_of(record: CalibrationRecord) -> Shared:
-    return Shared(record=record, machine_axes=MACHINE.axes, tared=True, u_SA_zero=0.0)
+    none = {name: TypeB(symbol=name, u=0.0, relative=0.0, source="") for name in ("SA", "FZ", "P", "zero")}
+    return Shared(record=record, machine_axes=MACHINE.axes, tared=True, **none)
+
+
+def weights_at_zero(group: Group) -> list[tuple[Condition, float]]:
+    """The line through the two conditions on both sides of zero."""
+    SA = group.SA
+    right = int(np.searchsorted(SA, 0.0))
+    share = -SA[right - 1] / (SA[right] - SA[right - 1])
+    return [(group.conditions[right - 1], 1 - share), (group.conditions[right], share)]
+
+
+def slope_weights(group: Group) -> list[tuple[Condition, float]]:
+    """The least-squares slope through the conditions within 2 deg of zero."""
+    near = [c for c in group.conditions if abs(c.SA) <= np.radians(2.0)]
+    rest = np.array([c.SA for c in near]) - np.mean([c.SA for c in near])
+    return list(zip(near, (rest / (rest @ rest)).tolist(), strict=True))
 
 
 def test_a_record_that_states_nothing_has_the_covariance_of_its_fit(fitted: CalibrationRecord) -> None:

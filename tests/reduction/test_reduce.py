@@ -266,6 +266,7 @@ def test_without_a_tare_the_zero_of_the_cells_is_in_the_uncertainty(
     bare = reduce_folder(folder, virtual_record)
     assert "no-tare" in rules(bare)
     for one, other in zip(declared.conditions, bare.conditions, strict=True):
+        # The virtual machine states its tare by values, with no scatter to go by.
         assert one.u_FY_zero == 0.0
         # What the tare removed is within two standard uncertainties of the stated zero.
         assert 0 < abs(other.FY - one.FY) < 2 * other.u_FY_total

@@ -162,6 +162,7 @@ def make_result(
                 PRAT_at_FY_zero=_estimate(1.8e-3 * load, 0.35, "N*m"),
                 thesis_CRAT=_estimate(1.0, 0.2, "N*m"),
                 thesis_PRAT=_estimate(0.3, 0.2, "N*m"),
+                thesis_PRAT_at_FY_zero=_estimate(0.25, 0.2, "N*m"),
                 residual_forward=_estimate(2.5, 0.3, "N*m"),
                 residual_reverse=_estimate(-1.5, 0.3, "N*m"),
             )

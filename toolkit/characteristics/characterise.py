@@ -2,16 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Literal
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Literal, cast
 
 import numpy as np
 
+from toolkit.channels import Rotation
 from toolkit.characteristics.groups import Group, group
-from toolkit.characteristics.model import Characteristics, DirectionFit
-from toolkit.characteristics.pull import Direction, pull
-from toolkit.characteristics.shared import Shared, line_at_zero, weights_at_zero
-from toolkit.characteristics.stiffness import stiffness
+from toolkit.characteristics.model import (
+    AtAngle,
+    Budget,
+    Characteristics,
+    DirectionFit,
+    Point,
+    Pull,
+    Stiffness,
+)
+from toolkit.characteristics.pull import NAMES as PULL
+from toolkit.characteristics.reading import Direction
+from toolkit.characteristics.rows import BOTH, Row, directions_of, point_u, rows_of
+from toolkit.characteristics.shared import shared_of
+from toolkit.characteristics.stiffness import NAMES as STIFFNESS
 from toolkit.findings import Finding
 from toolkit.tires.evaluate import estimate_at
 from toolkit.tires.fit import fit_curves, why_not
@@ -34,23 +45,69 @@ def characterise(
     """
     groups = group(reduced)
     fits, findings = _fit(groups)
-    directions = [Direction(group=g, fit=f) for g, f in zip(groups, fits, strict=True)]
-    shared = Shared(
-        record=record,
-        machine_axes=machine.axes,
-        tared=reduced.tare.source != "none",
-        u_SA_zero=machine.stated_uncertainty("SA").u,
-        u_cell_zero=tuple(u for _, u in reduced.tare.u),
-    )
-    pulls = []
-    for load in sorted({d.group.load_N for d in directions}):
-        there = {d.group.rotation: d for d in directions if d.group.load_N == load}
-        pulls.append(pull(load, there.get("forward"), there.get("reverse"), shared=shared))
+    directions = directions_of(reduced, fits)
+    shared = shared_of(reduced, machine=machine, record=record)
+    rows = rows_of(directions, shared=shared)
+    found = {(row.name, row.load_N, row.rotation, row.SA_rad): row.number.estimate() for row in rows}
+    loads = sorted({d.group.load_N for d in directions})
     return Characteristics(
         fits=fits,
-        stiffness=tuple(stiffness(d.group, d.fit, shared=shared) for d in directions),
-        pull=tuple(pulls),
+        stiffness=tuple(
+            Stiffness(
+                load_N=g.load_N,
+                rotation=g.rotation,
+                **{name: found.get((name, g.load_N, g.rotation, None)) for name in STIFFNESS},
+            )
+            for g in groups
+        ),
+        pull=tuple(
+            Pull(load_N=load, **{name: found.get((name, load, BOTH, None)) for name in PULL})
+            for load in loads
+        ),
         findings=(*findings, *_line_findings(directions)),
+        at_angles=tuple(
+            AtAngle(
+                load_N=load,
+                rotation=rotation,
+                SA_rad=angle,
+                FY=found.get(("FY", load, rotation, angle)),
+                MZ=found.get(("MZ", load, rotation, angle)),
+            )
+            for load, rotation, angle in dict.fromkeys(
+                (row.load_N, cast("Rotation", row.rotation), row.SA_rad)
+                for row in rows
+                if row.SA_rad is not None
+            )
+        ),
+        points=tuple(
+            Point(file=file, first_row=row, u_FY=u["FY"], u_MZ=u["MZ"])
+            for (file, row), u in point_u(directions, shared=shared).items()
+        ),
+        budgets=tuple(
+            Budget(
+                load_N=row.load_N,
+                rotation=row.rotation,
+                name=row.name,
+                unit=row.number.unit,
+                sources=row.number.by_source(),
+            )
+            for row in rows
+            if row.SA_rad is None
+        ),
+    )
+
+
+def characteristic_rows(
+    reduced: ReducedTest,
+    characteristics: Characteristics,
+    *,
+    machine: Machine,
+    record: CalibrationRecord | None,
+) -> tuple[Row, ...]:
+    """Return the characteristics again as rows that know the parts of their uncertainty, to compare them."""
+    return rows_of(
+        directions_of(reduced, characteristics.fits),
+        shared=shared_of(reduced, machine=machine, record=record),
     )
 
 
@@ -115,18 +172,21 @@ def _where(group: Group) -> str:
     return f"drum {group.rotation}, {float(from_si(group.load_N, 'lbf')):.0f} lbf"
 
 
-def _line_findings(directions: list[Direction]) -> list[Finding]:
+def _line_findings(directions: Sequence[Direction]) -> list[Finding]:
     """Hold the curve's value at SA = 0 against the line through the nearest points."""
     found = []
     for one in directions:
-        if one.fit.FY is not None and not weights_at_zero(one.group):
-            message = "the slip angles lie on one side of zero: stiffness and pull at SA = 0 are null"
-            found.append(Finding(rule="one-sided", where=_where(one.group), message=message))
+        SA = one.group.SA
+        if not (len(SA) > 1 and SA[0] <= 0.0 <= SA[-1]):
+            if one.fit.FY is not None:
+                message = "the slip angles lie on one side of zero: stiffness and pull at SA = 0 are null"
+                found.append(Finding(rule="one-sided", where=_where(one.group), message=message))
+            continue
         for channel, fit in (("FY", one.fit.FY), ("MZ", one.fit.MZ)):
-            line = line_at_zero(one.group, channel)
-            if fit is None or line is None:
+            if fit is None:
                 continue
             at_zero = estimate_at(fit, 0.0)
+            line = float(np.interp(0.0, SA, one.group.values(channel)))
             # The line itself is wrong by the curve's bend: a fiftieth of the range is left to it.
             limit = max(5 * at_zero.u, 0.02 * float(np.ptp(one.group.values(channel))))
             if abs(at_zero.value - line) > limit:

@@ -31,13 +31,18 @@ class Group:
         """FY [N] or MZ [N·m] at the common load."""
         return np.array([c.FY_common if channel == "FY" else c.MZ_common for c in self.conditions])
 
-    def step(self, degrees: float) -> Condition | None:
-        """Return the condition of a slip angle step of the protocol [deg], None where it is missing."""
+    def own_u(self, channel: str) -> NDArray[np.float64]:
+        """Standard uncertainty of each condition's own value: rows, and the way to the common load."""
+        return np.array([c.u_FY_common if channel == "FY" else c.u_MZ_common for c in self.conditions])
+
+    def step(self, degrees: float) -> tuple[int, ...]:
+        """Return the places of the conditions of a slip angle step of the protocol [deg]; repeats too."""
         wanted = np.radians(degrees)
-        for one in self.conditions:
-            if one.step_SA is not None and abs(one.step_SA - wanted) < 1e-9:
-                return one
-        return None
+        return tuple(
+            i
+            for i, one in enumerate(self.conditions)
+            if one.step_SA is not None and abs(one.step_SA - wanted) < 1e-9
+        )
 
 
 def group(reduced: ReducedTest) -> tuple[Group, ...]:

@@ -32,7 +32,8 @@ class Pull:
 
     ``conicity plysteer CRAT PRAT`` by symmetry (machine-fixed axes or their equivalent);
     ``PRAT_at_FY_zero`` the mean of MZ at each direction's own FY = 0;
-    ``thesis_CRAT`` and ``thesis_PRAT`` by the formulas of the source document on machine-fixed values;
+    ``thesis_CRAT`` and ``thesis_PRAT`` by the formulas of the source document on machine-fixed values, and
+    ``thesis_PRAT_at_FY_zero`` its formula on MZ at each direction's own FY = 0;
     ``residual_*`` the single-direction MZ at FY = 0. None where a direction or the curve is missing.
     """
 
@@ -44,8 +45,48 @@ class Pull:
     PRAT_at_FY_zero: Estimate | None
     thesis_CRAT: Estimate | None
     thesis_PRAT: Estimate | None
+    thesis_PRAT_at_FY_zero: Estimate | None
     residual_forward: Estimate | None
     residual_reverse: Estimate | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AtAngle:
+    """FY [N] and MZ [N·m] of one load and direction at a slip angle of the protocol, off the curves."""
+
+    load_N: float
+    rotation: Rotation
+    SA_rad: float
+    FY: Estimate | None
+    MZ: Estimate | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Point:
+    """One condition as measured, with its whole uncertainty.
+
+    ``u_FY`` [N] and ``u_MZ`` [N·m] are standard uncertainties of FY and MZ at the measured slip angle and
+    load, from every source that the budget names.
+    """
+
+    file: str
+    first_row: int
+    u_FY: float
+    u_MZ: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Budget:
+    """What makes one characteristic uncertain: (source, standard uncertainty [``unit``]), all of them.
+
+    ``rotation`` is ``both`` for what needs a forward and a reversed run.
+    """
+
+    load_N: float
+    rotation: str
+    name: str
+    unit: str
+    sources: tuple[tuple[str, float], ...]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -66,3 +107,6 @@ class Characteristics:
     stiffness: tuple[Stiffness, ...]
     pull: tuple[Pull, ...]
     findings: tuple[Finding, ...]
+    at_angles: tuple[AtAngle, ...] = ()
+    points: tuple[Point, ...] = ()
+    budgets: tuple[Budget, ...] = ()

@@ -1,4 +1,4 @@
-"""What all rows of a test share: the coefficients of one record, the zero of the slip angle.
+"""What all rows of a test share: the record's coefficients, the zeros of the cells, the slip angle's scale.
 
 A characteristic is, to first order, a weighted sum of conditions. The record's coefficients are the same
 in every one of them, so their uncertainty goes through the weighted sum of the sensitivities, not through
@@ -6,10 +6,15 @@ the conditions one by one: it cancels in a difference of equal readings and adds
 session stated (reference standard, indications, drift of the zero, creep) is in their covariance: an error of
 the scale stays in conicity and stiffness in proportion to their values, a shift of the zero goes where the
 signs of the axes take it (`uncertainty.propagation`).
+
+Every share is a signed `Part` whose key says which variable it is. Two tests that one record computed share
+its keys; what the machine definition states is common to all tests of the machine or drawn anew in each one
+(``common = "machine" | "test"``).
 """
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from types import MappingProxyType
@@ -19,7 +24,9 @@ import numpy as np
 
 from toolkit.calibration.apply import coefficient_jacobian
 from toolkit.calibration.uncertainty.propagation import record_covariance
-from toolkit.channels import signs
+from toolkit.channels import seen_by_cells, signs
+from toolkit.characteristics.uncertain import Part
+from toolkit.machine import TypeB
 from toolkit.reduction.tare import zero_shifts
 from toolkit.units import si_scale
 
@@ -27,11 +34,13 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from toolkit.calibration.records.record import CalibrationRecord
-    from toolkit.channels import Axes
-    from toolkit.characteristics.groups import Group
-    from toolkit.reduction.model import Condition
+    from toolkit.channels import Axes, Reversal
+    from toolkit.machine import Machine
+    from toolkit.reduction.model import Condition, ReducedTest
 
 Weighted = Sequence[tuple["Condition", float]]
+# A pivot of a correlation matrix below this is rounding.
+_NO_PIVOT = 1e-14
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -39,43 +48,118 @@ class Shared:
     """What every row of a test has in common.
 
     ``record`` computed the rows (None where it is not at hand: its share is then zero); ``machine_axes``
-    are the axes of its cells; ``tared`` says that a tare was subtracted; ``u_SA_zero`` [rad] is the
-    standard uncertainty of the slip angle's zero, the same for both directions of rotation;
-    ``u_cell_zero`` that of each cell's zero in the record's units, empty where a tare was subtracted.
+    are the axes of its cells; ``tared`` says that a tare was subtracted; ``u_cell_zero`` is the standard
+    uncertainty of each cell's zero in the record's units, one shift of every row (the open zero of an
+    untared bridge, or the scatter of a tare that serves all files). ``SA FZ P zero`` are what the machine
+    states of the slip angle, the load, the pressure and the cells' zeros; ``pressure_Pa`` None where the
+    test does not say it. ``machine`` and ``test`` name the owners of variables; ``reversal`` says what was
+    turned for the runs called reverse.
     ``covariance`` of each load's coefficients follows from the record and what its session stated.
     """
 
     record: CalibrationRecord | None
     machine_axes: Axes
     tared: bool
-    u_SA_zero: float
+    SA: TypeB
+    FZ: TypeB
+    P: TypeB
+    zero: TypeB
     u_cell_zero: tuple[float, ...] = ()
+    pressure_Pa: float | None = None
+    machine: str = ""
+    test: str = ""
+    reversal: Reversal = "drum"
     covariance: Mapping[str, NDArray[np.float64]] = field(init=False, repr=False)
+    roots: Mapping[str, NDArray[np.float64]] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         found = {} if self.record is None else record_covariance(self.record)
         object.__setattr__(self, "covariance", MappingProxyType(found))
+        roots = {load: root_of(one) for load, one in found.items()}
+        object.__setattr__(self, "roots", MappingProxyType(roots))
 
-    def common_u(self, channel: str, parts: Weighted) -> float:
-        """Return the standard uncertainty [SI] of a weighted sum that all rows have in common.
+    def owner(self, stated: TypeB) -> str:
+        """Return who owns the variable of a statement: the machine, or this test alone."""
+        return self.machine if stated.common == "machine" else f"{self.machine}/{self.test}"
 
-        The record's covariance, and the open zero of the cells where there is no tare.
-        """
-        return float(np.hypot(self.calibration_u(channel, parts), self.zero_u(channel, parts)))
-
-    def zero_u(self, channel: str, parts: Weighted) -> float:
-        """Return the share of the cells' open zeros [SI]: each moves every row, none of them alone."""
-        if self.record is None or not parts or not self.u_cell_zero:
-            return 0.0
-        cells = np.array([condition.indications for condition, _ in parts]).T
-        shifts = zero_shifts(self.record, cells, self.u_cell_zero)[channel]
-        return float(np.linalg.norm(shifts @ self._weights(channel, parts)))
-
-    def _weights(self, channel: str, parts: Weighted) -> NDArray[np.float64]:
-        """Return the weights with the signs from SAE axes back to those of the cells."""
+    def signed(self, channel: str, conditions: Sequence[Condition]) -> NDArray[np.float64]:
+        """Return the sign of a channel from the cells' axes to SAE for each condition (conditions,)."""
         return np.array(
-            [w * signs(self.machine_axes, "SAE", condition.rotation)[channel] for condition, w in parts]
+            [
+                signs(self.machine_axes, "SAE", seen_by_cells(one.rotation, self.reversal))[channel]
+                for one in conditions
+            ],
+            dtype=float,
         )
+
+    def calibration_rows(self, channel: str, conditions: Sequence[Condition]) -> NDArray[np.float64]:
+        """Return how each independent variable of the record moves each condition [SI]: (variables, rows).
+
+        The variables are those of the triangular root of the coefficients' covariance; none without one.
+        """
+        if self.record is None or channel not in self.covariance or not conditions:
+            return np.zeros((0, len(conditions)))
+        names = self.record.indications
+        # The conditions hold tared means. A record whose intercept carries the zero of its session loses
+        # that term with the tare, and the difference to a tare of zero says so.
+        tare = dict.fromkeys(names, 0.0) if self.tared else None
+        rows = {name: np.array([one.indications[i] for one in conditions]) for i, name in enumerate(names)}
+        jacobian = coefficient_jacobian(self.record, channel, rows, tare)
+        moved = (jacobian @ self.roots[channel]).T * si_scale(self.record.load(channel).unit)
+        return np.asarray(moved * self.signed(channel, conditions))
+
+    def zero_rows(self, channel: str, conditions: Sequence[Condition]) -> NDArray[np.float64]:
+        """Return how each cell's zero moves each condition [SI]: (cells, rows); none where it is known."""
+        if self.record is None or not conditions or not any(self.u_cell_zero):
+            return np.zeros((0, len(conditions)))
+        cells = np.array([one.indications for one in conditions]).T
+        shifts = zero_shifts(self.record, cells, self.u_cell_zero)[channel]
+        return np.asarray(shifts * self.signed(channel, conditions))
+
+    def calibration_parts(self, channel: str, moved: NDArray[np.float64]) -> list[Part]:
+        """Return the record's parts of a weighted sum that its variables move by ``moved``."""
+        sha = "" if self.record is None else self.record.sha256
+        return [
+            Part(source="calibration", key=f"calibration/{sha}/{channel}/{i}", u=float(u))
+            for i, u in enumerate(moved)
+        ]
+
+    def zero_parts(self, moved: NDArray[np.float64]) -> list[Part]:
+        """Return the parts of a weighted sum that the cells' zeros move by ``moved``.
+
+        FY and MZ have the same keys: one cell moves both.
+        """
+        source = "tare" if self.tared else "cell zero"
+        owner = f"{self.machine}/{self.test}" if self.tared else self.owner(self.zero)
+        return [Part(source=source, key=f"{source}/{owner}/{i}", u=float(u)) for i, u in enumerate(moved)]
+
+    def angle_parts(self, slope: float, stretch: float) -> list[Part]:
+        """Return the slip angle's parts.
+
+        Parameters
+        ----------
+        slope : d value / d slip angle [value per rad]
+        stretch : d value / d ln(slip angle), all angles together [value]
+
+        An angle that reads too large by e stands for one smaller by e: both enter with a minus.
+        """
+        owner = self.owner(self.SA)
+        return [
+            Part(source="slip angle zero", key=f"SA zero/{owner}", u=-slope * self.SA.u),
+            Part(source="slip angle scale", key=f"SA scale/{owner}", u=-stretch * self.SA.relative),
+        ]
+
+    def load_part(self, slope: float, FZ: float) -> Part:
+        """Return the part of the load cell: ``slope`` is d value / d FZ [value per N] at the load FZ [N]."""
+        u = float(np.hypot(self.FZ.u, self.FZ.relative * FZ))
+        return Part(source="load", key=f"FZ/{self.owner(self.FZ)}", u=slope * u)
+
+    def pressure_part(self, value: float) -> Part | None:
+        """Return the part of the inflation pressure; None where the test does not say its pressure."""
+        if self.pressure_Pa is None or not self.P.effect:
+            return None
+        relative = float(np.hypot(self.P.u / self.pressure_Pa, self.P.relative))
+        return Part(source="pressure", key=f"P/{self.owner(self.P)}", u=value * self.P.effect * relative)
 
     def calibration_u(self, channel: str, parts: Weighted) -> float:
         """Return the standard uncertainty [SI] that the record gives a weighted sum: fit and statements.
@@ -85,56 +169,52 @@ class Shared:
         channel : ``FY`` or ``MZ``
         parts : (condition, weight) of the sum, the conditions' values in SAE axes
         """
-        if self.record is None or not parts:
-            return 0.0
-        fit = self.record.load(channel)
-        if channel not in self.covariance:
-            return 0.0
-        names = self.record.indications
-        # The conditions hold tared means. A record whose intercept carries the zero of its session loses
-        # that term with the tare, and the difference to a tare of zero says so.
-        tare = dict.fromkeys(names, 0.0) if self.tared else None
-        rows = {
-            name: np.array([condition.indications[i] for condition, _ in parts])
-            for i, name in enumerate(names)
-        }
-        total = self._weights(channel, parts) @ coefficient_jacobian(self.record, channel, rows, tare)
-        variance = float(total @ self.covariance[channel] @ total)
-        return float(np.sqrt(max(variance, 0.0))) * si_scale(fit.unit)
+        rows = self.calibration_rows(channel, [condition for condition, _ in parts])
+        return float(np.linalg.norm(rows @ np.array([weight for _, weight in parts])))
 
 
-def weights_at_zero(group: Group) -> tuple[tuple[Condition, float], ...]:
-    """Return the weights of the line through the two conditions nearest to SA = 0, one on each side.
+def shared_of(reduced: ReducedTest, *, machine: Machine, record: CalibrationRecord | None) -> Shared:
+    """Return what the rows of a reduced test have in common."""
+    own_tares = reduced.tare.source == "block"  # a tare of each file is no shift of all rows
+    return Shared(
+        record=record,
+        machine_axes=machine.axes,
+        tared=reduced.tare.source != "none",
+        SA=machine.stated_uncertainty("SA"),
+        FZ=machine.stated_uncertainty("FZ"),
+        P=machine.stated_uncertainty("P"),
+        zero=machine.stated_uncertainty("zero"),
+        u_cell_zero=() if own_tares else tuple(u for _, u in reduced.tare.u),
+        pressure_Pa=reduced.info.pressure_Pa,
+        machine=machine.name,
+        test=identity_of(reduced),
+        reversal=reduced.info.reversal,
+    )
 
-    They stand for the fitted curve's own weights there; empty where the angles have one sign only.
+
+def identity_of(reduced: ReducedTest) -> str:
+    """Return what tells a test from every other: a hash of its files, whatever the folder's name."""
+    text = "\n".join(sorted({f"{one.file} {one.file_sha256}" for one in reduced.conditions}))
+    return hashlib.sha256(text.encode()).hexdigest()[:12]
+
+
+def root_of(covariance: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the lower triangular L with L L^T = V of a semi-definite V (terms, terms).
+
+    By columns, without pivoting: the same V gives the same variables in the same order on every machine,
+    so that two tests name them alike. A column without a remainder is zero.
+
+    >>> root_of(np.array([[4.0, 2.0], [2.0, 1.0]])).tolist()
+    [[2.0, 0.0], [1.0, 0.0]]
     """
-    return weights_at(group, 0.0)
-
-
-def weights_at(group: Group, angle: float) -> tuple[tuple[Condition, float], ...]:
-    """Return the weights of the line through the conditions on both sides of an angle [rad]; else empty."""
-    SA = group.SA
-    if len(SA) < 2 or SA[0] > angle or SA[-1] < angle:
-        return ()
-    right = int(np.clip(np.searchsorted(SA, angle), 1, len(SA) - 1))
-    left = right - 1
-    share = float(angle - SA[left]) / float(SA[right] - SA[left])
-    return ((group.conditions[left], 1 - share), (group.conditions[right], share))
-
-
-def line_at_zero(group: Group, channel: str) -> float | None:
-    """Return the value at SA = 0 of the line through the nearest conditions: a check on the curve."""
-    parts = weights_at_zero(group)
-    if not parts:
-        return None
-    return sum(w * (c.FY_common if channel == "FY" else c.MZ_common) for c, w in parts)
-
-
-def slope_weights(group: Group) -> tuple[tuple[Condition, float], ...]:
-    """Return the weights of the least-squares slope through the conditions within 2 deg of SA = 0."""
-    near = [c for c in group.conditions if abs(c.SA) <= np.radians(2.0)]
-    if len(near) < 2:
-        return ()
-    SA: NDArray[np.float64] = np.array([c.SA for c in near])
-    rest = SA - SA.mean()
-    return tuple(zip(near, (rest / (rest @ rest)).tolist(), strict=True))
+    spread = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    safe = np.where(spread > 0, spread, 1.0)
+    rest = covariance / np.outer(safe, safe)
+    size = len(rest)
+    lower = np.zeros((size, size))
+    for j in range(size):
+        pivot = rest[j, j] - lower[j, :j] @ lower[j, :j]
+        if pivot > _NO_PIVOT:
+            lower[j, j] = np.sqrt(pivot)
+            lower[j + 1 :, j] = (rest[j + 1 :, j] - lower[j + 1 :, :j] @ lower[j, :j]) / lower[j, j]
+    return np.asarray(lower * spread[:, None])

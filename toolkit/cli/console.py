@@ -37,6 +37,12 @@ KnownAt = Annotated[
     datetime | None,
     typer.Option("--known-at", formats=["%Y-%m-%d"], help="Judge the registry as known on this day."),
 ]
+ProtocolFile = Annotated[
+    Path | None,
+    typer.Option(
+        "--protocol", metavar="FILE", help="Protocol (.toml); default: the test's own, else the machine's."
+    ),
+]
 Reader = Annotated[
     str, typer.Option("--reader", help="calamine, or both: read again with openpyxl and compare.")
 ]
@@ -62,6 +68,29 @@ def answer(payload: dict[str, Any], text: str, *, as_json: bool, quiet: bool) ->
         )
     elif not quiet and text:
         typer.echo(text)
+
+
+def stream(payload: dict[str, Any]) -> None:
+    """Print a JSON document whose iterators are written element by element, never held as a whole."""
+    write = sys.stdout.write
+    write('{\n  "schema": 1')
+    for key, value in payload.items():
+        write(f",\n  {json.dumps(key)}: ")
+        if isinstance(value, Iterator):
+            write("[")
+            first = True
+            for one in value:
+                write(("" if first else ",") + "\n    " + _json(one))
+                first = False
+            write("]" if first else "\n  ]")
+        else:
+            write(_json(value))
+    write("\n}\n")
+    sys.stdout.flush()
+
+
+def _json(value: Any) -> str:
+    return json.dumps(_plain(value), ensure_ascii=False, allow_nan=False)
 
 
 def exit_code(findings: Sequence[Finding]) -> int:
@@ -124,13 +153,14 @@ def progress(total: int | None, title: str, *, show: bool = True) -> Iterator[Ca
         yield lambda _text: None
         return
     from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
     with Progress(
         TextColumn("{task.description}"),
         BarColumn(),
         TextColumn("{task.fields[text]}"),
         TimeElapsedColumn(),
+        *([] if total is None else [TextColumn("left"), TimeRemainingColumn(compact=True)]),
         console=Console(stderr=True),
         transient=True,
     ) as bar:

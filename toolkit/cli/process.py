@@ -15,6 +15,7 @@ from toolkit.cli.console import (
     Home,
     Json,
     KnownAt,
+    ProtocolFile,
     Quiet,
     Reader,
     answer,
@@ -40,6 +41,7 @@ def command(
         Path | None, typer.Option("--out", help="Write the reduced test (.xlsx: the whole test in one file).")
     ] = None,
     known_at: KnownAt = None,
+    protocol: ProtocolFile = None,
     reader: Reader = "calamine",
     calibrations: Calibrations = None,
     home: Home = None,
@@ -68,6 +70,7 @@ def command(
             home=home,
             known_at=day(known_at),
             reader=chosen,
+            protocol=protocol,
             step=step,
         )
     digest = write_test_file(out, resolved.result, dict(resolved.recordings)) if out else None
@@ -82,14 +85,20 @@ def command(
 
 
 def test_payload(resolved: Resolved) -> dict[str, Any]:
-    """Return a reduced test as the JSON answer: SI units, SAE axes; names carry the units."""
-    reduced = resolved.result.reduced
+    """Return a reduced test as the JSON answer: SI units, SAE axes; names carry the units.
+
+    ``u_FY_N`` and ``u_MZ_Nm`` of a condition hold every source of its budget, null where it is not used.
+    """
+    reduced, characteristics = resolved.result.reduced, resolved.result.characteristics
+    points = {(p.file, p.first_row): p for p in characteristics.points}
     return {
         "test": reduced.info.name,
         "machine": reduced.info.machine,
         "simulated": reduced.info.simulated,
         "axes": reduced.axes,
         "averaging": reduced.averaging,
+        "protocol": reduced.protocol,
+        "reversal": reduced.info.reversal,
         "calibration": {
             "id": reduced.calibration.id,
             "sha256": reduced.calibration.sha256,
@@ -111,9 +120,9 @@ def test_payload(resolved: Resolved) -> dict[str, Any]:
                 "FZ_N": c.FZ,
                 "FY_N": c.FY,
                 "MZ_Nm": c.MZ,
-                "u_FY_N": c.u_FY_total,
+                "u_FY_N": points[c.file, c.first_row].u_FY if c.used else None,
                 "u_FY_repeatability_N": c.u_FY,
-                "u_MZ_Nm": c.u_MZ_total,
+                "u_MZ_Nm": points[c.file, c.first_row].u_MZ if c.used else None,
                 "u_MZ_repeatability_Nm": c.u_MZ,
                 "FY_file_N": c.FY_file,
                 "MZ_file_Nm": c.MZ_file,
@@ -128,8 +137,19 @@ def test_payload(resolved: Resolved) -> dict[str, Any]:
             for c in reduced.conditions
         ],
         "characteristics": {
-            "stiffness": [_characteristic(s) for s in resolved.result.characteristics.stiffness],
-            "pull": [_characteristic(p) for p in resolved.result.characteristics.pull],
+            "stiffness": [_characteristic(s) for s in characteristics.stiffness],
+            "pull": [_characteristic(p) for p in characteristics.pull],
+            "at_angles": [_characteristic(a) for a in characteristics.at_angles],
+            "budgets": [
+                {
+                    "load_N": b.load_N,
+                    "rotation": b.rotation,
+                    "name": b.name,
+                    "unit": b.unit,
+                    "standard_uncertainty": dict(b.sources),
+                }
+                for b in characteristics.budgets
+            ],
         },
         "findings": [finding.as_dict() for finding in resolved.findings],
     }

@@ -37,12 +37,14 @@ def resolve_test(
     home: Path | None = None,
     known_at: date | None = None,
     reader: Literal["calamine", "both"] = "calamine",
+    protocol: Path | None = None,
     step: Callable[[str], None] = lambda _name: None,
 ) -> Resolved:
     """Return the result of a TEST argument.
 
     The record is ``calibration`` where it is named, else the one in force on the test's date as known at
-    ``known_at``. A reduced test keeps the record that made it, which must still be in the registry, whole
+    ``known_at``; the protocol is that of the file named, else the test's own, else the machine's. A reduced
+    test keeps the record that made it, which must still be in the registry, whole
     and with the same hash.
 
     Raises
@@ -55,7 +57,22 @@ def resolve_test(
     registry = Registry(calibrations_folder(calibrations, home))
     if test.is_dir():
         return _from_folder(
-            test, registry, calibration=calibration, known_at=known_at, reader=reader, step=step
+            test,
+            registry,
+            calibration=calibration,
+            known_at=known_at,
+            reader=reader,
+            protocol=protocol,
+            step=step,
+        )
+    if protocol is not None:
+        raise ConfigError(
+            "a reduced test keeps the protocol that it was reduced by",
+            where=test,
+            got=f"--protocol {protocol}",
+            expected="a folder of recordings",
+            next_step="process the recordings again with this protocol",
+            rule="protocol-of-reduced",
         )
     return _from_file(test, registry, calibration=calibration, known_at=known_at)
 
@@ -67,14 +84,16 @@ def _from_folder(
     calibration: str | None,
     known_at: date | None,
     reader: Literal["calamine", "both"],
+    protocol: Path | None,
     step: Callable[[str], None],
 ) -> Resolved:
-    from toolkit.machine import load_machine
-    from toolkit.pipeline import process, read_test
+    from toolkit.machine import read_protocol
+    from toolkit.pipeline import machine_of, process, read_test
     from toolkit.recording.folder import read_test_folder
 
     folder = read_test_folder(test)
-    machine = load_machine(folder.info.machine)
+    plan = None if protocol is None else read_protocol(protocol)
+    machine = machine_of(folder, plan)
     on = date.fromisoformat(folder.info.date) if folder.info.date else None
     findings: list[Finding] = []
     if calibration is not None:
@@ -92,7 +111,7 @@ def _from_folder(
     else:
         record = registry.in_force(machine.name, on=on, known_at=known_at)
     recordings = read_test(folder, reader=reader, step=step)
-    result = process(folder, recordings, record)
+    result = process(folder, recordings, record, protocol=plan)
     return Resolved(
         result=result,
         record=record,

@@ -11,10 +11,24 @@ from typing import Any, Literal, cast
 from toolkit.channels import AXES, ROTATIONS, Axes, Rotation
 from toolkit.errors import ConfigError
 from toolkit.files import check_keys, read_toml
+from toolkit.machine.protocol import KEYS as PROTOCOL_KEYS
+from toolkit.machine.protocol import Protocol, build_protocol
+from toolkit.machine.quantity import one_of, quantity
 from toolkit.units import si_scale, unit
 
+__all__ = [
+    "Column",
+    "Drum",
+    "Machine",
+    "Protocol",
+    "Role",
+    "TypeB",
+    "load_machine",
+    "machine_names",
+    "quantity",
+]
+
 Role = Literal["load", "indication", "slip_angle", "acquired", "time", "angle", "covariate"]
-Acquisition = Literal["after_settling", "continuous"]
 
 _PACKAGED = Path(__file__).parent
 _KEYS = (
@@ -49,27 +63,20 @@ class Drum:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Protocol:
-    """The test plan that a test is checked against; loads [N], slip angles [rad]."""
-
-    source: str
-    slip_angles_rad: tuple[float, ...]
-    loads_N: tuple[float, ...]
-    slip_angle_tolerance_rad: float
-    load_tolerance: float
-    settle_revolutions: float
-    average_revolutions: float
-    acquisition: Acquisition
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class TypeB:
-    """A stated standard uncertainty: ``u`` [SI] plus ``relative`` of the value, and its source."""
+    """A stated standard uncertainty: ``u`` [SI] and ``relative`` of the value, and its source.
+
+    ``common`` says who draws it: one error of the ``machine``, the same in all its tests, or another one in
+    each ``test``. ``effect`` is that of a condition which is not measured in a force: the relative change
+    of a force for a relative change of the condition.
+    """
 
     symbol: str
     u: float
     relative: float
     source: str
+    common: Literal["machine", "test"] = "test"
+    effect: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -168,13 +175,13 @@ def _build(table: dict[str, Any], path: Path) -> Machine:
             )
             for entry in table["column"]
         )
-        drum, protocol, cells = table["drum"], table["protocol"], table["cells"]
+        drum, cells = table["drum"], table["cells"]
         return Machine(
             name=table["name"],
             title=table["title"],
-            simulated=_one_of(table["kind"], ("real", "simulated"), path) == "simulated",
-            axes=cast("Axes", _one_of(table["axes"], AXES, path)),
-            rotations=tuple(cast("Rotation", _one_of(r, ROTATIONS, path)) for r in table["rotations"]),
+            simulated=one_of(table["kind"], ("real", "simulated"), path) == "simulated",
+            axes=cast("Axes", one_of(table["axes"], AXES, path)),
+            rotations=tuple(cast("Rotation", one_of(r, ROTATIONS, path)) for r in table["rotations"]),
             columns=columns,
             drum=Drum(
                 surface=drum["surface"],
@@ -184,19 +191,7 @@ def _build(table: dict[str, Any], path: Path) -> Machine:
             ),
             cell_pitch_diameter_m=quantity(cells["pitch_diameter"], "length", path),
             overturning_lever_m=tuple((k, float(v)) for k, v in cells["overturning_lever"].items()),
-            protocol=Protocol(
-                source=protocol["source"],
-                slip_angles_rad=_quantities(protocol["slip_angles"], "angle", path),
-                loads_N=_quantities(protocol["loads"], "force", path),
-                slip_angle_tolerance_rad=quantity(protocol["slip_angle_tolerance"], "angle", path),
-                load_tolerance=float(protocol["load_tolerance"]),
-                settle_revolutions=float(protocol["settle_revolutions"]),
-                average_revolutions=float(protocol["average_revolutions"]),
-                acquisition=cast(
-                    "Acquisition",
-                    _one_of(protocol["acquisition"], ("after_settling", "continuous"), path),
-                ),
-            ),
+            protocol=_protocol(table["protocol"], path),
             type_b=tuple(_type_b(symbol, entry, path) for symbol, entry in table.get("type_b", {}).items()),
             sample_rate_Hz=quantity(table["sample_rate"], "frequency", path)
             if "sample_rate" in table
@@ -212,45 +207,36 @@ def _build(table: dict[str, Any], path: Path) -> Machine:
         ) from error
 
 
-def quantity(entry: dict[str, Any], dimension: str, where: object) -> float:
-    """Return ``{ value, unit }`` as a float in SI; the unit must have the dimension that is named."""
-    if not isinstance(entry, dict) or "value" not in entry or not isinstance(entry.get("unit"), str):
+def _protocol(entry: object, path: Path) -> Protocol:
+    if not isinstance(entry, dict):
         raise ConfigError(
-            "a quantity has no unit",
-            where=where,
-            got=entry,
-            expected='{ value = NUMBER, unit = "..." }',
-            next_step="write value and unit",
-            rule="no-unit",
-        )
-    if isinstance(entry["value"], bool) or not isinstance(entry["value"], int | float):
-        raise ConfigError(
-            "a quantity's value is not a number", where=where, got=entry["value"], expected="a number",
-            next_step="write value as a plain number", rule="wrong-value",
+            "the protocol of a machine definition is no table", where=path, got=entry, expected="[protocol]",
+            next_step="write the protocol into the definition; a test may name a file", rule="wrong-value",
         )  # fmt: skip
-    found = unit(entry["unit"], where=where)
-    if found.dimension == dimension:
-        return float(entry["value"]) * found.factor + found.offset
-    return float(entry["value"]) * si_scale(entry["unit"], dimension, where=where)
+    check_keys(entry, PROTOCOL_KEYS, where=f"{path}: protocol")
+    return build_protocol(entry, path)
 
 
-def _quantities(entry: dict[str, Any], dimension: str, where: object) -> tuple[float, ...]:
-    return tuple(quantity({"value": v, "unit": entry["unit"]}, dimension, where) for v in entry["value"])
-
-
-def _type_b(symbol: str, entry: dict[str, Any], where: object) -> TypeB:
-    check_keys(entry, ("u", "unit", "relative", "source"), where=f"{where}: type_b.{symbol}")
+def _type_b(symbol: str, entry: dict[str, Any], where: Path) -> TypeB:
+    here = f"{where}: type_b.{symbol}"
+    check_keys(entry, ("u", "unit", "relative", "source", "common", "effect"), where=here)
+    for key in ("u", "relative", "effect"):
+        value = entry.get(key, 0.0)
+        number = not isinstance(value, bool) and isinstance(value, int | float) and math.isfinite(value)
+        if not number or (value < 0 and key != "effect"):
+            raise ConfigError(
+                f"a stated uncertainty has a wrong {key!r}", where=here, got=value,
+                expected="a number" if key == "effect" else "a number from 0",
+                next_step="correct it", rule="wrong-value",
+            )  # fmt: skip
     u = float(entry.get("u", 0.0)) * (si_scale(entry["unit"], where=where) if "unit" in entry else 1.0)
-    return TypeB(symbol=symbol, u=u, relative=float(entry.get("relative", 0.0)), source=entry["source"])
-
-
-def _one_of(value: str, allowed: tuple[str, ...], where: object) -> str:
-    if value not in allowed:
-        raise ConfigError(
-            "a setting has a value that is not known",
-            where=where,
-            got=value,
-            expected=", ".join(allowed),
-            next_step="use one of those expected",
-        )
-    return value
+    return TypeB(
+        symbol=symbol,
+        u=u,
+        relative=float(entry.get("relative", 0.0)),
+        source=entry["source"],
+        common=cast(
+            "Literal['machine', 'test']", one_of(entry.get("common", "test"), ("machine", "test"), here)
+        ),
+        effect=float(entry.get("effect", 0.0)),
+    )

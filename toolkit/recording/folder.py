@@ -11,11 +11,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, cast
 
-from toolkit.channels import ROTATIONS, Rotation
+from toolkit.channels import REVERSALS, ROTATIONS, Reversal, Rotation
 from toolkit.errors import ConfigError, RecordingError
 from toolkit.files import check_keys, read_toml
-from toolkit.machine import Machine, load_machine
-from toolkit.machine.definition import quantity
+from toolkit.machine import Machine, Protocol, load_machine, read_protocol
+from toolkit.machine.quantity import quantity
 from toolkit.recording.marks import is_own_output
 from toolkit.recording.model import TestInfo
 from toolkit.units import from_si, si_scale, unit
@@ -24,11 +24,12 @@ TEST_FILE = "test.toml"
 
 _KEYS = (
     "schema date machine operator requestor surface special rotation speed pressure rated_load tire "
-    "rotations tare simulated"
+    "rotations tare simulated protocol reversal mounting laboratory"
 ).split()
 _LITTER = ("Thumbs.db", "desktop.ini", "__MACOSX")  # what file managers leave behind
-_TEXTS = ("operator", "requestor", "surface", "special")
-_TIRE = ("size", "company", "DOT", "series", "construction", "rim")
+_TEXTS = ("operator", "requestor", "surface", "special", "mounting", "laboratory")
+_TIRE = ("size", "company", "DOT", "series", "construction", "rim", "belt")
+BELTS = ("regular", "reversed")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -36,7 +37,8 @@ class TestFolder:
     """A test as it lies on the disk.
 
     ``files``: the recordings, sorted by their path, without the tare's. ``rotations``: direction by file;
-    ``tare_values``: (indication, value, unit), in the machine's unit.
+    ``tare_values``: (indication, value, unit), in the machine's unit; ``protocol`` that of the test's own
+    file, None where the machine's applies.
     """
 
     __test__ = False  # not a pytest class
@@ -48,6 +50,7 @@ class TestFolder:
     rotations: tuple[tuple[Path, Rotation], ...]
     tare_file: Path | None
     tare_values: tuple[tuple[str, float, str], ...]
+    protocol: Protocol | None = None
 
     def rotation_of(self, path: Path) -> Rotation:
         """Return the direction of the drum in a file: its own, else that of the test."""
@@ -107,8 +110,9 @@ def read_test_folder(folder: Path) -> TestFolder:
     if table.get("schema", 1) != 1:
         raise _wrong(toml, "schema", table["schema"], "1")
     machine = _machine(table, toml)
-    definition = Path(_machine_name(table, toml))
-    files = tuple(sorted(path for path in _recordings(folder) if path != definition))
+    plan = _protocol_file(table, toml)
+    settings = (Path(_machine_name(table, toml)), plan)
+    files = tuple(sorted(path for path in _recordings(folder) if path not in settings))
     tare_file, tare_values = _tare(table.get("tare", {}), machine, folder, toml)
     found = tuple(path for path in files if path != tare_file)
     if not found:
@@ -128,7 +132,13 @@ def read_test_folder(folder: Path) -> TestFolder:
         rotations=_rotations(table.get("rotations", {}), folder, files, toml),
         tare_file=tare_file,
         tare_values=tare_values,
+        protocol=None if plan is None else read_protocol(plan),
     )
+
+
+def _protocol_file(table: Mapping[str, Any], toml: Path) -> Path | None:
+    # By path, relative to the test, as a machine definition is.
+    return toml.parent / _text(table["protocol"], "protocol", toml) if "protocol" in table else None
 
 
 def _recordings(folder: Path) -> Iterator[Path]:
@@ -180,6 +190,11 @@ def _info(table: Mapping[str, Any], machine: Machine, folder: Path, toml: Path) 
     if not isinstance(simulated, bool):
         raise _wrong(toml, "simulated", simulated, "true or false")
     texts = {key: _text(table[key], key, toml) for key in _TEXTS if key in table}
+    reversal = table.get("reversal", "drum")
+    if reversal not in REVERSALS:
+        raise _wrong(toml, "reversal", reversal, " or ".join(REVERSALS))
+    if tire.get("belt", BELTS[0]) not in BELTS:
+        raise _wrong(toml, "tire.belt", tire["belt"], " or ".join(BELTS))
     tires = {f"tire_{key}": _text(value, f"tire.{key}", toml) for key, value in tire.items()}
     return TestInfo(
         name=folder.resolve().name,
@@ -189,6 +204,7 @@ def _info(table: Mapping[str, Any], machine: Machine, folder: Path, toml: Path) 
         pressure_Pa=_positive(table, "pressure", "pressure", toml),
         rated_load_N=_positive(table, "rated_load", "force", toml),
         simulated=simulated or machine.simulated,
+        reversal=cast("Reversal", reversal),
         **texts,
         **tires,
     )

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import datetime as dt
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from toolkit.channels import Reversal
 from toolkit.errors import ColumnError
 from toolkit.units import to_si
 
@@ -39,7 +41,10 @@ class Series:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Recording:
-    """One file of a test. Rows count from 1 at the first data row."""
+    """One file of a test. Rows count from 1 at the first data row.
+
+    ``saved`` is the day on which the file, by its own properties, was last written; None where it is silent.
+    """
 
     path: Path
     sha256: str
@@ -47,6 +52,7 @@ class Recording:
     series: tuple[Series, ...]
     simulated: bool
     format: str
+    saved: dt.date | None = None
 
     @property
     def rows(self) -> int:
@@ -85,7 +91,12 @@ class Recording:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TestInfo:
-    """What ``test.toml`` says; texts as written, None where it is silent. Pressure [Pa], speed [m/s]."""
+    """What ``test.toml`` says; texts as written, None where it is silent. Pressure [Pa], speed [m/s].
+
+    ``reversal`` says what was turned for the runs called reverse: the drum, or the tire on its hub.
+    ``mounting`` and ``laboratory`` tell repeats apart; ``tire_belt`` says how a prototype's belt cords
+    were laid: regular or reversed.
+    """
 
     __test__ = False  # not a pytest class
 
@@ -106,3 +117,7 @@ class TestInfo:
     tire_construction: str | None = None
     tire_rim: str | None = None
     simulated: bool = False
+    reversal: Reversal = "drum"
+    mounting: str | None = None
+    laboratory: str | None = None
+    tire_belt: str | None = None

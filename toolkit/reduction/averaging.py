@@ -21,7 +21,9 @@ ROLLING_RATIO = 0.97
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Window:
-    """Rows to be averaged; ``revolutions`` of the tire that they span, None where the file cannot tell.
+    """Rows to be averaged; ``revolutions`` that they span, None where the file cannot tell.
+
+    Revolutions are those of the shaft that the protocol counts, tire or drum.
 
     ``short`` says that the block ended before settling and averaging were complete.
     """
@@ -81,21 +83,32 @@ def window(recording: Recording, block: Block, *, machine: Machine, rolling_radi
 def _revolutions(
     recording: Recording, block: Block, *, machine: Machine, rolling_radius_m: float | None
 ) -> NDArray[np.float64] | None:
-    """Return tire revolutions since the block's first row (rows,), or None where they cannot be known."""
-    if recording.has("TIRE_ANGLE"):
-        angle = np.unwrap(recording["TIRE_ANGLE"].si[block.rows])
-        return np.asarray(np.abs(angle - angle[0]) / (2 * np.pi))
-    if rolling_radius_m is None:
+    """Return revolutions of the protocol's shaft since the block's first row (rows,), None if unknown.
+
+    The tire rolls on the drum: what the drum's surface travels, the tire's does too. A turn of the other
+    shaft is known by the ratio of the circumferences, for which the tire's size must be known.
+    """
+    tire = None if rolling_radius_m is None else 2 * np.pi * rolling_radius_m
+    drum = machine.drum.circumference_m
+    wanted = tire if machine.protocol.revolutions_of == "tire" else drum
+    shafts = (("TIRE_ANGLE", tire, "tire"), ("DRUM_ANGLE", drum, "drum"))
+    for symbol, around, shaft in sorted(shafts, key=lambda one: one[2] != machine.protocol.revolutions_of):
+        if not recording.has(symbol):
+            continue
+        angle = np.unwrap(recording[symbol].si[block.rows])
+        turns = np.asarray(np.abs(angle - angle[0]) / (2 * np.pi))
+        if shaft == machine.protocol.revolutions_of:
+            return turns
+        if around is not None and wanted is not None:
+            return np.asarray(turns * around / wanted)
+    if wanted is None:
         return None
-    if recording.has("DRUM_ANGLE"):
-        # The tire rolls on the drum: what the drum's surface travels, the tire's does too.
-        angle = np.unwrap(recording["DRUM_ANGLE"].si[block.rows])
-        return np.asarray(np.abs(angle - angle[0]) * machine.drum.radius_m / (2 * np.pi * rolling_radius_m))
-    per_second = machine.drum.speed_m_s / (2 * np.pi * rolling_radius_m)
+    protocol = machine.protocol
+    per_second = (protocol.speed_m_s or machine.drum.speed_m_s) / wanted
     if recording.has("t"):
         time = recording["t"].si[block.rows]
         return np.asarray((time - time[0]) * per_second)
-    if machine.sample_rate_Hz and machine.protocol.acquisition == "continuous":
+    if machine.sample_rate_Hz and protocol.acquisition == "continuous":
         return np.arange(block.n) / machine.sample_rate_Hz * per_second
     return None
 

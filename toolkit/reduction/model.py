@@ -31,7 +31,7 @@ class Condition:
     turned by half a turn about z). ``u_FY`` and ``u_MZ`` are the standard uncertainties of the mean
     (repeatability over the rows, autocorrelation included). ``*_common`` are carried to the load
     ``FZ_common`` that all blocks of this nominal load share; ``u_*_common`` includes that correction.
-    ``u_*_zero`` is what an unknown zero of the cells leaves, common to all rows; zero with a tare.
+    ``u_*_zero`` is what the zero of the cells leaves: that of an untared bridge, or the scatter of the tare.
     ``indications`` are the cells' means minus tare, in the record's order and units.
     ``FY_file`` and ``MZ_file`` are the acquisition program's own values, None where the file has none.
     ``first_row`` and ``last_row`` count from 1 at the first data row of the file.
@@ -67,12 +67,12 @@ class Condition:
 
     @property
     def u_FY_total(self) -> float:
-        """Standard uncertainty of FY [N]: repeatability, and the zero of the cells where it is open."""
+        """Standard uncertainty of FY [N] from the file alone: repeatability and the zero of the cells."""
         return math.hypot(self.u_FY, self.u_FY_zero)
 
     @property
     def u_MZ_total(self) -> float:
-        """Standard uncertainty of MZ [N·m]: repeatability, and the zero of the cells where it is open."""
+        """Standard uncertainty of MZ [N·m] from the file alone: repeatability and the zero of the cells."""
         return math.hypot(self.u_MZ, self.u_MZ_zero)
 
 
@@ -80,8 +80,8 @@ class Condition:
 class Tare:
     """The tare that was subtracted, each indication in its own unit; source ``none`` where there is none.
 
-    ``u`` holds the standard uncertainty of each cell's zero, in the same unit; empty where a tare was
-    recorded, whose own scatter is far below the rows'.
+    ``u`` holds the standard uncertainty of each cell's zero, in the same unit: what the machine states of an
+    untared bridge, or the scatter of a recorded tare; empty where a tare is declared by its value alone.
     """
 
     source: str
@@ -92,7 +92,10 @@ class Tare:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ReducedTest:
-    """A whole test, reduced. ``conditions`` in the order of the protocol, unused ones last."""
+    """A whole test, reduced. ``conditions`` in the order of the protocol, unused ones last.
+
+    ``protocol`` is the source that the protocol of the test names.
+    """
 
     info: TestInfo
     calibration: CalibrationUse
@@ -102,6 +105,7 @@ class ReducedTest:
     findings: tuple[Finding, ...]
     code_version: str
     axes: str = "SAE"
+    protocol: str = ""
 
     def used(self, rotation: Rotation | None = None) -> tuple[Condition, ...]:
         """Return the conditions that feed results, optionally of one direction of rotation."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -39,7 +40,7 @@ def nearest_step(SA: float, protocol: Protocol) -> float | None:
     The reach is half the distance to the neighbouring step, at least the tolerance: a file that is out
     of tolerance still is that step, with a finding.
     """
-    steps = np.asarray(protocol.slip_angles_rad)
+    steps = np.unique(protocol.slip_angles_rad)
     distances = np.abs(steps - SA)
     best = int(np.argmin(distances))
     others = np.abs(np.delete(steps, best) - steps[best])
@@ -54,18 +55,21 @@ def nearest_load(FZ: float, protocol: Protocol) -> float | None:
     return best if abs(FZ - best) <= _LOAD_REACH * best else None
 
 
-def doubled(placed: Sequence[Placed]) -> tuple[int, ...]:
-    """Return the indices of blocks whose condition an earlier file already holds: they stay unused."""
-    seen: set[tuple[Rotation, float, float]] = set()
+def doubled(placed: Sequence[Placed], protocol: Protocol) -> tuple[int, ...]:
+    """Return the indices of blocks beyond the repeats that the protocol declares: they stay unused.
+
+    Of more blocks than it asks for, the earlier files count.
+    """
+    seen: Counter[tuple[Rotation, float, float]] = Counter()
     later: list[int] = []
     for index in sorted(range(len(placed)), key=lambda i: placed[i].file_order):
         one = placed[index]
         if one.step_SA is None or one.step_FZ is None:
             continue
         key = (one.rotation, one.step_SA, one.step_FZ)
-        if key in seen:
+        if seen[key] >= protocol.times(one.step_SA):
             later.append(index)
-        seen.add(key)
+        seen[key] += 1
     return tuple(sorted(later))
 
 
@@ -84,7 +88,7 @@ def check(
 def _missing(placed: Sequence[Placed], protocol: Protocol, rotations: Sequence[Rotation]) -> list[Finding]:
     found: list[Finding] = []
     for rotation in rotations:
-        there = {(p.step_SA, p.step_FZ) for p in placed if p.rotation == rotation}
+        there = Counter((p.step_SA, p.step_FZ) for p in placed if p.rotation == rotation)
         if not there:
             found.append(
                 Finding(
@@ -94,7 +98,8 @@ def _missing(placed: Sequence[Placed], protocol: Protocol, rotations: Sequence[R
                 )
             )
             continue
-        gone = [step for step in protocol.slip_angles_rad if not any(step == s for s, _ in there)]
+        steps = list(dict.fromkeys(protocol.slip_angles_rad))
+        gone = [step for step in steps if not any(step == s for s, _ in there)]
         if gone:
             found.append(
                 Finding(
@@ -105,16 +110,19 @@ def _missing(placed: Sequence[Placed], protocol: Protocol, rotations: Sequence[R
                     + " and what they feed lack it",
                 )
             )
-        for step in protocol.slip_angles_rad:
+        for step in steps:
+            where = f"drum {rotation}, slip angle {_list([step], 'deg')}"
             loads = [load for load in protocol.loads_N if (step, load) not in there]
             if step not in gone and loads:
-                found.append(
-                    Finding(
-                        rule="missing",
-                        where=f"drum {rotation}, slip angle {_list([step], 'deg')}",
-                        message=f"no block at load {_list(loads, 'lbf')}",
-                    )
+                message = f"no block at load {_list(loads, 'lbf')}"
+                found.append(Finding(rule="missing", where=where, message=message))
+            few = [load for load in protocol.loads_N if 0 < there[step, load] < protocol.times(step)]
+            if few:
+                message = (
+                    f"{min(there[step, load] for load in few)} of {protocol.times(step)} declared repeats "
+                    f"at load {_list(few, 'lbf')}"
                 )
+                found.append(Finding(rule="missing-repeat", where=where, message=message))
     return found
 
 
@@ -127,8 +135,8 @@ def _doubled(placed: Sequence[Placed], later: Sequence[int]) -> list[Finding]:
             rule="doubled",
             where=file,
             message=f"slip angle {_list([some[0].step_SA or 0.0], 'deg')}, drum {some[0].rotation}: "
-            f"{len(some)} block(s) of a condition that an earlier file holds, with no "
-            "declared repeat; unused",
+            f"{len(some)} block(s) of a condition that earlier files hold as often as "
+            "the protocol declares; unused",
         )
         for file, some in files.items()
     ]

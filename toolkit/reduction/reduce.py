@@ -9,13 +9,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from toolkit import __version__
-from toolkit.channels import Rotation, signs
+from toolkit.channels import Reversal, Rotation, seen_by_cells, signs
 from toolkit.reduction import protocol as plan
 from toolkit.reduction import remarks
 from toolkit.reduction.averaging import Window, means
 from toolkit.reduction.common_load import carry, slopes
 from toolkit.reduction.model import CalibrationUse, Condition, ReducedTest, Tare
 from toolkit.reduction.opened import OpenedFile, check_record, open_file, split_blocks
+from toolkit.reduction.repeats import drift_findings
 from toolkit.reduction.tare import choose_tares, zero_shifts
 
 if TYPE_CHECKING:
@@ -40,7 +41,7 @@ def reduce_test(
 
     Parameters
     ----------
-    info, machine : what the test and the machine say of themselves
+    info, machine : what the test and the machine say of themselves; ``machine.protocol`` is the test's
     record : the calibration record that applies
     recordings : each file by its path inside the test, with its direction of rotation; in that order
     tare : the declared tare; without it, a tare block in a file serves that file
@@ -66,10 +67,14 @@ def reduce_test(
         )
         for (name, recording, rotation), (loads, _), own in zip(recordings, blocks, tares, strict=True)
     ]
-    conditions, placed, later = _conditions(files, machine=machine, record=record)
+    measured, placed, later = _conditions(files, machine=machine, record=record, reversal=info.reversal)
+    conditions = _ordered(_at_common_load(_own_loads(measured)), machine)
+    protocol = machine.protocol
     findings = [
-        *plan.check(placed, later, machine.protocol, machine.rotations),
+        *plan.check(placed, later, protocol, protocol.rotations or machine.rotations),
+        *drift_findings(conditions, protocol),
         *remarks.machine_findings(info, machine),
+        *remarks.speed_findings(files, machine),
         *remarks.tare_findings(files, record),
         *remarks.angle_findings(files),
         *remarks.window_findings(files),
@@ -80,23 +85,24 @@ def reduce_test(
     return ReducedTest(
         info=info,
         calibration=CalibrationUse(id=record.id, sha256=record.sha256, unverified=not record.verified),
-        conditions=_ordered(_at_common_load(_own_loads(conditions)), machine),
+        conditions=conditions,
         tare=files[0].tare,
         averaging=remarks.averaging_text(files, machine),
         findings=tuple(findings),
         code_version=__version__,
+        protocol=protocol.source,
     )
 
 
 def _conditions(
-    files: Sequence[OpenedFile], *, machine: Machine, record: CalibrationRecord
+    files: Sequence[OpenedFile], *, machine: Machine, record: CalibrationRecord, reversal: Reversal
 ) -> tuple[list[Condition], list[plan.Placed], tuple[int, ...]]:
     conditions: list[Condition] = []
     placed: list[plan.Placed] = []
     for order, file in enumerate(files):
         step = plan.nearest_step(float(np.mean(file.channels[0])), machine.protocol)
         for block, rows in zip(file.blocks, file.windows, strict=True):
-            one = _condition(file, rows, step_SA=step, machine=machine, record=record)
+            one = _condition(file, rows, step_SA=step, machine=machine, record=record, reversal=reversal)
             conditions.append(one)
             placed.append(
                 plan.Placed(
@@ -109,17 +115,23 @@ def _conditions(
                     step_FZ=one.step_FZ,
                 )
             )
-    later = plan.doubled(placed)
+    later = plan.doubled(placed, machine.protocol)
     for index in later:
         conditions[index] = dataclasses.replace(conditions[index], used=False)
     return conditions, placed, later
 
 
 def _condition(
-    file: OpenedFile, chosen: Window, *, step_SA: float | None, machine: Machine, record: CalibrationRecord
+    file: OpenedFile,
+    chosen: Window,
+    *,
+    step_SA: float | None,
+    machine: Machine,
+    record: CalibrationRecord,
+    reversal: Reversal,
 ) -> Condition:
     recording, rows = file.recording, chosen.rows
-    sign = signs(machine.axes, "SAE", file.rotation)
+    sign = signs(machine.axes, "SAE", seen_by_cells(file.rotation, reversal))
     SA, FZ, FY, MZ = means(file.channels[:, rows])
     zero = {"FY": 0.0, "MZ": 0.0}
     cells = file.indications[:, rows].mean(axis=1)

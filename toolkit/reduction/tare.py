@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from toolkit.calibration.apply import apply_record
+from toolkit.reduction.averaging import means
 from toolkit.reduction.blocks import Block
 from toolkit.reduction.model import Tare
 
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
 def tare_of_file(recording: Recording) -> Tare:
     """Return the tare from a recording that holds nothing else: the mean of every row."""
     whole = Block(start=0, stop=recording.rows, mean_FZ=0.0)
-    return _tare(_means([(recording, [whole])]), recording, source=f"file {recording.name}")
+    return _tare([(recording, [whole])], source=f"file {recording.name}")
 
 
 def choose_tares(
@@ -52,10 +53,8 @@ def choose_tares(
             files
         )
     if len(having) == len(files):
-        return tuple(_tare(_means([one]), one[0], source="block") for one in having)
-    shared = _tare(
-        _means(having), having[0][0], source=f"mean of the tare blocks in {len(having)} of {len(files)} files"
-    )
+        return tuple(_tare([one], source="block") for one in having)
+    shared = _tare(having, source=f"mean of the tare blocks in {len(having)} of {len(files)} files")
     return (shared,) * len(files)
 
 
@@ -83,20 +82,31 @@ def zero_shifts(
     }
 
 
-def _means(files: Sequence[tuple[Recording, Sequence[Block]]]) -> dict[str, float]:
-    rows = {
-        one.symbol: np.concatenate([
-            recording[one.symbol].values[block.rows] for recording, blocks in files for block in blocks
-        ])
-        for one in files[0][0].series
-        if one.role == "indication"
-    }  # fmt: skip
-    return {name: float(np.mean(values)) for name, values in rows.items()}
+def _tare(files: Sequence[tuple[Recording, Sequence[Block]]], *, source: str) -> Tare:
+    """Return the mean of the tare rows and how sure it is.
 
-
-def _tare(values: dict[str, float], recording: Recording, *, source: str) -> Tare:
-    unit = next(one.unit for one in recording.series if one.role == "indication")
-    return Tare(source=source, values=tuple(values.items()), unit=unit)
+    Of one file: from the scatter of its rows, their autocorrelation included. Of several files: from the
+    scatter of the files' own tares, which a drift of the zero enters too, where that is the larger.
+    """
+    first = files[0][0]
+    names = [one.symbol for one in first.series if one.role == "indication"]
+    rows = [
+        np.stack([np.concatenate([recording[name].values[b.rows] for b in blocks]) for name in names])
+        for recording, blocks in files
+    ]
+    everything = np.concatenate(rows, axis=1)
+    u = np.array([one.u for one in means(everything)])
+    if len(rows) > 1:
+        own = np.array([one.mean(axis=1) for one in rows])
+        u = np.maximum(u, own.std(axis=0, ddof=1) / np.sqrt(len(rows)))
+    values = everything.mean(axis=1)
+    unit = next(one.unit for one in first.series if one.role == "indication")
+    return Tare(
+        source=source,
+        values=tuple(zip(names, values.tolist(), strict=True)),
+        unit=unit,
+        u=tuple(zip(names, u.tolist(), strict=True)) if everything.shape[1] > 1 else (),
+    )
 
 
 def _open_zero(recordings: Sequence[Recording], *, machine: Machine, record: CalibrationRecord) -> Tare:

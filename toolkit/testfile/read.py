@@ -8,7 +8,15 @@ from pathlib import Path
 from typing import Any, cast, get_type_hints
 
 from toolkit.channels import Rotation
-from toolkit.characteristics.model import Characteristics, DirectionFit, Pull, Stiffness
+from toolkit.characteristics.model import (
+    AtAngle,
+    Budget,
+    Characteristics,
+    DirectionFit,
+    Point,
+    Pull,
+    Stiffness,
+)
 from toolkit.errors import RecordingError
 from toolkit.estimate import Estimate
 from toolkit.findings import Finding, Level
@@ -134,6 +142,7 @@ def _result(sheets: dict[str, list[Row]], items: Row) -> TestResult:
         findings=_findings(sheets["findings"]),
         code_version=items["code_version"],
         axes=items["axes"],
+        protocol=items["protocol"],
     )
     return TestResult(reduced=reduced, characteristics=_characteristics(sheets))
 
@@ -240,4 +249,48 @@ def _characteristics(sheets: dict[str, list[Row]]) -> Characteristics:
             for load in dict.fromkeys(load for load, _ in groups)
         ),
         findings=_findings(sheets["characteristic_findings"]),
+        at_angles=_at_angles(sheets["at_angles"]),
+        points=tuple(
+            Point(
+                file=str(r["file"]),
+                first_row=int(r["first_row"]),
+                u_FY=number(r["u_FY [N]"]),
+                u_MZ=number(r["u_MZ [N*m]"]),
+            )
+            for r in sheets["points"]
+        ),
+        budgets=_budgets(sheets["budgets"]),
+    )
+
+
+def _at_angles(rows: list[Row]) -> tuple[AtAngle, ...]:
+    keys = dict.fromkeys((number(r["load_N"]), r["rotation"], number(r["SA_rad"])) for r in rows)
+    found = {
+        (number(r["load_N"]), r["rotation"], number(r["SA_rad"]), r["name"]): _estimate(
+            r["value"], r["u"], r["dof"], r["unit"]
+        )
+        for r in rows
+    }
+    return tuple(
+        AtAngle(
+            load_N=load,
+            rotation=cast("Rotation", rotation),
+            SA_rad=angle,
+            FY=found[load, rotation, angle, "FY"],
+            MZ=found[load, rotation, angle, "MZ"],
+        )
+        for load, rotation, angle in keys
+    )
+
+
+def _budgets(rows: list[Row]) -> tuple[Budget, ...]:
+    sources: dict[tuple[float, str, str, str], list[tuple[str, float]]] = {}
+    for r in rows:
+        key = (number(r["load_N"]), str(r["rotation"]), str(r["name"]), str(r["unit"]))
+        lines = sources.setdefault(key, [])
+        if r["source"] not in ("", None):
+            lines.append((str(r["source"]), number(r["u"])))
+    return tuple(
+        Budget(load_N=load, rotation=rotation, name=name, unit=unit, sources=tuple(lines))
+        for (load, rotation, name, unit), lines in sources.items()
     )

@@ -57,6 +57,9 @@ def _workbook(result: TestResult, digest: str, recordings: Mapping[str, Recordin
         ("fit_parameters", _parameters(result)),
         ("fit_covariance", _covariances(result)),
         ("characteristics", _characteristics(result)),
+        ("at_angles", _at_angles(result)),
+        ("points", _points(result)),
+        ("budgets", _budgets(result)),
         ("characteristic_findings", _findings(result.characteristics.findings)),
         ("findings", _findings(result.reduced.findings)),
         ("raw", _raw(recordings)),
@@ -116,6 +119,7 @@ def _provenance(result: TestResult, digest: str) -> Rows:
     yield ("code_version", reduced.code_version)
     yield ("axes", reduced.axes)
     yield ("averaging", reduced.averaging)
+    yield ("protocol", reduced.protocol)
     for field in dataclasses.fields(reduced.calibration):
         yield (f"calibration.{field.name}", getattr(reduced.calibration, field.name))
     yield ("tare.source", reduced.tare.source)
@@ -199,6 +203,26 @@ def _characteristics(result: TestResult) -> Rows:
     for pull in result.characteristics.pull:
         for field in dataclasses.fields(pull)[1:]:
             yield (pull.load_N, "both", field.name, *_parts(getattr(pull, field.name)))
+
+
+def _at_angles(result: TestResult) -> Rows:
+    yield ("load_N", "rotation", "SA_rad", "name", "value", "u", "dof", "unit")
+    for one in result.characteristics.at_angles:
+        for name in ("FY", "MZ"):
+            yield (one.load_N, one.rotation, one.SA_rad, name, *_parts(getattr(one, name)))
+
+
+def _points(result: TestResult) -> Rows:
+    yield ("file", "first_row", "u_FY [N]", "u_MZ [N*m]")
+    for one in result.characteristics.points:
+        yield (one.file, one.first_row, one.u_FY, one.u_MZ)
+
+
+def _budgets(result: TestResult) -> Rows:
+    yield ("load_N", "rotation", "name", "source", "u", "unit")
+    for one in result.characteristics.budgets:
+        for source, u in one.sources or (("", None),):
+            yield (one.load_N, one.rotation, one.name, source, u, one.unit)
 
 
 def _findings(findings: Sequence[Finding]) -> Rows:
