@@ -14,7 +14,7 @@ from template_factory import opened, p, run, sdt, tbl
 
 from toolkit.errors import OutputError, RenderError, TemplateError
 from toolkit.recording.marks import is_own_output
-from toolkit.report import verify
+from toolkit.report import verify, verify_text
 from toolkit.report.build import build_content
 from toolkit.report.deliver import deliver
 from toolkit.report.drawer import Drawer
@@ -85,26 +85,26 @@ def filled(*entries: tuple[str, str], cells: tuple[tuple[str, ...], ...] = ()) -
     return Filled(docx=b"", manifest=manifest, figures=(), cells=cells, missing=(), lint=(), marks_added=())
 
 
-def names(checks: list[verify.Check]) -> set[str]:
+def names(checks: list[verify_text.Check]) -> set[str]:
     return {one.name for one in checks if not one.ok}
 
 
 def test_values_are_compared_without_white_space_and_soft_hyphens() -> None:
     page = "Cornering stiff\u00adness\n12\u00a0345.6 N 0.2\n5\f"
-    assert names(verify._texts(page, filled(("a", "stiffness 12345.6"), ("b", "0.25")))) == set()
-    assert names(verify._texts(page, filled(("a", "12345.7")))) == {"values"}
+    assert names(verify_text.text_checks(page, filled(("a", "stiffness 12345.6"), ("b", "0.25")))) == set()
+    assert names(verify_text.text_checks(page, filled(("a", "12345.7")))) == {"values"}
 
 
 def test_cells_are_compared_in_their_order() -> None:
     rows = (("-0.30", "371.4"), ("0.70", "-12.0"))
-    assert names(verify._texts("SA FY -0.30 371.4 0.70 -12.0", filled(cells=rows))) == set()
-    assert names(verify._texts("SA FY -0.30 371.4 0.70 -12.1", filled(cells=rows))) == {"cells"}
+    assert names(verify_text.text_checks("SA FY -0.30 371.4 0.70 -12.0", filled(cells=rows))) == set()
+    assert names(verify_text.text_checks("SA FY -0.30 371.4 0.70 -12.1", filled(cells=rows))) == {"cells"}
 
 
 def test_a_script_that_cannot_be_read_back_is_a_warning_and_a_number_beside_it_is_not() -> None:
-    checks = verify._texts("smile 5.0", filled(("a", "smile 😀"), ("b", "5.0")))
+    checks = verify_text.text_checks("smile 5.0", filled(("a", "smile 😀"), ("b", "5.0")))
     assert [(one.name, one.warning) for one in checks if not one.ok] == [("script", True)]
-    assert "values" in names(verify._texts("smile", filled(("b", "5.0"))))
+    assert "values" in names(verify_text.text_checks("smile", filled(("b", "5.0"))))
 
 
 def test_loose_fonts_are_found() -> None:

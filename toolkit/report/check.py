@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
-from typing import Literal
 
 from toolkit.report.certificate.vocabulary import CERTIFICATE
+from toolkit.report.check_around import surroundings
 from toolkit.report.fonts import missing_fonts
+from toolkit.report.lint import RULES, LintFinding
 from toolkit.report.package import Template, open_package
 from toolkit.report.scan import (
     Site,
@@ -38,52 +38,7 @@ from toolkit.report.xml import (
     ancestor,
     q,
     stories,
-    walk_fields,
 )
-
-RULES = {
-    "no-tags": "the template has no tag of the toolkit",
-    "unknown-tag": "a tag is not in the catalogue",
-    "malformed-tag": "a literal tag is not closed or has no path",
-    "missing-required": "a required tag is not in the template",
-    "doubled-tag": "a figure or table stands twice in the body",
-    "bad-format": "the format after the bar does not fit the tag",
-    "wrong-place": "a tag stands where it cannot be filled",
-    "overlapping-tags": "a tag stands inside a control that will be filled as a whole",
-    "no-table": "a table tag has no table",
-    "prototype": "a table has no prototype row, or more than one",
-    "unknown-column": "a prototype row names a column that the table has not",
-    "column-count": "a prototype row without tags has more or fewer cells than the table has columns",
-    "tracked-changes": "the template holds tracked changes",
-    "comments": "the template holds comments",
-    "date-field": "a DATE or TIME field becomes the day of printing",
-    "if-field": "an IF field is not evaluated",
-    "contents": "a table of contents is not updated",
-    "missing-style": "a style that the style file names is not in the template",
-    "font-unavailable": "a font is not installed and will be replaced",
-    "attached-template": "the template is attached to another file, which is dropped",
-}
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class LintFinding:
-    """One finding: rule, level, the part of the package, the place in it, and a sentence."""
-
-    rule: str
-    level: Literal["error", "warning"]
-    part: str
-    place: str
-    message: str
-
-    def as_dict(self) -> dict[str, str]:
-        """Return the finding as a JSON-ready dict."""
-        return {
-            "rule": self.rule,
-            "level": self.level,
-            "part": self.part,
-            "place": self.place,
-            "message": self.message,
-        }
 
 
 def check_template(template: Template, style: Style, *, fonts: bool = True) -> tuple[LintFinding, ...]:
@@ -118,7 +73,7 @@ def check_stories(
         *_tags(sites, style, words),
         *_tables(sites, words),
         *_broken(parts),
-        *_surroundings(package, parts, style),
+        *surroundings(package, parts, style),
     ]
     found += [
         LintFinding(
@@ -343,58 +298,6 @@ def _broken(parts: list[Story]) -> Iterator[LintFinding]:
                 place=place_of(paragraph, story),
                 message="a literal {{tk: is not closed by }} in the same paragraph",
             )
-
-
-_TRACKED = tuple(q(f"w:{one}") for one in ("ins", "del", "moveFrom", "moveTo", "rPrChange", "pPrChange"))
-
-
-def _surroundings(package: object, parts: list[Story], style: Style) -> Iterator[LintFinding]:
-    def warn(rule: str, story: Story, element: Element, message: str) -> LintFinding:
-        return LintFinding(
-            rule=rule, level="warning", part=story.name, place=place_of(element, story), message=message
-        )
-
-    for story in parts:
-        for element in story.root.iter(*_TRACKED):
-            yield warn("tracked-changes", story, element, "tracked changes: accept or reject them before use")
-            break
-        for element in story.root.iter(q("w:commentReference")):
-            yield warn("comments", story, element, "a comment will stand in the report")
-            break
-        for element, code in walk_fields(story.root):
-            word = code.split()[0].upper() if code.split() else ""
-            if word in ("DATE", "TIME"):
-                yield warn(
-                    "date-field", story, element, f"{word} becomes the day of printing; use tk:report.date"
-                )
-            elif word == "IF":
-                yield warn("if-field", story, element, "an IF field is not evaluated; use a tk:if control")
-            elif word == "TOC":
-                yield warn(
-                    "contents",
-                    story,
-                    element,
-                    "a table of contents is updated by Word, not by the PDF's maker",
-                )
-    names = _style_names(package)
-    for use, name in style.styles:
-        if name.lower() not in names:
-            yield LintFinding(
-                rule="missing-style",
-                level="warning",
-                part="word/styles.xml",
-                place=name,
-                message=f"the style file names {name!r} for {use}; the template has no such style",
-            )
-
-
-def _style_names(package: object) -> set[str]:
-    main = package.main_document_part  # type: ignore[attr-defined]
-    return {
-        (one.find(q("w:name")).get(q("w:val")) or "").lower()
-        for one in main._styles_part.element.iter(q("w:style"))
-        if one.find(q("w:name")) is not None
-    }
 
 
 __all__ = ["RULES", "LintFinding", "check_stories", "check_template"]

@@ -14,6 +14,7 @@ from toolkit.report.xml import (
     SDT_PR,
     W_P,
     W_R,
+    W_SDT,
     W_TBL,
     W_TC,
     W_TR,
@@ -36,6 +37,8 @@ def fill_control(sdt: Element, text: str, *, iso_date: str | None = None) -> Non
 def settle(sdt: Element, iso_date: str | None = None) -> None:
     """Take the placeholder state and the data binding off a control."""
     properties = sdt.find(SDT_PR)
+    if properties is None:
+        return
     for name in ("w:showingPlcHdr", "w:dataBinding", "w15:dataBinding"):
         for element in properties.findall(q(name)):
             properties.remove(element)
@@ -45,6 +48,14 @@ def settle(sdt: Element, iso_date: str | None = None) -> None:
         date.attrib.pop(q("w:fullDate"), None)
         if iso_date is not None:
             date.set(q("w:fullDate"), f"{iso_date}T00:00:00Z")
+
+
+def release(paragraph: Element) -> None:
+    """Settle the controls of others around a paragraph's literals: Word would show their own data again."""
+    holders = [t for t in visible_texts(paragraph) if "{{" in (t.text or "") or "}}" in (t.text or "")]
+    for element in [paragraph, *holders]:
+        for outer in element.iterancestors(W_SDT):
+            settle(outer)
 
 
 def replace_content(sdt: Element, run: Element) -> None:

@@ -1,37 +1,81 @@
-"""Make a report and hand it over: written beside, verified, then renamed into the output folder."""
+"""Make reports and hand them over: written beside, verified, then renamed into their output folders.
+
+Several reports are converted in one call of LibreOffice, whose start is paid for once.
+"""
 
 from __future__ import annotations
 
 import contextlib
 import shutil
 import tempfile
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
-from toolkit.errors import OutputError, RenderError
+from toolkit.errors import OutputError, RenderError, ToolkitError
 from toolkit.recording.marks import refuse_original
-from toolkit.report.content import ReportContent
-from toolkit.report.drawer import Drawer
-from toolkit.report.fill import Filled, fill, needed_figures
+from toolkit.report.content import Plot, ReportContent
+from toolkit.report.fill import fill, needed_figures
+from toolkit.report.filled import Filled
+from toolkit.report.handover import MANIFEST, content_hash, manifest_json
 from toolkit.report.package import Template
 from toolkit.report.pdf import Office
-from toolkit.report.verify import Check, verify_docx, verify_pdf
+from toolkit.report.print_copy import Printed, print_copies
+from toolkit.report.verify import verify_docx, verify_pdf
+from toolkit.report.verify_text import Check
+
+if TYPE_CHECKING:
+    from toolkit.report.drawer import Drawer
+    from toolkit.report.figures import Picture
 
 Step = Callable[[str], None]
+Writer = Callable[[Path], object]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Job:
+    """One report to make.
+
+    Attributes
+    ----------
+    template, content : the safe template and the report's content
+    out, name : output folder, made where it does not exist, and the name of the two files in it
+    companions : files that are handed over with the two, suffix to content (``.xml``)
+    extras : further files by name, each with a function that writes it to the path it is given
+    provenance : what the manifest of the hand-over names besides the outputs; None for no manifest
+    """
+
+    template: Template
+    content: ReportContent
+    out: Path
+    name: str = "report"
+    companions: Mapping[str, bytes] = field(default_factory=dict)
+    extras: Mapping[str, Writer] = field(default_factory=dict)
+    provenance: Mapping[str, Any] | None = None
+
+    def names(self) -> list[str]:
+        """Return the names of every file that the job hands over."""
+        own = [f"{self.name}{suffix}" for suffix in (".docx", ".pdf", *self.companions)]
+        return [*own, *self.extras, *([MANIFEST] if self.provenance is not None else [])]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Delivered:
-    """A delivered report."""
+    """A delivered report; ``content_sha256`` is the same for the same inputs, whatever the day or the run."""
 
     docx: Path
     pdf: Path
     companions: tuple[Path, ...] = ()
+    extras: tuple[Path, ...] = ()
+    manifest: Path | None = None
     pages: int
     checks: tuple[Check, ...]
     filled: Filled
     template_sha256: str
+    content_sha256: str
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -58,60 +102,188 @@ def deliver(
     companions: Mapping[str, bytes] | None = None,
     step: Step = lambda _text: None,
 ) -> Delivered:
-    """Fill, convert, verify and deliver ``<name>.docx`` and ``<name>.pdf``.
-
-    Parameters
-    ----------
-    template, content : the safe template and the report's content
-    out : output folder; made where it does not exist
-    office, drawer : LibreOffice and the figures' workers prepared by the caller; default: LibreOffice of
-        its own, figures drawn here
-    companions : files that are handed over with the two, suffix to content (``.xml``)
-    keep : on failure leave what was made in ``rejected/`` of the folder
+    """Fill, convert, verify and deliver ``<name>.docx`` and ``<name>.pdf`` (see `deliver_all`).
 
     Raises
     ------
     TemplateError, RenderError, OutputError
         nothing is left in the output folder then
     """
+    job = Job(template=template, content=content, out=out, name=name, companions=companions or {})
+    made = deliver_all([job], office=office, drawer=drawer, allow_missing=allow_missing, keep=keep, step=step)
+    if isinstance(made[0], ToolkitError):
+        raise made[0]
+    return made[0]
+
+
+def deliver_all(
+    jobs: Sequence[Job],
+    *,
+    office: Office | None = None,
+    drawer: Drawer | None = None,
+    allow_missing: bool = False,
+    keep: bool = False,
+    step: Step = lambda _text: None,
+) -> list[Delivered | ToolkitError]:
+    """Make several reports, converted in one call; return each report or why there is none.
+
+    Parameters
+    ----------
+    office, drawer : LibreOffice and the figures' workers prepared by the caller; default: LibreOffice of
+        its own, figures drawn here
+    allow_missing : print a visible mark for a value that a test has not
+    keep : on failure leave what was made in ``rejected/`` of the folder
+    """
+    office = office or Office()
+    with office, contextlib.ExitStack() as stack:
+        work = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="toolkit-print-")))
+        runs = [_Run(job=job, keep=keep) for job in jobs]
+        for run in runs:
+            stack.callback(run.close)
+            run.attempt(run.open)
+        step("figures")
+        pictures = _pictures(runs, drawer)
+        step("document")
+        for index, run in enumerate(runs):
+            run.attempt(partial(run.fill, _Own(index, pictures), allow_missing))
+        filled = [run for run in runs if run.filled is not None]
+        step("PDF")
+        with ThreadPoolExecutor(1) as pool:
+            # Workbooks and tire files are written while LibreOffice works in its own process.
+            waiting = [(run, pool.submit(run.attempt, run.write_extras)) for run in filled]
+            printed = print_copies([run.filled for run in filled if run.filled is not None], office, work)
+            for _, job in waiting:
+                job.result()
+        step("verification")
+        for run, copy in zip(filled, printed, strict=True):
+            run.attempt(partial(run.finish, copy))
+        return [run.result() for run in runs]
+
+
+class _Own(dict[str, "Picture"]):
+    """The pictures of one report among those of all, looked up when they are asked for."""
+
+    def __init__(self, index: int, pictures: Mapping[str, Picture]) -> None:
+        super().__init__()
+        self.index, self.pictures = index, pictures
+
+    def __missing__(self, name: str) -> Picture:
+        return self.pictures[f"{self.index}/{name}"]
+
+    def __contains__(self, name: object) -> bool:
+        return f"{self.index}/{name}" in self.pictures
+
+
+def _pictures(runs: Sequence[_Run], drawer: Drawer | None) -> Mapping[str, Picture]:
     from toolkit.report.figures import draw
 
-    beside = companions or {}
-    for suffix in (".docx", ".pdf", *beside):
-        refuse_original(out / f"{name}{suffix}", suffix=suffix)
-    office = office or Office()
-    with office, _staging(out) as stage:
-        step("figures")
-        plots = {figure: content.plots[figure] for figure in needed_figures(template, content)}
-        pictures = drawer.pictures(plots) if drawer else {one: draw(plot) for one, plot in plots.items()}
-        step("document")
-        filled = fill(template, content, pictures, allow_missing=allow_missing, fonts=True)
-        docx = stage / f"{name}.docx"
-        docx.write_bytes(filled.docx)
+    plots: dict[str, Plot] = {}
+    for index, run in enumerate(runs):
+        if run.error is None:
+            run.attempt(run.choose)
+            plots |= {f"{index}/{name}": run.job.content.plots[name] for name in run.figures}
+    return drawer.pictures(plots) if drawer else {one: draw(plot) for one, plot in plots.items()}
+
+
+class _Run:
+    """A job under way: its staging folder, what was filled, and the error that ended it."""
+
+    def __init__(self, *, job: Job, keep: bool) -> None:
+        self.job, self.keep = job, keep
+        self.stack = contextlib.ExitStack()
+        self.stage: Path | None = None
+        self.figures: tuple[str, ...] = ()
+        self.filled: Filled | None = None
+        self.checks: list[Check] = []
+        self.error: ToolkitError | None = None
+        self.delivered: Delivered | None = None
+
+    def attempt(self, work: Callable[[], None]) -> None:
+        """Do one step; an error ends this job and leaves the others alone."""
+        if self.error is not None:
+            return
         try:
-            checks = list(verify_docx(filled))
-            step("PDF")
-            pdf = office.convert([docx], stage)[0]
-            step("verification")
-            found, pages = verify_pdf(pdf, filled)
-            checks += found
-            _demand(checks)
-        except RenderError as error:
-            if keep:
-                _reject(stage, out, name, str(error))
-            raise
-        for suffix, data in beside.items():
-            (stage / f"{name}{suffix}").write_bytes(data)
-        targets = _hand_over([docx, pdf, *(stage / f"{name}{suffix}" for suffix in beside)], out)
-    return Delivered(
-        docx=targets[0],
-        pdf=targets[1],
-        companions=tuple(targets[2:]),
-        pages=pages,
-        checks=tuple(checks),
-        filled=filled,
-        template_sha256=template.sha256,
-    )
+            work()
+        except ToolkitError as error:
+            self.error, self.filled = error, None
+            if self.keep and isinstance(error, RenderError) and self.stage is not None:
+                _reject(self.stage, self.job.out, self.job.name, str(error))
+            self.stack.__exit__(type(error), error, error.__traceback__)
+
+    def open(self) -> None:
+        for name in self.job.names():
+            refuse_original(self.job.out / name, suffix=Path(name).suffix)
+        self.stage = self.stack.enter_context(_staging(self.job.out))
+
+    def close(self) -> None:
+        """Take the staging away; without a report the folders that were made for it too."""
+        if self.error is None and self.delivered is None:
+            stop = RenderError("the report was not finished")
+            self.stack.__exit__(type(stop), stop, None)
+        elif self.error is None:
+            self.stack.close()
+
+    def choose(self) -> None:
+        self.figures = needed_figures(self.job.template, self.job.content)
+
+    def fill(self, pictures: Mapping[str, Picture], allow_missing: bool) -> None:
+        job = self.job
+        filled = fill(job.template, job.content, pictures, allow_missing=allow_missing, fonts=True)
+        self._file(".docx").write_bytes(filled.docx)
+        self.checks += verify_docx(filled)
+        self.filled = filled
+
+    def write_extras(self) -> None:
+        for name, writer in self.job.extras.items():
+            writer(self._stage() / name)
+
+    def finish(self, copy: Printed | RenderError) -> None:
+        if isinstance(copy, RenderError):
+            raise copy
+        if self.filled is None:
+            return
+        job, docx, pdf = self.job, self._file(".docx"), self._file(".pdf")
+        self.filled = replace(self.filled, docx=copy.docx)
+        docx.write_bytes(copy.docx)
+        shutil.move(copy.pdf, pdf)
+        found, pages = verify_pdf(pdf, self.filled)
+        self.checks += found
+        _demand(self.checks)
+        for suffix, data in job.companions.items():
+            self._file(suffix).write_bytes(data)
+        digest = content_hash(self.filled, job.template)
+        names = job.names()
+        if job.provenance is not None:
+            outputs = [self._stage() / one for one in names if one != MANIFEST]
+            text = manifest_json(job.provenance, job.content, job.template, digest, outputs)
+            (self._stage() / MANIFEST).write_text(text, encoding="utf-8")
+        targets = _hand_over([self._stage() / one for one in names], job.out)
+        beside = 2 + len(job.companions)
+        self.delivered = Delivered(
+            docx=targets[0],
+            pdf=targets[1],
+            companions=tuple(targets[2:beside]),
+            extras=tuple(targets[beside : beside + len(job.extras)]),
+            manifest=targets[-1] if job.provenance is not None else None,
+            pages=pages,
+            checks=tuple(self.checks),
+            filled=self.filled,
+            template_sha256=job.template.sha256,
+            content_sha256=digest,
+        )
+
+    def result(self) -> Delivered | ToolkitError:
+        if self.delivered is not None:
+            return self.delivered
+        return self.error or RenderError("the report was not finished", where=self.job.out)
+
+    def _stage(self) -> Path:
+        if self.stage is None:
+            raise RenderError("the report has no staging folder", where=self.job.out)
+        return self.stage
+
+    def _file(self, suffix: str) -> Path:
+        return self._stage() / f"{self.job.name}{suffix}"
 
 
 def _demand(checks: list[Check]) -> None:

@@ -10,18 +10,23 @@ from typing import Any
 from lxml import etree
 
 from toolkit.errors import TemplateError
+from toolkit.files import sha256_bytes
 from toolkit.report.check import LintFinding, check_stories
 from toolkit.report.content import ReportContent, Table
+from toolkit.report.contents import write_contents
 from toolkit.report.controls import (
     apply_condition,
     fill_control,
     fill_literals,
+    release,
     replace_content,
     settle,
 )
 from toolkit.report.fields import number_captions
 from toolkit.report.figures import Picture
+from toolkit.report.filled import Entry, Filled
 from toolkit.report.package import Template, open_package
+from toolkit.report.pages import drop_notes, headers_shown, notes_used
 from toolkit.report.pictures import Ids, free_height, insert_at_mark, picture_run
 from toolkit.report.properties import set_properties
 from toolkit.report.rows import fill_table
@@ -43,36 +48,6 @@ from toolkit.report.xml import (
 )
 
 _MARK = "\ufdd0"  # a noncharacter: it stands where a literal figure goes, and no value may hold it
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Entry:
-    """One value as it was printed: its tag, its text, the part that it stands in."""
-
-    tag: str
-    text: str
-    part: str
-
-    def as_dict(self) -> dict[str, str]:
-        """Return the entry as a JSON-ready dict."""
-        return {"tag": self.tag, "text": self.text, "part": self.part}
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Filled:
-    """A filled report: the .docx, and what must be found in it and in its PDF.
-
-    ``figures`` are (tag, alt) of every picture; ``cells`` the rows of filled tables, cell by cell;
-    ``missing`` the tags that print the visible mark.
-    """
-
-    docx: bytes
-    manifest: tuple[Entry, ...]
-    figures: tuple[tuple[str, str], ...]
-    cells: tuple[tuple[str, ...], ...]
-    missing: tuple[str, ...]
-    lint: tuple[LintFinding, ...]
-    marks_added: tuple[str, ...]
 
 
 def needed_figures(template: Template, content: ReportContent) -> tuple[str, ...]:
@@ -133,6 +108,7 @@ class _Log:
     figures: list[tuple[str, str]] = field(default_factory=list)
     missing: list[str] = field(default_factory=list)
     rows: list[Element] = field(default_factory=list)
+    pictures: list[str] = field(default_factory=list)
 
 
 class _Filler:
@@ -151,7 +127,11 @@ class _Filler:
 
     def run(self, lint: tuple[LintFinding, ...]) -> Filled:
         used = {site.tag.path for site in scan(self.parts)}
+        body = self.parts[0].root
+        noted = notes_used(body)
         self._conditions()
+        drop_notes(self.parts, noted - notes_used(body))
+        never, perhaps = headers_shown(self.package, self.parts)
         sites = scan(self.parts)
         self._demand(sites)
         # Everything is located before anything is written: a value that reads like a tag stays a value.
@@ -179,7 +159,8 @@ class _Filler:
             if site.form == "control" and site.tag.family == "figure":
                 self._figure_control(site)
         added = self._marks(used)
-        number_captions(self.parts[0].root)
+        number_captions(body)
+        contents = write_contents(self.package, body)
         cells = tuple(
             tuple(_cell_text(cell) for cell in row.iter(W_TC) if ancestor(cell, W_TR) is row)
             for row in self.log.rows
@@ -197,6 +178,11 @@ class _Filler:
             missing=tuple(dict.fromkeys(self.log.missing)),
             lint=lint,
             marks_added=added,
+            contents=contents,
+            main_part=self.parts[0].name,
+            pictures=tuple(dict.fromkeys(self.log.pictures)),
+            never_shown=never,
+            perhaps_shown=perhaps,
         )
 
     def _conditions(self) -> None:
@@ -287,6 +273,7 @@ class _Filler:
                 continue
             seen.add(id(site.element))
             free_height(site.element)
+            release(site.element)
             figures: list[Tag] = []
 
             def resolve(tag: Tag, site: Site = site, figures: list[Tag] = figures) -> str:
@@ -328,6 +315,7 @@ class _Filler:
         alt = self.content.plots[tag.name].alt
         if not site.fallback:
             self.log.figures.append((f"tk:{tag.path}", alt))
+            self.log.pictures.append(f"{tag.name} {sha256_bytes(self.pictures[tag.name].png)}")
         return picture_run(
             site.story,
             self.package,
@@ -380,3 +368,6 @@ def _unprintable(table: Table | None) -> str:
 
 def _cell_text(cell: Element) -> str:
     return "".join(paragraph_text(p) for p in cell.iter(W_P) if ancestor(p, W_TBL) is ancestor(cell, W_TBL))
+
+
+__all__ = ["Entry", "Filled", "fill", "needed_figures"]

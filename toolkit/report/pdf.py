@@ -36,6 +36,7 @@ _PROFILE = """<?xml version="1.0" encoding="UTF-8"?>
 </oor:items>
 """
 TIMEOUT_S = 180.0
+_SMALL, _SECONDS_PER_BYTE = 2**19, 600 / 2**20  # packed; tables inflate thirty times and more
 
 
 class Office:
@@ -83,24 +84,29 @@ class Office:
         RenderError
             LibreOffice took too long, or a PDF is not there or is no PDF
         """
+        made = self.convert_each(documents, out)
+        for one in made:
+            if isinstance(one, RenderError):
+                raise one
+        return [one for one in made if isinstance(one, Path)]
+
+    def convert_each(self, documents: Sequence[Path], out: Path) -> list[Path | RenderError]:
+        """Convert Word files to PDF in one call; return each PDF, or why there is none."""
         wanted = [out / f"{one.stem}.pdf" for one in documents]
-        said = self._run(documents, out, wanted)
-        if self._warm is not None:
-            # The waiting instance took the job; where it did not, a fresh one gets it.
-            self._end_warm()
-            if not all(pdf.is_file() for pdf in wanted):
-                said = self._run(documents, out, wanted)
-        for pdf in wanted:
-            if not pdf.is_file() or not pdf.read_bytes()[:5] == b"%PDF-":
-                raise RenderError(
-                    "LibreOffice made no PDF",
-                    where=pdf.name,
-                    got=said or "nothing",
-                    expected="a PDF of the filled report",
-                    rule="render-failed",
-                    next_step="run 'toolkit doctor'; open the .docx in LibreOffice to see why",
-                )
-        return wanted
+        late: RenderError | None = None
+        try:
+            said = self._run(documents, out, wanted)
+            if self._warm is not None:
+                # The waiting instance took the job; where it did not, a fresh one gets it.
+                self._end_warm()
+                if not all(pdf.is_file() for pdf in wanted):
+                    said = self._run(documents, out, wanted)
+        except RenderError as error:
+            late, said = error, ""
+        return [
+            pdf if _is_pdf(pdf) else late or _no_pdf(source.name, said)
+            for source, pdf in zip(documents, wanted, strict=True)
+        ]
 
     def _run(self, documents: Sequence[Path], out: Path, wanted: Sequence[Path]) -> str:
         """Run one conversion and return what LibreOffice said of it."""
@@ -117,18 +123,23 @@ class Office:
             ]
         )
         try:
-            _, said = process.communicate(timeout=self.timeout_s)
+            _, said = process.communicate(timeout=self._limit(documents))
         except subprocess.TimeoutExpired as error:
             _kill(process)
             raise RenderError(
                 "LibreOffice took too long",
                 where=documents[0].name,
-                got=f"no end after {self.timeout_s:g} s",
+                got=f"no end after {self._limit(documents):.0f} s",
                 expected="a PDF within the time limit",
                 rule="render-timeout",
                 next_step="run 'toolkit doctor'; convert the document by hand to see what stops it",
             ) from error
         return said.decode("utf-8", "replace").strip()[-300:] or f"exit code {process.returncode}"
+
+    def _limit(self, documents: Sequence[Path]) -> float:
+        # A document of five hundred pages takes minutes, ten of them ten times as long.
+        size = sum(one.stat().st_size for one in documents)
+        return self.timeout_s * max(1, len(documents)) + max(0, size - _SMALL) * _SECONDS_PER_BYTE
 
     def _end_warm(self) -> None:
         if self._warm is not None:
@@ -157,6 +168,25 @@ class Office:
             start_new_session=True,
             env=environment,
         )
+
+
+def _is_pdf(path: Path) -> bool:
+    # One that was cut off in the middle has no end mark.
+    if not path.is_file():
+        return False
+    data = path.read_bytes()
+    return data[:5] == b"%PDF-" and b"%%EOF" in data[-1024:]
+
+
+def _no_pdf(name: str, said: str) -> RenderError:
+    return RenderError(
+        "LibreOffice made no PDF",
+        where=name,
+        got=said or "nothing",
+        expected="a PDF of the filled report",
+        rule="render-failed",
+        next_step="run 'toolkit doctor'; open the .docx in LibreOffice to see why",
+    )
 
 
 def find_soffice() -> str:

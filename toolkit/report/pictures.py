@@ -17,6 +17,7 @@ from toolkit.report.xml import NS, W_P, W_R, W_T, W_TBL, W_TC, W_TR, Element, St
 
 EMU_TWIP = 635
 _CELL_MARGIN = 2 * 108
+_NEXT_SECTION: Any = etree.XPath("following::w:sectPr[1]", namespaces={"w": NS["w"]})
 _LETTER = (12240, 15840, 1440)
 
 
@@ -170,24 +171,58 @@ def _cell_width(cell: Element) -> int | None:
         return int(own.get(q("w:w"))) - _CELL_MARGIN
     table, row = ancestor(cell, W_TBL), ancestor(cell, W_TR)
     grid = [int(float(g.get(q("w:w")) or 0)) for g in table.findall(f"{q('w:tblGrid')}/{q('w:gridCol')}")]
-    cells = [one for one in row.iter(W_TC) if ancestor(one, W_TR) is row]
-    at = cells.index(cell)
-    return grid[at] - _CELL_MARGIN if at < len(grid) == len(cells) and row in own_rows(table) else None
+    if row not in own_rows(table):
+        return None
+    at = 0
+    for one in (cell_ for cell_ in row.iter(W_TC) if ancestor(cell_, W_TR) is row):
+        span = _number_of(one, "w:tcPr/w:gridSpan")
+        if one is cell:
+            inside = sum(grid[at : at + span])
+            return inside - _CELL_MARGIN if inside > _CELL_MARGIN else None
+        at += span
+    return None
+
+
+def _number_of(cell: Element, path: str) -> int:
+    found = cell.find("/".join(q(one) for one in path.split("/")))
+    text = "" if found is None else found.get(q("w:val")) or ""
+    return max(int(text), 1) if text.isdigit() else 1
 
 
 def _section(at: Element, story: Story) -> tuple[int, int]:
     """Return width of one column and height of the text area [twips] of the section around an element."""
-    if story.body:
-        sections = list(story.root.iter(q("w:sectPr")))
-        order = {id(e): i for i, e in enumerate(story.root.iter())} if len(sections) > 1 else {}
-        here = order.get(id(at), 0)
-        section = next(
-            (s for s in sections if order.get(id(s), 1) > here), sections[-1] if sections else None
-        )
-    else:
-        section = None
+    section = _of_body(at) if story.body else _of_part(story)
     if section is None:
         return _LETTER[0] - 2 * _LETTER[2], _LETTER[1] - 2 * _LETTER[2]
+    return section_room(section)
+
+
+def _of_body(at: Element) -> Element | None:
+    # A section's properties stand in its last paragraph, or at the end of the body.
+    for paragraph in at.iterancestors(W_P):
+        own = paragraph.find(f"{q('w:pPr')}/{q('w:sectPr')}")
+        if own is not None:
+            return own
+    inside = next(at.iter(q("w:sectPr")), None)
+    if inside is not None:
+        return inside
+    return next(iter(_NEXT_SECTION(at)), None)
+
+
+def _of_part(story: Story) -> Element | None:
+    """Return the properties of the section that a header or footer belongs to; a note's are the last ones."""
+    main = story.part.package.main_document_part
+    sections = list(main.element.iter(q("w:sectPr")))
+    ids = {rel.rId for rel in main.rels.values() if not rel.is_external and rel.target_part is story.part}
+    for section in sections:
+        for reference in section.iter(q("w:headerReference"), q("w:footerReference")):
+            if reference.get(q("r:id")) in ids:
+                return section
+    return sections[-1] if sections else None
+
+
+def section_room(section: Element) -> tuple[int, int]:
+    """Return width of one column and height of the text area [twips] of a section."""
     size, margin, columns = (section.find(q(f"w:{one}")) for one in ("pgSz", "pgMar", "cols"))
 
     def number(element: Element | None, name: str, default: int) -> int:

@@ -6,41 +6,14 @@ import io
 import re
 import subprocess
 import tempfile
-import unicodedata
-from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
 from pathlib import Path
 
 from toolkit.errors import RenderError
-from toolkit.report.fill import Filled
+from toolkit.report.filled import Filled
 from toolkit.report.scan import BROKEN, LITERAL, control_tag
+from toolkit.report.verify_text import Check, text_checks
 from toolkit.report.xml import SDT_PR, W_P, W_SDT, clean, in_fallback, paragraph_text, q, stories
-
-_SPACE = re.compile("[\\s\u00ad\u200b-\u200f\u202a-\u202e\u2066-\u2069\ufeff]+")
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Check:
-    """One check: ``ok``, or what was not as it should be. A warning does not stop the delivery."""
-
-    name: str
-    ok: bool
-    message: str
-    warning: bool = False
-
-    def as_dict(self) -> dict[str, object]:
-        """Return the check as a JSON-ready dict."""
-        return {"name": self.name, "ok": self.ok, "message": self.message}
-
-
-def squeeze(text: str) -> str:
-    """Return text as it is compared: composed, without white space, soft hyphens and direction marks.
-
-    >>> squeeze("1 234,5\\u00ad N")
-    '1234,5N'
-    """
-    return _SPACE.sub("", unicodedata.normalize("NFKC", text))
 
 
 def verify_docx(filled: Filled) -> tuple[Check, ...]:
@@ -90,19 +63,16 @@ def verify_pdf(pdf: Path, filled: Filled) -> tuple[tuple[Check, ...], int]:
     found = re.search(r"^Pages:\s+(\d+)", info, re.MULTILINE)
     pages = int(found[1]) if found else 0
     data = pdf.read_bytes()
-    with tempfile.TemporaryDirectory(prefix="toolkit-verify-") as folder, ThreadPoolExecutor(2) as pool:
-        # The text is the same without PDF/A's colour profile, which pdftotext sets up anew for each page:
-        # 50 ms a page. The name is blotted out in place, so that every offset stays right.
-        plain = Path(folder) / "text.pdf"
-        plain.write_bytes(data.replace(b"/OutputIntents", b"/OutputIntent_"))
+    with ThreadPoolExecutor(2) as pool:
         fonts = pool.submit(_run, ["pdffonts", str(pdf)])
-        text = _run(["pdftotext", "-raw", "-enc", "UTF-8", str(plain), "-"])
+        text = pdf_text(pdf)
         listing = fonts.result()
     pictures = data.count(b"/Subtype/Image")
     mute = [tag for tag, alt in filled.figures if _pdf_string(alt) not in data]
     return (
         (
-            *_texts(text, filled),
+            *text_checks(text, filled),
+            *_contents(pdf, text, filled),
             _fonts(listing),
             Check(name="pages", ok=pages > 0 and text.count("\f") == pages, message=f"{pages} pages"),
             Check(
@@ -122,96 +92,36 @@ def verify_pdf(pdf: Path, filled: Filled) -> tuple[tuple[Check, ...], int]:
     )
 
 
+def _contents(pdf: Path, text: str, filled: Filled) -> list[Check]:
+    from toolkit.report.verify_contents import contents_problems
+
+    if not filled.contents.entries:
+        return []
+    problems = contents_problems(pdf, text, filled)
+    lines = len(filled.contents.entries)
+    return [
+        Check(
+            name="contents",
+            ok=not problems,
+            message="; ".join(problems[:5]) or f"{lines} lines of contents with the pages of the print",
+        )
+    ]
+
+
+def pdf_text(pdf: Path) -> str:
+    """Return a PDF's text, a form feed after each page."""
+    with tempfile.TemporaryDirectory(prefix="toolkit-verify-") as folder:
+        # The text is the same without PDF/A's colour profile, which pdftotext sets up anew for each page:
+        # 50 ms a page. The name is blotted out in place, so that every offset stays right.
+        plain = Path(folder) / "text.pdf"
+        plain.write_bytes(pdf.read_bytes().replace(b"/OutputIntents", b"/OutputIntent_"))
+        return _run(["pdftotext", "-raw", "-enc", "UTF-8", str(plain), "-"])
+
+
 def _pdf_string(text: str) -> bytes:
     # LibreOffice writes alternative texts as UTF-16 in hexadecimal, in objects that are not packed.
     plain = clean(text).replace("\n", " ")
     return b"<FEFF" + plain.encode("utf-16-be").hex().upper().encode() + b">"
-
-
-def _texts(text: str, filled: Filled) -> list[Check]:
-    page = squeeze(text)
-    rows_left = _absent_rows(page, filled.cells)
-    lost, unreadable = [], []
-    for entry in dict.fromkeys(filled.manifest):
-        wanted = squeeze(entry.text)
-        if not wanted or wanted in page or _in_pieces(wanted, page, entry.text):
-            continue
-        plain = "".join(ch for ch in wanted if not _hard_to_extract(ch))
-        if plain != wanted and all(squeeze(w) in page for w in _plain_words(entry.text)):
-            unreadable.append(entry.tag)
-        else:
-            lost.append(f"{entry.tag} {entry.text[:40]!r}")
-    checks = [
-        Check(
-            name="values",
-            ok=not lost,
-            message="; ".join(lost[:5]) or f"{len(filled.manifest)} values found in the PDF",
-        ),
-        Check(
-            name="cells",
-            ok=not rows_left,
-            message="; ".join(rows_left[:5]) or f"{sum(map(len, filled.cells))} table cells found in the PDF",
-        ),
-    ]
-    if unreadable:
-        checks.append(
-            Check(
-                name="script",
-                ok=False,
-                warning=True,
-                message=f"{', '.join(unreadable[:5])}: characters that no installed font shows, "
-                "or that run from right to left, could not be read back from the PDF",
-            )
-        )
-    return checks
-
-
-def _absent_rows(page: str, rows: Sequence[Sequence[str]]) -> list[str]:
-    """Return the rows that are not in the text in their order, cell after cell."""
-    lost, cursor = [], 0
-    for row in rows:
-        joined = squeeze("".join(row))
-        at = page.find(joined, cursor)
-        if at >= 0:
-            cursor = at + len(joined)
-            continue
-        # A row that breaks over a page, or whose cells the PDF paints in another order: cell by cell.
-        for cell in row:
-            wanted = squeeze(cell)
-            if (
-                wanted not in page
-                and not _in_pieces(wanted, page, cell)
-                and not any(map(_hard_to_extract, wanted))
-            ):
-                lost.append(cell[:60])
-    return lost
-
-
-def _in_pieces(wanted: str, page: str, original: str) -> bool:
-    # Long prose may be cut by a page's end, with header and footer between its halves; a number may not.
-    words = original.split()
-    return len(words) > 3 and len(wanted) > 40 and all(squeeze(word) in page for word in words)
-
-
-def _hard_to_extract(character: str) -> bool:
-    return (
-        unicodedata.bidirectional(character) in ("R", "AL", "AN")
-        or unicodedata.category(character)
-        in (
-            "So",
-            "Sk",
-            "Cn",
-            "Co",
-            "Mn",
-            "Me",
-            "Cf",
-        )
-        or ord(character) > 0xFFFF
-    )
-
-
-def _plain_words(text: str) -> list[str]:
-    return [word for word in text.split() if not any(map(_hard_to_extract, word))]
 
 
 def _fonts(listing: str) -> Check:

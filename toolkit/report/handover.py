@@ -1,0 +1,64 @@
+"""The hand-over: one manifest of what went in and what came out, and the hash of the content."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from toolkit.files import sha256_bytes, sha256_file
+from toolkit.recording.marks import GENERATOR
+from toolkit.report.content import ReportContent
+from toolkit.report.filled import Filled
+from toolkit.report.package import Template
+
+MANIFEST = "manifest.json"
+_OF_THE_DAY = ("tk:report.date",)
+
+
+def content_hash(filled: Filled, template: Template) -> str:
+    """Return the SHA-256 of what a report says: every printed value, cell, figure, and the template.
+
+    Neither a .docx nor a PDF is the same byte for byte twice, so the content is hashed. The day of issue
+    is left out: the same inputs give the same hash on another day.
+    """
+    told = {
+        "template": template.sha256,
+        "values": [[one.tag, one.text, one.part] for one in filled.manifest if one.tag not in _OF_THE_DAY],
+        "cells": filled.cells,
+        "figures": [[tag, alt] for tag, alt in filled.figures],
+        "pictures": filled.pictures,
+        "contents": [[one.text, one.level] for one in filled.contents.entries],
+    }
+    return sha256_bytes(json.dumps(told, ensure_ascii=False, separators=(",", ":")).encode())
+
+
+def manifest_json(
+    provenance: Mapping[str, Any],
+    content: ReportContent,
+    template: Template,
+    digest: str,
+    outputs: Sequence[Path],
+) -> str:
+    """Return the manifest: inputs, calibration, software and outputs, each with its SHA-256.
+
+    ``provenance`` holds what the caller knows: the inputs and the software.
+    """
+    told = {
+        "generator": GENERATOR,
+        "schema": 1,
+        "report": content.identity,
+        "issued": content.issued,
+        "content_sha256": digest,
+        "template": {"name": template.path.name, "sha256": template.sha256},
+        "calibrations": [
+            {"id": one, "sha256": sha, "unverified": unverified}
+            for one, sha, unverified in content.calibrations
+        ],
+        **provenance,
+        "outputs": [
+            {"name": one.name, "sha256": sha256_file(one), "bytes": one.stat().st_size} for one in outputs
+        ],
+    }
+    return json.dumps(told, ensure_ascii=False, indent=2) + "\n"
