@@ -1,0 +1,131 @@
+"""The families of cases: how each is built, what it can conceal, and how often it is drawn."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from tests.concealed import dynamic_cases, slow_cases, tire_cases
+from tests.concealed.model import Scenario
+
+Builder = Callable[[np.random.Generator, frozenset[str]], Scenario]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Family:
+    """One plant with its plan."""
+
+    build: Builder
+    weight: float
+    inside: tuple[str, ...]
+    """Effects of the contract's catalogue that may stand alone."""
+    outside: tuple[str, ...]
+
+
+_TIRE = tuple(
+    """relaxation channel_delay filter_lag zero_offset zero_drift thermal_drift creep hysteresis nonlinearity
+    crosstalk sensitivity_error saturation quantisation dead_band rectification unit_error channel_sign
+    steer_compliance backlash thermal_friction wear load_friction speed_friction viscoelastic_settling
+    nonuniformity drum_runout turn_slip drum_curvature surface_friction""".split()
+)
+_TIRE_OUTSIDE = ("hidden_ambient", "hidden_resonance", "hidden_line", "hidden_pulse")
+_BEAM = tuple(
+    """zero_offset zero_drift saturation quantisation sensitivity_error nonlinearity hysteresis creep
+    dead_band
+    thermal_drift channel_sign""".split()
+)
+_BEAM_OUTSIDE = ("hidden_slip", "hidden_ambient")
+
+FAMILIES: dict[str, Family] = {
+    "tire-machine": Family(
+        build=lambda rng, needs: tire_cases.build(rng, kind="machine", needs=needs),
+        weight=5, inside=(*_TIRE, "pressure_change"), outside=_TIRE_OUTSIDE,
+    ),
+    "tire-python": Family(
+        build=lambda rng, needs: tire_cases.build(rng, kind="python", needs=needs),
+        weight=3, inside=_TIRE, outside=_TIRE_OUTSIDE,
+    ),
+    "tire-columns": Family(
+        build=lambda rng, needs: tire_cases.build(rng, kind="columns", needs=needs),
+        weight=2, inside=_TIRE, outside=_TIRE_OUTSIDE,
+    ),
+    "pendulum": Family(
+        build=lambda rng, _: dynamic_cases.pendulum(rng), weight=2,
+        inside=tuple("""coulomb_friction viscous_damping quadratic_drag cubic_stiffness constant_force
+                     periodic_ripple channel_delay filter_lag quantisation saturation zero_drift
+                     channel_sign""".split()),
+        outside=("hidden_resonance",),
+    ),
+    "drive": Family(
+        build=lambda rng, _: dynamic_cases.drive(rng), weight=2,
+        inside=tuple("""coulomb_friction quadratic_drag cubic_stiffness constant_force periodic_ripple
+                     quantisation filter_lag channel_delay saturation""".split()),
+        outside=("hidden_resonance",),
+    ),
+    "drive-force": Family(
+        build=lambda rng, _: dynamic_cases.drive_force(rng), weight=2,
+        inside=("coulomb_friction", "quadratic_drag", "quantisation", "dead_band", "filter_lag",
+            "zero_drift"),
+        outside=(),
+    ),
+    "tank": Family(
+        build=lambda rng, _: slow_cases.tank(rng), weight=1.5,
+        inside=("overflow", "saturation", "zero_drift", "zero_offset",
+                "quantisation", "channel_delay", "filter_lag"),
+        outside=("hidden_reservoir",),
+    ),
+    "thermal": Family(
+        build=lambda rng, _: slow_cases.thermal(rng), weight=1.5,
+        inside=("zero_offset", "zero_drift", "channel_delay", "filter_lag",
+                "sensitivity_error", "channel_swap"),
+        outside=("hidden_radiation", "hidden_mass"),
+    ),
+    "beam-python": Family(
+        build=lambda rng, _: slow_cases.beam(rng, kind="python"), weight=2, inside=_BEAM,
+            outside=_BEAM_OUTSIDE,
+    ),
+    "beam-columns": Family(
+        build=lambda rng, _: slow_cases.beam(rng, kind="columns"), weight=1.5, inside=_BEAM,
+        outside=_BEAM_OUTSIDE,
+    ),
+}  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Confounded:
+    """A recording that cannot tell the effects of a class apart; one of them is there."""
+
+    family: str
+    build: Builder
+    present: tuple[str, ...]
+    """Any of these is put in."""
+    members: frozenset[str]
+    needs: frozenset[str] = frozenset()
+
+
+CONFOUNDED: dict[str, Confounded] = {
+    "steering zero": Confounded(
+        family="tire-machine", build=FAMILIES["tire-machine"].build, present=("steer_offset", "plysteer"),
+        members=frozenset({"steer_offset", "plysteer"}),
+    ),
+    "pull by load": Confounded(
+        family="tire-machine", build=FAMILIES["tire-machine"].build, present=("conicity",),
+        members=frozenset({"conicity", "camber_offset", "crosstalk"}), needs=frozenset({"reverse"}),
+    ),
+    "one steering rate": Confounded(
+        family="tire-columns",
+        build=lambda rng, _: tire_cases.one_rate(rng), present=("relaxation", "channel_delay", "filter_lag"),
+        members=frozenset({"relaxation", "channel_delay", "filter_lag"}),
+    ),
+    "one speed": Confounded(
+        family="drive-force", build=lambda rng, _: dynamic_cases.drive_force(rng, one_speed=True),
+        present=("coulomb_friction", "viscous_damping", "quadratic_drag"),
+        members=frozenset({"coulomb_friction", "viscous_damping", "quadratic_drag"}),
+    ),
+    "steady warming": Confounded(
+        family="beam-python", build=lambda rng, _: slow_cases.beam(rng, kind="python", steady_warming=True),
+        present=("zero_drift", "thermal_drift"), members=frozenset({"zero_drift", "thermal_drift"}),
+    ),
+}  # fmt: skip

@@ -1,0 +1,224 @@
+"""Drawing a batch: the mix, one case at a time, each from its own seed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from tests.concealed import size as sizing
+from tests.concealed.catalogue import CONFOUNDED, FAMILIES, Confounded
+from tests.concealed.files import missing
+from tests.concealed.instruments import DIGITAL, digital
+from tests.concealed.model import Array, Params, Scenario
+from tests.concealed.noise import coloured, converter, spikes
+
+MIX = {"single": 0.34, "two": 0.10, "null": 0.38, "outside": 0.10, "confounded": 0.08}
+LARGEST_MODEL_ERROR = 1.0
+"""A null's systematic error over the whole recording, in noise sd: below it no test can see it."""
+ALIKE = 4.0
+"""Two effects whose responses differ by less than this, in noise sd over the recording, are one class."""
+# pairs that a compound may not hold: one shadows the other
+_SHADOWS = (
+    frozenset("relaxation channel_delay filter_lag backlash hysteresis turn_slip creep".split()),
+    frozenset("saturation quantisation dead_band rectification unit_error channel_sign channel_swap".split()),
+    frozenset("coulomb_friction viscous_damping quadratic_drag".split()),
+    frozenset("zero_offset zero_drift thermal_drift constant_force crosstalk".split()),
+    frozenset("steer_compliance wear drum_curvature thermal_friction load_friction speed_friction".split()),
+)
+_ONE_SIZE = ("unit_error", "channel_sign", "rectification", "channel_swap")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Drawn:
+    """A case with its answer."""
+
+    scenario: Scenario
+    measured: list[dict[str, Array]]
+    predicted: list[dict[str, Array]]
+    """What the outputs of the files to predict truly do, without noise."""
+    answer: dict[str, Any]
+
+
+class RedrawError(Exception):
+    """The draw does not meet its own conditions; another is drawn."""
+
+
+def mix(n: int, rng: np.random.Generator) -> list[str]:
+    """Return the kinds of `n` cases in drawn order: shares by largest remainder."""
+    exact = {k: n * v for k, v in MIX.items()}
+    count = {k: int(v) for k, v in exact.items()}
+    for k in sorted(exact, key=lambda k: count[k] - exact[k])[: n - sum(count.values())]:
+        count[k] += 1
+    kinds = [k for k, m in count.items() for _ in range(m)]
+    return [kinds[i] for i in rng.permutation(n)]
+
+
+def _log_uniform(rng: np.random.Generator, low: float, high: float) -> float:
+    return float(np.exp(rng.uniform(np.log(low), np.log(high))))
+
+
+def _pick(rng: np.random.Generator, bucket: str) -> tuple[str, Confounded | None, tuple[str, ...]]:
+    """Return the family, the class it is drawn for, and the effects to put in."""
+    if bucket == "confounded":
+        group = CONFOUNDED[str(rng.choice(list(CONFOUNDED)))]
+        return group.family, group, (str(rng.choice(group.present)),)
+    names = [k for k, f in FAMILIES.items() if bucket != "outside" or f.outside]
+    if bucket == "two":
+        names = [k for k in names if k not in ("thermal", "tank")]
+    weight = np.array([FAMILIES[k].weight for k in names])
+    family = str(rng.choice(names, p=weight / weight.sum()))
+    inside = FAMILIES[family].inside
+    if bucket == "null":
+        return family, None, ()
+    if bucket == "outside":
+        return family, None, (str(rng.choice(FAMILIES[family].outside)),)
+    if bucket == "single":
+        share = np.array([0.5 if name in _ONE_SIZE else 1.0 for name in inside])
+        return family, None, (str(rng.choice(inside, p=share / share.sum())),)
+    graded = [name for name in inside if name not in _ONE_SIZE]
+    first, second = (str(x) for x in rng.choice(graded, 2, replace=False))
+    if any({first, second} <= group for group in _SHADOWS):
+        raise RedrawError
+    return family, None, (first, second)
+
+
+def _alike(
+    s: Scenario,
+    name: str,
+    there: sizing.Signals,
+    without: sizing.Signals,
+    slopes: list[sizing.Signals],
+    distance: float,
+) -> dict[str, float]:
+    """Return the effects of the family that this recording can hardly tell from `name`, with their
+    distance."""
+    near = {}
+    a = sizing.projected(s, sizing.difference(there, without), slopes)
+    p = s.true_parameters()
+    for other, spec in s.effects.items():
+        if other == name or other not in FAMILIES[s.family].inside or not spec.scaled:
+            continue
+        b = sizing.projected(
+            s, sizing.difference(sizing.truth_of(s, s.runs, p, {other: spec.at(1.0)}), without), slopes
+        )
+        length = float(np.linalg.norm(b))
+        if length < 1e-6:
+            continue
+        cosine = float(a @ b) / (float(np.linalg.norm(a)) * length)
+        apart = distance * float(np.sqrt(max(1 - cosine**2, 0.0)))
+        if apart < ALIKE:
+            near[other] = round(apart, 2)
+    return near
+
+
+def _largest_cosine(
+    s: Scenario, effect: sizing.Signals, without: sizing.Signals, slopes: list[sizing.Signals]
+) -> float:
+    """Return how much of an effect from outside the nearest one of the catalogue could take."""
+    a = sizing.projected(s, effect, slopes)
+    p, best = s.true_parameters(), 0.0
+    for other, spec in s.effects.items():
+        if other.startswith("hidden") or not spec.scaled:
+            continue
+        b = sizing.projected(
+            s, sizing.difference(sizing.truth_of(s, s.runs, p, {other: spec.at(1.0)}), without), slopes
+        )
+        length = float(np.linalg.norm(b) * np.linalg.norm(a))
+        if length > 1e-9:
+            best = max(best, abs(float(a @ b)) / length)
+    return best
+
+
+def _before_converter(s: Scenario, p: Params, effects: dict[str, dict[str, Any]]) -> sizing.Signals:
+    return sizing.truth_of(s, s.runs, p, {k: v for k, v in effects.items() if k not in DIGITAL})
+
+
+def _recorded(
+    s: Scenario,
+    row: dict[str, Array],
+    effects: dict[str, dict[str, Any]],
+    lost: float,
+    rng: np.random.Generator,
+) -> dict[str, Array]:
+    """Return the outputs of one run with noise, spikes and the converter; digital effects act on the noisy
+    value."""
+    out = {}
+    for k, y in row.items():
+        noise = s.noise[k]
+        y = y + coloured(noise, y.size, rng) + spikes(noise, y.size, rng)
+        stages = [(name, q) for name, q in effects.items() if name in DIGITAL and q["channel"] == k]
+        if not stages:
+            y = converter(y, noise.sd / 12)
+        for name, q in stages:
+            y = digital(name, q, y)
+        out[k] = missing(y, lost, rng)
+    return out
+
+
+def draw_case(seed: int, index: int, bucket: str) -> Drawn:
+    """Return the case; the same seed, index and kind give the same bytes."""
+    for attempt in range(60):
+        rng = np.random.default_rng([seed, index, attempt])
+        try:
+            return _draw(rng, bucket)
+        except RedrawError:
+            continue
+    raise RuntimeError(f"no draw of kind {bucket} met its conditions (case {index})")
+
+
+def _draw(rng: np.random.Generator, bucket: str) -> Drawn:
+    family, group, names = _pick(rng, bucket)
+    needs = frozenset(names) | (group.needs if group else frozenset())
+    s = (group or FAMILIES[family]).build(rng, needs)
+    p = s.true_parameters()
+    slopes = sizing.jacobian(s, s.runs)
+    without = sizing.truth_of(s, s.runs, p, {})
+    error = sizing.size_of(s, sizing.difference(without, sizing.nominal_of(s, s.runs, p)), slopes)
+    if error.distance > LARGEST_MODEL_ERROR:
+        raise RedrawError
+    low, high = {"outside": (0.5, 8.0), "confounded": (1.0, 8.0), "two": (0.7, 6.0)}.get(bucket, (0.1, 8.0))
+    effects, rows = {}, []
+    for name in names:
+        wanted = _log_uniform(rng, low, high)
+        factor, found = sizing.scaled_to(s, name, wanted, slopes)
+        spec = s.effects[name]
+        if spec.scaled and not 0.6 < found.over_noise / wanted < 1.6:
+            raise RedrawError
+        effects[name] = spec.at(factor)
+        rows.append({
+            "name": name,
+            "channel": spec.channel,
+            "parameters": spec.reported(effects[name]) if spec.reported else None,
+            "either_sign": spec.either_sign,
+            "size": round(found.over_noise, 4),
+            "distance": round(found.distance, 3),
+        })  # fmt: skip
+    truth = sizing.truth_of(s, s.runs, p, effects)
+    total = sizing.size_of(s, sizing.difference(truth, without), slopes)
+    near: dict[str, float] = {}
+    if bucket == "outside" and _largest_cosine(s, sizing.difference(truth, without), without, slopes) > 0.8:
+        raise RedrawError
+    if bucket == "single" and rows[0]["name"] not in _ONE_SIZE:
+        near = _alike(s, names[0], truth, without, slopes, total.distance)
+    lost = 0.01 if rng.random() < 0.2 else 0.0
+    measured = [_recorded(s, row, effects, lost, rng) for row in _before_converter(s, p, effects)]
+    answer = {
+        "bucket": bucket,
+        "family": s.family,
+        "kind": s.kind,
+        "effects": rows,
+        "class": sorted(group.members) if group else [],
+        "alike": near,
+        "outside": bucket == "outside",
+        "size": round(total.over_noise, 4),
+        "distance": round(total.distance, 3),
+        "by_output": {k: round(v, 4) for k, v in total.by_output.items()},
+        "model_error_distance": round(error.distance, 3),
+        "noise": {k: {"sd": v.sd, "ar": list(v.ar), "outliers": v.outliers} for k, v in s.noise.items()},
+        "parameters": {q.name: q.true for q in s.free()},
+        "lost": lost,
+    }
+    predicted = sizing.truth_of(s, s.predict, p, effects)
+    return Drawn(scenario=s, measured=measured, predicted=predicted, answer=answer)

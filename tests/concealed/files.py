@@ -1,0 +1,98 @@
+"""A case on disk: CASE.toml, its runs as CSV, its simulator; byte for byte the same for the same draw."""
+
+from __future__ import annotations
+
+import hashlib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from tests.concealed.model import Array, Run, Scenario
+
+
+def _value(x: Any) -> str:
+    """Return a TOML value: text, number, list or inline table."""
+    if isinstance(x, bool):
+        return "true" if x else "false"
+    if isinstance(x, str):
+        return '"' + x.replace("\\", "\\\\").replace('"', '\\"') + '"'
+    if isinstance(x, (int, float)):
+        return repr(x)
+    if isinstance(x, dict):
+        return "{ " + ", ".join(f"{k} = {_value(v)}" for k, v in x.items()) + " }"
+    return "[" + ", ".join(_value(v) for v in x) + "]"
+
+
+def case_text(s: Scenario, *, order: dict[str, int]) -> str:
+    """Return CASE.toml."""
+    lines = ["schema = 1", f"title = {_value(s.title)}", "", "[simulation]"]
+    lines += [f"{k} = {_value(v)}" for k, v in s.simulation.items()]
+    if s.simulated:
+        lines.append(f"simulated = {_value(dict(s.simulated))}")
+    for p in () if s.kind == "columns" else s.parameters:
+        if s.kind == "machine" and p.sd is None:
+            continue
+        lines += ["", f"[simulation.parameters.{p.name}]", f"value = {p.declared!r}", f'unit = "{p.unit}"']
+        if p.sd is not None:
+            lines.append(f"sd = {p.sd:.6g}")
+    lines += ["", "[recording]", 'time = "t"']
+    if s.axes:
+        lines.append(f"axes = {_value(s.axes)}")
+    lines += ["", "[recording.channels]"]
+    for name, c in s.channels.items():
+        entry: dict[str, Any] = {"unit": c.unit, "role": c.role}
+        if c.sd is not None:
+            entry["sd"] = float(f"{c.sd:.4g}")
+        lines.append(f"{name} = {_value(entry)}")
+    for run in s.runs:
+        lines += ["", "[[recording.run]]", f'file = "{run.name}"', f"order = {order[run.name]}"]
+        lines += [f"{k} = {_value(v)}" for k, v in run.conditions.items()]
+    for run in s.predict:
+        lines += ["", "[[recording.predict]]", f'file = "{run.name}"']
+        lines += [f"{k} = {_value(v)}" for k, v in run.conditions.items() if v != "forward"]
+    return "\n".join(lines) + "\n"
+
+
+def table(s: Scenario, run: Run, measured: dict[str, Array] | None) -> pd.DataFrame:
+    """Return the rows of a run's file; without measured outputs, those of a file to predict."""
+    df = s.inputs(run).round(7)
+    if s.simulated:
+        for output, y in s.nominal(df, run, s.declared_parameters()).items():
+            df[s.simulated[output]] = y
+    for name, y in (measured or {}).items():
+        df[name] = y
+    return df
+
+
+def write_csv(df: pd.DataFrame, path: Path) -> None:
+    """Write a run: ten significant digits, an empty cell for a missing sample."""
+    df.to_csv(path, index=False, float_format="%.10g", lineterminator="\n")
+
+
+def write_case(s: Scenario, measured: list[dict[str, Array]], folder: Path) -> None:
+    """Write the case into a new folder."""
+    folder.mkdir(parents=True)
+    for name, text in s.files.items():
+        (folder / name).write_text(text, encoding="utf-8")
+    for run, y in zip(s.runs, measured, strict=True):
+        write_csv(table(s, run, y), folder / run.name)
+    for run in s.predict:
+        write_csv(table(s, run, None), folder / run.name)
+    order = {run.name: i + 1 for i, run in enumerate(s.runs)}
+    (folder / "CASE.toml").write_text(case_text(s, order=order), encoding="utf-8")
+
+
+def sha256_of_tree(folder: Path) -> str:
+    """Return one hash of all files below the folder: their relative paths and contents, sorted."""
+    total = hashlib.sha256()
+    for path in sorted(p for p in folder.rglob("*") if p.is_file()):
+        name = path.relative_to(folder).as_posix().encode()
+        total.update(len(name).to_bytes(4, "big") + name + hashlib.sha256(path.read_bytes()).digest())
+    return total.hexdigest()
+
+
+def missing(y: Array, share: float, rng: np.random.Generator) -> Array:
+    """Return the samples with a share of them lost."""
+    return np.where(rng.random(y.size) < share, np.nan, y)
