@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import datetime as dt
 from collections import Counter
-from collections.abc import Callable
-from contextlib import ExitStack
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
+from typing import Any
 
+from toolkit.audit.across import Across
 from toolkit.audit.inventory import inventory
-from toolkit.audit.model import GRADES, TELLS
-from toolkit.audit.one_file import Auditor, FileAudit, unreadable
-from toolkit.audit.resume import Results
+from toolkit.audit.lines import Lines
+from toolkit.audit.model import GRADES, TELLS, Grade
+from toolkit.audit.one_file import Auditor, OwnOutput, unreadable
+from toolkit.audit.resume import Files, Results
 from toolkit.audit.workers import Lost, run_isolated
 from toolkit.calibration.registry.registry import Refused, Registry
 from toolkit.errors import ConfigError, RegistryError
@@ -27,31 +29,26 @@ CLEAN = ("exact", "rounding")
 class ArchiveAudit:
     """Every file of an archive, sorted by path. ``refused`` are records that may not be candidates.
 
-    ``heads``: (instrument, head of its ledger), by which the answer can be repeated.
+    ``files`` are read from the disk as they are asked for. ``undated`` counts readable files without a test
+    date, whatever their grade. ``tests`` are plain values (`TestSums.summary`). ``heads``: (instrument, head
+    of its ledger), by which the answer can be repeated. ``reused`` counts results of an earlier run.
     """
 
     archive: Path
     known_at: dt.date
-    files: tuple[FileAudit, ...]
+    files: Files
+    grades: Mapping[str, int]
+    undated: int
+    tests: Lines
     refused: tuple[Refused, ...]
     heads: tuple[tuple[str, str], ...]
     findings: tuple[Finding, ...]
-
-    @property
-    def grades(self) -> dict[str, int]:
-        """How many files have each grade; every grade is there."""
-        counted = Counter(one.grade for one in self.files)
-        return {grade: counted[grade] for grade in GRADES}
-
-    @property
-    def undated(self) -> int:
-        """Readable files without a test date, whatever their grade."""
-        return sum(one.found is not None and one.date is None for one in self.files)
+    reused: int = field(compare=False)
 
     @property
     def clean(self) -> bool:
-        """Whether every file is exact or rounding and nothing else was found."""
-        return all(one.grade in CLEAN for one in self.files) and not self.findings
+        """Whether every file is exact or rounding and nothing else asks for a person's attention."""
+        return all(one.level == "note" for one in self.findings)
 
 
 def audit_archive(
@@ -90,34 +87,43 @@ def audit_archive(
         )  # fmt: skip
     day = known_at or today()
     todo = inventory(archive) if names is None else names
-    done: dict[str, FileAudit] = {}
     make = partial(Auditor, archive, registry, day)
-    with ExitStack() as stack:
-        kept = None
-        keys: dict[str, str | None] = {}
-        if out is not None:
-            kept = stack.enter_context(Results(out, archive=archive, registry_hash=_hash(registry, day)))
-            keys = {name: kept.key_of(name) for name in todo}
-            for name, key in keys.items():
-                if key is not None and kept.has(name, key):
-                    reused = kept.get(name, key)
-                    if reused is not None:
-                        done[name] = reused
-                    step(name)
-            todo = tuple(name for name in todo if not kept.has(name, keys[name]))
-        for name, result in run_isolated(make, todo, workers=workers):
-            found = unreadable(name, result.reason) if isinstance(result, Lost) else result
-            if kept is not None and not isinstance(result, Lost):
-                kept.put(name, keys[name], found)
-            if found is not None:
-                done[name] = found
+    with Results(out, archive=archive, registry_hash=_hash(registry, day)) as kept:
+        reused: set[str] = set()
+        for name in kept.known(todo):
+            reused.add(name)
             step(name)
-    files = tuple(done[name] for name in sorted(done))
-    instruments = sorted({one.instrument for one in files if one.instrument is not None})
+        new = tuple(name for name in todo if name not in reused)
+        for name, result in run_isolated(make, new, workers=workers):
+            if isinstance(result, Lost):
+                kept.put(name, None, unreadable(name, result.reason))
+            elif isinstance(result, OwnOutput):
+                kept.put(name, result.sha256, None)
+            else:
+                kept.put(name, result.sha256, result)
+            step(name)
+        return _summed(archive, registry, day, kept.files(todo), reused=len(reused))
+
+
+def _summed(archive: Path, registry: Registry, day: dt.date, files: Files, *, reused: int) -> ArchiveAudit:
+    across = Across()
+    grades: Counter[str] = Counter()
+    undated = 0
+    instruments: set[str] = set()
+    findings: list[Finding] = []
+    notes: list[Finding] = []
+    for one in files.plain():
+        grades[one["grade"]] += 1
+        undated += one["grade"] != "unreadable" and one["date"] is None
+        if one["instrument"] is not None:
+            instruments.add(one["instrument"])
+        findings += _of_file(one)
+        notes += across.add(one)
+    notes += across.rest()
     refused: list[Refused] = []
     heads: list[tuple[str, str]] = []
     troubles: list[Finding] = []
-    for instrument in instruments:
+    for instrument in sorted(instruments):
         refused += registry.usable(instrument)[1]
         try:
             heads.append((instrument, registry.head(instrument)))
@@ -127,9 +133,13 @@ def audit_archive(
         archive=archive,
         known_at=day,
         files=files,
+        grades={grade: grades[grade] for grade in GRADES},
+        undated=undated,
+        tests=across.tests,
         refused=tuple(refused),
         heads=tuple(heads),
-        findings=(*_findings(files), *_refusals(refused), *troubles),
+        findings=(*findings, *_refusals(refused), *troubles, *notes),
+        reused=reused,
     )
 
 
@@ -138,20 +148,28 @@ def _hash(registry: Registry, day: dt.date) -> str:
     return sha256_bytes("|".join([day.isoformat(), *parts]).encode())
 
 
-def _findings(files: tuple[FileAudit, ...]) -> list[Finding]:
+def _of_file(one: Mapping[str, Any]) -> list[Finding]:
     made = []
-    for one in files:
-        if one.context is not None:
-            message = f"its test.toml cannot be used, the file counts as undated: {one.context}"
-            made.append(Finding(rule="test-toml", where=one.path, message=message))
-        if one.found is None:
-            made.append(Finding(rule="unreadable-file", where=one.path, message=one.reason or ""))
-        elif one.grade not in CLEAN:
-            found = one.found
-            who = f" ({found.record}{', ' + found.variant if found.variant else ''})" if found.record else ""
-            text = one.reason or f"Fy and Mz were computed {TELLS[one.grade]}{who}"
-            made.append(Finding(rule=f"identified-{one.grade}", where=one.path, message=text))
+    path, grade, reason = one["path"], one["grade"], one["reason"]
+    if one["test_toml"] is not None:
+        message = f"its test.toml cannot be used, the file counts as undated: {one['test_toml']}"
+        made.append(Finding(rule="test-toml", where=path, message=message))
+    if grade == "unreadable":
+        made.append(Finding(rule="unreadable-file", where=path, message=reason or ""))
+    elif grade not in CLEAN:
+        made.append(Finding(rule=f"identified-{grade}", where=path, message=reason or told(one)))
     return made
+
+
+def told(one: Mapping[str, Any]) -> str:
+    """Return in one sentence what computed a file, from its plain answer."""
+    grade: Grade = one["grade"]
+    who = ""
+    if one["record"]:
+        who = f" ({one['record']}{', ' + one['variant'] if one['variant'] else ''})"
+    elif one["candidates"]:
+        who = f" ({', '.join(one['candidates'])})"
+    return f"Fy and Mz were computed {TELLS[grade]}{who}"
 
 
 def _refusals(refused: list[Refused]) -> list[Finding]:

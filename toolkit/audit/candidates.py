@@ -10,6 +10,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -24,6 +25,9 @@ if TYPE_CHECKING:
     from toolkit.calibration.records.record import CalibrationRecord, LoadFit
 
 CONSTANT = "constant"
+ROUND_OFF = 8 * float(np.finfo(np.float64).eps)
+"""Of a sum of products in double precision, in parts of the sum of their sizes."""
+
 _ALL_ORDERS = 4  # beyond so many channels only exchanges of two are tried
 _FIFTH = 4  # the fifth significant digit stands four places below the first
 
@@ -82,8 +86,10 @@ def unfit(record: CalibrationRecord, columns: Columns) -> str | None:
     return f"it has no equation for {', '.join(missing)}" if missing else None
 
 
-def groups(record: CalibrationRecord, columns: Columns) -> Iterator[Group]:
-    """Yield a record's groups on a file: full and issued coefficients, every order of the columns."""
+def group_of(
+    record: CalibrationRecord, columns: Columns, *, order: tuple[int, ...], issued: bool = False
+) -> Group:
+    """Return a record's sign variants on a file, by full or issued coefficients, in one order of columns."""
     # Each indication in the record's unit, in the record's order.
     place = [columns.names.index(name) for name in record.indications]
     scale = np.array(
@@ -92,25 +98,29 @@ def groups(record: CalibrationRecord, columns: Columns) -> Iterator[Group]:
             for p, text in zip(place, record.indication_units, strict=True)
         ]
     )
-    x, half = columns.x[:, place] * scale, columns.half_x[:, place] * np.abs(scale)
-    forms = (False,) if all(one.issued == one.coefficients for one in record.loads) else (False, True)
-    for order in orders(len(place)):
-        shuffled, half_shuffled = x[:, order], half[:, order]
-        designs = {
-            load: _design(record, record.load(load), shuffled, half_shuffled) for load in columns.loads
-        }
-        for issued in forms:
-            families = {
-                load: _family(record, record.load(load), columns, load, *designs[load], issued=issued)
-                for load in columns.loads
-            }
-            yield Group(record=record, issued=issued, order=order, families=families)
+    x, half = (columns.x[:, place] * scale)[:, order], (columns.half_x[:, place] * np.abs(scale))[:, order]
+    return Group(
+        record=record,
+        issued=issued,
+        order=order,
+        families={
+            load: _family(record, record.load(load), columns, load, x, half, issued=issued)
+            for load in columns.loads
+        },
+    )
 
 
 def _design(
     record: CalibrationRecord, fit: LoadFit, x: NDArray[np.float64], half: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     # The terms, and how far each may be off when every indication is off by half its last place.
+    if all(term == INTERCEPT or term in record.indications for term in fit.terms):
+        rows = len(x)
+        at = [None if t == INTERCEPT else record.indications.index(t) for t in fit.terms]
+        return (
+            np.column_stack([np.ones(rows) if i is None else x[:, i] for i in at]),
+            np.column_stack([np.zeros(rows) if i is None else half[:, i] for i in at]),
+        )
     values = {name: x[:, i] for i, name in enumerate(record.indications)}
     terms = term_matrix(fit.terms, values)
     moved = np.zeros_like(terms)
@@ -119,38 +129,60 @@ def _design(
     return terms, moved
 
 
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Variants:
+    # What a family has before any file is seen.
+    signs: NDArray[np.int8]
+    coefficients: NDArray[np.float64]
+    size: NDArray[np.float64]
+    slack: NDArray[np.float64]
+
+
+@lru_cache(maxsize=1024)
+def _variants(fit: LoadFit, indications: tuple[str, ...], to_file: float, issued: bool) -> _Variants:
+    plain = np.array(fit.issued if issued else fit.coefficients)
+    signs = np.array(list(itertools.product((1, -1), repeat=len(indications) + 1)), dtype=np.int8)
+    turned = np.column_stack([_turn(indications, name, signs) for name in fit.terms])
+    return _Variants(
+        signs=signs,
+        coefficients=plain * to_file * turned,
+        size=np.abs(plain * to_file),
+        slack=half_fifth_digit(plain) * abs(to_file),
+    )
+
+
 def _family(
     record: CalibrationRecord,
     fit: LoadFit,
     columns: Columns,
     load: str,
-    terms: NDArray[np.float64],
-    moved: NDArray[np.float64],
+    x: NDArray[np.float64],
+    half: NDArray[np.float64],
     *,
     issued: bool,
 ) -> Family:
+    terms, moved = _design(record, fit, x, half)
     to_file = si_scale(fit.unit) / si_scale(columns.y_units[load])
-    plain = np.array(fit.issued if issued else fit.coefficients) * to_file
-    signs = np.array(list(itertools.product((1, -1), repeat=len(record.indications) + 1)), dtype=np.int8)
-    coefficients = plain * np.column_stack([_turn(record, name, signs) for name in fit.terms])
-    rounding = columns.half_y[load] + 1e-9 * np.abs(columns.y[load])
+    some = _variants(fit, record.indications, to_file, issued)
+    size = np.abs(terms)
     return Family(
-        signs=signs,
-        coefficients=coefficients,
-        predicted=coefficients @ terms.T,
-        bound=moved @ np.abs(plain) + rounding,
-        slack=np.abs(terms) @ half_fifth_digit(plain / to_file) * abs(to_file),
+        signs=some.signs,
+        coefficients=some.coefficients,
+        predicted=some.coefficients @ terms.T,
+        # Large terms may cancel to a small load: the sum's own round-off is no departure.
+        bound=columns.half_y[load] + 1e-9 * np.abs(columns.y[load]) + (moved + ROUND_OFF * size) @ some.size,
+        slack=size @ some.slack,
     )
 
 
-def _turn(record: CalibrationRecord, term: str, signs: NDArray[np.int8]) -> NDArray[np.float64]:
+def _turn(indications: tuple[str, ...], term: str, signs: NDArray[np.int8]) -> NDArray[np.float64]:
     # A channel with the wrong sign turns every term in which it stands to an odd power.
     if term == INTERCEPT:
         return signs[:, -1].astype(np.float64)
     factor = np.ones(len(signs))
     for name, power in parse_term(term).powers:
         if power % 2:
-            factor = factor * signs[:, record.indications.index(name)]
+            factor = factor * signs[:, indications.index(name)]
     return factor
 
 

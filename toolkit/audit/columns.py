@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -37,6 +37,16 @@ class Columns:
     def rows(self) -> int:
         """Number of rows."""
         return len(self.x)
+
+    def part(self, rows: slice) -> Columns:
+        """Return some of the rows; each keeps the last place that the whole file gave it."""
+        return replace(
+            self,
+            x=self.x[rows],
+            half_x=self.half_x[rows],
+            y={load: values[rows] for load, values in self.y.items()},
+            half_y={load: values[rows] for load, values in self.half_y.items()},
+        )
 
     @property
     def loads(self) -> tuple[str, ...]:

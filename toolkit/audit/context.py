@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import datetime as dt
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 from toolkit.errors import ConfigError
 from toolkit.files import read_toml
@@ -33,16 +34,26 @@ class Context:
     is_tare: bool = False
 
 
-def context_of(path: Path, *, machine: str | None = None) -> Context:
+def context_of(
+    path: Path,
+    *,
+    machine: str | None = None,
+    own: Callable[[], str | None] | None = None,
+    read: Callable[[Path], Mapping[str, Any]] = read_toml,
+    find: Callable[[Path], Path | None] = nearest_test_toml,
+) -> Context:
     """Return a file's context: ``machine`` where it is named, else test.toml, else the file, else m15.
+
+    ``own`` tells the machine that the file names, ``read`` reads a test.toml and ``find`` finds it: for a
+    caller that remembers.
 
     Raises
     ------
     ConfigError
         the test.toml is no TOML, its date is no date, or the machine is unknown
     """
-    toml = nearest_test_toml(path)
-    table = {} if toml is None else read_toml(toml)
+    toml = find(path)
+    table: Mapping[str, Any] = {} if toml is None else read(toml)
     date = None if toml is None or "date" not in table else _date(table["date"], toml)
     source: MachineSource
     if machine is not None:
@@ -51,8 +62,8 @@ def context_of(path: Path, *, machine: str | None = None) -> Context:
         name, source = str(table["machine"]), "test.toml"
         name = str(toml.parent / name) if name.endswith(".toml") else name
     else:
-        own = machine_of(path)
-        name, source = (own, "file") if own is not None else (DEFAULT_MACHINE, "default")
+        named = machine_of(path) if own is None else own()
+        name, source = (named, "file") if named is not None else (DEFAULT_MACHINE, "default")
     return Context(
         machine=load_machine(name),
         machine_source=source,

@@ -7,18 +7,19 @@ unit of its fifth significant digit. Candidates that the file cannot tell apart 
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field
 from datetime import date
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolkit.audit.candidates import Group, describe, groups, unfit
+from toolkit.audit.candidates import Group, describe, unfit
 from toolkit.audit.columns import Columns, columns_of
 from toolkit.audit.model import Grade, Identification, Repair, Segment, Skipped, worst
+from toolkit.audit.screen import Key, Screen, screen_of
 from toolkit.audit.segments import Hit, Run, distinct_rivals, partition, whole_file
-from toolkit.calibration.terms import INTERCEPT
+from toolkit.calibration.terms import INTERCEPT, term_matrix
 from toolkit.units import si_scale
 
 if TYPE_CHECKING:
@@ -68,13 +69,17 @@ def identify_columns(
     on: date | None,
     in_force: CalibrationRecord | None,
     void: Collection[str] = (),
+    screen: Screen | None = None,
+    new: Mapping[str, NDArray[np.float64]] | None = None,
 ) -> Identification:
-    """Identify from plain columns; see `identify`."""
-    reasons = {record.id: unfit(record, columns) for record in records}
-    fitting = [record for record in records if reasons[record.id] is None]
+    """Identify from plain columns; see `identify`.
+
+    ``screen`` is that of the records for files of this layout, where the caller keeps it for many files;
+    ``new`` what `recompute` gives by the record in force, where the caller has it.
+    """
     judge = _Judge(
         columns=columns,
-        groups=tuple(g for record in fitting for g in groups(record, columns)) if columns.loads else (),
+        screen=screen or screen_of(records, columns),
         on=on,
         in_force=None if on is None else in_force,
         void=frozenset(void),
@@ -91,52 +96,69 @@ def identify_columns(
         candidates=segments[at].candidates,
         segments=segments,
         in_force=None if judge.in_force is None else judge.in_force.id,
-        repair=None if judge.in_force is None else repair(columns, judge.in_force),
-        skipped=tuple(Skipped(id=i, reason=r) for i, r in reasons.items() if r is not None),
+        repair=None if judge.in_force is None else repair(columns, judge.in_force, new),
+        skipped=tuple(Skipped(id=i, reason=r) for i, r in judge.screen.reasons if r is not None),
     )
 
 
 def recompute(columns: Columns, record: CalibrationRecord) -> dict[str, NDArray[np.float64]]:
     """Return FY [N] and MZ [N·m] (rows,) by a record's full coefficients, columns as named by the header."""
-    first = next(iter(groups(record, columns)))  # full coefficients, the file's own order, plain signs
+    scale = {
+        name: si_scale(columns.units[columns.names.index(name)]) / si_scale(text)
+        for name, text in zip(record.indications, record.indication_units, strict=True)
+    }
+    x = {name: columns.x[:, columns.names.index(name)] * factor for name, factor in scale.items()}
     return {
-        load: family.predicted[0] * si_scale(columns.y_units[load]) for load, family in first.families.items()
+        load: term_matrix(fit.terms, x) @ np.array(fit.coefficients) * si_scale(fit.unit)
+        for load, fit in ((load, record.load(load)) for load in columns.loads)
     }
 
 
-def repair(columns: Columns, record: CalibrationRecord) -> Repair | None:
+def repair(
+    columns: Columns, record: CalibrationRecord, new: Mapping[str, NDArray[np.float64]] | None = None
+) -> Repair | None:
     """Return what a record would change at most; None where it cannot be applied to the file."""
     if unfit(record, columns) is not None:
         return None
-    new = recompute(columns, record)
+    values = recompute(columns, record) if new is None else new
     most = {
-        load: float(np.max(np.abs(new[load] - columns.y[load] * si_scale(columns.y_units[load]))))
+        load: float(np.max(np.abs(values[load] - columns.y[load] * si_scale(columns.y_units[load]))))
         for load in columns.loads
     }
     return Repair(FY_max_abs_N=most.get("FY"), MZ_max_abs_Nm=most.get("MZ"))
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+@dataclass(slots=True, kw_only=True, eq=False)
 class _Judge:
     columns: Columns
-    groups: tuple[Group, ...]
+    screen: Screen
     on: date | None
     in_force: CalibrationRecord | None
     void: frozenset[str]
+    groups: list[Group] = field(default_factory=list)  # those that the screen let through so far
+    _keys: set[Key] = field(default_factory=set)
 
     def segments(self) -> tuple[tuple[Segment, ...], tuple[_Answer | None, ...]]:
         """Return the file's segments and the answer of each: the whole file first, parts only if it must."""
-        tiers = [(slack, self._fits(slack=slack)) for slack in (False, True)]
-        for slack, fits in tiers:
-            hits = whole_file(fits)
+        self._let_in(self.screen.whole(self.columns))
+        for slack in (False, True):
+            hits = whole_file(self._fits(slack=slack))
             if hits:
                 told = self._answers(hits, slack=slack)
                 if len(told) == 1:  # and does nothing else come near?
+                    accepted = self.groups[hits[0].group]
+                    self._let_in(self.screen.close_to(accepted, self.columns, dict(hits[0].signs)))
                     told = self._answers(distinct_rivals(self.groups, hits[0], slack=slack), slack=slack)
                 return self._told([Run(start=0, stop=self.columns.rows, hits=hits)], [told])
-        parts = [(slack, partition(fits, self.columns.rows)) for slack, fits in tiers]
+        self._let_in(self.screen.anywhere(self.columns))
+        parts = [(slack, partition(self._fits(slack=slack), self.columns.rows)) for slack in (False, True)]
         slack, runs = min(parts, key=lambda part: (_unknown_rows(part[1]), len(part[1]), part[0]))
         return self._told(runs, [self._answers(run.hits, slack=slack) for run in runs])
+
+    def _let_in(self, keys: Sequence[Key]) -> None:
+        new = [key for key in keys if key not in self._keys]
+        self._keys.update(new)
+        self.groups += [self.screen.group(key, self.columns) for key in new]
 
     def _fits(self, *, slack: bool) -> list[dict[str, NDArray[np.bool_]]]:
         return [
@@ -183,6 +205,8 @@ class _Judge:
     def _answers(self, hits: Sequence[Hit], *, slack: bool) -> tuple[_Answer, ...]:
         # Equal coefficients are one candidate, named after the plain record or the one with fewest changes;
         # full and issued digits of one record and variant are one candidate too.
+        if len(hits) == 1:
+            return (self._simplest(set(hits), slack=slack),)
         by_key: dict[object, set[Hit]] = {}
         for hit in hits:
             for key in (self._coefficients(hit), self._variant(hit)):
@@ -208,6 +232,7 @@ class _Judge:
             other = self.in_force is None or group.record.id != self.in_force.id
             return (
                 self._changes(hit), other, group.record.id in self.void, group.record.id, not group.issued,
+                group.order, hit.signs,
             )  # fmt: skip
 
         hit = min(same, key=rank)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import datetime as dt
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -85,13 +85,25 @@ class Inspection:
 
 
 def choose(
-    registry: Registry, instrument: str, *, on: dt.date | None, known_at: dt.date | None = None
+    registry: Registry,
+    instrument: str,
+    *,
+    on: dt.date | None,
+    known_at: dt.date | None = None,
+    offered: Choice | None = None,
 ) -> Choice:
-    """Return the records that may have computed a file, and the one in force on the test's day."""
+    """Return the records that may have computed a file, and the one in force on the test's day.
+
+    ``offered``: the choice of another day, whose records need not be read and checked again.
+    """
     from toolkit.calibration.registry.registry import today
 
-    records, refused = registry.usable(instrument)
     now = known_at or today()
+    if offered is not None:
+        if on is None or offered.trouble is not None:
+            return replace(offered, in_force=None)
+        return replace(offered, in_force=_in_force(registry, instrument, on, now))
+    records, refused = registry.usable(instrument)
     trouble: str | None = None
     statuses: list[RecordStatus] = []
     force: dict[dt.date, CalibrationRecord | None] = {}

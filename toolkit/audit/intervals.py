@@ -8,6 +8,7 @@ the signs is all that the file allows: a sign is proven, not estimated.
 from __future__ import annotations
 
 import itertools
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -17,6 +18,9 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from toolkit.audit.columns import Columns
+
+_STEPS = 200
+_TIGHT = 1e-11
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -93,25 +97,95 @@ def interval_bounds(
     target = y / rounding
     centre, rest = back @ (q.T @ target), target - q @ (q.T @ target)
     low, high = np.full(n + 1, np.inf), np.full(n + 1, -np.inf)
-    for signs in itertools.product((1.0, -1.0), repeat=n):
+    size = np.linalg.norm(back, axis=1)
+    for signs in itertools.product(*_possible_signs(q, back, centre, half_x, half_y, rounding)):
         turned = np.array(signs)
         allowed = half_x / rounding[:, None] * turned  # |c| half_x for these signs
         moving, fixed = allowed @ back[:n], half_y / rounding + allowed @ centre[:n]
-        size = np.linalg.norm(back[:n], axis=1)
-        area = np.vstack([q - moving, -q - moving, -turned[:, None] * back[:n] / size[:, None]])
-        right = np.concatenate([fixed + rest, fixed - rest, turned * centre[:n] / size])
-        if _lowest(np.zeros(n + 1), area, right) is None:
-            continue  # no solution has these signs
+        area = np.vstack([q - moving, -q - moving, -turned[:, None] * back[:n] / size[:n, None]])
+        right = np.concatenate([fixed + rest, fixed - rest, turned * centre[:n] / size[:n]])
+        polytope = _Polytope(area, right)
         for i in range(n + 1):
-            unit = float(np.linalg.norm(back[i]))
-            ends = [_lowest(turn * back[i] / unit, area, right) for turn in (1.0, -1.0)]
-            low[i] = min(low[i], -np.inf if ends[0] is None else centre[i] + ends[0] * unit)
-            high[i] = max(high[i], np.inf if ends[1] is None else centre[i] - ends[1] * unit)
+            ends = [polytope.lowest(turn * back[i] / size[i]) for turn in (1.0, -1.0)]
+            if polytope.empty:
+                break  # no solution has these signs
+            low[i] = min(low[i], -np.inf if ends[0] is None else centre[i] + ends[0] * size[i])
+            high[i] = max(high[i], np.inf if ends[1] is None else centre[i] - ends[1] * size[i])
     return np.column_stack([low, high]) if np.all(low <= high) else None
 
 
+def _possible_signs(
+    q: NDArray[np.float64],
+    back: NDArray[np.float64],
+    centre: NDArray[np.float64],
+    half_x: NDArray[np.float64],
+    half_y: NDArray[np.float64],
+    rounding: NDArray[np.float64],
+) -> list[tuple[float, ...]]:
+    # A solution c gives residuals e with |e| <= half_y + |c| half_x, and c - centre = back q^T e. So
+    # |c - centre| <= d with d = |back q^T| (half_y + half_x (|centre| + d)): where that has a solution, a
+    # coefficient beyond its d has one sign only, and the programmes of the other need not be solved.
+    n = half_x.shape[1]
+    gain = np.abs(back[:n] @ q.T) / rounding
+    mixed = gain @ half_x
+    if float(np.abs(np.linalg.eigvals(mixed)).max()) < 1:
+        reach = np.linalg.solve(np.eye(n) - mixed, gain @ (half_y + half_x @ np.abs(centre[:n])))
+        spare = 1 + 1e-6
+        return [
+            (1.0,) if c > r * spare else (-1.0,) if c < -r * spare else (1.0, -1.0)
+            for c, r in zip(centre[:n].tolist(), reach.tolist(), strict=True)
+        ]
+    return [(1.0, -1.0)] * n
+
+
+class _Polytope:
+    """The points with area x <= right: thousands of sides in a few dimensions."""
+
+    def __init__(self, area: NDArray[np.float64], right: NDArray[np.float64]) -> None:
+        size = np.maximum(np.linalg.norm(area, axis=1), np.finfo(float).tiny)
+        # A cube that is far outside gives every programme a first vertex; a lowest point on it means that
+        # nothing else bounds the goal.
+        self._cube = len(area)
+        corner = np.eye(area.shape[1])
+        self._far = 1e6 * math.sqrt(len(area)) * (1.0 + float(np.abs(right / size).max()))
+        self._area = np.vstack([area / size[:, None], corner, -corner])
+        self._right = np.concatenate([right / size, np.full(2 * len(corner), self._far)])
+        self._given = (area, right)
+        self.empty = False
+
+    def lowest(self, goal: NDArray[np.float64]) -> float | None:
+        """Return the lowest value of ``goal`` x; None where there is no point at all, or no limit.
+
+        The dual simplex: from a vertex that is optimal for the sides it knows, to the side that it violates
+        most, until it violates none.
+        """
+        n = len(goal)
+        basis = np.where(goal >= 0, self._cube + n, self._cube) + np.arange(n)
+        for _ in range(_STEPS):
+            sides = self._area[basis]
+            try:
+                point = np.linalg.solve(sides, self._right[basis])
+                weights = np.linalg.solve(sides.T, -goal)
+                over = self._area @ point - self._right
+                new = int(np.argmax(over))
+                if over[new] <= _TIGHT * (1.0 + abs(self._right[new])):
+                    free = bool(np.any((basis >= self._cube) & (weights > _TIGHT)))
+                    return None if free else float(goal @ point)
+                moves = np.linalg.solve(sides.T, self._area[new])
+            except np.linalg.LinAlgError:
+                break
+            held = moves > _TIGHT
+            if not held.any():
+                self.empty = True
+                return None
+            ratio = np.full(n, np.inf)
+            ratio[held] = np.maximum(weights[held], 0.0) / moves[held]
+            basis[int(np.argmin(ratio))] = new
+        return _lowest(goal, *self._given)
+
+
 def _lowest(goal: NDArray[np.float64], area: NDArray[np.float64], right: NDArray[np.float64]) -> float | None:
-    # None where the programme has no lowest value: no solution at all, or no limit.
+    # By a general solver where the steps above did not end; None where the programme has no lowest value.
     from scipy.optimize import linprog
 
     answer = linprog(goal, A_ub=area, b_ub=right, bounds=(None, None), method="highs")

@@ -3,19 +3,31 @@
 from __future__ import annotations
 
 import datetime as dt
+import functools
+import os
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any, cast
 
+from toolkit.audit.candidates import unfit
+from toolkit.audit.choices import Choices
 from toolkit.audit.columns import columns_of
+from toolkit.audit.conditions import Change, changes
 from toolkit.audit.context import DEFAULT_MACHINE, Context, MachineSource, context_of
-from toolkit.audit.identify import identify_columns
-from toolkit.audit.inspection import Choice, choose
+from toolkit.audit.estimate import Estimate, estimate
+from toolkit.audit.identify import identify_columns, recompute
 from toolkit.audit.model import Grade, Identification
+from toolkit.audit.quality import quality
 from toolkit.calibration.registry.registry import Registry
+from toolkit.channels import REVERSALS, ROTATIONS, Rotation, seen_by_cells, signs
 from toolkit.errors import ToolkitError
-from toolkit.files import sha256_file
+from toolkit.files import read_toml, sha256_bytes, sha256_file
+from toolkit.findings import Finding
 from toolkit.machine import load_machine
-from toolkit.recording.marks import is_own_output, machine_of
+from toolkit.recording.archive import MAX_FILE_BYTES
+from toolkit.recording.folder import nearest_test_toml
+from toolkit.recording.marks import machine_in, own_output
 from toolkit.recording.read import read_recording
 from toolkit.reduction.opened import split_blocks
 
@@ -25,7 +37,13 @@ class FileAudit:
     """What is known of one file. ``path`` is relative to the archive, with ``/``.
 
     ``found`` is None where the file is unreadable; ``reason`` then begins with the rule that refused it.
-    ``context`` tells why its test.toml could not be used, None where it could or there is none.
+    ``context`` tells why its test.toml could not be used, None where it could or there is none. ``test`` is
+    the folder of its test.toml, relative to the archive (``.``: at or above it); ``to_SAE`` the sign that
+    each channel has in SAE axes, ``own_protocol`` whether the test declares another than the machine's.
+    ``units`` are those of its columns by symbol, ``values_sha256`` the hash of its numbers whatever the file
+    around them. ``modified`` is the day on which the file, by its own properties, was last saved.
+    ``changes`` are its load blocks, ``estimate`` its own equation where no record explains it, ``notes``
+    what else its rows show.
     """
 
     path: str
@@ -37,6 +55,16 @@ class FileAudit:
     found: Identification | None
     reason: str | None
     context: str | None = None
+    test: str | None = None
+    rotation: Rotation = "forward"
+    to_SAE: tuple[tuple[str, int], ...] = ()
+    own_protocol: bool = False
+    units: tuple[tuple[str, str], ...] = ()
+    values_sha256: str | None = None
+    modified: dt.date | None = None
+    changes: tuple[Change, ...] = ()
+    estimate: Estimate | None = None
+    notes: tuple[Finding, ...] = ()
 
     @property
     def grade(self) -> Grade:
@@ -44,59 +72,125 @@ class FileAudit:
         return "unreadable" if self.found is None else self.found.grade
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class OwnOutput:
+    """A file that is a result of the toolkit: no part of the archive."""
+
+    sha256: str
+
+
 class Auditor:
     """Audits files one after another; what the registry offers is asked once an instrument and day."""
 
     def __init__(self, archive: Path, registry: Registry, known_at: dt.date | None) -> None:
         self.archive = archive
-        self.registry = registry
-        self.known_at = known_at
-        self._choices: dict[tuple[str, dt.date | None], Choice] = {}
+        self._root = Path(os.path.abspath(archive))  # noqa: PTH100  resolve() would follow links
+        self.choices = Choices(registry=registry, known_at=known_at)
+        self._toml = functools.lru_cache(maxsize=64)(read_toml)
+        nearest = functools.lru_cache(maxsize=64)(nearest_test_toml)
+        self._find = lambda path: nearest(path.parent)  # what is no folder holds no test.toml
 
-    def __call__(self, name: str) -> FileAudit | None:
-        """Audit one file by its path in the archive; None for a result that the toolkit wrote.
-
-        What a file holds never raises.
-        """
+    def __call__(self, name: str) -> FileAudit | OwnOutput:
+        """Audit one file by its path in the archive; what it holds never raises."""
         path = self.archive / name
-        if is_own_output(path):
-            return None
-        sha256 = size = None
         try:
             size = path.stat().st_size
-            sha256 = sha256_file(path)
+            if size > MAX_FILE_BYTES:  # the gate refuses it without reading it
+                data, sha256 = None, sha256_file(path)
+            else:
+                data = path.read_bytes()
+                sha256 = sha256_bytes(data)
         except OSError as error:
             return unreadable(name, f"no-file: {error.strerror}")
-        context, trouble = _context(path)
+        # A workbook's marks are looked at where it is opened, or not to be opened as a recording.
+        workbook = data is not None and data.startswith(b"PK")
+        if data is not None and not workbook and own_output(data):
+            return OwnOutput(sha256=sha256)
+        context, trouble = self._context(path, data or b"")
         try:
-            recording = read_recording(path, context.machine)
-            if not context.is_tare:
-                split_blocks(recording, context.machine)
+            recording = read_recording(path, context.machine, data=data)
+            blocks = () if context.is_tare else split_blocks(recording, context.machine)[0]
         except ToolkitError as error:
+            if workbook and data is not None and own_output(data):
+                return OwnOutput(sha256=sha256)
             told = f"{error.rule or 'unreadable'}: {error.what}" + (f", got {error.got}" if error.got else "")
             return unreadable(name, told, sha256=sha256, size=size, context=trouble)
         columns = columns_of(recording)
-        choice = self.choice(context.machine.name, context.date)
+        instrument = context.machine.name
+        choice = self.choices.on(instrument, context.date)
+        screen = self.choices.screen(instrument, columns)
+        in_force = choice.in_force
+        fits = in_force is not None and unfit(in_force, columns) is None
+        new = recompute(columns, in_force) if in_force is not None and fits else None
+        found = identify_columns(
+            columns,
+            choice.records,
+            on=context.date,
+            in_force=in_force,
+            void=choice.void,
+            screen=screen,
+            new=new,
+        )
+        table: Mapping[str, Any] = {} if context.test_toml is None else self._toml(context.test_toml)
+        rotation = self._rotation(path, context, table)
+        reversal = table.get("reversal")
+        seen = seen_by_cells(rotation, reversal) if reversal in REVERSALS else rotation
+        sae = signs(context.machine.axes, "SAE", seen)
         return FileAudit(
             path=name,
             sha256=sha256,
             size=size,
-            instrument=context.machine.name,
+            instrument=instrument,
             date=context.date,
             rows=recording.rows,
-            found=identify_columns(
-                columns, choice.records, on=context.date, in_force=choice.in_force, void=choice.void
-            ),
+            found=found,
             reason=None if columns.loads else "no-own-values: the file has no FY and no MZ of its own",
             context=trouble,
+            test=None if context.test_toml is None else self._test(context.test_toml),
+            rotation=rotation,
+            to_SAE=tuple(sae.items()),
+            own_protocol="protocol" in table,
+            units=tuple((one.symbol, one.unit) for one in recording.series),
+            values_sha256=sha256_bytes(b"".join(one.values.tobytes() for one in recording.series)),
+            modified=recording.saved,
+            changes=changes(
+                recording,
+                columns,
+                blocks,
+                new,
+                turn=sae["SA"],
+            ),
+            estimate=estimate(columns, found.segments, screen) if found.grade == "unknown" else None,
+            notes=quality(recording, name),
         )
 
-    def choice(self, instrument: str, on: dt.date | None) -> Choice:
-        """Return what the registry offers for an instrument and a day."""
-        key = (instrument, on)
-        if key not in self._choices:
-            self._choices[key] = choose(self.registry, instrument, on=on, known_at=self.known_at)
-        return self._choices[key]
+    def _context(self, path: Path, data: bytes) -> tuple[Context, str | None]:
+        # A test.toml that cannot be used must not hide what its recordings hold: they have no date then.
+        try:
+            return context_of(path, own=lambda: machine_in(data), read=self._toml, find=self._find), None
+        except ToolkitError as error:
+            own = machine_in(data)
+            source: MachineSource = "default" if own is None else "file"
+            machine = load_machine(own or DEFAULT_MACHINE)
+            told = f"{error.rule or 'test-toml'}: {error.what} ({error.where})"
+            return Context(machine=machine, machine_source=source, date=None, test_toml=None), told
+
+    def _test(self, toml: Path) -> str:
+        try:
+            return toml.parent.relative_to(self._root).as_posix()
+        except ValueError:
+            return "."
+
+    def _rotation(self, path: Path, context: Context, table: Mapping[str, Any]) -> Rotation:
+        if context.test_toml is None:
+            return "forward"
+        named: Any = table.get("rotations")
+        inside = (
+            (self._root / path.relative_to(self.archive)).relative_to(context.test_toml.parent).as_posix()
+        )
+        own: Mapping[str, Any] = named if isinstance(named, dict) else {}
+        said = own.get(inside, own.get(path.name, table.get("rotation")))
+        return cast("Rotation", said) if said in ROTATIONS else "forward"
 
 
 def unreadable(
@@ -112,15 +206,3 @@ def unreadable(
         path=name, sha256=sha256, size=size, instrument=None, date=None, rows=None, found=None,
         reason=reason, context=context,
     )  # fmt: skip
-
-
-def _context(path: Path) -> tuple[Context, str | None]:
-    # A test.toml that cannot be used must not hide what its recordings hold: they have no date then.
-    try:
-        return context_of(path), None
-    except ToolkitError as error:
-        own = machine_of(path)
-        source: MachineSource = "default" if own is None else "file"
-        machine = load_machine(own or DEFAULT_MACHINE)
-        told = f"{error.rule or 'test-toml'}: {error.what} ({error.where})"
-        return Context(machine=machine, machine_source=source, date=None, test_toml=None), told

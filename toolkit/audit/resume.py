@@ -1,37 +1,85 @@
 """Results that outlive a run: an interrupted audit goes on, and a second one does only what changed.
 
-``results.jsonl`` holds one line a file, written as soon as the file is done. A result is used again only for
-the same content of the file, the same words of its test.toml, the same registry and day of knowledge, and the
-same version of the toolkit; file times are never asked.
+``results.jsonl`` holds one line a file, written as soon as the file is done; without an output folder it is a
+temporary file. Nothing but its index stays in memory, so that an archive may have any number of files. A
+result is used again only for the same content of the file, the same words of its test.toml, the same registry
+and day of knowledge, and the same version of the toolkit; file times are never asked.
 """
 
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+import tempfile
+import weakref
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from types import TracebackType
-from typing import Any
+from typing import IO, Any, overload
 
 from toolkit import __version__
 from toolkit.audit.one_file import FileAudit
-from toolkit.audit.serial import from_plain, to_plain
+from toolkit.audit.serial import SHAPE, from_plain, to_plain
 from toolkit.errors import OutputError
-from toolkit.files import sha256_bytes
+from toolkit.files import sha256_bytes, sha256_file
 from toolkit.recording.folder import nearest_test_toml
 from toolkit.recording.marks import GENERATOR, OWN_OUTPUT
 
 RESULTS = "results.jsonl"
 _HEADER = (json.dumps({"generator": GENERATOR, "marks": OWN_OUTPUT}) + "\n").encode()
+_REST = b', "result": '
+_HASHING = 4  # threads; reading and hashing leave the interpreter free
+
+
+class Files(Sequence[FileAudit]):
+    """The results of an audit, sorted by path, read from the disk when they are asked for."""
+
+    def __init__(self, file: IO[bytes], places: Sequence[int]) -> None:
+        self._file, self._places = file, places
+        weakref.finalize(self, file.close)
+
+    def __len__(self) -> int:
+        return len(self._places)
+
+    @overload
+    def __getitem__(self, index: int) -> FileAudit: ...
+    @overload
+    def __getitem__(self, index: slice) -> tuple[FileAudit, ...]: ...
+    def __getitem__(self, index: int | slice) -> FileAudit | tuple[FileAudit, ...]:
+        """Return one result, or some."""
+        if isinstance(index, slice):
+            return tuple(from_plain(self._plain(place)) for place in self._places[index])
+        return from_plain(self._plain(self._places[index]))
+
+    def __iter__(self) -> Iterator[FileAudit]:
+        return (from_plain(one) for one in self.plain())
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Files):
+            return NotImplemented
+        return len(self) == len(other) and all(
+            a == b for a, b in zip(self.plain(), other.plain(), strict=True)
+        )
+
+    __hash__ = None  # type: ignore[assignment]
+
+    def plain(self) -> Iterator[dict[str, Any]]:
+        """Yield the results under the keys of the answer."""
+        return (self._plain(place) for place in self._places)
+
+    def _plain(self, place: int) -> dict[str, Any]:
+        self._file.seek(place)
+        found: dict[str, Any] = json.loads(self._file.readline())["result"]
+        return found
 
 
 class Results:
     """The results file of an output folder; one audit writes it at a time.
 
-    ``key_of`` makes a file's key; ``get`` looks one up, ``put`` appends one.
+    ``known`` tells which files need not be audited again, ``put`` appends a result.
     """
 
-    def __init__(self, folder: Path, *, archive: Path, registry_hash: str) -> None:
+    def __init__(self, folder: Path | None, *, archive: Path, registry_hash: str) -> None:
         """Read what is there; a line that was cut off by a crash is left out and written again.
 
         Raises
@@ -40,28 +88,23 @@ class Results:
             ``in-use``: another audit writes here; ``output``: the folder cannot be written to
         """
         self._archive = archive
-        self._base = f"{__version__}|{registry_hash}"
+        self._base = f"{__version__}|{SHAPE}|{registry_hash}"
         self._tomls: dict[Path, str] = {}
-        self._contents: dict[str, str] = {}
-        self._known: dict[tuple[str, str], dict[str, Any] | None] = {}
-        path = folder / RESULTS
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-            self._file = path.open("a+b")
-        except OSError as error:
-            raise _refused(path, error.strerror or "an error", "a folder that can be written to") from error
-        _lock(self._file, path)
+        self._places: dict[str, tuple[bytes, int]] = {}  # path -> key, offset of its newest line
+        self._path = None if folder is None else folder / RESULTS
+        self._file = tempfile.TemporaryFile() if self._path is None else _opened(self._path)  # noqa: SIM115
         self._file.seek(0)
         whole = 0
         for line in self._file:
             if not line.endswith(b"\n"):
                 break
-            self._remember(line)
+            self._remember(line, whole)
             whole += len(line)
         self._file.truncate(whole)
         self._file.seek(whole)
+        self._end = whole
         if whole == 0:
-            self._file.write(_HEADER)
+            self._write(_HEADER)
 
     def __enter__(self) -> Results:
         return self
@@ -69,66 +112,89 @@ class Results:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self._file.close()
+        if self._path is not None:
+            self._file.close()  # and with it the lock
 
-    def key_of(self, name: str) -> str | None:
-        """Return the key of a file by its path in the archive; None where it cannot be read."""
-        path = self._archive / name
-        try:
-            content = sha256_bytes(path.read_bytes())
-        except OSError:
-            return None
-        self._contents[name] = content
-        return sha256_bytes(f"{self._base}|{content}|{self._toml(path.parent)}".encode())
+    def known(self, names: Sequence[str]) -> Iterator[str]:
+        """Yield those of the names whose results still hold."""
+        before = [name for name in names if name in self._places]
+        with ThreadPoolExecutor(_HASHING) as pool:
+            for name, content in zip(before, pool.map(self._hashed, before, chunksize=32), strict=True):
+                if content is not None and self._places[name][0] == self._key(name, content):
+                    yield name
 
-    def has(self, name: str, key: str | None) -> bool:
-        """Tell whether a file's result is known."""
-        return key is not None and (name, key) in self._known
-
-    def get(self, name: str, key: str) -> FileAudit | None:
-        """Return a known result; None for a file that the toolkit wrote."""
-        plain = self._known[name, key]
-        return None if plain is None else from_plain(plain)
-
-    def put(self, name: str, key: str | None, result: FileAudit | None) -> None:
-        """Append a result; one without a key is never used again."""
-        if key is None or (result is not None and result.sha256 != self._contents[name]):
-            return  # the file changed while it was read
+    def put(self, name: str, sha256: str | None, result: FileAudit | None) -> None:
+        """Append a result, None for a file that the toolkit wrote; one without a hash is not used again."""
+        key = b"" if sha256 is None else self._key(name, sha256)
         plain = None if result is None else to_plain(result)
-        line = json.dumps({"path": name, "key": key, "result": plain}, ensure_ascii=False) + "\n"
+        head = json.dumps({"key": key.hex(), "path": name}, ensure_ascii=False)
+        body = json.dumps(plain, ensure_ascii=False)
+        self._places[name] = (key, self._end)
+        self._write(head[:-1].encode() + _REST + body.encode() + b"}\n")
+
+    def files(self, names: Sequence[str]) -> Files:
+        """Return the results of the names, without those of files that the toolkit wrote."""
+        self._file.flush()
+        stream = self._file if self._path is None else self._path.open("rb")
+        places = []
+        for name in sorted(names):
+            place = self._places[name][1]
+            stream.seek(place)
+            if not stream.readline().endswith(_REST + b"null}\n"):
+                places.append(place)
+        return Files(stream, places)
+
+    def _write(self, line: bytes) -> None:
         try:
-            self._file.write(line.encode())
+            self._file.write(line)
             self._file.flush()
         except OSError as error:
-            raise _refused(
-                Path(self._file.name), error.strerror or "an error", "space for the results"
-            ) from error
+            where = self._path or Path(tempfile.gettempdir())
+            raise _refused(where, error.strerror or "an error", "space for the results") from error
+        self._end += len(line)
 
-    def _toml(self, folder: Path) -> str:
-        if folder not in self._tomls:
-            toml = nearest_test_toml(folder)
-            self._tomls[folder] = "" if toml is None else f"{toml}:{sha256_bytes(toml.read_bytes())}"
-        return self._tomls[folder]
-
-    def _remember(self, line: bytes) -> None:
+    def _hashed(self, name: str) -> str | None:
         try:
-            entry: Mapping[str, Any] = json.loads(line)
-            plain = entry["result"]
-            if plain is not None:
-                from_plain(plain)
-            self._known[entry["path"], entry["key"]] = plain
+            return sha256_file(self._archive / name)
+        except OSError:
+            return None
+
+    def _key(self, name: str, content: str) -> bytes:
+        folder = (self._archive / name).parent
+        if folder not in self._tomls:
+            self._tomls[folder] = _words(nearest_test_toml(folder))
+        return bytes.fromhex(sha256_bytes(f"{self._base}|{content}|{self._tomls[folder]}".encode()))
+
+    def _remember(self, line: bytes, place: int) -> None:
+        try:
+            head = json.loads(line[: line.index(_REST)] + b"}")
+            if line.endswith(b"}\n"):
+                self._places[head["path"]] = (bytes.fromhex(head["key"]), place)
         except (ValueError, KeyError, TypeError):
-            return  # of another version, or damaged: the file is audited again
+            return  # the header, or of another version, or damaged: the file is audited again
 
 
-def _lock(file: Any, path: Path) -> None:
+def _words(toml: Path | None) -> str:
+    try:
+        return "" if toml is None else f"{toml}:{sha256_bytes(toml.read_bytes())}"
+    except OSError as error:
+        return f"{toml}:{error.strerror}"
+
+
+def _opened(path: Path) -> IO[bytes]:
     import fcntl
 
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        file = path.open("a+b")
+    except OSError as error:
+        raise _refused(path, error.strerror or "an error", "a folder that can be written to") from error
     try:
         fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except OSError as error:
         file.close()
         raise _refused(path, "another audit writes here", "a folder of its own", rule="in-use") from error
+    return file
 
 
 def _refused(path: Path, got: str, expected: str, *, rule: str = "output") -> OutputError:

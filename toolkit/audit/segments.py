@@ -72,13 +72,12 @@ def partition(fits: Sequence[dict[str, NDArray[np.bool_]]], rows: int) -> tuple[
 
 
 def _run_lengths(fit: NDArray[np.bool_]) -> NDArray[np.int64]:
-    # How many rows from this one on fit without a break, (variants, rows).
-    lengths = np.zeros(fit.shape, dtype=np.int64)
-    after = np.zeros(len(fit), dtype=np.int64)
-    for row in range(fit.shape[1] - 1, -1, -1):
-        after = np.where(fit[:, row], after + 1, 0)
-        lengths[:, row] = after
-    return lengths
+    # How many rows from this one on fit without a break, variants x rows.
+    rows = fit.shape[1]
+    here = np.arange(rows)
+    breaks = np.where(fit, rows, here)
+    next_break = np.minimum.accumulate(breaks[:, ::-1], axis=1)[:, ::-1]
+    return np.asarray(next_break - here)
 
 
 def _products(index: int, choices: list[list[tuple[str, int]]]) -> list[Hit]:

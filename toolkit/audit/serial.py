@@ -4,10 +4,18 @@ from __future__ import annotations
 
 import datetime as dt
 from collections.abc import Mapping
+from dataclasses import asdict, fields
 from typing import Any
 
+from toolkit.audit.conditions import Change
+from toolkit.audit.estimate import Coefficient, Equation, Estimate, Nearest
 from toolkit.audit.model import Identification, Repair, Segment, Skipped
 from toolkit.audit.one_file import FileAudit
+from toolkit.findings import Finding
+
+_CHANGE = tuple(field.name for field in fields(Change))
+SHAPE = 2
+"""Of what is written here; results of another one are not used again."""
 
 
 def to_plain(one: FileAudit) -> dict[str, Any]:
@@ -19,7 +27,11 @@ def to_plain(one: FileAudit) -> dict[str, Any]:
         "sha256": one.sha256,
         "size": one.size,
         "instrument": one.instrument,
-        "date": None if one.date is None else one.date.isoformat(),
+        "date": _day(one.date),
+        "test": one.test,
+        "rotation": one.rotation,
+        "to_SAE": dict(one.to_SAE),
+        "own_protocol": one.own_protocol,
         "rows": one.rows,
         "grade": one.grade,
         "record": None if found is None else found.record,
@@ -31,9 +43,15 @@ def to_plain(one: FileAudit) -> dict[str, Any]:
         "repair": None
         if repair is None
         else {"FY_max_abs_N": repair.FY_max_abs_N, "MZ_max_abs_Nm": repair.MZ_max_abs_Nm},
+        "conditions": [_change(change) for change in one.changes],
+        "estimate": None if one.estimate is None else _estimate(one.estimate),
         "skipped": [] if found is None else [{"id": s.id, "reason": s.reason} for s in found.skipped],
         "reason": one.reason,
         "test_toml": one.context,
+        "units": dict(one.units),
+        "values_sha256": one.values_sha256,
+        "modified": _day(one.modified),
+        "notes": [{"rule": note.rule, "message": note.message} for note in one.notes],
     }
 
 
@@ -45,17 +63,85 @@ def from_plain(plain: Mapping[str, Any]) -> FileAudit:
     KeyError, TypeError, ValueError
         it is not what this version writes
     """
-    date = plain["date"]
+    estimate = plain["estimate"]
     return FileAudit(
         path=plain["path"],
         sha256=plain["sha256"],
         size=plain["size"],
         instrument=plain["instrument"],
-        date=None if date is None else dt.date.fromisoformat(date),
+        date=_date(plain["date"]),
         rows=plain["rows"],
         found=None if plain["grade"] == "unreadable" else _found(plain),
         reason=plain["reason"],
         context=plain["test_toml"],
+        test=plain["test"],
+        rotation=plain["rotation"],
+        to_SAE=tuple(plain["to_SAE"].items()),
+        own_protocol=plain["own_protocol"],
+        units=tuple(plain["units"].items()),
+        values_sha256=plain["values_sha256"],
+        modified=_date(plain["modified"]),
+        changes=tuple(_changed(one) for one in plain["conditions"]),
+        estimate=None if estimate is None else _estimated(estimate),
+        notes=tuple(
+            Finding(rule=note["rule"], where=plain["path"], message=note["message"], level="note")
+            for note in plain["notes"]
+        ),
+    )
+
+
+def _day(day: dt.date | None) -> str | None:
+    return None if day is None else day.isoformat()
+
+
+def _date(text: str | None) -> dt.date | None:
+    return None if text is None else dt.date.fromisoformat(text)
+
+
+def _change(one: Change) -> dict[str, Any]:
+    return {name: getattr(one, name) for name in _CHANGE}
+
+
+def _changed(plain: Mapping[str, Any]) -> Change:
+    return Change(**plain)
+
+
+def _estimate(one: Estimate) -> dict[str, Any]:
+    return {
+        "first_row": one.first_row,
+        "last_row": one.last_row,
+        "equations": {
+            equation.load: {
+                "unit": equation.unit,
+                "linear": equation.linear,
+                "rms": equation.rms,
+                "max_abs": equation.max_abs,
+                "coefficients": {
+                    c.name: {"value": c.value, "low": c.low, "high": c.high} for c in equation.coefficients
+                },
+            }
+            for equation in one.equations
+        },
+        "nearest": None if one.nearest is None else asdict(one.nearest),
+    }
+
+
+def _estimated(plain: Mapping[str, Any]) -> Estimate:
+    return Estimate(
+        first_row=plain["first_row"],
+        last_row=plain["last_row"],
+        equations=tuple(
+            Equation(
+                load=load,
+                unit=one["unit"],
+                linear=one["linear"],
+                rms=one["rms"],
+                max_abs=one["max_abs"],
+                coefficients=tuple(Coefficient(name=name, **c) for name, c in one["coefficients"].items()),
+            )
+            for load, one in plain["equations"].items()
+        ),
+        nearest=None if plain["nearest"] is None else Nearest(**plain["nearest"]),
     )
 
 

@@ -8,7 +8,9 @@ a new worker takes its place and the others go on.
 
 from __future__ import annotations
 
+import contextlib
 import multiprocessing as mp
+import os
 import time
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
@@ -21,6 +23,7 @@ Result = TypeVar("Result")
 
 TIMEOUT_S = 120.0
 MEMORY_BYTES = 4 << 30
+_THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
 _AHEAD = 16  # files in a worker's pipe: it never waits for the next one
 
 
@@ -66,7 +69,8 @@ def run_isolated(
     def start() -> _Worker[Result]:
         ours, theirs = context.Pipe()
         process = context.Process(target=_serve, args=(make, theirs), daemon=True)
-        process.start()
+        with _one_thread():
+            process.start()
         theirs.close()
         return _Worker(process=process, pipe=ours, waiting=deque(), since=time.monotonic())
 
@@ -131,6 +135,21 @@ def run_isolated(
             worker.process.kill()
             worker.process.join()
             worker.pipe.close()
+
+
+@contextlib.contextmanager
+def _one_thread() -> Iterator[None]:
+    # Each worker is one core's work: libraries that start threads of their own would only get in its way.
+    before = {name: os.environ.get(name) for name in _THREADS}
+    os.environ.update(dict.fromkeys(_THREADS, "1"))
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                del os.environ[name]
+            else:
+                os.environ[name] = value
 
 
 def _serve(make: Callable[[], Callable[[str], Result]], pipe: Connection) -> None:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from toolkit.cli.console import Calibrations, Home, Json, KnownAt, Quiet, answer, day, progress, table
+from toolkit.cli.console import Calibrations, Home, Json, KnownAt, Quiet, day, progress, stream, table
 from toolkit.cli.home import calibrations_folder
 
 if TYPE_CHECKING:
@@ -50,47 +51,68 @@ def command(
             archive, registry, known_at=day(known_at), workers=workers, step=step, names=names, out=out
         )
     seconds = time.perf_counter() - began
-    payload = _payload(made)
-    payload["timing"] = {"seconds": seconds, "files_per_second": len(names) / seconds if seconds else None}
-    answer(payload, _text(made), as_json=json, quiet=quiet)
+    if json:
+        payload = _payload(made)
+        payload["timing"] = {
+            "seconds": seconds,
+            "files_per_second": len(names) / seconds if seconds else None,
+            "reused": made.reused,
+        }
+        stream(payload)
+    elif not quiet:
+        typer.echo(_text(made))
     return 0 if made.clean else 1
 
 
 def _payload(made: ArchiveAudit) -> dict[str, Any]:
-    from toolkit.audit.serial import to_plain
-
     return {
         "archive": made.archive,
         "known_at": made.known_at.isoformat(),
-        "files": [to_plain(one) for one in made.files],
-        "summary": {"files": len(made.files), "grades": made.grades, "undated": made.undated},
+        "files": made.files.plain(),
+        "summary": {"files": len(made.files), "grades": dict(made.grades), "undated": made.undated},
+        "tests": iter(made.tests),
         "refused_records": [{"id": r.id, "rule": r.rule, "reason": r.reason} for r in made.refused],
         "heads": dict(made.heads),
-        "findings": [finding.as_dict() for finding in made.findings],
+        "findings": (finding.as_dict() for finding in made.findings),
     }
 
 
 def _text(made: ArchiveAudit) -> str:
-    bad = [one for one in made.files if one.grade not in ("exact", "rounding")]
-    rows = []
-    for one in bad[:_SHOWN]:
-        found = one.found
-        repair = None if found is None else found.repair
-        rows.append([
-            one.path,
-            one.grade,
-            (found and found.record) or "",
-            (found and found.variant) or one.reason or "",
-            (found and found.in_force) or "",
-            "" if repair is None or repair.FY_max_abs_N is None else f"{repair.FY_max_abs_N:.1f}",
-            "" if repair is None or repair.MZ_max_abs_Nm is None else f"{repair.MZ_max_abs_Nm:.2f}",
-        ])  # fmt: skip
+    rows = list(_rows(made))
+    bad = len(made.files) - made.grades["exact"] - made.grades["rounding"]
     header = ["file", "grade", "computed by", "how", "in force", "dFY [N]", "dMZ [N·m]"]
     lines = [table(header, rows, align="<<<<<>>")] if rows else []
-    if len(bad) > _SHOWN:
-        lines.append(f"... and {len(bad) - _SHOWN} more; --json tells all of them")
+    if bad > len(rows):
+        lines.append(f"... and {bad - len(rows)} more; --json tells all of them")
     told = ", ".join(f"{count} {grade}" for grade, count in made.grades.items() if count)
     lines += ["", f"{len(made.files)} files: {told or 'none'}; known at {made.known_at.isoformat()}"]
+    notes = [one for one in made.findings if one.level == "note"]
+    if notes:
+        from collections import Counter
+
+        counted = Counter(one.rule for one in notes)
+        lines.append("also: " + ", ".join(f"{count} {rule}" for rule, count in sorted(counted.items())))
     lines += [f"refused record {one.id}: {one.reason}" for one in made.refused]
     lines += [f"head of {name}: {head}" for name, head in made.heads]
     return "\n".join(lines)
+
+
+def _rows(made: ArchiveAudit) -> Iterator[list[str]]:
+    shown = 0
+    for one in made.files.plain():
+        if one["grade"] in ("exact", "rounding"):
+            continue
+        if shown == _SHOWN:
+            return
+        shown += 1
+        repair = one["repair"] or {"FY_max_abs_N": None, "MZ_max_abs_Nm": None}
+        FY, MZ = repair["FY_max_abs_N"], repair["MZ_max_abs_Nm"]
+        yield [
+            one["path"],
+            one["grade"],
+            one["record"] or "",
+            one["variant"] or one["reason"] or "",
+            one["in_force"] or "",
+            "" if FY is None else f"{FY:.1f}",
+            "" if MZ is None else f"{MZ:.2f}",
+        ]

@@ -42,15 +42,18 @@ class Gated:
     members: Mapping[str, bytes]
 
 
-def gate(path: Path) -> Gated:
+def gate(path: Path, data: bytes | None = None) -> Gated:
     """Read a file's bytes and refuse it unless it is harmless to read.
+
+    ``data`` is the file's content where the caller has read it already.
 
     Raises
     ------
     UnreadableError
         the file is missing, too large, no workbook and no text, damaged or hostile; see the rules above
     """
-    data = _bytes(path)
+    if data is None:
+        data = _bytes(path)
     kind = sniff(data)
     if kind.id == "text":
         return Gated(path=path, data=data, sha256=sha256_bytes(data), kind="text", members={})

@@ -7,6 +7,7 @@ the keywords of their core properties; a JSON result has ``"generator": "toolkit
 
 from __future__ import annotations
 
+import datetime as dt
 import json
 import re
 from pathlib import Path
@@ -30,6 +31,8 @@ SIMULATED = "simulated"
 
 _HEAD = 4096
 _KEYWORDS = re.compile(rb"<(?:\w+:)?keywords[^<>]{0,500}>([^<]{0,4000})<")
+
+_MODIFIED = re.compile(rb"<(?:\w+:)?modified[^<>]{0,200}>([0-9]{4}-[0-9]{2}-[0-9]{2})")
 
 
 def recording_keywords(*, machine: str, simulated: bool) -> str:
@@ -66,6 +69,19 @@ def keywords_of(core_xml: bytes) -> tuple[str, ...]:
     found = _KEYWORDS.search(core_xml)
     text = found.group(1).decode("utf-8", "replace") if found else ""
     return tuple(word.strip() for word in text.split(";") if word.strip())
+
+
+def saved_on(core_xml: bytes) -> dt.date | None:
+    """Return the day of the last change in ``docProps/core.xml``; None where it has none.
+
+    >>> saved_on(b"<dcterms:modified>2019-06-04T10:00:00Z</dcterms:modified>")
+    datetime.date(2019, 6, 4)
+    """
+    found = _MODIFIED.search(core_xml)
+    try:
+        return None if found is None else dt.date.fromisoformat(found.group(1).decode())
+    except ValueError:
+        return None
 
 
 def refuse_original(target: Path, *, suffix: str) -> None:
@@ -110,16 +126,25 @@ def machine_of(path: Path) -> str | None:
 
     Never raises for what a file holds: a file that cannot be opened names no machine.
     """
-    return machine_named(_core_keywords(_content(path)))
+    return machine_in(_content(path))
+
+
+def machine_in(data: bytes) -> str | None:
+    """Return the machine that a recording's content names, as `machine_of`."""
+    return machine_named(_core_keywords(data))
 
 
 def is_own_output(path: Path) -> bool:
-    """Tell by its content whether a file is a result that the toolkit wrote.
+    """Tell by its content whether a file is a result that the toolkit wrote; see `own_output`."""
+    return own_output(_content(path))
+
+
+def own_output(data: bytes) -> bool:
+    """Tell whether this is the content of a result that the toolkit wrote.
 
     True for JSON with ``"generator": "toolkit"`` at the top level, an .xlsx or .docx whose keywords hold
     `OWN_OUTPUT`, a PDF that carries it, and any other file that shows it in its first 4096 bytes.
     """
-    data = _content(path)
     kind = sniff(data)
     if kind.id == "zip":
         return OWN_OUTPUT in _core_keywords(data)

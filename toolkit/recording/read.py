@@ -9,7 +9,7 @@ from toolkit.errors import RecordingError, UnreadableError
 from toolkit.machine import Machine
 from toolkit.recording.csvfile import read_csv
 from toolkit.recording.gate import gate
-from toolkit.recording.marks import OWN_OUTPUT, SIMULATED, keywords_of, machine_named
+from toolkit.recording.marks import OWN_OUTPUT, SIMULATED, keywords_of, machine_named, saved_on
 from toolkit.recording.model import Recording
 from toolkit.recording.table import read_table
 from toolkit.recording.xlsx import read_sheet
@@ -17,7 +17,9 @@ from toolkit.recording.xlsx import read_sheet
 Reader = Literal["calamine", "both"]
 
 
-def read_recording(path: Path, machine: Machine, *, reader: Reader = "calamine") -> Recording:
+def read_recording(
+    path: Path, machine: Machine, *, reader: Reader = "calamine", data: bytes | None = None
+) -> Recording:
     """Read a recording whole or not at all.
 
     Parameters
@@ -25,6 +27,7 @@ def read_recording(path: Path, machine: Machine, *, reader: Reader = "calamine")
     path : an .xlsx workbook or a CSV file, under any name
     machine : the machine that wrote it
     reader : ``both`` has openpyxl read every cell a second time
+    data : the file's content where the caller has read it already
 
     Raises
     ------
@@ -37,7 +40,7 @@ def read_recording(path: Path, machine: Machine, *, reader: Reader = "calamine")
     RecordingError
         several worksheets look like recordings, or the file names another machine
     """
-    gated = gate(path)
+    gated = gate(path, data)
     if gated.kind == "text":
         return Recording(
             path=path,
@@ -47,7 +50,8 @@ def read_recording(path: Path, machine: Machine, *, reader: Reader = "calamine")
             simulated=machine.simulated,
             format="csv",
         )
-    keywords = keywords_of(gated.members.get("docProps/core.xml", b""))
+    properties = gated.members.get("docProps/core.xml", b"")
+    keywords = keywords_of(properties)
     _check_origin(path, keywords, machine)
     sheet, table = read_sheet(gated, machine)
     series = read_table(table, machine)
@@ -62,6 +66,7 @@ def read_recording(path: Path, machine: Machine, *, reader: Reader = "calamine")
         series=series,
         simulated=machine.simulated or SIMULATED in keywords,
         format="xlsx",
+        saved=saved_on(properties),
     )
 
 

@@ -1,0 +1,117 @@
+"""What the files of an archive show together: copies, late edits, changed conventions, missing conditions.
+
+All of it informs and changes no grade. Files are added one by one, sorted by path, as plain answers; what is
+kept of each is a few bytes.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from toolkit.audit.effects import TestSums
+from toolkit.audit.lines import Lines
+from toolkit.findings import Finding
+
+_LATE_DAYS = 1  # a file is often saved on the day after its test
+
+
+@dataclass(slots=True, eq=False)
+class Across:
+    """Takes the files of an archive one by one."""
+
+    tests: Lines = field(default_factory=Lines)
+    _open: dict[str, TestSums] = field(default_factory=dict)
+    _slopes: dict[tuple[str, str], list[tuple[str, int]]] = field(default_factory=dict)
+    _first: dict[bytes, str] = field(default_factory=dict)
+    _units: dict[str, Counter[tuple[tuple[str, str], ...]]] = field(default_factory=dict)
+    _with: dict[tuple[tuple[str, str], ...], list[str]] = field(default_factory=dict)
+
+    def add(self, one: Mapping[str, Any]) -> Iterator[Finding]:
+        """Take a file and yield what can be said at once."""
+        path = one["path"]
+        for note in one["notes"]:
+            yield Finding(rule=note["rule"], where=path, message=note["message"], level="note")
+        yield from self._copies(one)
+        if one["units"]:
+            units = tuple(sorted(one["units"].items()))
+            self._units.setdefault(one["instrument"], Counter())[units] += 1
+            if len(few := self._with.setdefault(units, [])) < 4:
+                few.append(path)
+        if one["date"] is not None and one["modified"] is not None:
+            late = _days(one["modified"]) - _days(one["date"])
+            if late > _LATE_DAYS:
+                message = (
+                    f"by its own properties the file was last saved on {one['modified']}, {late} days after "
+                    f"the test of {one['date']}"
+                )
+                yield Finding(rule="edited-after-test", where=path, message=message, level="note")
+        # Sorted by path, all files of a test's folder come in one stretch.
+        for name in [name for name in self._open if name != "." and not path.startswith(name + "/")]:
+            yield from self._closed(name)
+        key = one["test"]
+        if key is not None and one["date"] is not None and one["grade"] != "unreadable":
+            if key not in self._open:
+                self._open[key] = TestSums(
+                    test=key, instrument=one["instrument"], date=one["date"], own_protocol=one["own_protocol"]
+                )
+            self._open[key].add(one)
+
+    def rest(self) -> Iterator[Finding]:
+        """Yield what only the whole archive can say."""
+        for name in list(self._open):
+            yield from self._closed(name)
+        yield from self._conventions()
+        for (instrument, rotation), signs in self._slopes.items():
+            most = 1 if sum(sign for _, sign in signs) >= 0 else -1
+            against = [name for name, sign in signs if sign != most]
+            if len(against) >= len(signs) / 2:
+                continue  # no convention to depart from
+            usual, here = ("rises", "falls") if most > 0 else ("falls", "rises")
+            for name in against:
+                message = (
+                    f"drum {rotation}: Fy {here} with the slip angle, and {usual} in "
+                    f"{len(signs) - len(against)} of {len(signs)} tests of {instrument}: an axis has another "
+                    "sign here"
+                )
+                yield Finding(rule="axes-changed", where=name, message=message, level="note")
+
+    def _closed(self, name: str) -> Iterator[Finding]:
+        test = self._open.pop(name)
+        yield from test.missing()
+        for rotation, sign in test.slope_signs():
+            self._slopes.setdefault((test.instrument, rotation), []).append((name, sign))
+        self.tests.add(test.summary())
+
+    def _copies(self, one: Mapping[str, Any]) -> Iterator[Finding]:
+        told = False
+        for key, what in ((one["sha256"], "byte for byte"), (one["values_sha256"], "in every number")):
+            if key is None:
+                continue
+            short = bytes.fromhex(key[:32])
+            first = self._first.setdefault(short, one["path"])
+            if first != one["path"] and not told:
+                told = True
+                message = f"the same as {first}, {what}"
+                yield Finding(rule="duplicate-file", where=one["path"], message=message, level="note")
+
+    def _conventions(self) -> Iterator[Finding]:
+        for instrument, kinds in sorted(self._units.items()):
+            usual = dict(kinds.most_common(1)[0][0])
+            for units, count in kinds.items():
+                other = {symbol: unit for symbol, unit in units if symbol in usual and usual[symbol] != unit}
+                if other:
+                    told = ", ".join(f"{s} in {unit} for {usual[s]}" for s, unit in other.items())
+                    some = self._with[units]
+                    message = (
+                        f"{told}: {count} file{'s' if count > 1 else ''} of {instrument}, such as {some[0]}"
+                    )
+                    yield Finding(rule="units-changed", where=some[0], message=message, level="note")
+
+
+def _days(text: str) -> int:
+    import datetime as dt
+
+    return dt.date.fromisoformat(text).toordinal()

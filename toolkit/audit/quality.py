@@ -1,0 +1,83 @@
+"""What the rows of one file show besides its calibration: constant and saturated channels, clock jumps."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from toolkit.findings import Finding
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from toolkit.recording.model import Recording, Series
+
+_FEW_ROWS = 8  # fewer prove nothing
+_STUCK = 6  # rows in a row at the very end of a channel's range
+_JUMP = 10.0  # in median steps of the clock
+_MEASURED = ("load", "indication", "slip_angle")
+
+
+def quality(recording: Recording, where: str) -> tuple[Finding, ...]:
+    """Return what the channels of a recording show, as notes.
+
+    ``constant-channel``: a measured channel that never changes. ``saturated-channel``: at least six rows in
+    a row stand exactly at its largest or smallest value, while elsewhere neighbouring rows differ.
+    ``clock-jump``: a time channel that runs backwards, stands still, or leaps by over ten of its steps.
+    """
+    if recording.rows < _FEW_ROWS:
+        return ()
+    found: list[Finding] = []
+    for one in recording.series:
+        text = None
+        if one.role == "time":
+            text, rule = _clock(one), "clock-jump"
+        elif one.role in _MEASURED:
+            first = one.values[0]
+            if bool(np.all(one.values == first)):
+                text = f"{one.header} is {first:g} {one.unit} in all {recording.rows} rows"
+                rule = "constant-channel"
+            else:
+                text, rule = _saturated(one), "saturated-channel"
+        if text is not None:
+            found.append(Finding(rule=rule, where=where, message=text, level="note"))
+    return tuple(found)
+
+
+def _saturated(one: Series) -> str | None:
+    values = one.values
+    same = values[1:] == values[:-1]
+    if int(same.sum()) < _STUCK - 1:
+        return None  # the usual case, and the cheap one
+    for end in (float(values.max()), float(values.min())):
+        start, length = _longest(values == end)
+        # A channel printed so coarsely that it often repeats is not at an end of its range.
+        elsewhere = int(same.sum()) - (length - 1)
+        if length >= _STUCK and elsewhere < 0.2 * len(same):
+            return (
+                f"{one.header} stands at {end:g} {one.unit}, an end of its range, in rows {start + 1} to "
+                f"{start + length}"
+            )
+    return None
+
+
+def _longest(true: NDArray[np.bool_]) -> tuple[int, int]:
+    # Start and length of the longest run of True.
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], true, [False]]).astype(np.int8)))
+    starts, lengths = edges[::2], edges[1::2] - edges[::2]
+    best = int(np.argmax(lengths))
+    return int(starts[best]), int(lengths[best])
+
+
+def _clock(one: Series) -> str | None:
+    steps = np.diff(one.values)
+    usual = float(np.median(steps))
+    bad = np.flatnonzero((steps <= 0) | (steps > _JUMP * usual))
+    if not len(bad):
+        return None
+    row = int(bad[0])
+    return (
+        f"{one.header} goes from {one.values[row]:g} to {one.values[row + 1]:g} {one.unit} after row "
+        f"{row + 1}; the usual step is {usual:g}" + (f" ({len(bad)} such places)" if len(bad) > 1 else "")
+    )

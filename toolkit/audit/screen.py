@@ -1,0 +1,199 @@
+"""The screen: which candidates are worth evaluating on a file, out of the thousands that there are.
+
+A candidate that explains a file explains a few of its rows, and linear equations of all records, orders and
+signs are one matrix product on these. What the screen leaves out could not have been accepted; what it lets
+through is judged row by row as before. Equations with higher terms are always let through.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from toolkit.audit.candidates import ROUND_OFF, Group, group_of, half_fifth_digit, orders, unfit
+from toolkit.calibration.terms import INTERCEPT
+from toolkit.units import si_scale
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from toolkit.audit.columns import Columns
+    from toolkit.calibration.records.record import CalibrationRecord, LoadFit
+
+_PROBE = 6  # rows that are looked at first
+_CELLS = 1 << 21  # predictions in memory at a time
+# Both sides of a comparison are computed in another order here: what is near the limit goes through.
+_SPARE = 1.0 + 1e-6
+
+Key = tuple[int, bool, tuple[int, ...]]
+"""A group: index of the record, issued coefficients, order of the columns."""
+
+Signature = tuple[tuple[str, ...], tuple[str, ...], tuple[tuple[str, str], ...]]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Equations:
+    # One load by every linear group: (groups, variants, channels + 1) in the file's columns and units, the
+    # constant last; ``size`` and ``slack`` (groups, channels + 1) without signs.
+    coefficients: NDArray[np.float64]
+    size: NDArray[np.float64]
+    slack: NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Screen:
+    """Every group of the records that fit files of one layout (names, units, own columns)."""
+
+    records: tuple[CalibrationRecord, ...]
+    reasons: tuple[tuple[str, str | None], ...]
+    linear: tuple[Key, ...]
+    other: tuple[Key, ...]
+    equations: dict[str, _Equations]
+
+    def group(self, key: Key, columns: Columns) -> Group:
+        """Return a group, evaluated on a file."""
+        index, issued, order = key
+        return group_of(self.records[index], columns, order=order, issued=issued)
+
+    def whole(self, columns: Columns) -> list[Key]:
+        """Return the groups that may explain every row, with a rounded coefficient or without."""
+        rows = _probe(columns.rows)
+        good = np.arange(len(self.linear))
+        for load in self.equations:
+            fits = self._fits(columns, load, rows, good)
+            good = good[np.any(np.all(fits, axis=0), axis=1)]
+        return self._keys(good)
+
+    def anywhere(self, columns: Columns) -> list[Key]:
+        """Return the groups that may explain at least one row."""
+        found: set[int] = set()
+        most = max((one.coefficients[..., 0].size for one in self.equations.values()), default=1)
+        for start in range(0, columns.rows, max(1, _CELLS // most)):
+            rows = np.arange(start, min(start + max(1, _CELLS // most), columns.rows))
+            good = np.arange(len(self.linear))
+            both = np.ones((len(rows), len(good)), dtype=bool)
+            for load in self.equations:
+                both &= np.any(self._fits(columns, load, rows, good), axis=2)
+                some = np.any(both, axis=0)
+                good, both = good[some], both[:, some]
+            found.update(good.tolist())
+        return self._keys(np.array(sorted(found), dtype=np.int64))
+
+    def close_to(self, accepted: Group, columns: Columns, signs: dict[str, int]) -> list[Key]:
+        """Return the groups that a file may not tell from an accepted candidate."""
+        rows = _probe(columns.rows)
+        good = np.arange(len(self.linear))
+        for load, variant in signs.items() if self.equations else ():
+            family = accepted.families[load]
+            limit = self._limit(columns, load, rows, good) + (family.bound + family.slack)[rows, None]
+            predicted = self._predicted(columns, load, rows, good)
+            apart = np.abs(predicted - family.predicted[variant][rows, None, None]) > limit[..., None]
+            good = good[np.any(~np.any(apart, axis=0), axis=1)]
+        return self._keys(good)
+
+    def _keys(self, good: NDArray[np.int64]) -> list[Key]:
+        return [*(self.linear[i] for i in good.tolist()), *self.other]
+
+    def _fits(
+        self, columns: Columns, load: str, rows: NDArray[np.int64], among: NDArray[np.int64]
+    ) -> NDArray[np.bool_]:
+        # of shape rows x groups x variants
+        error = self._predicted(columns, load, rows, among)
+        error -= columns.y[load][rows, None, None]
+        fits: NDArray[np.bool_] = (
+            np.abs(error, out=error) <= self._limit(columns, load, rows, among)[..., None]
+        )
+        return fits
+
+    def _predicted(
+        self, columns: Columns, load: str, rows: NDArray[np.int64], among: NDArray[np.int64]
+    ) -> NDArray[np.float64]:
+        chosen = self.equations[load].coefficients
+        if len(among) < len(chosen):
+            chosen = chosen[among]
+        groups, variants, n = chosen.shape
+        flat = chosen.reshape(groups * variants, n)
+        predicted = columns.x[rows] @ flat[:, :-1].T
+        predicted += flat[:, -1]
+        return predicted.reshape(len(rows), groups, variants)
+
+    def _limit(
+        self, columns: Columns, load: str, rows: NDArray[np.int64], among: NDArray[np.int64]
+    ) -> NDArray[np.float64]:
+        equations, y = self.equations[load], np.abs(columns.y[load][rows])
+        size, slack = equations.size[among], equations.slack[among]
+        here = np.column_stack([np.abs(columns.x[rows]), np.ones(len(rows))])
+        own = (columns.half_y[load][rows] + 1e-9 * y)[:, None]
+        limit: NDArray[np.float64] = (
+            columns.half_x[rows] @ size[:, :-1].T + here @ (slack + 2 * ROUND_OFF * size).T + own
+        ) * _SPARE
+        return limit
+
+
+def layout(columns: Columns) -> Signature:
+    """Return what two files must share to use the same screen."""
+    return columns.names, columns.units, tuple(columns.y_units.items())
+
+
+def screen_of(records: Sequence[CalibrationRecord], columns: Columns) -> Screen:
+    """Return the screen of the records for files with the layout of ``columns``."""
+    reasons = tuple((record.id, unfit(record, columns)) for record in records)
+    fitting = tuple(r for r, (_, reason) in zip(records, reasons, strict=True) if reason is None)
+    linear: list[Key] = []
+    other: list[Key] = []
+    for index, record in enumerate(fitting if columns.loads else ()):
+        forms = (False,) if all(one.issued == one.coefficients for one in record.loads) else (False, True)
+        simple = all(_is_linear(record, record.load(load)) for load in columns.loads)
+        (linear if simple else other).extend(
+            (index, issued, order) for order in orders(len(record.indications)) for issued in forms
+        )
+    return Screen(
+        records=fitting,
+        reasons=reasons,
+        linear=tuple(linear),
+        other=tuple(other),
+        equations={load: _equations(fitting, linear, columns, load) for load in columns.loads}
+        if linear
+        else {},
+    )
+
+
+def _is_linear(record: CalibrationRecord, fit: LoadFit) -> bool:
+    return all(term == INTERCEPT or term in record.indications for term in fit.terms)
+
+
+def _equations(
+    records: Sequence[CalibrationRecord], keys: Sequence[Key], columns: Columns, load: str
+) -> _Equations:
+    n = len(columns.names)
+    plain, slack = np.zeros((len(keys), n + 1)), np.zeros((len(keys), n + 1))
+    turned = np.array(list(itertools.product((1, -1), repeat=n + 1)), dtype=np.float64)
+    coefficients = np.zeros((len(keys), len(turned), n + 1))
+    for at, (index, issued, order) in enumerate(keys):
+        record = records[index]
+        fit = record.load(load)
+        to_file = si_scale(fit.unit) / si_scale(columns.y_units[load])
+        values = dict(zip(fit.terms, fit.issued if issued else fit.coefficients, strict=True))
+        signs = np.ones((len(turned), n + 1))
+        for i, name in enumerate(record.indications):
+            # The coefficient of this channel is given the column of the channel that stands in its place.
+            place = columns.names.index(record.indications[order[i]])
+            own = si_scale(columns.units[place]) / si_scale(record.indication_units[order[i]])
+            value = values.get(name, 0.0)
+            plain[at, place] = value * own * to_file
+            slack[at, place] = abs(own * to_file) * half_fifth_digit(np.array([value]))[0]
+            signs[:, place] = turned[:, i]
+        constant = values.get(INTERCEPT, 0.0)
+        plain[at, n] = constant * to_file
+        slack[at, n] = abs(to_file) * half_fifth_digit(np.array([constant]))[0]
+        signs[:, n] = turned[:, n]
+        coefficients[at] = plain[at] * signs
+    return _Equations(coefficients=coefficients, size=np.abs(plain), slack=slack)
+
+
+def _probe(rows: int) -> NDArray[np.int64]:
+    return np.unique(np.linspace(0, rows - 1, min(rows, _PROBE)).round().astype(np.int64))
