@@ -14,7 +14,8 @@ from report_factory import make_record, make_result
 from template_factory import make, p, tbl
 
 from toolkit.cli import resolve
-from toolkit.cli.report import command, default_template
+from toolkit.cli.delivery import home_template
+from toolkit.cli.report import command
 from toolkit.cli.template import check, new, tags
 from toolkit.errors import OutputError, TemplateError
 from toolkit.findings import Finding
@@ -88,11 +89,11 @@ def test_a_refused_template_is_told_before_the_test_is_read(tmp_path: Path, monk
 
 def test_the_default_template_is_the_homes(tmp_path: Path) -> None:
     (tmp_path / "calibrations").mkdir()
-    assert default_template(tmp_path).name == "org.docx"
+    assert home_template("org.docx", tmp_path).name == "org.docx"
     own = tmp_path / "report_templates" / "org.docx"
     own.parent.mkdir()
     own.write_bytes(b"x")
-    assert default_template(tmp_path) == own
+    assert home_template("org.docx", tmp_path) == own
 
 
 def test_template_check_new_and_tags(tmp_path: Path, resolved, capsys) -> None:

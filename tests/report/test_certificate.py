@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import datetime as dt
 import re
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -21,7 +22,7 @@ from toolkit.report.certificate.template import build_certificate
 from toolkit.report.style import Style
 
 CHECKOUT = Path(__file__).resolve().parents[2]
-DAY = dt.date(2026, 3, 1)
+DAY, LATER = dt.date(2026, 3, 1), dt.date(2027, 3, 1)
 STYLE = Style(laboratory="Bench laboratory", country="US")
 FULL = (
     '[certificate]\nnumber = "CAL-17"\ncustomer = "Customer & Co <x>"\naddress = "1 Drum Road"\n'
@@ -61,6 +62,49 @@ def registry_of(folder: Path, more: str = FULL.format(""), *, approved: bool = T
         )  # fmt: skip
         assert done.done, done.findings
     return registry
+
+
+def adjusted(folder: Path) -> Registry:
+    """Return a registry whose pair came in with indications 0.5 % too large (r2) and was adjusted (r3)."""
+    registry = registry_of(folder)
+    session, columns = (folder / "SESSION.toml").read_text(), (folder / "loads.csv").read_text().splitlines()
+    for phase, drift, U in (("as_found", 1.005, 0.5), ("as_left", 1.0, 0.02)):
+        there = folder / phase
+        there.mkdir()
+        rows = [line.split(",") for line in columns[1:]]
+        for row in rows:
+            row[:2] = [repr(drift * float(cell)) for cell in row[:2]]
+        (there / "loads.csv").write_text("\n".join([columns[0], *(",".join(row) for row in rows)]) + "\n")
+    XX.replace('check = "check.csv"\n', "")
+        text = text.replace('data = "loads.csv"', f'data = "loads.csv"\nphase = "{phase}"')
+        (there / "SESSION.toml").write_text(text.replace("U = 0.02", f"U = {U}"))
+        calibrate(there / "SESSION.toml", registry)
+    approve(registry, "pair-r3", in_force_from=dt.date(2027, 2, 2), checked_by="B", known_on=LATER)
+    return registry
+
+
+def test_as_found_and_as_left_have_each_their_own_uncertainty(tmp_path: Path) -> None:
+    made = collect(adjusted(tmp_path), "pair-r3", STYLE, issued=LATER)
+    # What a reference of U = 0.5 found and one of U = 0.02 left: each rules the budget of its own session.
+    one = next(one for one in made.loads if one.load == "FY")
+    told = one.adjustment
+    assert told is not None
+    assert told.left is not None
+    # The equation has an intercept of 1.5 lbf, which does not drift.
+    assert told.as_found == pytest.approx(0.005 * (told.found.at - 1.5), abs=0.05)
+    assert told.found.U == pytest.approx(0.5, rel=0.05)
+    assert told.left.U < 0.05
+    row = build_content(made, STYLE).tables["adjustment"].rows[0]
+    # k = 1.96 for about 95 % and large dof, u = 0.5 / 2.
+    assert (row[0], row[-2]) == ("FY", "0.49")
+    newtons = 0.5 * 0.45359237 * 9.80665
+    found = re.search(
+        r"basic_beforeAdjustment.*?valueExpandedMU>([^<]+)<", build_dcc(made).decode(), flags=re.DOTALL
+    )
+    assert found
+    assert float(found[1]) == pytest.approx(newtons, rel=0.05)
+    # The as-found session is told here, under the number that both of them state.
+    assert "certificate-number" not in {one.rule for one in made.findings}
 
 
 def test_the_items_of_17025_are_there(tmp_path: Path) -> None:
@@ -172,17 +216,28 @@ def test_the_dcc_converts_to_newtons(tmp_path: Path) -> None:
 # The schema's own examples write \\per; dsiUnits reads it and advises negative powers.
 @pytest.mark.filterwarnings("ignore:The dsi string contains the token")
 @pytest.mark.skipif(not (SHARED_DATA / "dcc_schema").is_dir(), reason="the DCC schema is not here")
-@pytest.mark.parametrize("more", ["", FULL.format("interval_agreed = true")], ids=["gaps", "full"])
-def test_the_dcc_passes_schema_schematron_and_units(tmp_path: Path, more: str) -> None:
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda folder: (registry_of(folder, ""), "pair-r1"),
+        lambda folder: (registry_of(folder, FULL.format("interval_agreed = true")), "pair-r1"),
+        lambda folder: (adjusted(folder), "pair-r3"),
+    ],
+    ids=["gaps", "full", "adjusted"],
+)
+def test_the_dcc_passes_schema_schematron_and_units(
+    tmp_path: Path, make: Callable[[Path], tuple[Registry, str]]
+) -> None:
     dsi_unit = pytest.importorskip("dsi_unit")
     saxonche = pytest.importorskip("saxonche")
     from lxml import etree
 
+    registry, record_id = make(tmp_path)
     made = collect(
-        registry_of(tmp_path, more),
-        "pair-r1",
+        registry,
+        record_id,
         STYLE,
-        issued=DAY,
+        issued=LATER,
         replaces="OLD-1",
         amendment="a <reason> & more",
     )

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -21,7 +20,8 @@ from toolkit.cli.console import (
     finding_lines,
     progress,
 )
-from toolkit.cli.home import calibrations_folder, find_home, packaged_home
+from toolkit.cli.delivery import file_name, home_template
+from toolkit.cli.home import calibrations_folder
 
 if TYPE_CHECKING:
     from toolkit.report.certificate.model import Certificate
@@ -74,7 +74,7 @@ def command(
     from toolkit.report.style import read_style, style_file
 
     started = time.perf_counter()
-    opened = read_template(template or default_certificate(home))
+    opened = read_template(template or home_template("certificate.docx", home))
     style = read_style(style_file(opened.path))
     with progress(None, "certificate", show=not (json or quiet)) as step:
         step("record")
@@ -91,7 +91,7 @@ def command(
             opened,
             build_content(made, style),
             out or Path.cwd() / f"certificate-{record_id}",
-            name=file_name(made.id),
+            name=file_name(made.id, otherwise="certificate"),
             companions={".xml": build_dcc(made)} if dcc else None,
             keep=keep,
             step=step,
@@ -99,29 +99,6 @@ def command(
     payload = _payload(made, delivered) | {"timing": {"seconds": time.perf_counter() - started}}
     answer(payload, _text(made, delivered), as_json=json, quiet=quiet)
     return 1 if delivered.warnings else exit_code(made.findings)
-
-
-def default_certificate(home: Path | None) -> Path:
-    """Return ``report_templates/certificate.docx`` of the home; the packaged one where it has none."""
-    from toolkit.errors import ConfigError
-
-    packaged = packaged_home() / "report_templates" / "certificate.docx"
-    try:
-        own = find_home(home) / "report_templates" / "certificate.docx"
-    except ConfigError:
-        if home is not None:
-            raise
-        return packaged
-    return own if own.is_file() else packaged
-
-
-def file_name(identity: str) -> str:
-    """Return a certificate's id as a file's name.
-
-    >>> file_name("CAL 2026/017")
-    'CAL-2026-017'
-    """
-    return re.sub(r"[^\w.-]+", "-", identity).strip("-.")[:100] or "certificate"
 
 
 def _payload(made: Certificate, done: Delivered) -> dict[str, Any]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -24,6 +23,7 @@ from toolkit.cli.console import (
     progress,
 )
 from toolkit.cli.console import reader as choose_reader
+from toolkit.cli.delivery import file_name, home_template
 
 if TYPE_CHECKING:
     from toolkit.cli.resolve import Resolved
@@ -73,7 +73,7 @@ def command(
     chosen = choose_reader(reader)
     started = time.perf_counter()
     # The template is judged before anything is read: its error must not wait for a long reduction.
-    opened = read_template(template or default_template(home))
+    opened = read_template(template or home_template("org.docx", home))
     with Office() as office, Drawer() as drawer, progress(None, "report", show=not (json or quiet)) as step:
         resolved = resolve_test(
             test,
@@ -84,7 +84,9 @@ def command(
             reader=chosen,
             step=step,
         )
-        target = out or Path.cwd() / f"report-{_file_name(resolved.result.reduced.info.name)}"
+        target = (
+            out or Path.cwd() / f"report-{file_name(resolved.result.reduced.info.name, otherwise='test')}"
+        )
         made = make_report(
             resolved,
             opened.path,
@@ -155,25 +157,6 @@ def report_payload(made: Delivered, resolved: Resolved) -> dict[str, Any]:
         "warnings": list(made.warnings),
         "findings": [finding.as_dict() for finding in resolved.findings],
     }
-
-
-def default_template(home: Path | None) -> Path:
-    """Return ``report_templates/org.docx`` of the home; the packaged one where the home has none."""
-    from toolkit.cli.home import find_home, packaged_home
-    from toolkit.errors import ConfigError
-
-    packaged = packaged_home() / "report_templates" / "org.docx"
-    try:
-        own = find_home(home) / "report_templates" / "org.docx"
-    except ConfigError:
-        if home is not None:
-            raise
-        return packaged
-    return own if own.is_file() else packaged
-
-
-def _file_name(name: str) -> str:
-    return re.sub(r"[^\w.-]+", "-", name).strip("-.") or "test"
 
 
 def _text(made: Delivered, resolved: Resolved) -> str:

@@ -16,7 +16,7 @@ from toolkit.calibration.session.statements import Statements, statements_of
 from toolkit.errors import ConfigError, RecordError, ToolkitError
 from toolkit.machine import load_machine, machine_names
 from toolkit.report.certificate.findings import gap_findings, gaps_of, result_findings, state_findings
-from toolkit.report.certificate.loads import load_results
+from toolkit.report.certificate.loads import FoundSession, load_results
 from toolkit.report.certificate.model import Certificate
 from toolkit.report.certificate.statements import Stated, read_stated
 
@@ -27,6 +27,12 @@ if TYPE_CHECKING:
     from toolkit.calibration.registry.status import RecordStatus
     from toolkit.report.style import Style
 
+_METHODS = {
+    "ols": "ordinary least squares",
+    "wls": "least squares weighted by the stated uncertainties of the reference loads",
+    "gls": "generalised least squares, with the error that reference loads share",
+    "odr": "orthogonal distance regression, with the stated uncertainties of loads and indications",
+}
 _AMENDED = re.compile(r"(?P<stem>.+)-A(?P<number>[1-9][0-9]*)\Z")
 
 
@@ -75,7 +81,7 @@ def collect(
         check,
         rule=stated.rule if check is not None else None,
         unverifiable=unverifiable(record, check),
-        found=found,
+        found=None if found is None else _found_session(registry, found),
         as_left=statements.phase == "as_left",
     )
     gaps = gaps_of(record, statements, stated)
@@ -192,6 +198,16 @@ def _found(registry: Registry, record: CalibrationRecord, statements: Statements
     return as_found_before(registry, record) if statements.phase == "as_left" else None
 
 
+def _found_session(registry: Registry, found: AsFound) -> FoundSession | None:
+    session = registry.load(found.session_record)
+    loads = stored_loads(registry.folder, session)
+    if loads is None:
+        return None
+    return FoundSession(
+        result=found, session=session, loads=loads, check=stored_check(registry.folder, session)
+    )
+
+
 def _adjustment(statements: Statements, found: AsFound | None) -> str:
     if statements.phase is None:
         return "No adjustment or repair is stated: the results hold for the item as it was calibrated."
@@ -207,13 +223,18 @@ def _adjustment(statements: Statements, found: AsFound | None) -> str:
 
 
 def _same_number(registry: Registry, record: CalibrationRecord, stated: Stated) -> str | None:
-    """Return another record of the instrument whose session states the same number."""
+    """Return another record of the instrument that may have a certificate of the same number.
+
+    A candidate has none: the as-found session of a pair is told on the certificate of the as-left one.
+    """
     number = stated.get("number")
     if number is None:
         return None
+    ledger = registry.ledger(record.instrument)
     for other in registry.ids(record.instrument):
         path = registry.folder / record.instrument / f"{other}.json"
-        if other == record.id or not path.is_file():
+        approved = any(entry.event == "approved" for entry in ledger.of(other))
+        if other == record.id or not approved or not path.is_file():
             continue
         try:
             table = json.loads(from_bytes(path.read_bytes(), where=path).settings).get("certificate", {})
@@ -238,8 +259,7 @@ def _withdrawn(status: RecordStatus) -> str | None:
 
 def _model(record: CalibrationRecord) -> str:
     terms = record.loads[0].terms
-    method = {"ols": "ordinary", "wls": "weighted", "gls": "generalised"}.get(record.loads[0].method)
-    fit = f"{method} least squares" if method else record.loads[0].method
+    fit = _METHODS.get(record.loads[0].method, record.loads[0].method)
     zero = "indications tared before each run" if record.zero == "tared" else "zero of the cells included"
     return f"load = sum of coefficient x term, {len(terms)} terms a load, fitted by {fit}; {zero}"
 

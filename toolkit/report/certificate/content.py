@@ -257,11 +257,13 @@ def _checks(one: LoadResult) -> Iterable[list[str]]:
 def _adjustment(one: LoadResult) -> list[str]:
     told = one.adjustment
     assert told is not None  # noqa: S101  only loads with one are asked
-    U = one.full_scale.U
-    left = "no adjustment" if told.as_left is None else round_to_uncertainty(told.as_left, U)
+    left, left_U = "no adjustment", "-"
+    if told.as_left is not None and told.left is not None:
+        left, left_U = round_to_uncertainty(told.as_left, told.left.U), round_uncertainty(told.left.U)
+    U = told.found.U
     return [
-        one.load, told.found_by, round_to_uncertainty(told.as_found, U), f"{told.at:.6g}", left,
-        f"{one.tolerance:.4g}", shown(one.unit),
+        one.load, told.found_by, round_to_uncertainty(told.as_found, U), f"{told.found.at:.6g}", left,
+        f"{one.tolerance:.4g}", shown(one.unit), round_uncertainty(U), left_U,
     ]  # fmt: skip
 
 

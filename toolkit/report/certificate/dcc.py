@@ -338,17 +338,27 @@ def _adjustment(one: LoadResult) -> Node:
     told = one.adjustment
     assert told is not None  # noqa: S101  the caller asked
     made = dsi(one.unit)
-    U = one.full_scale.U * made.factor
-    lines = [("as found", told.as_found, "basic_beforeAdjustment")]
-    lines += [("as left", told.as_left, "basic_afterAdjustment")] if told.as_left is not None else []
+    lines = [("as found", told.as_found, told.found, "basic_beforeAdjustment")]
+    if told.as_left is not None and told.left is not None:
+        lines.append(("as left", told.as_left, told.left, "basic_afterAdjustment"))
     return node(
         "dcc:result",
         text("dcc:name", f"Largest deviation of {one.load} before and after adjustment"),
         node(
             "dcc:data",
             *(
-                quantity(name, round_to_uncertainty(value * made.factor, U), made.text, kind=kind)
-                for name, value, kind in lines
+                quantity(
+                    name,
+                    round_to_uncertainty(value * made.factor, of.U * made.factor),
+                    made.text,
+                    kind=kind,
+                    expanded=(
+                        round_uncertainty(of.U * made.factor),
+                        f"{of.k:.2f}",
+                        f"{of.probability:g}",
+                    ),
+                )
+                for name, value, of, kind in lines
             ),
         ),
     )

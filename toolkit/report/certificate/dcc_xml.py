@@ -40,11 +40,30 @@ def rich(tag: str, words: str) -> Node:
     return text(tag, words)
 
 
-def quantity(name: str, value: str, unit: str, *, told: str = "", standard: str = "", kind: str = "") -> Node:
-    """Return one value; ``standard`` is its standard uncertainty, all as they are printed."""
+def quantity(
+    name: str,
+    value: str,
+    unit: str,
+    *,
+    told: str = "",
+    standard: str = "",
+    expanded: tuple[str, str, str] | None = None,
+    kind: str = "",
+) -> Node:
+    """Return one value, as printed; with its standard uncertainty, or with ``expanded`` = (U, k, p)."""
     real = node("si:real", node("si:value", plain(value)), node("si:unit", unit))
     if standard:
         mu = node("si:standardMU", node("si:valueStandardMU", plain(standard)))
+        real.append(node("si:measurementUncertaintyUnivariate", mu))
+    if expanded:
+        U, k, p = expanded
+        mu = node(
+            "si:expandedMU",
+            node("si:valueExpandedMU", plain(U)),
+            node("si:coverageFactor", k),
+            node("si:coverageProbability", p),
+            node("si:distribution", "studentT"),
+        )
         real.append(node("si:measurementUncertaintyUnivariate", mu))
     about = rich("dcc:description", told) if told else None
     return node("dcc:quantity", text("dcc:name", name), about, real, **({"refType": kind} if kind else {}))

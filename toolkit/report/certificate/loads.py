@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,10 +13,22 @@ from toolkit.report.certificate.decision import decide
 from toolkit.report.certificate.model import Adjustment, CheckLine, Expanded, LoadResult, Part, TermLine
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from toolkit.calibration.control.as_found import AsFound
     from toolkit.calibration.records.record import CalibrationRecord, LoadFit
     from toolkit.calibration.session.table import Table
     from toolkit.calibration.uncertainty.model import Budget
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class FoundSession:
+    """An as-found result, with the record of its session and that session's loads, in the record's units."""
+
+    result: AsFound
+    session: CalibrationRecord
+    loads: Table
+    check: Table | None
 
 
 def load_results(
@@ -25,7 +38,7 @@ def load_results(
     *,
     rule: str | None,
     unverifiable: tuple[str, ...],
-    found: AsFound | None,
+    found: FoundSession | None,
     as_left: bool,
 ) -> tuple[LoadResult, ...]:
     """Return the results of every load of a checked record.
@@ -35,7 +48,7 @@ def load_results(
     loads, check : its reference and check loads, in its units
     rule : decision rule, None where none was agreed
     unverifiable : terms as "load: term"
-    found : what the session found by the record in force before, where that is known
+    found : what the as-found session found by the record in force before, where that is known
     as_left : the record is of the session after the adjustment
     """
     return tuple(_load(record, one, loads, check, rule, unverifiable, found, as_left) for one in record.loads)
@@ -48,7 +61,7 @@ def _load(
     check: Table | None,
     rule: str | None,
     unverifiable: tuple[str, ...],
-    found: AsFound | None,
+    found: FoundSession | None,
     as_left: bool,
 ) -> LoadResult:
     reference = loads.column(one.load)
@@ -57,7 +70,6 @@ def _load(
     tolerance = one.tolerance or 1e-3 * one.largest
     checks = () if check is None else _checks(record, one, loads, check, rule, tolerance)
     full = calibration_budget(record, loads, check, one.load)
-    left = [line.deviation for line in checks] or residuals.tolist()
     errors = one.standard_errors
     return LoadResult(
         load=one.load,
@@ -94,7 +106,9 @@ def _load(
             for part in full.components
         ),
         checks=checks,
-        adjustment=_adjustment(one, found, max(left, key=abs) if as_left else None),
+        adjustment=_adjustment(
+            one, found, _left(record, one, loads, check, residuals, checks) if as_left else None
+        ),
         unverifiable=tuple(
             name.partition(": ")[2] for name in unverifiable if name.partition(": ")[0] == one.load
         ),
@@ -142,15 +156,38 @@ def _expanded(budget: Budget) -> Expanded:
     return Expanded(at=budget.at, U=budget.U, k=budget.k, probability=budget.probability, dof=budget.dof)
 
 
-def _adjustment(one: LoadFit, found: AsFound | None, left: float | None) -> Adjustment | None:
-    told = next((o for o in found.loads if o.load == one.load), None) if found else None
-    if told is None or found is None or found.record is None:
+def _left(
+    record: CalibrationRecord,
+    one: LoadFit,
+    loads: Table,
+    check: Table | None,
+    residuals: NDArray[np.float64],
+    checks: tuple[CheckLine, ...],
+) -> tuple[float, Expanded]:
+    """Return the largest deviation as left and its uncertainty: of the check loads, else of the residuals."""
+    if checks:
+        worst = max(checks, key=lambda line: abs(line.deviation))
+        return worst.deviation, worst.uncertainty
+    row = int(np.abs(residuals).argmax())
+    at = float(loads.column(one.load)[row])
+    return float(residuals[row]), _expanded(calibration_budget(record, loads, check, one.load, at))
+
+
+def _adjustment(
+    one: LoadFit, found: FoundSession | None, left: tuple[float, Expanded] | None
+) -> Adjustment | None:
+    told = next((o for o in found.result.loads if o.load == one.load), None) if found else None
+    if told is None or found is None or found.result.record is None:
         return None
+    # The item's deviation under the reference is judged by what the as-found session knows of both: the
+    # coefficients of the record in force are a given there, and have no share in it.
+    at = told.reference[told.worst_row - 1]
     return Adjustment(
-        found_by=found.record,
+        found_by=found.result.record,
         as_found=told.max_error,
-        at=told.reference[told.worst_row - 1],
-        as_left=left,
+        found=_expanded(calibration_budget(found.session, found.loads, found.check, one.load, at)),
+        as_left=None if left is None else left[0],
+        left=None if left is None else left[1],
     )
 
 

@@ -81,12 +81,18 @@ class CheckLine:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Adjustment:
-    """Before and after adjustment, in the load's unit: largest deviations with their signs."""
+    """Before and after adjustment, in the load's unit: largest deviations with their signs.
+
+    ``found`` and ``left`` are the uncertainties of the two deviations: of a load told by the as-found session
+    and by this one, at the reference loads ``found.at`` and ``left.at``. Without an adjustment ``as_left``
+    and ``left`` are None.
+    """
 
     found_by: str
     as_found: float
-    at: float
+    found: Expanded
     as_left: float | None
+    left: Expanded | None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

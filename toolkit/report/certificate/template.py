@@ -3,10 +3,13 @@
 # ruff: noqa: E501  lines of a template's text read best whole
 from __future__ import annotations
 
+import re
+
 from toolkit.report.blocks import Pieces, field, literal, paragraph, run
 from toolkit.report.certificate.vocabulary import FIGURES
 from toolkit.report.default_template import build_document
 
+_UNKEPT = re.compile(r'(<w:pPr><w:pStyle w:val="[^"]*"/>)(?!<w:keepNext/>)')
 _WIDE = (38.0, 128.0)
 _QUARTER = (34.0, 52.0, 31.0, 49.0)
 
@@ -52,6 +55,11 @@ def _footer(p: Pieces) -> str:
 
 def _heading(text: str) -> str:
     return paragraph(run(text), style="Heading1")
+
+
+def _kept(fragment: str) -> str:
+    """Return a fragment whose every paragraph, in tables too, stays on a page with what follows it."""
+    return _UNKEPT.sub(r"\1<w:keepNext/>", fragment)
 
 
 def _value(p: Pieces, name: str) -> str:
@@ -146,13 +154,16 @@ def _results(p: Pieces) -> list[str]:
         _value(p, "traceability"),
         _heading("2  Expanded uncertainty"),
         _value(p, "uncertainty"),
-        p.table(
-            "uncertainty",
-            "Expanded uncertainty over the calibrated range and at full scale.",
-            ["load", "value", "% of full scale", "U", "unit", "k", "p [%]", "dof"],
-            ["load", "at", "percent_fs", "U", "unit", "k", "p", "dof"],
-            [16, 26, 26, 24, 22, 16, 16, 20],
-            "lrrrlrrr",
+        # U is read as a whole: the table does not break where a page can hold it.
+        _kept(
+            p.table(
+                "uncertainty",
+                "Expanded uncertainty over the calibrated range and at full scale.",
+                ["load", "value", "% of full scale", "U", "unit", "k", "p [%]", "dof"],
+                ["load", "at", "percent_fs", "U", "unit", "k", "p", "dof"],
+                [16, 26, 26, 24, 22, 16, 16, 20],
+                "lrrrlrrr",
+            )
         ),
         _heading("3  Calibration equation"),
         _value(p, "model"),
@@ -205,10 +216,10 @@ def _statements(p: Pieces) -> list[str]:
         p.table(
             "adjustment",
             "Largest deviations as found, by the record then in force, and as left.",
-            ["load", "record", "as found", "at load", "as left", "tolerance", "unit"],
-            ["load", "found_by", "as_found", "at", "as_left", "tolerance", "unit"],
-            [16, 36, 24, 24, 26, 22, 18],
-            "llrrrrl",
+            ["load", "record", "at load", "as found", "U", "as left", "U", "tolerance", "unit"],
+            ["load", "found_by", "at", "as_found", "U_found", "as_left", "U_left", "tolerance", "unit"],
+            [12, 32, 18, 21, 17, 21, 17, 18, 14],
+            "llrrrrrrl",
         ),
         _heading("6  Uncertainty budget at full scale"),
         p.table(
@@ -227,18 +238,21 @@ def _statements(p: Pieces) -> list[str]:
             ),
         ),
         p.block("tk:if.interval_agreed", _heading("Agreed with the customer") + _value(p, "interval")),
-        _heading("Record"),
-        paragraph(
-            literal(
-                "Made by {{tk:certificate.software}} from calibration record {{tk:certificate.record}} of {{tk:certificate.instrument}}, made with {{tk:certificate.record_software}}."
+        # The end mark never stands on a page of its own.
+        _kept(
+            _heading("Record")
+            + paragraph(
+                literal(
+                    "Made by {{tk:certificate.software}} from calibration record {{tk:certificate.record}} of {{tk:certificate.instrument}}, made with {{tk:certificate.record_software}}."
+                )
             )
-        ),
-        p.facts(
-            [
-                [("RECORD SHA-256", "certificate.record_hash")],
-                [("LEDGER HEAD", "certificate.ledger_head")],
-            ],
-            _WIDE,
+            + p.facts(
+                [
+                    [("RECORD SHA-256", "certificate.record_hash")],
+                    [("LEDGER HEAD", "certificate.ledger_head")],
+                ],
+                _WIDE,
+            )
         ),
         paragraph(
             run("End of certificate ") + p.inline("tk:certificate.id", "certificate id"), style="EndMark"

@@ -183,6 +183,8 @@ TABLES: Tables = {
             as_left|largest deviation of the new equation, check loads where there are some
             tolerance|tolerance
             unit|unit
+            U_found|expanded uncertainty of the deviation as found, by the as-found session
+            U_left|expanded uncertainty of the deviation as left
             """
         ),
     ),

@@ -1,0 +1,36 @@
+"""What the commands that fill a Word template share: where the template lies, how the files are called."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+from toolkit.cli.home import find_home, packaged_home
+from toolkit.errors import ConfigError
+
+
+def home_template(name: str, home: Path | None = None) -> Path:
+    """Return a template of the home's ``report_templates/``; the packaged one where the home has none.
+
+    Raises
+    ------
+    ConfigError
+        ``home`` was given and is none
+    """
+    packaged = packaged_home() / "report_templates" / name
+    try:
+        own = find_home(home) / "report_templates" / name
+    except ConfigError:
+        if home is not None:
+            raise
+        return packaged
+    return own if own.is_file() else packaged
+
+
+def file_name(text: str, *, otherwise: str) -> str:
+    """Return the name of a test, or the id of a certificate, as a file's name.
+
+    >>> file_name("CAL 2026/017", otherwise="certificate"), file_name("../", otherwise="test")
+    ('CAL-2026-017', 'test')
+    """
+    return re.sub(r"[^\w.-]+", "-", text).strip("-.")[:100] or otherwise
