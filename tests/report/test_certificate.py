@@ -75,7 +75,8 @@ def adjusted(folder: Path) -> Registry:
         for row in rows:
             row[:2] = [repr(drift * float(cell)) for cell in row[:2]]
         (there / "loads.csv").write_text("\n".join([columns[0], *(",".join(row) for row in rows)]) + "\n")
-    XX.replace('check = "check.csv"\n', "")
+        text = session.replace("2026-02-01", "2027-02-01").replace("CAL-17", "CAL-18")
+        text = text.replace('check = "check.csv"\n', "")
         text = text.replace('data = "loads.csv"', f'data = "loads.csv"\nphase = "{phase}"')
         (there / "SESSION.toml").write_text(text.replace("U = 0.02", f"U = {U}"))
         calibrate(there / "SESSION.toml", registry)
