@@ -47,7 +47,7 @@ EDITIONS: tuple[tuple[dt.date, tuple[float, ...], tuple[float, ...]], ...] = (
     (dt.date(1990, 1, 1), _FY, _MZ),
     *((dt.date(1990 + 3 * n, 1, 1), *_drifted(n)) for n in range(1, 11)),
     # Differs from the last one in the fourth digit of one coefficient: coarse files cannot tell the two.
-    (dt.date(2022, 1, 1), (lambda c: (c[0] + 3e-4, *c[1:]))(_drifted(10)[0]), _drifted(10)[1]),
+    (dt.date(2022, 1, 1), (_drifted(10)[0][0] + 3e-4, *_drifted(10)[0][1:]), _drifted(10)[1]),
 )
 """Day in force, FY, MZ; record ``m15-r<N>`` is entry N - 1. The first is withdrawn, void on every day."""
 
@@ -93,9 +93,10 @@ def make_registry(calibrations: Path) -> None:
     for since, FY, MZ in EDITIONS:
         source = calibrations.parent / "source.toml"
         lines = [
-            "schema = 1", 'instrument = "m15"', f"date = {since}", 'entered_by = "legacy"', 'zero = "included"',
+            "schema = 1", 'instrument = "m15"', f"date = {since}", 'entered_by = "legacy"',
+            'zero = "included"',
             "indications = [" + ", ".join(f'{{ name = "{n}", unit = "lbf" }}' for n in CELLS) + "]",
-            "[source]", 'title = "made for a test"', f'place = "edition of {since}, {FY[0]!r}"', 'text = "drawn"',
+            "[source]", 'title = "made for a test"', f'place = "edition of {since}"', f'text = "{FY}, {MZ}"',
         ]  # fmt: skip
         for load, unit, values in (("FY", "lbf", FY), ("MZ", "lbf*ft", MZ)):
             told = ", ".join(f"{n} = {v!r}" for n, v in zip((*CELLS, "intercept"), values, strict=True))
@@ -206,6 +207,7 @@ def _cells(rows: int, rng: np.random.Generator) -> tuple[NDArray[np.float64], ..
     load = np.array(LOADS)[block] + rng.normal(0, 1.0, rows)
     angle = float(rng.choice([0, 1, -1, 2, -2, 4, -4, 6, -6, 8, -8, 10, -10]))
     share = np.array([0.36, 0.22, -0.36]) + rng.normal(0, 0.1, 3) - 0.04 * angle * np.array([1, 1, 0.6])
+    share = np.where(np.abs(share) < 0.08, 0.08, share)  # a cell without load would prove nothing
     bend = 1 + rng.normal(0, 0.1, (5, 3))
     x = load[:, None] * share * bend[block] + rng.normal(0, 0.02, (rows, 3))
     return printed(x), load, angle - 0.3 + rng.normal(0, 0.001, rows)

@@ -28,7 +28,7 @@ CONSTANT = "constant"
 ROUND_OFF = 8 * float(np.finfo(np.float64).eps)
 """Of a sum of products in double precision, in parts of the sum of their sizes."""
 
-_ALL_ORDERS = 4  # beyond so many channels only exchanges of two are tried
+_ALL_ORDERS = 5  # beyond so many channels only exchanges of two are tried
 _FIFTH = 4  # the fifth significant digit stands four places below the first
 
 

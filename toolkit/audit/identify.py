@@ -18,7 +18,7 @@ from toolkit.audit.candidates import Group, describe, unfit
 from toolkit.audit.columns import Columns, columns_of
 from toolkit.audit.model import Grade, Identification, Repair, Segment, Skipped, worst
 from toolkit.audit.screen import Key, Screen, screen_of
-from toolkit.audit.segments import Hit, Run, distinct_rivals, partition, whole_file
+from toolkit.audit.segments import Hit, Run, distinct_rivals, partition, whole_file, without_chance
 from toolkit.calibration.terms import INTERCEPT, term_matrix
 from toolkit.units import si_scale
 
@@ -151,7 +151,10 @@ class _Judge:
                     told = self._answers(distinct_rivals(self.groups, hits[0], slack=slack), slack=slack)
                 return self._told([Run(start=0, stop=self.columns.rows, hits=hits)], [told])
         self._let_in(self.screen.anywhere(self.columns))
-        parts = [(slack, partition(self._fits(slack=slack), self.columns.rows)) for slack in (False, True)]
+        parts = [
+            (slack, without_chance(partition(self._fits(slack=slack), self.columns.rows)))
+            for slack in (False, True)
+        ]
         slack, runs = min(parts, key=lambda part: (_unknown_rows(part[1]), len(part[1]), part[0]))
         return self._told(runs, [self._answers(run.hits, slack=slack) for run in runs])
 

@@ -20,7 +20,7 @@ class Lines:
     def add(self, value: dict[str, Any]) -> None:
         """Append a value that JSON can hold."""
         self._file.seek(0, 2)
-        self._file.write(json.dumps(value, ensure_ascii=False).encode() + b"\n")
+        self._file.write(json.dumps(value).encode() + b"\n")
         self._count += 1
 
     def __len__(self) -> int:

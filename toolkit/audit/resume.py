@@ -127,8 +127,9 @@ class Results:
         """Append a result, None for a file that the toolkit wrote; one without a hash is not used again."""
         key = b"" if sha256 is None else self._key(name, sha256)
         plain = None if result is None else to_plain(result)
-        head = json.dumps({"key": key.hex(), "path": name}, ensure_ascii=False)
-        body = json.dumps(plain, ensure_ascii=False)
+        # ASCII: a name that is no UTF-8 survives as well.
+        head = json.dumps({"key": key.hex(), "path": name})
+        body = json.dumps(plain)
         self._places[name] = (key, self._end)
         self._write(head[:-1].encode() + _REST + body.encode() + b"}\n")
 

@@ -6,6 +6,7 @@ the rows; rows that none fits form a segment of their own, be it a single one.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -16,6 +17,9 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from toolkit.audit.candidates import Group
+
+
+_LUCKY = 3  # rows
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -69,6 +73,28 @@ def partition(fits: Sequence[dict[str, NDArray[np.bool_]]], rows: int) -> tuple[
             runs.append(Run(start=row, stop=row + max(longest, 1), hits=tuple(hits)))
         row += max(longest, 1)
     return tuple(runs)
+
+
+def without_chance(runs: Sequence[Run]) -> tuple[Run, ...]:
+    """Return the runs without those that a file of unknown origin has by chance.
+
+    Thousands of candidates meet a few rows of any file. Where no candidate explains over half of the rows,
+    a run of one to three rows counts only if one of its candidates explains other rows too.
+    """
+    unknown = sum(run.stop - run.start for run in runs if not run.hits)
+    if 2 * unknown <= runs[-1].stop:
+        return tuple(runs)
+    times = Counter(hit for run in runs for hit in run.hits)
+    kept: list[Run] = []
+    for run in runs:
+        lucky = run.stop - run.start <= _LUCKY and all(times[hit] == 1 for hit in run.hits)
+        if run.hits and not lucky:
+            kept.append(run)
+        elif kept and not kept[-1].hits:
+            kept[-1] = Run(start=kept[-1].start, stop=run.stop, hits=())
+        else:
+            kept.append(Run(start=run.start, stop=run.stop, hits=()))
+    return tuple(kept)
 
 
 def _run_lengths(fit: NDArray[np.bool_]) -> NDArray[np.int64]:

@@ -90,7 +90,12 @@ def stream(payload: dict[str, Any]) -> None:
 
 
 def _json(value: Any) -> str:
-    return json.dumps(_plain(value), ensure_ascii=False, allow_nan=False)
+    text = json.dumps(_plain(value), ensure_ascii=False, allow_nan=False)
+    try:
+        text.encode()
+    except UnicodeEncodeError:  # the name of a file that is no UTF-8
+        text = json.dumps(_plain(value), allow_nan=False)
+    return text
 
 
 def exit_code(findings: Sequence[Finding]) -> int:

@@ -3,6 +3,11 @@
 The acquisition program prints a fixed number of digits, and a workbook keeps no trailing zeros. So the last
 printed place of a value is the finest that occurs in its column among values of the same decade; where
 that takes 15 or more significant digits, the file holds full doubles and nothing was rounded.
+
+A program that prints into a field of fixed width has one place less beside a minus sign (-0.35393, 371.3554
+and -182.415 in Figure 4.4 of the source document are all of eight characters). So where a decade holds both
+signs, and six or more values of one of them never show the finest place, those have the place that they show:
+by chance that happens to one in a million columns whose values were all printed alike.
 """
 
 from __future__ import annotations
@@ -17,6 +22,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
 FULL_DIGITS = 15
+_FEW = 6
 _FULL = 999
 _SMALL = -8  # below this decade the powers of ten that are needed are no longer exact in a double
 _TEN = 10.0 ** np.arange(23)
@@ -44,15 +50,17 @@ def half_last_place(values: ArrayLike) -> NDArray[np.float64]:
     table = given.reshape(len(given), math.prod(given.shape[1:]))
     half = np.zeros(table.shape)
     for column in range(table.shape[1]):
-        _column(np.abs(table[:, column]), half[:, column])
+        _column(table[:, column], half[:, column])
     return half.reshape(given.shape)
 
 
-def _column(size: NDArray[np.float64], half: NDArray[np.float64]) -> None:
+def _column(values: NDArray[np.float64], half: NDArray[np.float64]) -> None:
+    size = np.abs(values)
     zero = size == 0
     any_zero = bool(zero.any())
     if bool(zero.all()):  # also of an empty column
         return
+    mixed = bool(values.min() < 0 < values.max())
     decade = _decades(np.where(zero, 1.0, size) if any_zero else size)
     smallest = np.inf
     low, high = int(decade.min()), int(decade.max())
@@ -66,6 +74,11 @@ def _column(size: NDArray[np.float64], half: NDArray[np.float64]) -> None:
         place = _half_of(group, one)
         half[here] = place
         smallest = min(smallest, place)
+        if mixed and place:
+            inside = np.ones(len(values), dtype=bool) if isinstance(here, slice) else here
+            for side in (inside & (values < 0), inside & (values > 0)):
+                if _FEW <= int(np.count_nonzero(side)) < len(group):
+                    half[side] = _half_of(size[side], one)
     if any_zero:
         half[zero] = smallest
 
