@@ -35,8 +35,8 @@ GOLDEN = 1e-12
 GOLDEN_REFIT = 1e-9
 # Two algorithms agree in a covariance to some 1e-13 where the terms are well conditioned; an entry off the
 # diagonal is small beside its two standard errors, so that a wide tolerance would not see it dropped.
-_SPREAD = 1e-9
-_RESIDUAL = 1e-12
+SPREAD = 1e-9
+RESIDUAL = 1e-12
 
 
 def check_reproduces(record: CalibrationRecord, table: Table) -> None:
@@ -141,7 +141,7 @@ def _check_load(
     _demand_equal(record, where, "issued coefficients", one.issued, issued)
     _demand(
         record, where, "residual standard deviation",
-        one.residual_sd is not None and abs(one.residual_sd - sd) <= _SPREAD * sd + _RESIDUAL * largest,
+        one.residual_sd is not None and abs(one.residual_sd - sd) <= SPREAD * sd + RESIDUAL * largest,
         repr(one.residual_sd), repr(sd),
     )  # fmt: skip
     stored = np.asarray(one.covariance)
@@ -149,7 +149,7 @@ def _check_load(
     # rounding, and the covariance is that rounding squared.
     scale = (one.residual_sd or 0.0) ** 2 if not solver.known else 1.0
     # Its rounding grows with the square of the terms' condition number.
-    slack = _SPREAD + 10 * np.finfo(float).eps * solver.condition**2
+    slack = SPREAD + 10 * np.finfo(float).eps * solver.condition**2
     _demand(
         record, where, "covariance",
         stored.shape == solver.inverse.shape

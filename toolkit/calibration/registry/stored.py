@@ -59,7 +59,8 @@ def parse_loads(record: CalibrationRecord, data: bytes, folder: Path) -> Table:
     file = record.data_file("loads")
     where = folder / ("loads" if file is None else file.file)
     try:
-        group = group_column(json.loads(record.settings).get("reference", {}))
+        named = '"shared_group"' in record.settings
+        group = group_column(json.loads(record.settings).get("reference", {})) if named else ()
         table = read_table(data, where=where, required=needed, optional=[*uncertainties, *group])
         return _as_fitted(record, table, where)
     except RegistryError:

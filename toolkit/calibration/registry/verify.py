@@ -1,7 +1,7 @@
 """`verify`: every record on disk or in a ledger, and every file that belongs to none.
 
-Many records are shared out among processes. Each record passes the same gates there, one by one, and the
-rows are the same and in the same order.
+Many records are shared out among processes, and those of one shape are refitted together (`refit_many`). Each
+passes the same gates, by its own numbers, and the rows are the same and in the same order.
 """
 
 from __future__ import annotations
@@ -14,7 +14,8 @@ from typing import TYPE_CHECKING
 
 from toolkit.calibration.records.record import from_bytes
 from toolkit.calibration.registry.ledger import HEAD, LEDGER, Ledger
-from toolkit.calibration.registry.registry import ID, load_checked
+from toolkit.calibration.registry.refit_many import reproducing
+from toolkit.calibration.registry.registry import ID, Started, finish, start
 from toolkit.errors import ToolkitError
 
 if TYPE_CHECKING:
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
 _FOLDER_KEEPERS = (".gitkeep", ".gitignore")
 # Starting the processes takes as long as some hundred records.
 _SHARED_FROM = 200
-_CHUNK = 25
+_CHUNK = 50
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -34,6 +35,9 @@ class VerifyRow:
     ok: bool
     verified: bool
     reason: str | None
+
+
+_Judged = tuple[VerifyRow, tuple[str, ...]]
 
 
 def verify_registry(registry: Registry, head: str | None = None) -> tuple[VerifyRow, ...]:
@@ -91,15 +95,18 @@ def _judged(folder: Path, ids: Sequence[str], ledger: Ledger) -> Iterator[tuple[
     # A worker of somebody else's pool may not start processes of its own.
     alone = multiprocessing.current_process().daemon
     workers = 1 if alone else min(len(os.sched_getaffinity(0)), 4)
+    chunks = [ids[at : at + _CHUNK] for at in range(0, len(ids), _CHUNK)]
     if len(ids) < _SHARED_FROM or workers < 2:
-        yield from (_judge(folder, record_id, ledger) for record_id in ids)
+        for chunk in chunks:
+            yield from _judge(folder, chunk, ledger)
         return
     from concurrent.futures import ProcessPoolExecutor
 
     # A fork holds the parsed ledger already; nothing but ids and rows goes through the pipe.
     context = multiprocessing.get_context("fork")
     with ProcessPoolExecutor(workers, mp_context=context, initializer=_share, initargs=(ledger,)) as pool:
-        yield from pool.map(functools.partial(_judge_shared, folder), ids, chunksize=_CHUNK)
+        for judged in pool.map(functools.partial(_judge_shared, folder), chunks):
+            yield from judged
 
 
 _shared: list[Ledger] = []
@@ -109,13 +116,30 @@ def _share(ledger: Ledger) -> None:
     _shared[:] = [ledger]
 
 
-def _judge_shared(folder: Path, record_id: str) -> tuple[VerifyRow, tuple[str, ...]]:
-    return _judge(folder, record_id, _shared[0])
+def _judge_shared(folder: Path, ids: Sequence[str]) -> list[_Judged]:
+    return _judge(folder, ids, _shared[0])
 
 
-def _judge(folder: Path, record_id: str, ledger: Ledger) -> tuple[VerifyRow, tuple[str, ...]]:
+def _judge(folder: Path, ids: Sequence[str], ledger: Ledger) -> list[_Judged]:
+    """Return the rows of some records and the names of their files."""
+    started: list[Started | ToolkitError] = []
+    for record_id in ids:
+        try:
+            started.append(start(folder, record_id, ledger))
+        except ToolkitError as error:
+            started.append(error)
+    pairs = [(one.record, one.table) for one in started if isinstance(one, Started) and one.table is not None]
+    sound = {record.id for (record, _), good in zip(pairs, reproducing(pairs), strict=True) if good}
+    return [
+        _row(folder, record_id, one, record_id in sound) for record_id, one in zip(ids, started, strict=True)
+    ]
+
+
+def _row(folder: Path, record_id: str, started: Started | ToolkitError, reproduces: bool) -> _Judged:
     try:
-        checked = load_checked(folder, record_id, ledger)
+        if isinstance(started, ToolkitError):
+            raise started
+        checked = finish(started, reproduces=reproduces)
     except ToolkitError as error:
         reason = f"{error.rule or 'unreadable'}: {error.what}"
         reason += f" (got {error.got}, expected {error.expected})" if error.got else ""

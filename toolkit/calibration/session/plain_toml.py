@@ -111,7 +111,7 @@ def _value(text: str) -> Any:
             raise _NotPlainError
         return text[1:-1]
     if first in "[{":
-        return json.loads(_as_json(text), object_pairs_hook=_once)
+        return _DECODER.decode(_as_json(text))
     if _INTEGER.fullmatch(text):
         return int(text)
     if _FLOAT.fullmatch(text):
@@ -137,3 +137,6 @@ def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     if len(made) != len(pairs):
         raise _NotPlainError
     return made
+
+
+_DECODER = json.JSONDecoder(object_pairs_hook=_once)

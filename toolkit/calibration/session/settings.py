@@ -7,6 +7,7 @@ content that is no number of the fit must follow from the session file that lies
 from __future__ import annotations
 
 import datetime as dt
+import json
 import math
 import re
 from collections.abc import Mapping
@@ -21,6 +22,9 @@ from toolkit.files import check_keys, parse_toml, sha256_bytes
 from toolkit.machine.definition import quantity
 from toolkit.units import unit
 
+_ENCODER = json.JSONEncoder(
+    sort_keys=True, separators=(",", ":"), ensure_ascii=False, allow_nan=False, default=str
+)
 METHODS = ("ols", "wls", "gls", "odr")
 DEFAULT_TOLERANCE = 1e-3
 _KEYS = (
@@ -148,7 +152,7 @@ def settings_of(raw: Mapping[str, Any], *, where: object) -> Settings:
         check=check,
         check_table=isinstance(raw.get("check"), dict),
         tolerances=tuple(tolerances.items()),
-        text=canonical(_plain(settings, where)),
+        text=_text_of(settings, where),
     )
 
 
@@ -263,6 +267,14 @@ def _degree(raw: Mapping[str, Any], model: str, where: object) -> int:
     if isinstance(degree, bool) or not isinstance(degree, int) or not 1 <= degree <= 9:
         raise wrong(where, "degree", degree, "a whole number from 1 to 9")
     return degree
+
+
+def _text_of(settings: dict[str, Any], where: object) -> str:
+    try:
+        # A date is written as its text.
+        return _ENCODER.encode(settings)
+    except ValueError:
+        return canonical(_plain(settings, where))
 
 
 def _plain(value: Any, where: object) -> Any:
