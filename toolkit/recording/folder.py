@@ -16,6 +16,7 @@ from toolkit.errors import ConfigError, RecordingError
 from toolkit.files import check_keys, read_toml
 from toolkit.machine import Machine, Protocol, load_machine, read_protocol
 from toolkit.machine.quantity import quantity
+from toolkit.recording.details import read_details
 from toolkit.recording.marks import is_own_output
 from toolkit.recording.model import TestInfo
 from toolkit.units import from_si, si_scale, unit
@@ -24,7 +25,7 @@ TEST_FILE = "test.toml"
 
 _KEYS = (
     "schema date machine operator requestor surface special rotation speed pressure rated_load tire "
-    "rotations tare simulated protocol reversal mounting laboratory"
+    "rotations tare simulated protocol reversal mounting laboratory report"
 ).split()
 _LITTER = ("Thumbs.db", "desktop.ini", "__MACOSX")  # what file managers leave behind
 _TEXTS = ("operator", "requestor", "surface", "special", "mounting", "laboratory")
@@ -109,6 +110,7 @@ def read_test_folder(folder: Path) -> TestFolder:
     check_keys(table, _KEYS, where=toml)
     if table.get("schema", 1) != 1:
         raise _wrong(toml, "schema", table["schema"], "1")
+    read_details(table.get("report", {}), where=toml)  # the report reads it again; a slip shows here
     machine = _machine(table, toml)
     plan = _protocol_file(table, toml)
     settings = (Path(_machine_name(table, toml)), plan)

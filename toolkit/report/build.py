@@ -10,8 +10,10 @@ from typing import TYPE_CHECKING
 
 from toolkit import __version__
 from toolkit.files import sha256_bytes
+from toolkit.recording.details import ReportDetails
 from toolkit.report.columns import UNITS
 from toolkit.report.content import Cell, ReportContent, Table, Value
+from toolkit.report.details import details_values
 from toolkit.report.plots import build_plots, load_groups
 from toolkit.report.style import Style
 from toolkit.report.tables import build_tables
@@ -34,6 +36,7 @@ def build_content(
     findings: Sequence[Finding] | None = None,
     style: Style | None = None,
     issued: dt.date | None = None,
+    details: ReportDetails | None = None,
 ) -> ReportContent:
     """Return what a template can ask for.
 
@@ -44,6 +47,7 @@ def build_content(
     findings : what the report lists; default those of the result
     style : units, decimals and laboratory
     issued : date of issue; default today
+    details : what the report says beyond the measurement: customer, item, method, opinions
     """
     style = style or Style()
     day = (issued or dt.datetime.now(tz=dt.UTC).date()).isoformat()
@@ -52,8 +56,11 @@ def build_content(
     )
     info, use = result.reduced.info, result.reduced.calibration
     plots = build_plots(result, style, SIMULATED if info.simulated else None)
-    tables = build_tables(result, record, listed, style)
+    details = details or ReportDetails()
+    tables = build_tables(result, record, listed, style, details.opinions)
     values = _values(result, record, listed, style, day)
+    values |= details_values(details, result, style, len(listed))
+    values["report.id"] = Value(kind="text", value=report_id(result, details))
     values |= {
         f"caption.{name}": Value(kind="text", value=plots[name].caption) for name in FIGURES if name in plots
     }
@@ -84,10 +91,15 @@ def build_content(
     )
 
 
-def report_id(result: TestResult) -> str:
-    """Return an id made from the inputs: the same recordings and calibration give the same id."""
+def report_id(result: TestResult, details: ReportDetails | None = None) -> str:
+    """Return an id made from the inputs: the same recordings and calibration give the same id.
+
+    A report that replaces another one has an id of its own, although it rests on the same inputs.
+    """
     reduced = result.reduced
     parts = sorted({c.file_sha256 for c in reduced.conditions})
+    if details is not None and details.amends:
+        parts += [details.amends, details.amendment or ""]
     digest = sha256_bytes("\n".join([reduced.info.name, reduced.calibration.sha256, *parts]).encode())
     date = "".join(ch for ch in (reduced.info.date or "") if ch.isdigit())
     return "-".join(part for part in ("TR", date, digest[:8].upper()) if part)

@@ -145,13 +145,15 @@ def _one(site: Site, words: Vocabulary) -> Iterator[LintFinding]:
     known: dict[str, Mapping[str, object]] = {
         "figure": words.figures,
         "table": words.tables,
-        "if": words.conditions,
     }
     if not tag.path or re.search(r"[\s|{}]", tag.path):
         yield _at(site, "malformed-tag", f"'{tag}' has no path, or white space in it")
         return
-    if (family == "value" and not words.knows(tag.path)) or (
-        tag.name not in known.get(family, {tag.name: ""})
+    asked = family == "if" and not words.knows_condition(tag.name)
+    if (
+        asked
+        or (family == "value" and not words.knows(tag.path))
+        or (tag.name not in known.get(family, {tag.name: ""}))
     ):
         yield _at(site, "unknown-tag", f"{tag} is not known: {_near(tag.path, words)}")
         return

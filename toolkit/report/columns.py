@@ -172,6 +172,13 @@ TABLES: dict[str, tuple[str, tuple[Column, ...]]] = {
             _text("message", "what was found"),
         ),
     ),
+    "opinions": (
+        "opinions and interpretations, which are not results of the test",
+        (
+            _text("statement", "opinion or interpretation"),
+            _text("basis", "what it rests on"),
+        ),
+    ),
     "files": (
         "the recordings and their hashes",
         (

@@ -93,3 +93,14 @@ class ReportContent:
     marks: tuple[tuple[str, str], ...] = ()
     style: Style = field(default_factory=Style)
     vocabulary: Vocabulary = REPORT
+
+    def holds(self, name: str) -> bool:
+        """Tell whether ``tk:if.<name>`` is kept: it is true, or the figure, table or value is there."""
+        if name in self.conditions:
+            return self.conditions[name]
+        family, _, rest = name.partition(".")
+        if family == "figure":
+            return rest in self.plots
+        if family == "table":
+            return rest in self.tables and bool(self.tables[rest].rows)
+        return name in self.values and not self.values[name].missing

@@ -191,7 +191,7 @@ class _Filler:
                 continue
             attached = any(one is site.story.root for one in site.element.iterancestors())
             if attached:
-                apply_condition(site.element, self.content.conditions.get(site.tag.name, False))
+                apply_condition(site.element, self.content.holds(site.tag.name))
 
     def _demand(self, sites: list[Site]) -> None:
         """Refuse a template that asks for what this test has not, naming everything at once."""

@@ -11,7 +11,10 @@ from toolkit.errors import ConfigError
 from toolkit.files import check_keys, read_toml
 from toolkit.units import si_scale
 
-_KEYS = "schema laboratory decimal_comma dates missing required styles decimals units".split()
+_KEYS = "schema laboratory report decimal_comma dates missing required styles decimals units".split()
+_TABLES = ("laboratory", "report", "styles", "decimals", "units")
+_LABORATORY = "name address contact place country accreditation".split()
+_REPORT = "method authorised_by function".split()
 _STYLES = ("heading", "caption", "table")
 _UNITS = ("force", "moment")
 _DEFAULT_REQUIRED = ("tk:calibration.hash",)
@@ -21,14 +24,19 @@ _DEFAULT_REQUIRED = ("tk:calibration.hash",)
 class Style:
     """How an organisation writes numbers and dates, and what its templates must hold.
 
-    ``decimals`` maps a unit, a tag's path or ``<table>.<column>`` to digits after the point; ``styles`` maps
-    heading, caption and table to the names of the template's Word styles.
+    ``method``, ``authorised_by``, ``function`` stand in a report whose test names none. ``decimals`` maps a
+    unit, a tag's path or ``<table>.<column>`` to digits after the point; ``styles`` maps heading, caption and
+    table to the names of the template's Word styles.
     """
 
     laboratory: str | None = None
     address: str | None = None
     place: str | None = None
+    contact: str | None = None
     country: str | None = None
+    method: str | None = None
+    authorised_by: str | None = None
+    function: str | None = None
     accreditation: str | None = None
     decimal_comma: bool = False
     dates: str = "%Y-%m-%d"
@@ -82,12 +90,9 @@ def read_style(path: Path | None) -> Style:
         return Style()
     table = read_toml(path)
     check_keys(table, _KEYS, where=path)
-    parts = {key: _typed(table, key, dict, {}, path) for key in ("laboratory", "styles", "decimals", "units")}
-    check_keys(
-        parts["laboratory"],
-        ("name", "address", "place", "country", "accreditation"),
-        where=f"{path}: laboratory",
-    )
+    parts = {key: _typed(table, key, dict, {}, path) for key in _TABLES}
+    check_keys(parts["laboratory"], _LABORATORY, where=f"{path}: laboratory")
+    check_keys(parts["report"], _REPORT, where=f"{path}: report")
     check_keys(parts["styles"], _STYLES, where=f"{path}: styles")
     check_keys(parts["units"], _UNITS, where=f"{path}: units")
     for name, digits in parts["decimals"].items():
@@ -102,10 +107,8 @@ def read_style(path: Path | None) -> Style:
         raise _wrong(path, "missing", missing, "a visible text")
     return Style(
         laboratory=_text(parts["laboratory"], "name", path),
-        address=_text(parts["laboratory"], "address", path),
-        place=_text(parts["laboratory"], "place", path),
-        country=_text(parts["laboratory"], "country", path),
-        accreditation=_text(parts["laboratory"], "accreditation", path),
+        **{key: _text(parts["laboratory"], key, path) for key in _LABORATORY[1:]},
+        **{key: _text(parts["report"], key, path) for key in _REPORT},
         decimal_comma=_typed(table, "decimal_comma", bool, False, path),
         dates=_typed(table, "dates", str, "%Y-%m-%d", path),
         missing=missing,

@@ -16,13 +16,18 @@ if TYPE_CHECKING:
     from toolkit.estimate import Estimate
     from toolkit.findings import Finding
     from toolkit.pipeline import TestResult
+    from toolkit.recording.details import Opinion
 
 _DEG = math.pi / 180
 Row = dict[str, Cell]
 
 
 def build_tables(
-    result: TestResult, record: CalibrationRecord | None, findings: Sequence[Finding], style: Style
+    result: TestResult,
+    record: CalibrationRecord | None,
+    findings: Sequence[Finding],
+    style: Style,
+    opinions: Sequence[Opinion] = (),
 ) -> dict[str, Table]:
     """Return every table of the catalogue; one without data has no rows."""
     makers: dict[str, Callable[[], list[Row]]] = {
@@ -35,6 +40,7 @@ def build_tables(
         "calibration": lambda: _calibration(record),
         "acquisition": lambda: _acquisition(result),
         "findings": lambda: [one.as_dict() for one in findings],  # type: ignore[misc]
+        "opinions": lambda: [{"statement": one.statement, "basis": one.basis} for one in opinions],
         "files": lambda: _files(result),
     }
     return {name: _table(name, makers[name](), style) for name in TABLES}

@@ -103,6 +103,22 @@ def _texts() -> list[Spec]:
     software.version|version of the program
     laboratory.name|laboratory (from the style file)
     laboratory.address|its address (from the style file)
+    laboratory.contact|how to reach it (from the style file)
+    laboratory.accreditation|its accreditation (from the style file)
+    report.customer|customer: of [report] in test.toml, else the requestor
+    report.customer_contact|the customer's address or contact
+    report.location|where the test was made: of [report], else the laboratory's place
+    report.method|method: of [report], else of the style file, else what the test's protocol names
+    report.deviations|deviations from the method: of [report], else a count of the findings
+    report.sampling|sampling plan
+    report.conformity|statement of conformity
+    report.external|results that come from another laboratory
+    report.authorised_by|who authorises the report: of [report], else of the style file
+    report.authorised_function|function of that person
+    report.amends|id of the report that this one replaces
+    report.amendment|why it is replaced
+    item.description|the item tested: of [report], else size, maker, series and DOT number of the tire
+    item.condition|condition of the item as received
     simulated|simulated data or measured data
     unit.force|unit of forces in the report
     unit.moment|unit of moments
@@ -119,6 +135,7 @@ _VALUES = (
     *_texts(),
     Spec(path="test.date", kind="date", description="date of the test"),
     Spec(path="report.date", kind="date", description="date of issue"),
+    Spec(path="item.received", kind="date", description="date on which the item was received"),
     Spec(path="test.pressure.psi", kind="number", unit="psi", spec=".1f", description="test pressure"),
     Spec(path="test.pressure.bar", kind="number", unit="bar", spec=".2f", description="test pressure"),
     Spec(path="test.pressure.kPa", kind="number", unit="kPa", spec=".0f", description="test pressure"),

@@ -51,6 +51,15 @@ class Vocabulary:
             return found.kind in ("text", "number", "date")
         return self.open_values is not None and self.open_values.fullmatch(path) is not None
 
+    def knows_condition(self, name: str) -> bool:
+        """Tell whether ``tk:if.<name>`` can be asked: a condition, a figure, a table or any value.
+
+        ``tk:if.figure.gough`` and ``tk:if.gough`` ask the same.
+        """
+        family, _, rest = name.partition(".")
+        own: Mapping[str, object] = {"figure": self.figures, "table": self.tables}.get(family, {})
+        return name in self.conditions or rest in own or self.knows(name)
+
     def demanded(self, asked: tuple[str, ...]) -> tuple[str, ...]:
         """Return the tags that a template must hold: the kind's own, and those that a style file asks for.
 
