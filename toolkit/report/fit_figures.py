@@ -57,7 +57,7 @@ def fit_plots(data: Measured, curves: Sequence[CurveFit], models: Sequence[Model
     from toolkit.tires.catalog import find
     from toolkit.tires.global_model import GlobalModel
 
-    shown, _ = binned(data)
+    shown, _, _ = binned(data)
     plots = []
     for name in dict.fromkeys(one.model for one in curves):
         for channel in ("FY", "MZ"):

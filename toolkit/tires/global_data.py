@@ -21,8 +21,9 @@ CHANNELS = ("FX", "FY", "MZ")
 _NO_LOAD = 1.0  # N: a block below stands in the air
 _FEW = 3  # distinct values that a square needs
 _CAMBER, _ANGLE = np.radians(0.5), np.radians(0.5)
-_PRESSURE, _SPEED, _SLIP, _LOAD = 0.02, 0.05, 0.01, 0.2  # relative, but for the slip
-_BIN = np.radians(0.25)
+_PRESSURE, _SPEED, _SLIP, _LOAD = 0.05, 0.10, 0.01, 0.2  # relative, but for the slip
+_TAIL = 2.0  # percent of the rows at either end that a control's ripple may fill
+_BIN, _WIDEST = np.radians(0.25), np.radians(2.0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -137,14 +138,14 @@ def what_varies(data: Measured) -> frozenset[str]:
         found.add("two_loads")
     if loads >= _FEW or (loads == 1 and sweeps):
         found.add("three_loads")
-    if np.ptp(r.IA) > _CAMBER:
+    if _range(r.IA) > _CAMBER:
         found.add("camber")
     pressure = r.P / np.median(r.P)
-    if np.ptp(pressure) > _PRESSURE:
+    if _range(pressure) > _PRESSURE:
         found.add("pressure")
         if len(np.unique(np.rint(pressure / _PRESSURE))) >= _FEW:
             found.add("three_pressures")
-    if np.ptp(r.V) > _SPEED * np.median(r.V):
+    if _range(r.V) > _SPEED * np.median(r.V):
         found.add("speed")
     if r.SA.min() < -_ANGLE and r.SA.max() > _ANGLE:
         found.add("both_signs")
@@ -157,6 +158,11 @@ def what_varies(data: Measured) -> frozenset[str]:
     return frozenset(found)
 
 
+def _range(column: Array) -> float:
+    low, high = np.percentile(column, [_TAIL, 100.0 - _TAIL])
+    return float(high - low)
+
+
 def cell(data: Measured) -> NDArray[np.intp]:
     """Return a number a row (rows,) that is equal where load block, camber, pressure and slip are alike."""
     r = data.rows
@@ -167,17 +173,23 @@ def cell(data: Measured) -> NDArray[np.intp]:
     return np.unique(keys, axis=1, return_inverse=True)[1].reshape(-1)
 
 
-def binned(data: Measured, *, robust: bool = False) -> tuple[Measured, Array]:
-    """Return means of rows that share their cell and 0.25 deg of slip angle, and the rows each stands for.
+def binned(data: Measured, *, robust: bool = False, most: int | None = None) -> tuple[Measured, Array, float]:
+    """Return means of rows that share their cell and a bin of slip angle, their rows, the bin's width [rad].
 
-    ``robust`` takes medians, which outliers do not move. Few rows are returned as they are.
+    ``robust`` takes medians, which outliers do not move. Bins are 0.25 deg wide, or wider until there are no
+    more than ``most``. Few rows are returned as they are, of width zero.
     """
-    keys = np.stack([cell(data), np.rint(data.rows.SA / _BIN).astype(np.intp)])
-    unique, place = np.unique(keys, axis=1, return_inverse=True)
-    place = place.reshape(-1)
-    bins = unique.shape[1]
+    width = _BIN
+    while True:
+        keys = np.stack([cell(data), np.rint(data.rows.SA / width).astype(np.intp)])
+        unique, place = np.unique(keys, axis=1, return_inverse=True)
+        bins = unique.shape[1]
+        if most is None or bins <= most or width >= _WIDEST:
+            break
+        width *= 2.0
     if bins > 0.7 * len(data):
-        return data, np.ones(len(data))
+        return data, np.ones(len(data)), 0.0
+    place = place.reshape(-1)
     count = np.bincount(place, minlength=bins).astype(np.float64)
     order = np.argsort(place, kind="stable")
     cuts = np.cumsum(count[:-1]).astype(np.intp)
@@ -193,10 +205,8 @@ def binned(data: Measured, *, robust: bool = False) -> tuple[Measured, Array]:
         FNOMIN=r.FNOMIN, NOMPRES=r.NOMPRES, LONGVL=r.LONGVL, UNLOADED_RADIUS=r.UNLOADED_RADIUS,
     )  # fmt: skip
     first = order[np.concatenate([[0], cuts])]
-    return (
-        Measured(
-            rows=rows, axes=data.axes, block=data.block[first], loads=data.loads, given=data.given,
-            **{name: middle(data[name]) for name in data.channels},
-        ),
-        count,
+    means = Measured(
+        rows=rows, axes=data.axes, block=data.block[first], loads=data.loads, given=data.given,
+        **{name: middle(data[name]) for name in data.channels},
     )  # fmt: skip
+    return means, count, width

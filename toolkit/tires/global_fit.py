@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from toolkit.tires.global_model import Array
 
 WEIGHTS = ("equal", "noise")
+_INNER, _LEAST = 20_000, 120  # rows x inner points of a search, and rows that it has at least
 _PREDICT_FROM = 3  # load blocks, so that two are left
 
 
@@ -174,13 +175,18 @@ class _Fitter:
         more: tuple[Array, ...] = (),
     ) -> Found:
         robust = self.loss == "robust"
-        coarse, count = binned(data, robust=robust)
+        coarse, count, width = self._bins(data)
         task = Task(
             model=self.model, data=data, channels=channels, values=self.values, free=free,
             starts=np.concatenate([np.array(more).reshape(-1, len(self.values)), self.starts]),
             sigma=self.sigma.get(channels[0]), robust=robust,
         )  # fmt: skip
-        return run(task, coarse, count)
+        return run(task, coarse, count, width)
+
+    def _bins(self, data: Measured) -> tuple[Measured, Array, float]:
+        # A model with many inner points is searched on fewer bins.
+        most = None if self.model.grid == 1 else max(_INNER // self.model.grid, _LEAST)
+        return binned(data, robust=self.loss == "robust", most=most)
 
     def _weigh(self, channels: tuple[str, ...], values: Array) -> None:
         # Every load block by the size of its own residuals; none counts more than nine times another.
@@ -229,7 +235,7 @@ class _Fitter:
         return predicted
 
     def _refit(self, channels: tuple[str, ...], free: tuple[int, ...], data: Measured) -> Array:
-        coarse, count = binned(data, robust=self.loss == "robust")
+        coarse, count, _ = self._bins(data)
         task = Task(
             model=self.model, data=data, channels=channels, values=self.values, free=free,
             starts=self.starts, sigma=self.sigma.get(channels[0]), robust=self.loss == "robust",

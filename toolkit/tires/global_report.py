@@ -171,8 +171,9 @@ class Report:
             parts.append("FY and MZ were fitted together")
         elif channel == "MZ" and not self.model.moment_alone:
             parts.append("the parameters of FY were held: standard errors do not contain theirs")
-        if not stage.on_rows:
-            parts.append("fitted to the means of bins of 0.25 deg, judged on the rows")
+        if stage.bin_width:
+            width = np.degrees(stage.bin_width)
+            parts.append(f"fitted to the means of bins of {width:g} deg, judged on the rows")
         if stage.time > 1:
             parts.append(f"residuals are autocorrelated: standard errors times {np.sqrt(stage.time):.1f}")
         return "; ".join(parts)

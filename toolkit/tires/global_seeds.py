@@ -37,7 +37,7 @@ def seeds_of(data: Measured) -> Found:
     calm = (np.abs(np.abs(r.IA) - np.abs(r.IA).min()) <= _UPRIGHT) & (np.abs(r.KAPPA) <= _FREE)
     if calm.sum() >= 4:
         base = base.take(calm)
-    means, _ = binned(base)
+    means, _, _ = binned(base)
     curves: list[Curve] = []
     for number, load in enumerate(base.loads):
         own = means.block == number

@@ -26,6 +26,7 @@ _SAME = 1e-3  # the files contract: starts that agree in cost to this are at one
 _EXACT = 1e-18  # a cost below this share of the data's square is rounding
 _PLAN = (12, 6, 5, 60)  # starts, first steps, how many go on, steps to the end
 _PATIENT = (36, 8, 10, 90)
+_AGAIN = (25, 12, 8, 90)
 _WIDE = (0.5, 5.0)  # an interval's half width beyond half of the value and five sizes says nothing
 _ALLOWED = 4.0  # of the variance of a row: the rise of the cost by which a default is as good as the fit
 _BIWEIGHT = 4.685  # 95 % efficiency on normal noise
@@ -54,7 +55,8 @@ class Found:
     """What a stage found: ``values`` of all parameters, ``covariance`` of those in ``free`` that are left.
 
     ``fixed`` (place, reason); ``bound`` places at a bound; ``undetermined`` places without a standard error;
-    ``time`` autocorrelation time of the residuals; ``dof`` degrees of freedom.
+    ``time`` autocorrelation time of the residuals; ``dof`` degrees of freedom;
+    ``bin_width`` [rad] of the means that were fitted, zero where the rows were.
     """
 
     values: Array
@@ -67,7 +69,7 @@ class Found:
     agreeing: int
     time: float
     dof: float
-    on_rows: bool
+    bin_width: float
 
 
 class Misfit:
@@ -111,8 +113,8 @@ class Misfit:
         self.free.remove(place)
 
 
-def run(task: Task, coarse: Measured, count: Array) -> Found:
-    """Return what a stage finds; ``coarse`` are the bin means of the data, ``count`` the rows of each."""
+def run(task: Task, coarse: Measured, count: Array, width: float) -> Found:
+    """Return what a stage finds; ``coarse`` are the means of bins of ``width`` [rad], ``count`` rows each."""
     scale = {name: float(np.sqrt(np.mean(task.data[name] ** 2))) or 1.0 for name in task.channels}
     weight = np.ones(len(task.data)) if task.sigma is None else 1.0 / task.sigma
     weight = weight / np.sqrt(np.mean(weight**2))
@@ -163,7 +165,7 @@ def run(task: Task, coarse: Measured, count: Array) -> Found:
         agreeing=agreeing,
         time=time,
         dof=dof,
-        on_rows=on_rows,
+        bin_width=0.0 if on_rows else width,
     )
 
 
@@ -176,22 +178,34 @@ def _coarse(data: Measured, coarse: Measured, weight: Array) -> Array:
 
 def _search(misfit: Misfit, start: Array) -> tuple[Descent, int]:
     box = misfit.box()
+    floor = _EXACT * float(np.sum(misfit.weight**2))
     best: Descent | None = None
     asked = 0
     for (many, first, keep, last), reach in ((_PLAN, 3.0), (_PATIENT, 8.0)):
-        extra = max(many - len(start), 0)
-        x = np.concatenate([start, spread_starts(start, box, extra, reach=reach)])
-        asked += len(x)
-        early = descend(misfit, x, box, steps=first, tolerance=1e-4)
-        found = descend(misfit, early.x[:keep].copy(), box, steps=last, tolerance=1e-8)
-        if best is not None:
-            cost = np.concatenate([best.cost, found.cost])
-            order = np.argsort(cost, kind="stable")
-            found = Descent(x=np.concatenate([best.x, found.x])[order], cost=cost[order])
-        best = found
-        if found.agreeing(_SAME, _EXACT * float(np.sum(misfit.weight**2))) >= 2:
-            break
-    return found, asked
+        x = np.concatenate([start, spread_starts(start, box, max(many - len(start), 0), reach=reach)])
+        best, more = _round(misfit, x, box, (first, keep, last), best)
+        asked += more
+        if best.agreeing(_SAME, floor) >= 2:
+            return best, asked
+    # A deep and narrow valley is found again from about its end, or it is not confirmed.
+    many, first, keep, last = _AGAIN
+    x = spread_starts(best.x[:1], box, many, reach=5.0) if best is not None else start
+    best, more = _round(misfit, x, box, (first, keep, last), best)
+    return best, asked + more
+
+
+def _round(
+    misfit: Misfit, x: Array, box: Box, plan: tuple[int, int, int], best: Descent | None
+) -> tuple[Descent, int]:
+    # A round of starts, joined with where the best of earlier rounds ended.
+    first, keep, last = plan
+    early = descend(misfit, x, box, steps=first, tolerance=1e-4)
+    found = descend(misfit, early.x[:keep].copy(), box, steps=last, tolerance=1e-8)
+    if best is not None:
+        cost = np.concatenate([best.cost, found.cost])
+        order = np.argsort(cost, kind="stable")
+        found = Descent(x=np.concatenate([best.x, found.x])[order], cost=cost[order])
+    return found, len(x)
 
 
 def _reweight(misfit: Misfit, x: Array) -> tuple[Array, Array]:
