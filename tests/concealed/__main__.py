@@ -1,33 +1,104 @@
-"""`python -m tests.concealed draw | run | score | verify`: the proof on concealed effects, step by step."""
+"""`python -m tests.concealed draw | run | score | verify | real`: the proof on concealed effects, step by
+step."""
 
 from __future__ import annotations
 
 import argparse
+import datetime as dt
+import json
 import sys
 from pathlib import Path
+from typing import Any
 
+from tests.concealed import page
 from tests.concealed.batch import draw_batch, seed_of
+from tests.concealed.running import run_batch
+from tests.concealed.score import score_batch
 from tests.concealed.seal import SealError, verify
 
+TOOL = Path(sys.executable).with_name("toolkit")
 
-def main() -> int:
-    """Run one step; exit 1 where a seal is broken."""
+
+def _say(text: str) -> None:
+    print(f"\r\033[K{text}", end="", file=sys.stderr, flush=True)  # noqa: T201
+
+
+def _log(path: Path, score: dict[str, Any], batch: dict[str, Any], changed: str) -> list[dict[str, Any]]:
+    """Append a batch to the log and return the log; a batch stands in it once."""
+    rows = [json.loads(x) for x in path.read_text(encoding="utf-8").splitlines()] if path.exists() else []
+    if batch["answers_sha256"] not in {r["answers_sha256"] for r in rows}:
+        met = f"{sum(b.met is True for b in score['bars'])} of {len(score['bars'])}"
+        rows.append({
+            "date": dt.datetime.now(tz=dt.UTC).date().isoformat(), "cases": score["cases"],
+                "bars": met,
+            "answers_sha256": batch["answers_sha256"], "data_sha256": batch["data_sha256"],
+                "changed": changed,
+            "figures": {b.title: b.observed for b in score["bars"]},
+        })  # fmt: skip
+        path.write_text("".join(json.dumps(r) + "\n" for r in rows), encoding="utf-8")
+    return rows
+
+
+def _score(given: argparse.Namespace) -> None:
+    score = score_batch(given.out, workers=given.workers, progress=_say)
+    batch = verify(given.out)
+    if given.log:
+        score["log"] = _log(given.log, score, batch, given.changed)
+    real = given.out / "real" / "real.json"
+    if real.exists():
+        score["real"] = json.loads(real.read_text(encoding="utf-8"))
+    target = given.proof or given.out
+    target.mkdir(parents=True, exist_ok=True)
+    (target / "PROOF.md").write_text(page.markdown(score, batch), encoding="utf-8")
+    (target / "proof.html").write_text(page.page(score, batch), encoding="utf-8")
+    for bar in score["bars"]:
+        state = {True: "met    ", False: "NOT MET", None: "too few"}[bar.met]
+        print(f"{state}  {bar.title}: {bar.observed} ({bar.asked})")  # noqa: T201
+
+
+def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="python -m tests.concealed", description=__doc__)
     steps = parser.add_subparsers(dest="step", required=True)
     draw = steps.add_parser("draw", help="draw a batch and seal its answers")
     draw.add_argument("--seed", default="os", help='a number, or "os": nobody chose it (default)')
-    draw.add_argument("--cases", type=int, default=400)
+    draw.add_argument("--cases", type=int, default=400, help="without the negative controls, 6 %% more")
+    run = steps.add_parser("run", help="run the tool once on every case; resumable")
+    score = steps.add_parser("score", help="open, score and write PROOF.md and proof.html")
+    score.add_argument("--proof", type=Path, help="folder of PROOF.md and proof.html (default: the batch's)")
+    score.add_argument("--log", type=Path, help="file of batches to append to (one JSON object a line)")
+    score.add_argument("--changed", default="", help="what changed since the batch before, for the log")
+    real = steps.add_parser("real", help="make and run the cases of public recordings")
+    real.add_argument("--data", type=Path, required=True, help="folder of the recordings")
     check = steps.add_parser("verify", help="compare a batch with its seal")
-    for step in (draw, check):
+    for step in (run, real):
+        step.add_argument("--tool", default=str(TOOL), help="the command (default: the one of this Python)")
+        step.add_argument("--budget", type=float, default=600.0, help="seconds for one case")
+    for step in (draw, run, score, real, check):
         step.add_argument("--out", type=Path, required=True, help="the batch's folder")
         step.add_argument("--workers", type=int, default=2)
-    given = parser.parse_args()
+    return parser
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Run one step; exit 1 where a seal is broken."""
+    given = _parser().parse_args(argv)
     try:
         if given.step == "draw":
-            show = lambda n: print(f"\r{n}/{given.cases}", end="", file=sys.stderr, flush=True)  # noqa: E731, T201
+            show = lambda n: _say(f"{n} drawn")  # noqa: E731
             found = draw_batch(
                 given.out, seed=seed_of(given.seed), cases=given.cases, workers=given.workers, progress=show
             )
+        elif given.step == "run":
+            run_batch(given.out, tool=[given.tool], workers=given.workers, budget=given.budget, progress=_say)
+            return 0
+        elif given.step == "score":
+            _score(given)
+            return 0
+        elif given.step == "real":
+            from tests.concealed.real import run_real
+
+            run_real(given.data, given.out / "real", tool=[given.tool], budget=given.budget, progress=_say)
+            return 0
         else:
             found = verify(given.out)
     except SealError as error:

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from tests.concealed import controls
 from tests.concealed import size as sizing
 from tests.concealed.catalogue import CONFOUNDED, FAMILIES, Confounded
 from tests.concealed.files import missing
@@ -15,6 +16,8 @@ from tests.concealed.model import Array, Params, Scenario
 from tests.concealed.noise import coloured, converter, spikes
 
 MIX = {"single": 0.34, "two": 0.10, "null": 0.38, "outside": 0.10, "confounded": 0.08}
+CONTROLS = 0.06
+"""Negative controls, beyond the mix."""
 LARGEST_MODEL_ERROR = 1.0
 """A null's systematic error over the whole recording, in noise sd: below it no test can see it."""
 ALIKE = 4.0
@@ -39,6 +42,8 @@ class Drawn:
     predicted: list[dict[str, Array]]
     """What the outputs of the files to predict truly do, without noise."""
     answer: dict[str, Any]
+    effects: dict[str, dict[str, Any]]
+    """What is in it, in the truth's own terms."""
 
 
 class RedrawError(Exception):
@@ -46,21 +51,27 @@ class RedrawError(Exception):
 
 
 def mix(n: int, rng: np.random.Generator) -> list[str]:
-    """Return the kinds of `n` cases in drawn order: shares by largest remainder."""
+    """Return the kinds of `n` cases in drawn order (shares by largest remainder), and controls beyond
+    them."""
     exact = {k: n * v for k, v in MIX.items()}
     count = {k: int(v) for k, v in exact.items()}
     for k in sorted(exact, key=lambda k: count[k] - exact[k])[: n - sum(count.values())]:
         count[k] += 1
-    kinds = [k for k, m in count.items() for _ in range(m)]
-    return [kinds[i] for i in rng.permutation(n)]
+    kinds = [k for k, m in count.items() for _ in range(m)] + ["control"] * round(CONTROLS * n)
+    return [kinds[i] for i in rng.permutation(len(kinds))]
 
 
 def _log_uniform(rng: np.random.Generator, low: float, high: float) -> float:
     return float(np.exp(rng.uniform(np.log(low), np.log(high))))
 
 
-def _pick(rng: np.random.Generator, bucket: str) -> tuple[str, Confounded | None, tuple[str, ...]]:
+def _pick(
+    rng: np.random.Generator, bucket: str, control: str
+) -> tuple[str, Confounded | None, tuple[str, ...]]:
     """Return the family, the class it is drawn for, and the effects to put in."""
+    if control:
+        family, name = controls.KINDS[control][int(rng.integers(len(controls.KINDS[control])))]
+        return family, None, (name,)
     if bucket == "confounded":
         group = CONFOUNDED[str(rng.choice(list(CONFOUNDED)))]
         return group.family, group, (str(rng.choice(group.present)),)
@@ -157,19 +168,45 @@ def _recorded(
     return out
 
 
-def draw_case(seed: int, index: int, bucket: str) -> Drawn:
-    """Return the case; the same seed, index and kind give the same bytes."""
+def _as_control(drawn: Drawn, control: str, rng: np.random.Generator) -> Drawn:
+    """Return the case with its trace destroyed; its answer holds no effect."""
+    s, measured = drawn.scenario, drawn.measured
+    if control == "permuted metadata":
+        s = controls.permuted(s, drawn.answer["effects"][0]["name"])
+    elif control == "swapped labels":
+        s = controls.swapped(s)
+    else:
+        p = s.true_parameters()
+        there = sizing.truth_of(s, s.runs, p, drawn.effects)
+        without = sizing.truth_of(s, s.runs, p, {})
+        measured = []
+        for row, bare in zip(there, without, strict=True):
+            noise = {k: coloured(s.noise[k], y.size, rng) for k, y in row.items()}
+            measured.append({
+                k: bare[k] + controls.phase_randomised(y - bare[k], rng) + noise[k] for k, y in row.items()
+            })  # fmt: skip
+    was = drawn.answer["effects"]
+    answer = drawn.answer | {"control": control, "was": was, "effects": []}
+    return Drawn(scenario=s, measured=measured, predicted=drawn.predicted, answer=answer, effects={})
+
+
+def draw_case(seed: int, index: int, bucket: str, *, compare: bool = True) -> Drawn:
+    """Return the case; the same seed, index and kind give the same bytes.
+
+    `compare` False leaves out the list of effects alike, which costs most of the time.
+    """
     for attempt in range(60):
         rng = np.random.default_rng([seed, index, attempt])
         try:
-            return _draw(rng, bucket)
+            return _draw(rng, bucket, compare)
         except RedrawError:
             continue
     raise RuntimeError(f"no draw of kind {bucket} met its conditions (case {index})")
 
 
-def _draw(rng: np.random.Generator, bucket: str) -> Drawn:
-    family, group, names = _pick(rng, bucket)
+def _draw(rng: np.random.Generator, bucket: str, compare: bool) -> Drawn:
+    control = str(rng.choice(list(controls.KINDS))) if bucket == "control" else ""
+    family, group, names = _pick(rng, bucket, control)
     needs = frozenset(names) | (group.needs if group else frozenset())
     s = (group or FAMILIES[family]).build(rng, needs)
     p = s.true_parameters()
@@ -178,7 +215,12 @@ def _draw(rng: np.random.Generator, bucket: str) -> Drawn:
     error = sizing.size_of(s, sizing.difference(without, sizing.nominal_of(s, s.runs, p)), slopes)
     if error.distance > LARGEST_MODEL_ERROR:
         raise RedrawError
-    low, high = {"outside": (0.5, 8.0), "confounded": (1.0, 8.0), "two": (0.7, 6.0)}.get(bucket, (0.1, 8.0))
+    low, high = {
+        "outside": (0.5, 8.0),
+        "confounded": (1.0, 8.0),
+        "two": (0.7, 6.0),
+        "control": (1.5, 6.0),
+    }.get(bucket, (0.1, 8.0))
     effects, rows = {}, []
     for name in names:
         wanted = _log_uniform(rng, low, high)
@@ -200,7 +242,7 @@ def _draw(rng: np.random.Generator, bucket: str) -> Drawn:
     near: dict[str, float] = {}
     if bucket == "outside" and _largest_cosine(s, sizing.difference(truth, without), without, slopes) > 0.8:
         raise RedrawError
-    if bucket == "single" and rows[0]["name"] not in _ONE_SIZE:
+    if compare and bucket == "single" and rows[0]["name"] not in _ONE_SIZE:
         near = _alike(s, names[0], truth, without, slopes, total.distance)
     lost = 0.01 if rng.random() < 0.2 else 0.0
     measured = [_recorded(s, row, effects, lost, rng) for row in _before_converter(s, p, effects)]
@@ -221,4 +263,5 @@ def _draw(rng: np.random.Generator, bucket: str) -> Drawn:
         "lost": lost,
     }
     predicted = sizing.truth_of(s, s.predict, p, effects)
-    return Drawn(scenario=s, measured=measured, predicted=predicted, answer=answer)
+    drawn = Drawn(scenario=s, measured=measured, predicted=predicted, answer=answer, effects=effects)
+    return _as_control(drawn, control, rng) if bucket == "control" else drawn

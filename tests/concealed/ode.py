@@ -53,7 +53,7 @@ def truth(rates: Rates, x0: Array, t: Array, u: dict[str, Array], *, longest: fl
         return rates(at, x, dict(zip(names, now.tolist(), strict=True)))
 
     found = solve_ivp(
-        rhs, (t[0], t[-1]), x0, method="LSODA", t_eval=t, rtol=1e-7, atol=1e-9, max_step=longest
+        rhs, (t[0], t[-1]), x0, method="LSODA", t_eval=t, rtol=1e-6, atol=1e-8, max_step=longest
     )
     if not found.success:
         raise RuntimeError(found.message)

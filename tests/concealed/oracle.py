@@ -31,7 +31,7 @@ class Ceiling:
     """The true structure fitted to the same training data."""
 
 
-def _rmse(found: Signals, truth: Signals, outputs: tuple[str, ...]) -> dict[str, float]:
+def rmse_of(found: Signals, truth: Signals, outputs: tuple[str, ...]) -> dict[str, float]:
     return {
         k: float(
             np.sqrt(np.mean(np.concatenate([f[k] - t[k] for f, t in zip(found, truth, strict=True)]) ** 2))
@@ -132,9 +132,9 @@ def ceiling(s: Scenario, measured: Signals, effects: Effects, truth: Signals) ->
     d = fitted(s, model, measured, start, np.concatenate([np.ones(n), np.zeros(m)]), steps=2)
     best = truth_of(s, s.predict, _parameters(s, d[:n], "true"), _effects_at(effects, keys, d[n:]))
     return Ceiling(
-        declared=_rmse(nominal_of(s, s.predict, s.declared_parameters()), truth, s.outputs),
-        refitted=_rmse(nominal_of(s, s.predict, refit(s, measured)), truth, s.outputs),
-        oracle=_rmse(best, truth, s.outputs),
+        declared=rmse_of(nominal_of(s, s.predict, s.declared_parameters()), truth, s.outputs),
+        refitted=rmse_of(nominal_of(s, s.predict, refit(s, measured)), truth, s.outputs),
+        oracle=rmse_of(best, truth, s.outputs),
     )
 
 
