@@ -151,6 +151,7 @@ _DIMENSIONS = {
     "[mass] / [length] / [time] ** 2": ("pressure", "Pa"),
     "[temperature]": ("temperature", "K"),
     "[mass]": ("mass", "kg"),
+    "[mass] * [length] ** 2 / [time] ** 3 / [current]": ("voltage", "V"),
     "1 / [time]": ("frequency", "Hz"),
 }
 

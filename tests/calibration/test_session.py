@@ -161,6 +161,10 @@ BAD_SETTINGS = [
     ({"schema": "2"}, ConfigError, "schema"),
     ({"drop": '["D53"]'}, SessionError, "D53"),
     ({"temperature": '{ value = 20, unit = "N" }'}, UnitError, "temperature"),
+    ({"temperature": '{ value = -300, unit = "degC" }'}, ConfigError, "absolute zero"),
+    ({"cells": "{ D51 = { resolution = -1e-6 } }"}, ConfigError, "above zero"),
+    ({"cells": "{ D51 = { u = 0 } }"}, ConfigError, "above zero"),
+    ({"cells": '{ D51 = { excitation = { value = 10, unit = "mm" } } }'}, UnitError, "voltage"),
     ({"cells": '{ D59 = { serial = "1" } }'}, ConfigError, "did you mean 'D52'"),
 ]  # fmt: skip
 

@@ -246,6 +246,22 @@ def test_figures_that_cannot_be_written_stop_before_the_record(session: Path, tm
     assert not (tmp_path / "cal").exists()
 
 
+@pytest.mark.parametrize("option", ["--calibrations", "--out"])
+def test_a_new_registry_is_made_where_it_was_named(session: Path, tmp_path: Path, option: str) -> None:
+    folder = tmp_path / "new" / "lab" / "calibrations"
+    code, out = run(session, option, folder, "--json")
+    assert (code, Path(json.loads(out)["record"]["path"]).parent) == (0, folder / "cell2")
+    assert (folder / "cell2" / "cell2-r1.json").is_file()
+
+
+def test_a_registry_has_one_name(session: Path, tmp_path: Path) -> None:
+    with pytest.raises(ToolkitError) as caught:
+        run(session, "--calibrations", tmp_path / "one", "--out", tmp_path / "two")
+    assert (caught.value.rule, caught.value.exit_code) == ("usage", 2)
+    assert not (tmp_path / "one").exists()
+    assert not (tmp_path / "two").exists()
+
+
 @pytest.mark.skipif(os.geteuid() == 0, reason="root writes everywhere")
 def test_a_registry_that_is_not_writable(session: Path, tmp_path: Path) -> None:
     folder = tmp_path / "cal"

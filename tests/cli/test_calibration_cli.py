@@ -140,3 +140,12 @@ def test_text_for_people(run: Run, session: Path, capsys: pytest.CaptureFixture[
     text = capsys.readouterr().out
     for word in ("pair-r1", "candidate", "std error", "residual sd", "condition number", "approve pair-r1"):
         assert word in text
+    root = typer.Typer()
+    root.add_typer(calibration.app, name="calibration")
+    words = ["--in-force-from", "2026-02-02", "--checked-by", "B", "--calibrations", str(tmp_path / "cal")]
+    root(args=["calibration", "approve", "pair-r1", *words], standalone_mode=False)
+    capsys.readouterr()
+    root(args=["calibration", "show", "pair-r1", *words[-2:]], standalone_mode=False)
+    shown = capsys.readouterr().out
+    assert "verified      yes" in shown
+    assert "[" not in shown.split("ledger head")[0]

@@ -9,7 +9,8 @@ import typer
 
 from toolkit.cli.console import Calibrations, Home, Json, Quiet, answer, exit_code, finding_lines, table
 from toolkit.cli.fit_report import Figures, Full, check_folder, tell
-from toolkit.cli.home import calibrations_folder
+from toolkit.cli.home import registry_to_write
+from toolkit.errors import ConfigError
 
 if TYPE_CHECKING:
     from toolkit.calibration.registry.candidate import Candidate
@@ -27,15 +28,24 @@ def command(
     as_json: Json = False,
     quiet: Quiet = False,
 ) -> int:
-    """Fit a session: a candidate record and its diagnostics."""
+    """Fit a session: a candidate record and its diagnostics.
+
+    A class of ISO 376 is granted to a session of one indication and one load that states its preloads to
+    the largest load, "[standard] preloads = 3", and has runs at rotated mountings; rows are in time order.
+    """
     from toolkit.calibration.control.calibrate import calibrate
     from toolkit.calibration.registry.registry import Registry
 
-    folder = calibrations or out
-    if folder is not None and not folder.exists() and folder.parent.is_dir():
-        registry = Registry(folder)
-    else:
-        registry = Registry(calibrations_folder(folder, home))
+    if calibrations is not None and out is not None and calibrations != out:
+        raise ConfigError(
+            "the registry is named twice",
+            where="--calibrations, --out",
+            got=f"{calibrations} and {out}",
+            expected="one folder: --out is another name for --calibrations",
+            next_step="leave one of them out; nothing was written",
+            rule="usage",
+        )
+    registry = Registry(registry_to_write(calibrations or out, home))
     check_folder(figures)
     made = calibrate(session, registry)
     status = registry.status(made.record.id).state

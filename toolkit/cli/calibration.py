@@ -18,7 +18,7 @@ from toolkit.cli import (
     calibration_standard,
 )
 from toolkit.cli.console import Calibrations, Home, Json, Quiet, answer, exit_code, finding_lines, table
-from toolkit.cli.home import calibrations_folder
+from toolkit.cli.home import calibrations_folder, registry_to_write
 from toolkit.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -87,7 +87,7 @@ def show(
     registry = _registry(calibrations, home)
     record = registry.load(record_id)
     row = _row(record, registry.status(record_id, known_at=_day(known_at, "--known-at")))
-    lines = [f"{key:<14}{value}" for key, value in row.items() if value not in (None, "", [])]
+    lines = [f"{key:<14}{_plainly(value)}" for key, value in row.items() if value not in (None, "", [])]
     told, more = described(record, registry.folder)
     head = registry.head(record.instrument)
     lines += [f"{'ledger head':<14}{head}", *more]
@@ -166,8 +166,9 @@ def import_record(
 ) -> int:
     """Enter a legacy record: coefficients without their data, marked unverified for ever."""
     from toolkit.calibration.registry.legacy import import_legacy
+    from toolkit.calibration.registry.registry import Registry
 
-    registry = _registry(calibrations, home)
+    registry = Registry(registry_to_write(calibrations, home))
     record, existing = import_legacy(file, registry)
     path = registry.folder / record.instrument / f"{record.id}.json"
     payload = {**_row(record, registry.status(record.id)), "existing": existing, "path": str(path)}
@@ -284,6 +285,12 @@ def _day(text: str | None, option: str) -> dt.date | None:
             f"{option} is no date", where=option, got=text, expected="YYYY-MM-DD",
             next_step="write it as in 2026-03-31", rule="usage",
         ) from error  # fmt: skip
+
+
+def _plainly(value: object) -> object:
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    return "; ".join(map(str, value)) if isinstance(value, list) else value
 
 
 def _void(status: RecordStatus) -> str | None:

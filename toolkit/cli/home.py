@@ -52,6 +52,13 @@ def calibrations_folder(calibrations: Path | None = None, home: Path | None = No
     return calibrations.resolve()
 
 
+def registry_to_write(calibrations: Path | None = None, home: Path | None = None) -> Path:
+    """Return the registry folder of a command that enters a record: one that was named may yet be made."""
+    if calibrations is not None and not calibrations.exists():
+        return calibrations.absolute()
+    return calibrations_folder(calibrations, home)
+
+
 def _no_home(where: Path) -> ConfigError:
     return ConfigError(
         "no laboratory home was found",

@@ -109,7 +109,7 @@ def bridge_of(name: str, cell: Mapping[str, Any], *, where: object) -> Bridge:
     if "excitation" in cell:
         entry = cell["excitation"]
         excitation = (
-            quantity(entry, unit("V").dimension, f"{where}: cells.{name}.excitation")
+            quantity(entry, "voltage", f"{where}: cells.{name}.excitation")
             if isinstance(entry, dict)
             else entry
         )
@@ -185,6 +185,4 @@ def _positive(value: object, entry: object, key: str, where: object, expected: s
 
 
 def _is_voltage(text: str) -> bool:
-    dimension = unit(text).dimension
-    # A unit of force or a ratio is known without the table of all units; only others ask for it.
-    return dimension.startswith("[mass] * [length] ** 2") and dimension == unit("V").dimension
+    return unit(text).dimension == "voltage"

@@ -102,15 +102,20 @@ def check_statements(raw: Mapping[str, Any], table: Table, loads: tuple[str, ...
     for name, cell in cells.items():
         bridge, column = scope.bridges[name], scope.columns[name]
         for key in ("resolution", "u"):
-            if key in cell:
-                bridge.stated(cell[key], f"cells.{name}.{key}", column=column, target=scope.unit(name))
+            if key not in cell:
+                continue
+            place = f"cells.{name}.{key}"
+            if not bridge.stated(cell[key], place, column=column, target=scope.unit(name)) > 0:
+                raise wrong(where, place, cell[key], "a number above zero; leave out what is not known")
         temperature_effect(cell.get("temperature_coefficient"), bridge, column, scope.unit(name))
         shunt_entry(name, cell, scope)
     _check_reference(raw.get("reference", {}), table, loads, where)
     zero_entries(zero_readings(raw), scope)
     creep_entries(raw.get("creep", []), scope)
     if "temperature" in raw:
-        quantity(raw["temperature"], "temperature", f"{where}: temperature")
+        kelvin = quantity(raw["temperature"], "temperature", f"{where}: temperature")
+        if not kelvin > 0:
+            raise wrong(where, "temperature", raw["temperature"], "a temperature above absolute zero")
 
 
 def temperature_effect(
