@@ -127,7 +127,7 @@ def run(task: Task, coarse: Measured, count: Array, width: float) -> Found:
     descent, starts = _search(search, start)
     floor = _EXACT * float(np.sum((search.y * search.weight) ** 2))
     agreeing = descent.agreeing(_SAME, floor)
-    x = descent.x[:1]
+    x = descend(search, descent.x[:1].copy(), search.box(), steps=30, tolerance=1e-10).x
     on_rows = len(coarse) == len(task.data)
     cheap = len(task.data) * task.model.grid * (len(task.free) + 1) <= _POLISH
     if task.robust:
@@ -200,7 +200,7 @@ def _round(
     # A round of starts, joined with where the best of earlier rounds ended.
     first, keep, last = plan
     early = descend(misfit, x, box, steps=first, tolerance=1e-4)
-    found = descend(misfit, early.x[:keep].copy(), box, steps=last, tolerance=1e-8)
+    found = descend(misfit, early.x[:keep].copy(), box, steps=last, tolerance=1e-6)
     if best is not None:
         cost = np.concatenate([best.cost, found.cost])
         order = np.argsort(cost, kind="stable")
