@@ -32,7 +32,7 @@ class Choices:
 
     def on(self, instrument: str, day: dt.date | None) -> Choice:
         """Return what the registry offers for an instrument and a day; None: a test without a date."""
-        edges = self._days(instrument)
+        edges = self.days(instrument)
         key = (instrument, None if day is None else bisect.bisect_right(edges, day))
         if key not in self._made:
             first = self._made.get((instrument, None))
@@ -52,7 +52,8 @@ class Choices:
             self._screens[key] = screen_of(self.on(instrument, None).records, columns)
         return self._screens[key]
 
-    def _days(self, instrument: str) -> tuple[dt.date, ...]:
+    def days(self, instrument: str) -> tuple[dt.date, ...]:
+        """Return the days on which the record in force may change."""
         if instrument not in self._edges:
             try:
                 entries = self.registry.ledger(instrument).entries

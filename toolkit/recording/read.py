@@ -9,7 +9,7 @@ from toolkit.errors import RecordingError, UnreadableError
 from toolkit.machine import Machine
 from toolkit.recording.csvfile import read_csv
 from toolkit.recording.gate import gate
-from toolkit.recording.marks import OWN_OUTPUT, SIMULATED, keywords_of, machine_named, saved_on
+from toolkit.recording.marks import OWN_OUTPUT, RECORDING, SIMULATED, keywords_of, machine_named, saved_on
 from toolkit.recording.model import Recording
 from toolkit.recording.table import read_table
 from toolkit.recording.xlsx import read_sheet
@@ -66,7 +66,7 @@ def read_recording(
         series=series,
         simulated=machine.simulated or SIMULATED in keywords,
         format="xlsx",
-        saved=saved_on(properties),
+        saved=None if RECORDING in keywords else saved_on(properties),  # the toolkit's own stamp is no day
     )
 
 

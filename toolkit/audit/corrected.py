@@ -1,0 +1,203 @@
+"""Corrected copies: each recording whose Fy and Mz are not those of the record in force, with those that are.
+
+The originals are only read. A copy has the same name and columns; every number but Fy and Mz is the
+original's, and those two are the record's, in full. An index beside the copies says which file each
+replaces, by its hash, and which record computed it.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import os
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from toolkit.audit.columns import columns_of
+from toolkit.audit.context import context_of
+from toolkit.audit.identify import recompute
+from toolkit.errors import OutputError, ToolkitError
+from toolkit.files import sha256_bytes, sha256_file, write_atomic
+from toolkit.recording.folder import TEST_FILE, nearest_test_toml
+from toolkit.recording.labview import write_labview
+from toolkit.recording.marks import GENERATOR, OWN_OUTPUT
+from toolkit.recording.read import read_recording
+from toolkit.units import from_si, si_scale
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from toolkit.audit.archive import ArchiveAudit
+    from toolkit.calibration.records.record import CalibrationRecord
+    from toolkit.calibration.registry.registry import Registry
+    from toolkit.recording.model import Recording
+
+INDEX = "corrected.json"
+_CLEAN = ("exact", "rounding")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Copy:
+    """One corrected copy; ``reason`` tells why there is none, and then ``sha256`` is None."""
+
+    path: str
+    replaces: str
+    record: str
+    record_sha256: str
+    sha256: str | None
+    reason: str | None = None
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the copy under the keys of the answer."""
+        return {
+            "path": self.path,
+            "replaces_sha256": self.replaces,
+            "sha256": self.sha256,
+            "record": self.record,
+            "record_sha256": self.record_sha256,
+            "reason": self.reason,
+        }
+
+
+def check_target(archive: Path, target: Path) -> None:
+    """Refuse a folder in which a copy could meet an original.
+
+    Raises
+    ------
+    OutputError
+        ``repair-target``: the folder is the archive, inside it, or around it; or it holds other files
+    """
+    one, other = archive.resolve(), target.resolve()
+    if one == other or one in other.parents or other in one.parents:
+        raise _refused(target, f"the archive is {one}", "a folder apart from the archive")
+    if target.exists() and not target.is_dir():
+        raise _refused(target, "a file", "a folder")
+    if target.is_dir() and any(target.iterdir()) and not (target / INDEX).is_file():
+        raise _refused(target, "a folder with other files", f"an empty folder, or one with {INDEX} of before")
+
+
+def write_copies(
+    made: ArchiveAudit, registry: Registry, target: Path, *, step: Callable[[str], None] = lambda _: None
+) -> tuple[Copy, ...]:
+    """Write the corrected copies of an audited archive, and their index; return all of them.
+
+    Files without a record in force, and those that are right, have no copy.
+
+    Raises
+    ------
+    OutputError
+        see `check_target`; or a copy cannot be written
+    """
+    check_target(made.archive, target)
+    records: dict[str, CalibrationRecord] = {}
+    copies: list[Copy] = []
+    for plain in made.files.plain():
+        if plain["repair"] is None or plain["grade"] in _CLEAN or not plain["units"]:
+            continue
+        identity = plain["in_force"]
+        if identity not in records:
+            records[identity] = registry.load(identity)
+        copies.append(_copy(made.archive, plain, records[identity], target))
+        step(plain["path"])
+    told = {
+        "generator": GENERATOR,
+        "marks": OWN_OUTPUT,
+        "schema": 1,
+        "known_at": made.known_at.isoformat(),
+        "heads": dict(made.heads),
+        "files": [one.as_dict() for one in copies],
+    }
+    write_atomic(target / INDEX, json.dumps(told, indent=2) + "\n")
+    return tuple(copies)
+
+
+def _copy(archive: Path, plain: Mapping[str, Any], record: CalibrationRecord, target: Path) -> Copy:
+    path, place = archive / plain["path"], target / plain["path"]
+    failed: str | None = None
+    sha256: str | None = None
+    if not place.parent.resolve().is_relative_to(target.resolve()):
+        raise _refused(place.parent, "a link that leads outside", "a plain folder")
+    try:
+        context = context_of(path)
+        recording = read_recording(path, context.machine)
+        if recording.sha256 != plain["sha256"]:
+            failed = "the file changed since it was audited"
+        else:
+            columns = columns_of(recording)
+            _write(place, recording, recompute(columns, record), record)
+            sha256 = sha256_file(place)
+            _keep_test(path, archive, target)
+    except OutputError:
+        raise
+    except ToolkitError as error:
+        failed = f"{error.rule}: {error.what}"
+    return Copy(
+        path=plain["path"],
+        replaces=plain["sha256"],
+        record=record.id,
+        record_sha256=record.sha256,
+        sha256=sha256,
+        reason=failed,
+    )
+
+
+def _write(
+    place: Path, recording: Recording, new: Mapping[str, NDArray[np.float64]], record: CalibrationRecord
+) -> None:
+    place.parent.mkdir(parents=True, exist_ok=True)
+    if recording.format == "csv":
+        write_atomic(place, _csv(recording, new))
+        return
+    machine = recording.machine
+    known = {column.symbol: column.unit for column in machine.columns}
+    columns: dict[str, NDArray[np.float64]] = {}
+    for one in recording.series:
+        if one.symbol in known:
+            unit, name = known[one.symbol], one.symbol
+        else:
+            unit, name = one.unit, f"{one.symbol} [{one.unit}]"
+        values = one.values if unit == one.unit else from_si(one.si, unit)
+        columns[name] = np.asarray(from_si(new[one.symbol], unit) if one.symbol in new else values)
+    title = f"corrected copy of {recording.name}, sha256 {recording.sha256}; Fy and Mz by {record.id}"
+    write_labview(place, machine, columns, simulated=recording.simulated, title=title)
+
+
+def _csv(recording: Recording, new: Mapping[str, NDArray[np.float64]]) -> str:
+    stream = io.StringIO()
+    writer = csv.writer(stream, lineterminator="\n")
+    # A header that a spreadsheet would take for a formula is made a text.
+    headers = [one.header for one in recording.series]
+    writer.writerow([f"'{text}" if text.startswith(("=", "+", "-", "@")) else text for text in headers])
+    columns = [
+        new[one.symbol] / si_scale(one.unit) if one.symbol in new else one.values for one in recording.series
+    ]
+    writer.writerows([repr(float(v)) for v in row] for row in np.column_stack(columns))
+    return stream.getvalue()
+
+
+def _keep_test(path: Path, archive: Path, target: Path) -> None:
+    # The test's own test.toml goes along, as it is: without it a copy has no date and no machine.
+    toml = nearest_test_toml(path.parent)
+    root = Path(os.path.abspath(archive))  # noqa: PTH100  resolve() would follow links
+    if toml is None or root not in toml.parents:
+        return
+    place = target / toml.parent.relative_to(root) / TEST_FILE
+    data = toml.read_bytes()
+    if not place.is_file() or sha256_bytes(place.read_bytes()) != sha256_bytes(data):
+        write_atomic(place, data)
+
+
+def _refused(target: Path, got: str, expected: str) -> OutputError:
+    return OutputError(
+        "corrected copies cannot be written there",
+        where=target,
+        got=got,
+        expected=expected,
+        next_step="name another folder with --repair; the originals are never touched",
+        rule="repair-target",
+    )

@@ -1,0 +1,230 @@
+"""Reports of past years: which tests they rest on, by manifest, by file hash or by the test's name.
+
+A CSV file names them: a column ``report`` and one or both of ``test`` (the name or the path of a test's
+folder) and ``sha256`` (of a recording). A folder is searched: a ``manifest.json`` that the toolkit wrote
+names the recordings of the report beside it; any other document is linked where its path has the name of a
+test's folder as whole words.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import os
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from toolkit.errors import ConfigError
+from toolkit.files import check_keys, read_bytes
+from toolkit.recording.archive import MAX_FILE_BYTES
+from toolkit.recording.marks import GENERATOR
+
+if TYPE_CHECKING:
+    from toolkit.audit.archive import ArchiveAudit
+
+DOCUMENTS = (".docx", ".doc", ".pdf", ".odt", ".rtf", ".xlsx", ".xls", ".html", ".htm", ".txt", ".md")
+_COLUMNS = ("report", "test", "sha256")
+_SHA = re.compile(r"[0-9a-fA-F]{64}")
+_CLEAN = ("exact", "rounding")
+
+
+@dataclass(slots=True, kw_only=True, eq=False)
+class PastReport:
+    """A report and what it says of its origin; ``words`` are those in which a test's name may stand.
+
+    ``id`` is that of its manifest; ``tests``, ``files`` and ``not_clean`` are filled when it is linked.
+    """
+
+    report: str
+    id: str | None = None
+    words: str | None = None
+    named: set[str] = field(default_factory=set)
+    hashes: set[str] = field(default_factory=set)
+    calibrations: tuple[str, ...] = ()
+    linked_by: set[str] = field(default_factory=set)
+    tests: set[str] = field(default_factory=set)
+    files: int = 0
+    not_clean: int = 0
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the report under the keys of the answer."""
+        return {
+            "report": self.report,
+            "id": self.id,
+            "linked_by": sorted(self.linked_by),
+            "calibrations": list(self.calibrations),
+            "tests": sorted(self.tests),
+            "files": self.files,
+            "not_clean": self.not_clean,
+            "to_amend": self.not_clean > 0,
+        }
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Linked:
+    """Every report, and the tests of the archive that no report rests on (*report unknown*)."""
+
+    reports: tuple[PastReport, ...]
+    unknown: tuple[str, ...]
+
+    def of_test(self, test: str | None) -> list[str]:
+        """Return the reports that rest on a test."""
+        return [one.report for one in self.reports if test in one.tests]
+
+
+def read_reports(source: Path) -> tuple[PastReport, ...]:
+    """Return the reports that a folder holds, or a CSV file names; no link is followed.
+
+    Raises
+    ------
+    ConfigError
+        there is no such folder or file, or the CSV file has other columns or a hash that is none
+    """
+    if source.is_dir():
+        return tuple(_of_folder(source))
+    return tuple(_of_csv(source))
+
+
+def link(made: ArchiveAudit, reports: tuple[PastReport, ...]) -> Linked:
+    """Link reports to the tests of an audited archive, each report by all that it says."""
+    by_hash: dict[str, list[PastReport]] = {}
+    for one in reports:
+        for sha256 in one.hashes:
+            by_hash.setdefault(sha256, []).append(one)
+    tests: dict[str, tuple[int, int]] = {}
+    for plain in made.files.plain():
+        test = plain["test"]
+        dirty = plain["grade"] not in _CLEAN
+        if test is not None:
+            n, bad = tests.get(test, (0, 0))
+            tests[test] = (n + 1, bad + dirty)
+        for one in by_hash.get(plain["sha256"] or "", ()):
+            one.linked_by.add("sha256" if one.id is None else "manifest")
+            if test is not None:
+                one.tests.add(test)
+            else:
+                one.files += 1
+                one.not_clean += dirty
+    names: dict[str, list[str]] = {}
+    for test in tests:
+        names.setdefault(_words(_last(test, made.archive)), []).append(test)
+    for one in reports:
+        for test in _by_name(one, names):
+            one.tests.add(test)
+            one.linked_by.add("test")
+        for test in one.tests:
+            one.files += tests[test][0]
+            one.not_clean += tests[test][1]
+    taken = {test for one in reports for test in one.tests}
+    return Linked(reports=reports, unknown=tuple(sorted(set(tests) - taken)))
+
+
+def _by_name(one: PastReport, names: Mapping[str, list[str]]) -> Iterator[str]:
+    if one.linked_by & {"manifest", "sha256"}:
+        return  # what a report says of its files is better than what it is called
+    texts = [_words(name) for name in one.named] if one.named else [one.words or ""]
+    for text in texts:
+        for name, tests in names.items():
+            if not name or not (text == name or f" {name} " in f" {text} "):
+                continue
+            # Tests of the same name in different folders: those whose folders are named too, if any are.
+            inside = [test for test in tests if f" {_words(test)} " in f" {text} "]
+            yield from inside or tests
+
+
+def _last(test: str, archive: Path) -> str:
+    return archive.absolute().name if test == "." else test.rpartition("/")[2]
+
+
+def _words(text: str) -> str:
+    return " ".join(re.findall(r"[^\W_]+", text.casefold()))
+
+
+def _of_csv(source: Path) -> Iterator[PastReport]:
+    try:
+        text = read_bytes(source).decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise _bad(source, f"byte {error.start} is no UTF-8", "a CSV file in UTF-8") from error
+    try:
+        rows = list(csv.DictReader(io.StringIO(text, newline=""), strict=True))
+        header = next(iter(csv.reader([text.splitlines()[0]]))) if text.strip() else []
+    except csv.Error as error:
+        raise _bad(source, str(error), "values separated by commas") from error
+    check_keys(dict.fromkeys(header), _COLUMNS, where=source)
+    if "report" not in header or len(header) < 2:
+        raise _bad(source, ", ".join(header) or "nothing", "the columns report and test, sha256, or both")
+    found: dict[str, PastReport] = {}
+    for number, row in enumerate(rows, start=2):
+        name = (row.get("report") or "").strip()
+        test, sha256 = ((row.get(key) or "").strip() for key in ("test", "sha256"))
+        if not name or not (test or sha256):
+            raise _bad(source, f"row {number}: no report, or neither test nor sha256", "both in every row")
+        if sha256 and not _SHA.fullmatch(sha256):
+            raise _bad(source, f"row {number}: {sha256[:80]!r}", "64 hexadecimal digits")
+        one = found.setdefault(name, PastReport(report=name))
+        one.named |= {test} - {""}
+        one.hashes |= {sha256.lower()} - {""}
+    yield from found.values()
+
+
+def _of_folder(folder: Path) -> Iterator[PastReport]:
+    for place, folders, names in os.walk(folder):
+        folders[:] = sorted(name for name in folders if not (Path(place) / name).is_symlink())
+        manifests = [
+            _manifest(Path(place) / name, folder) for name in sorted(names) if name.endswith(".json")
+        ]
+        known = {name for one in manifests if one is not None for name in one[1]}
+        yield from (one[0] for one in manifests if one is not None)
+        for name in sorted(names):
+            path = Path(place) / name
+            if path.suffix.lower() in DOCUMENTS and name not in known and not path.is_symlink():
+                shown = path.relative_to(folder)
+                yield PastReport(report=shown.as_posix(), words=_words(shown.with_suffix("").as_posix()))
+
+
+def _manifest(path: Path, folder: Path) -> tuple[PastReport, set[str]] | None:
+    if path.is_symlink() or path.stat().st_size > MAX_FILE_BYTES:
+        return None
+    try:
+        told = json.loads(path.read_bytes())
+    except (OSError, ValueError, RecursionError):
+        return None
+    if not isinstance(told, dict) or told.get("generator") != GENERATOR or "inputs" not in told:
+        return None
+    outputs = {one.get("name") for one in _dicts(told.get("outputs"))}
+    made = PastReport(
+        report=path.parent.relative_to(folder).as_posix(),
+        id=str(told.get("report")),
+        hashes={one["sha256"].lower() for one in _dicts(told["inputs"]) if _is_sha(one.get("sha256"))},
+        calibrations=tuple(str(one.get("id")) for one in _dicts(told.get("calibrations"))),
+    )
+    return made, {name for name in outputs if isinstance(name, str)}
+
+
+def _dicts(value: Any) -> Iterator[dict[str, Any]]:
+    # Every object inside, whatever the lists and objects around it.
+    if isinstance(value, dict):
+        yield value
+        value = list(value.values())
+    if isinstance(value, list):
+        for one in value:
+            yield from _dicts(one)
+
+
+def _is_sha(value: object) -> bool:
+    return isinstance(value, str) and _SHA.fullmatch(value) is not None
+
+
+def _bad(source: Path, got: str, expected: str) -> ConfigError:
+    return ConfigError(
+        "the list of reports cannot be used",
+        where=source,
+        got=got,
+        expected=expected,
+        next_step="correct the file, or name a folder of reports",
+        rule="reports",
+    )

@@ -1,0 +1,203 @@
+"""The tests between the last good as-found result and the one that failed, and what the drift did to them.
+
+Nobody knows when between the two an instrument moved. As an estimate, the change that the failing session
+found is taken to have grown in proportion to the days: a test has that share of the difference between the
+record that the failing session led to and the record that was in force (ISO/IEC 17025:2017, 7.10: the extent
+of a nonconformity is evaluated; the interpolation is ours, not the standard's).
+"""
+
+from __future__ import annotations
+
+import datetime as dt
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from toolkit.audit.candidates import unfit
+from toolkit.audit.choices import Choices
+from toolkit.audit.columns import columns_of
+from toolkit.audit.context import context_of
+from toolkit.audit.identify import recompute
+from toolkit.audit.workers import Lost, run_isolated
+from toolkit.calibration.control.as_found import AsFound, as_found, as_found_history, phase_of
+from toolkit.calibration.registry.registry import Registry, instrument_of
+from toolkit.errors import ConfigError, ToolkitError
+from toolkit.recording.read import read_recording
+from toolkit.reduction.opened import split_blocks
+
+if TYPE_CHECKING:
+    from toolkit.audit.archive import ArchiveAudit
+    from toolkit.calibration.records.record import CalibrationRecord
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Drift:
+    """What lies between: ``good`` is the id that was named, ``failed`` the as-found result that failed.
+
+    ``later_good`` are as-found results between the two that were within tolerance.
+    """
+
+    instrument: str
+    good: str
+    good_date: dt.date
+    failed: AsFound
+    later_good: tuple[str, ...]
+
+    def share(self, day: dt.date) -> float | None:
+        """Return which part of the change a test of that day has; None outside of the stretch."""
+        span = (self.failed.date - self.good_date).days
+        since = (day - self.good_date).days
+        return since / span if 0 < since <= span else None
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the stretch under the keys of the answer."""
+        return {
+            "instrument": self.instrument,
+            "good": self.good,
+            "good_date": self.good_date.isoformat(),
+            "failed": self.failed.session_record,
+            "failed_date": self.failed.date.isoformat(),
+            "record_in_use": self.failed.record,
+            "later_good": list(self.later_good),
+            "loads": [
+                {"load": o.load, "unit": o.unit, "max_error": o.max_error, "tolerance": o.tolerance}
+                for o in self.failed.loads
+            ],
+        }
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DriftedFile:
+    """A recording of the stretch: its share of the days, and its share of the change.
+
+    ``FY_N`` and ``MZ_Nm`` are the largest of any row, ``conditions`` the means of the load blocks as
+    (first row, last row, FY [N], MZ [N·m]). ``reason`` tells why nothing could be computed.
+    """
+
+    path: str
+    date: dt.date
+    share: float
+    FY_N: float | None = None
+    MZ_Nm: float | None = None
+    conditions: tuple[tuple[int, int, float, float], ...] = ()
+    reason: str | None = None
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the file under the keys of the answer."""
+        return {
+            "path": self.path,
+            "date": self.date.isoformat(),
+            "share": self.share,
+            "FY_max_abs_N": self.FY_N,
+            "MZ_max_abs_Nm": self.MZ_Nm,
+            "conditions": [
+                {"first_row": a, "last_row": b, "FY_N": FY, "MZ_Nm": MZ} for a, b, FY, MZ in self.conditions
+            ],
+            "reason": self.reason,
+        }
+
+
+def drift_since(registry: Registry, good: str) -> Drift:
+    """Return the stretch from a good record to the next as-found result that failed.
+
+    ``good`` is the as-found session that was within tolerance, or the record that the instrument was
+    calibrated to.
+
+    Raises
+    ------
+    ConfigError
+        ``since-good``: the record is an as-found session that failed itself, or none failed after it
+    RegistryError, RecordError
+        there is no such record, or it fails a gate
+    """
+    instrument = instrument_of(good)
+    record = registry.load(good)
+    date = dt.date.fromisoformat(record.date)
+    if phase_of(record) == "as_found" and as_found(registry, record).within is not True:
+        raise _refused(good, "an as-found session that was out of tolerance itself", "one that was within")
+    after = [one for one in as_found_history(registry, instrument) if one.date > date]
+    failed = next((one for one in after if one.within is False), None)
+    if failed is None:
+        told = f"{len(after)} as-found sessions after {record.date}, none of them out of tolerance"
+        raise _refused(good, told, "a later as-found session out of tolerance")
+    between = tuple(one.session_record for one in after if one.date < failed.date and one.within)
+    return Drift(instrument=instrument, good=good, good_date=date, failed=failed, later_good=between)
+
+
+def drifted_files(
+    made: ArchiveAudit,
+    registry: Registry,
+    drift: Drift,
+    *,
+    workers: int = 1,
+    step: Callable[[str], None] = lambda _: None,
+) -> Iterator[DriftedFile]:
+    """Yield the recordings of the stretch, in the order in which they are done."""
+    days: dict[str, dt.date] = {}
+    for plain in made.files.plain():
+        if plain["instrument"] == drift.instrument and plain["date"] is not None:
+            day = dt.date.fromisoformat(plain["date"])
+            if drift.share(day) is not None:
+                days[plain["path"]] = day
+    make = partial(_Drifted, made.archive, registry, made.known_at, drift)
+    for name, result in run_isolated(make, tuple(days), workers=workers):
+        if isinstance(result, Lost):
+            share = drift.share(days[name]) or 0.0
+            yield DriftedFile(path=name, date=days[name], share=share, reason=result.reason)
+        else:
+            yield result
+        step(name)
+
+
+class _Drifted:
+    """Computes one file's share after another."""
+
+    def __init__(self, archive: Path, registry: Registry, known_at: dt.date, drift: Drift) -> None:
+        self.archive, self.drift = archive, drift
+        self.choices = Choices(registry=registry, known_at=known_at)
+        self.true: CalibrationRecord = registry.load(drift.failed.session_record)
+
+    def __call__(self, name: str) -> DriftedFile:
+        path = self.archive / name
+        context = context_of(path)
+        day = context.date or self.drift.good_date
+        share = self.drift.share(day) or 0.0
+        found = DriftedFile(path=name, date=day, share=share)
+        try:
+            recording = read_recording(path, context.machine)
+            blocks = () if context.is_tare else split_blocks(recording, context.machine)[0]
+        except ToolkitError as error:
+            return DriftedFile(path=name, date=day, share=share, reason=f"{error.rule}: {error.what}")
+        columns = columns_of(recording)
+        used = self.choices.on(context.machine.name, context.date).in_force
+        why = "no record was in force" if used is None else unfit(used, columns) or unfit(self.true, columns)
+        if used is None or why is not None or columns.loads != ("FY", "MZ"):
+            reason = why or "the file has not both Fy and Mz"
+            return DriftedFile(path=name, date=day, share=share, reason=reason)
+        old, new = recompute(columns, used), recompute(columns, self.true)
+        FY, MZ = (share * (new[load] - old[load]) for load in ("FY", "MZ"))
+        return DriftedFile(
+            path=found.path,
+            date=day,
+            share=share,
+            FY_N=float(np.abs(FY).max()),
+            MZ_Nm=float(np.abs(MZ).max()),
+            conditions=tuple(
+                (b.start + 1, b.stop, float(FY[b.rows].mean()), float(MZ[b.rows].mean())) for b in blocks
+            ),
+        )
+
+
+def _refused(good: str, got: str, expected: str) -> ConfigError:
+    return ConfigError(
+        "there is no stretch to look at",
+        where="--since-good",
+        got=f"{good}: {got}",
+        expected=expected,
+        next_step="see 'toolkit calibration chart' for the as-found results of the instrument",
+        rule="since-good",
+    )

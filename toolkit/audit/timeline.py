@@ -1,0 +1,78 @@
+"""The versions of a calibration over the years: when each record was in force, and what it computed."""
+
+from __future__ import annotations
+
+import datetime as dt
+from collections import Counter
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from toolkit.audit.choices import Choices
+
+if TYPE_CHECKING:
+    from toolkit.audit.archive import ArchiveAudit
+    from toolkit.calibration.registry.registry import Registry
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Stretch:
+    """Days on which a record is in force, as known on the audit's day; ``end`` excluded, None: still.
+
+    A record that is void on every day has its days as they were once decided, and ``void``.
+    """
+
+    record: str
+    begin: dt.date | None
+    end: dt.date | None
+    void: bool = False
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Timeline:
+    """One instrument: the stretches of its records, and (record or grade, YYYY-MM, grade) -> files."""
+
+    instrument: str
+    stretches: tuple[Stretch, ...]
+    counts: dict[tuple[str, str, str], int]
+    first: dt.date
+    last: dt.date
+
+
+def timelines(made: ArchiveAudit, registry: Registry) -> tuple[Timeline, ...]:
+    """Return the timeline of every instrument that the archive has dated files of."""
+    counts: dict[str, Counter[tuple[str, str, str]]] = {}
+    days: dict[str, tuple[str, str]] = {}
+    for one in made.files.plain():
+        instrument, date = one["instrument"], one["date"]
+        if instrument is None or date is None:
+            continue
+        who = one["record"] or one["grade"]
+        counts.setdefault(instrument, Counter())[who, date[:7], one["grade"]] += 1
+        first, last = days.get(instrument, (date, date))
+        days[instrument] = (min(first, date), max(last, date))
+    choices = Choices(registry=registry, known_at=made.known_at)
+    return tuple(
+        Timeline(
+            instrument=name,
+            stretches=_stretches(choices, name),
+            counts=dict(counts[name]),
+            first=dt.date.fromisoformat(days[name][0]),
+            last=dt.date.fromisoformat(days[name][1]),
+        )
+        for name in sorted(counts)
+    )
+
+
+def _stretches(choices: Choices, instrument: str) -> tuple[Stretch, ...]:
+    offered = choices.on(instrument, None)
+    edges = choices.days(instrument)
+    force = [choices.on(instrument, day).in_force for day in edges]
+    made: list[Stretch] = []
+    for status in sorted(offered.statuses, key=lambda one: (one.in_force_from or dt.date.max, one.id)):
+        if status.void_always:
+            made.append(Stretch(record=status.id, begin=status.in_force_from, end=None, void=True))
+            continue
+        held = [i for i, record in enumerate(force) if record is not None and record.id == status.id]
+        end = edges[held[-1] + 1] if held and held[-1] + 1 < len(edges) else None
+        made.append(Stretch(record=status.id, begin=edges[held[0]] if held else None, end=end))
+    return tuple(made)

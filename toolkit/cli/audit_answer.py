@@ -1,0 +1,171 @@
+"""The answer of `toolkit audit`: the JSON document, the text for people, and the files of ``--out``."""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from toolkit.cli.console import table
+
+if TYPE_CHECKING:
+    from toolkit.audit.archive import ArchiveAudit
+    from toolkit.audit.corrected import Copy
+    from toolkit.audit.linked import Linked
+    from toolkit.audit.since_good import Drift, DriftedFile
+    from toolkit.calibration.registry.registry import Registry
+
+PAGE, LINES = "audit.html", "audit.jsonl"
+_SHOWN, _WORST = 40, 6
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Answer:
+    """An audit and what was asked for besides; None where it was not."""
+
+    made: ArchiveAudit
+    linked: Linked | None
+    drift: Drift | None
+    drifted: tuple[DriftedFile, ...]
+    copies: tuple[Copy, ...] | None
+
+
+def payload_of(told: Answer) -> dict[str, Any]:
+    """Return the JSON document; what there may be many of are iterators."""
+    made = told.made
+    found: dict[str, Any] = {
+        "archive": made.archive,
+        "known_at": made.known_at.isoformat(),
+        "files": _files(told),
+        "summary": {"files": len(made.files), "grades": dict(made.grades), "undated": made.undated},
+        "tests": _tests(told),
+        "refused_records": [{"id": r.id, "rule": r.rule, "reason": r.reason} for r in made.refused],
+        "heads": dict(made.heads),
+        "findings": (finding.as_dict() for finding in made.findings),
+    }
+    if told.linked is not None:
+        found["reports"] = [one.as_dict() for one in told.linked.reports]
+        found["report_unknown"] = list(told.linked.unknown)
+    if told.drift is not None:
+        files = [one.as_dict() for one in told.drifted]
+        found["since_good"] = {**told.drift.as_dict(), "files": files}
+    if told.copies is not None:
+        found["repaired"] = [one.as_dict() for one in told.copies]
+    return found
+
+
+def _files(told: Answer) -> Iterator[dict[str, Any]]:
+    for one in told.made.files.plain():
+        if told.linked is not None:
+            one["reports"] = told.linked.of_test(one["test"])
+        yield one
+
+
+def _tests(told: Answer) -> Iterator[dict[str, Any]]:
+    for one in told.made.tests:
+        if told.linked is not None:
+            one["reports"] = told.linked.of_test(one["test"])
+        yield one
+
+
+def write_folder(out: Path, told: Answer, registry: Registry) -> tuple[Path, ...]:
+    """Write the page for people and the lines for machines; return them.
+
+    Raises
+    ------
+    OutputError
+        the folder cannot be written to
+    """
+    from toolkit.audit.timeline import timelines
+    from toolkit.audit.traces import traces
+    from toolkit.cli.explain import rules_catalogue
+    from toolkit.files import atomic_path
+    from toolkit.recording.marks import GENERATOR, OWN_OUTPUT
+    from toolkit.report.audit_page import AuditView, write_page
+
+    with atomic_path(out / LINES) as temporary, temporary.open("w", encoding="ascii") as lines:
+        head = {"generator": GENERATOR, "marks": OWN_OUTPUT, "schema": 1, "kind": "audit"}
+        lines.write(json.dumps({**head, "known_at": told.made.known_at.isoformat()}) + "\n")
+        lines.writelines(json.dumps(one) + "\n" for one in _files(told))
+    view = AuditView(
+        made=told.made,
+        rules=rules_catalogue(),
+        timelines=timelines(told.made, registry),
+        traces=tuple(traces(told.made, registry, _WORST)),
+        linked=told.linked,
+        drift=told.drift,
+        drifted=told.drifted,
+    )
+    write_page(out / PAGE, view)
+    return out / PAGE, out / LINES
+
+
+def text_of(told: Answer) -> str:
+    """Return the answer for people."""
+    made = told.made
+    rows = list(_rows(made))
+    bad = len(made.files) - made.grades["exact"] - made.grades["rounding"]
+    header = ["file", "grade", "computed by", "how", "in force", "dFY [N]", "dMZ [N·m]"]
+    lines = [table(header, rows, align="<<<<<>>")] if rows else []
+    if bad > len(rows):
+        lines.append(f"... and {bad - len(rows)} more; --json tells all of them")
+    counted = ", ".join(f"{count} {grade}" for grade, count in made.grades.items() if count)
+    lines += ["", f"{len(made.files)} files: {counted or 'none'}; known at {made.known_at.isoformat()}"]
+    notes = Counter(one.rule for one in made.findings if one.level == "note")
+    if notes:
+        lines.append("also: " + ", ".join(f"{count} {rule}" for rule, count in sorted(notes.items())))
+    lines += [f"refused record {one.id}: {one.reason}" for one in made.refused]
+    lines += [f"head of {name}: {head}" for name, head in made.heads]
+    return "\n".join([*lines, *_asked(told)])
+
+
+def _asked(told: Answer) -> Iterator[str]:
+    if told.linked is not None:
+        yield ""
+        for one in told.linked.reports:
+            why = f"{one.not_clean} of {one.files} files are not right" if one.not_clean else "stands"
+            tests = ", ".join(sorted(one.tests))
+            yield f"report {one.report} ({tests}): {why}" if one.files else f"report unknown: {one.report}"
+        if told.linked.unknown:
+            yield f"report unknown: {len(told.linked.unknown)} tests, {', '.join(told.linked.unknown[:10])}"
+    if told.drift is not None:
+        drift = told.drift
+        yield ""
+        yield (
+            f"{drift.good} ({drift.good_date}) to {drift.failed.session_record} ({drift.failed.date}): "
+            f"{len(told.drifted)} files; interpolated effect:"
+        )
+        rows = [
+            [f.path, f.date.isoformat(), f"{f.share:.0%}", "" if f.FY_N is None else f"{f.FY_N:.2f}",
+             "" if f.MZ_Nm is None else f"{f.MZ_Nm:.3f}"]
+            for f in told.drifted[:_SHOWN]
+        ]  # fmt: skip
+        yield table(["file", "date", "share", "dFY [N]", "dMZ [N·m]"], rows, align="<<>>>")
+    if told.copies is not None:
+        made = [one for one in told.copies if one.sha256 is not None]
+        yield f"{len(made)} corrected copies"
+        yield from (f"no copy of {one.path}: {one.reason}" for one in told.copies if one.sha256 is None)
+
+
+def _rows(made: ArchiveAudit) -> Iterator[list[str]]:
+    shown = 0
+    for one in made.files.plain():
+        if one["grade"] in ("exact", "rounding"):
+            continue
+        if shown == _SHOWN:
+            return
+        shown += 1
+        repair = one["repair"] or {"FY_max_abs_N": None, "MZ_max_abs_Nm": None}
+        FY, MZ = repair["FY_max_abs_N"], repair["MZ_max_abs_Nm"]
+        yield [
+            one["path"],
+            one["grade"],
+            one["record"] or "",
+            one["variant"] or one["reason"] or "",
+            one["in_force"] or "",
+            "" if FY is None else f"{FY:.1f}",
+            "" if MZ is None else f"{MZ:.2f}",
+        ]
