@@ -47,7 +47,7 @@ def command(
     """Run the whole path on the packaged example.
 
     From strain gauges to a Word and PDF report. Makes report.docx, report.pdf, test.xlsx (the whole test
-    in one file), tire.tir and figures/.
+    in one file), tire.tir, figures/ and certificate/, the certificate of the load cells' calibration.
     """
     started = time.perf_counter()
     say = _silent if json or quiet else typer.echo
@@ -66,6 +66,7 @@ def command(
         resolved = _resolved(stage)
         told = _tire_file(resolved, stage / "tire.tir")
         figures = _figures(resolved, stage)
+        certificates = sorted(one.name for one in (stage / "certificate").iterdir())
         say(f"      {told}\n      {len(figures)} figures\n")
         report = done[-1]
         (stage / _MARK).write_text(
@@ -78,7 +79,9 @@ def command(
     names = ("report.docx", "report.pdf", "test.xlsx", "tire.tir")
     payload = {
         "out": out,
-        "files": [str(out / name) for name in names] + [str(out / "figures" / name) for name in figures],
+        "files": [str(out / name) for name in names]
+        + [str(out / "figures" / name) for name in figures]
+        + [str(out / "certificate" / name) for name in certificates],
         "steps": done,
         "report": report["told"],
         "timing": {"seconds": time.perf_counter() - started},
@@ -155,6 +158,13 @@ def _steps(stage: Path) -> list[Step]:
             told=_told_verify,
         ),
         Step(
+            title="the certificate of the calibration: ISO/IEC 17025, 7.8.2 and 7.8.4",
+            words=("calibration", "certificate", "m15-virtual-r1", "--template",
+                   str(home / "report_templates" / "certificate.docx"), "--out", str(stage / "certificate"),
+                   *at),
+            told=_told_certificate,
+        ),
+        Step(
             title="a whole test on the virtual machine, drum forward and reversed",
             words=("simulate", str(plans / "test_plan.toml"), "--out", test, *at),
             told=lambda p: f"{len(p['files'])} files in test/, with a steering zero, a tare, drum run-out "
@@ -222,6 +232,14 @@ def _told_verify(payload: Payload) -> str:
     verified = sum(row["verified"] for row in rows)
     return (
         f"{sum(row['ok'] for row in rows)} of {len(rows)} records ok, {verified} of them verified from data"
+    )
+
+
+def _told_certificate(payload: Payload) -> str:
+    loads = ", ".join(f"{name} {one['U']:.2g} {one['unit']}" for name, one in payload["loads"].items())
+    state = "verified" if payload["verified"] else "not verified"
+    return (
+        f"certificate/{Path(payload['pdf']).name}: {payload['pages']} pages, {state}; U at full scale {loads}"
     )
 
 
