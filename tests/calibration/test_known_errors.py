@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from test_mutations import forge, refuse_all
 
 from toolkit.calibration.fit.diagnostics import diagnose
+from toolkit.calibration.fit.findings import session_findings
 from toolkit.calibration.fit.gls import fit_gls
 from toolkit.calibration.fit.odr import fit_odr
 from toolkit.calibration.fit.regression import TermFit, fit_terms
@@ -24,7 +25,7 @@ from toolkit.calibration.registry.registry import Registry
 from toolkit.calibration.session.known_errors import KnownErrors
 from toolkit.calibration.session.read import read_session
 from toolkit.calibration.terms import model_terms, term_matrix
-from toolkit.errors import ConfigError, RecordError, ToolkitError
+from toolkit.errors import ConfigError, RecordError, SessionError, ToolkitError
 
 TERMS = ("A", "B", "intercept")
 
@@ -248,6 +249,60 @@ def test_what_rows_share_is_named_in_many_ways_and_read_again(
         path = with_column(path, "weights [1]", [str(row % 5) for row in range(60)])
     record = load_of(tmp_path, path)
     assert [one.method for one in record.loads] == ["gls"] * 3
+
+
+def test_groups_may_have_names(tmp_path: Path, make_session: Callable[..., Path]) -> None:
+    tail = GLS.replace('"run"', '"stack"')
+    groups = [row % 5 for row in range(60)]
+    numbered = with_column(
+        make_session(name="n", method='"gls"', tail=tail), "stack [1]", list(map(str, groups))
+    )
+    named = with_column(
+        make_session(name="t", method='"gls"', tail=tail), "stack", [f"Stapel {'abcde'[g]}" for g in groups]
+    )
+    one, other = (fit_session(read_session(path)) for path in (numbered, named))
+    for a, b in zip(one.loads, other.loads, strict=True):
+        assert a.fit.coefficients == b.fit.coefficients
+        np.testing.assert_array_equal(a.fit.covariance, b.fit.covariance)
+    # Read again from the registry, and held against its data.
+    assert load_of(tmp_path, named).load("FY").method == "gls"
+
+
+def test_a_name_that_is_missing_in_a_row_is_refused(make_session: Callable[..., Path]) -> None:
+    path = make_session(name="t", method='"gls"', tail=GLS.replace('"run"', '"stack"'))
+    with pytest.raises(SessionError, match="row 3, column stack"):
+        read_session(with_column(path, "stack", ["a", "b", " ", *("a" for _ in range(57))]))
+
+
+def test_a_load_without_a_unit_is_no_column_of_names(make_session: Callable[..., Path]) -> None:
+    path = make_session(name="t", method='"gls"', tail=GLS.replace('"run"', '"FY"'))
+    file = path.parent / "loads.csv"
+    file.write_text(file.read_text().replace("FY [lbf]", "FY"))
+    with pytest.raises(SessionError, match="column FY has no unit"):
+        read_session(path)
+
+
+@pytest.mark.parametrize("slip", ["rn", "rnu", "directon", "Rotation", "FYY"])
+def test_a_slip_of_the_pen_is_not_one_standard_behind_every_row(
+    make_session: Callable[..., Path], slip: str
+) -> None:
+    session = read_session(make_session(name="t", method='"gls"', tail=GLS.replace('"run"', f'"{slip}"')))
+    with pytest.raises(ConfigError, match="shared_group"):
+        fit_session(session)
+
+
+@pytest.mark.parametrize(
+    ("more", "told"),
+    [("", 1), ('\nstandard = "stack 7"', 0), ('\ncertificate = "Stack 7 "', 0), ('\nstandard = "other"', 1)],
+)
+def test_one_standard_is_declared_or_said_to_be_assumed(
+    make_session: Callable[..., Path], more: str, told: int
+) -> None:
+    tail = f'[reference]\nshared_group = "stack 7"{more}' + UNCERTAINTY
+    found = session_findings(fit_session(read_session(make_session(name="t", method='"gls"', tail=tail))))
+    notes = [one for one in found if one.rule == "shared-group"]
+    assert len(notes) == told
+    assert all(one.level == "note" and "behind every row" in one.message for one in notes)
 
 
 def test_a_shared_error_widens_the_scale_of_a_session(make_session: Callable[..., Path]) -> None:

@@ -16,12 +16,13 @@ from test_e74 import GOLDEN, LBF, PONTIUS, RUN
 from tests.conftest import SHARED_DATA
 from toolkit.calibration.control.standard import evaluate_record
 from toolkit.calibration.fit.session_fit import fit_session
+from toolkit.calibration.registry.candidate import calibrate
 from toolkit.calibration.registry.registry import Registry
 from toolkit.calibration.session.read import read_session
 from toolkit.calibration.standards.e74 import E74Result
 from toolkit.calibration.standards.evaluation import Evaluation, evaluate_source, evaluations, source_of
 from toolkit.calibration.standards.iso376 import Iso376Result
-from toolkit.errors import SessionError
+from toolkit.errors import ConfigError, SessionError
 
 FORCES = tuple(1000.0 * i for i in range(1, 11))
 MOUNTINGS = ((1, 0.0), (2, 0.0), (3, 120.0), (4, 240.0))
@@ -84,6 +85,48 @@ def test_iso_376_of_a_session_by_hand(tmp_path: Path) -> None:
     assert found.f0 == pytest.approx(100 * 0.0001 / (2.0 * 1.0001))
     assert found.resolution == pytest.approx(1e-7 / 2e-4, rel=1e-3)
     assert (one.class_name, one.reasons, one.sense) == ("00", (), "positive")
+
+
+def test_a_session_that_states_its_preloads_has_its_class(tmp_path: Path) -> None:
+    path = session(tmp_path, iso_rows(), tail=STATED + "[standard]\npreloads = 3\n")
+    (one,) = evaluated(path, "iso376")
+    assert one.class_name == "00"
+    assert [e.class_name for e in evaluations(fit_session(read_session(path))) if e.standard == "iso376"] == [
+        "00"
+    ]
+    # An option goes before what was stated; two preloads are too few.
+    assert evaluated(path, "iso376", preloads=2)[0].class_name is None
+    few = session(tmp_path / "few", iso_rows(), tail=STATED + "[standard]\npreloads = 2\n")
+    assert any("2 preloads" in reason for reason in evaluated(few, "iso376")[0].all_reasons)
+
+
+def test_the_stated_preloads_belong_to_the_record(tmp_path: Path) -> None:
+    registry = Registry(tmp_path / "cal")
+    plain = calibrate(session(tmp_path / "a", iso_rows()), registry)
+    told = calibrate(
+        session(tmp_path / "b", iso_rows(), tail=STATED + "[standard]\npreloads = 3\n"), registry
+    )
+    assert (plain.existing, told.existing) == (False, False)
+    assert registry.load(told.record.id).sha256 != plain.record.sha256
+    found = evaluate_record(registry, told.record.id, standard="iso376", load=None, indication=None)
+    assert [one.class_name for one in found] == ["00"]
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("[standard]\npreloads = -1\n", "standard.preloads"),
+        ("[standard]\npreloads = 3.0\n", "standard.preloads"),
+        ("[standard]\npreloads = true\n", "standard.preloads"),
+        ('[standard]\npreloads = "three"\n', "standard.preloads"),
+        ("[standard]\npreload = 3\n", "unknown key 'preload'"),
+        ("[[standard]]\npreloads = 3\n", "standard has a value"),
+    ],
+)
+def test_preloads_that_are_none_are_refused(tmp_path: Path, text: str, told: str) -> None:
+    with pytest.raises(ConfigError) as caught:
+        read_session(session(tmp_path, iso_rows(), tail=STATED + text))
+    assert told in f"{caught.value.what} {caught.value.where}"
 
 
 def test_the_applied_forces_uncertainty_limits_the_class(tmp_path: Path) -> None:

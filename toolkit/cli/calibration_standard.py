@@ -27,7 +27,11 @@ def command(
         int | None, typer.Option("--degree", help="Of the curve; E74: by its annex, ISO 376: 3.")
     ] = None,
     preloads: Annotated[
-        int | None, typer.Option("--preloads", help="Preloads to the largest force (ISO 376).")
+        int | None,
+        typer.Option(
+            "--preloads",
+            help="Preloads to the largest force (ISO 376); default: [standard] preloads of the session.",
+        ),
     ] = None,
     calibrations: Calibrations = None,
     home: Home = None,

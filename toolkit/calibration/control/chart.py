@@ -19,15 +19,17 @@ from toolkit.calibration.control.errors import errors_by
 from toolkit.calibration.control.in_use import in_use_before
 from toolkit.calibration.control.rules import Break
 from toolkit.calibration.control.shewhart import LEAST_BASELINE, Limits, breaks_of, limits_of
-from toolkit.calibration.registry.registry import load_checked
+from toolkit.calibration.registry.registry import load_many
 from toolkit.calibration.registry.status import status_of
 from toolkit.calibration.registry.stored import stored_check
+from toolkit.errors import ToolkitError
 from toolkit.findings import Finding
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from toolkit.calibration.records.record import CalibrationRecord
+    from toolkit.calibration.registry.ledger import Ledger
     from toolkit.calibration.registry.registry import Registry
 
 SAME_PERCENT = 1.0
@@ -160,26 +162,36 @@ def _sessions(registry: Registry, instrument: str) -> tuple[list[_Session], list
     ledger = registry.ledger(instrument)
     made: list[tuple[str, int, _Session]] = []
     left_out: list[tuple[str, str]] = []
-    for at, record_id in enumerate(ledger.entered()):
+    standing = []
+    for record_id in ledger.entered():
         if status_of(record_id, ledger.of(record_id), dt.date.max).state == "withdrawn":
             left_out.append((record_id, "withdrawn"))
-            continue
-        record = load_checked(registry.folder / instrument, record_id, ledger)
-        found = _session(registry, record)
+        else:
+            standing.append(record_id)
+    checked: dict[str, CalibrationRecord] = {}
+    for record_id, one in load_many(registry.folder / instrument, standing, ledger).items():
+        if isinstance(one, ToolkitError):
+            raise one
+        checked[record_id] = one
+    for at, record in enumerate(checked.values()):
+        found = _session(registry, record, ledger, checked)
         if isinstance(found, str):
-            left_out.append((record_id, found))
+            left_out.append((record.id, found))
         else:
             made.append((record.date, at, found))
     return [session for _, _, session in sorted(made, key=lambda one: one[:2])], left_out
 
 
-def _session(registry: Registry, record: CalibrationRecord) -> _Session | str:
+def _session(
+    registry: Registry, record: CalibrationRecord, ledger: Ledger, checked: dict[str, CalibrationRecord]
+) -> _Session | str:
     if phase_of(record) == "as_left":
         return "as left: measured after an adjustment"
     check = stored_check(registry.folder, record)
     if check is None:
         return "no check loads"
-    before = in_use_before(registry, record.instrument, dt.date.fromisoformat(record.date), but=record.id)
+    day = dt.date.fromisoformat(record.date)
+    before = in_use_before(registry, record.instrument, day, but=record.id, ledger=ledger, checked=checked)
     if before is None:
         return "no record was in force before it"
     errors = errors_by(before, check, zero=record.zero)

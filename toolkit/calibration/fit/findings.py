@@ -15,6 +15,8 @@ from toolkit.calibration.fit.diagnostics import repeated_share
 from toolkit.calibration.fit.levels import lack_of_fit, load_levels
 from toolkit.calibration.fit.recommend import NEGLIGIBLE_PERCENT, recommend_drop, recommend_wider
 from toolkit.calibration.fit.robust import hidden_outliers, robust_weights
+from toolkit.calibration.fit.session_fit import session_statements
+from toolkit.calibration.session.known_errors import undeclared_standard
 from toolkit.findings import Finding
 
 if TYPE_CHECKING:
@@ -65,6 +67,14 @@ def _data_findings(session: Session) -> list[Finding]:
     if session.reference_due is not None and session.reference_due < session.date:
         message = f"the reference standard was due on {session.reference_due.isoformat()}"
         found.append(Finding(rule="reference-due", where=where, message=message))
+    if session.method == "gls":
+        name = undeclared_standard(session_statements(session).reference, table)
+        if name is not None:
+            message = (
+                f"shared_group {name!r} is no column of the data: taken as the name of one standard behind "
+                "every row; say so by [reference] standard, or name a column"
+            )
+            found.append(Finding(rule="shared-group", where=where, message=message, level="note"))
     return found
 
 

@@ -15,7 +15,7 @@ from toolkit.calibration.fit.odr import fit_odr
 from toolkit.calibration.fit.regression import TermFit, fit_loads, fit_terms
 from toolkit.calibration.session.known_errors import KnownErrors, known_errors, row_uncertainty
 from toolkit.calibration.session.settings import wrong
-from toolkit.calibration.session.statements import parse_statements
+from toolkit.calibration.session.statements import Statements, parse_statements
 from toolkit.calibration.terms import term_matrix
 
 if TYPE_CHECKING:
@@ -134,7 +134,13 @@ def load_uncertainty(session: Session, setting: LoadSetting) -> NDArray[np.float
 
 def load_errors(session: Session, setting: LoadSetting) -> KnownErrors:
     """Return what the session states about the errors of one load, for gls and odr."""
-    stated = parse_statements(
+    stated = session_statements(session)
+    return known_errors(session.method, stated, session.table, setting.name, session.path)
+
+
+def session_statements(session: Session) -> Statements:
+    """Return what a session states beside its data, typed."""
+    return parse_statements(
         json.loads(session.settings),
         indications={cell.name: cell.unit for cell in session.cells},
         loads={load.name: load.unit for load in session.loads},
@@ -142,7 +148,6 @@ def load_errors(session: Session, setting: LoadSetting) -> KnownErrors:
         where=session.path,
         columns={cell.name: cell.column_unit or cell.unit for cell in session.cells},
     )
-    return known_errors(session.method, stated, session.table, setting.name, session.path)
 
 
 def _resolution(session: Session, fit: TermFit) -> float:

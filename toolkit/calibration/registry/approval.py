@@ -10,7 +10,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from toolkit.calibration.registry import gates
-from toolkit.calibration.registry.candidate import last_approved, now
+from toolkit.calibration.registry.candidate import now
+from toolkit.calibration.registry.history import compared, history_of
 from toolkit.calibration.registry.interval import parse_interval
 from toolkit.calibration.registry.names import check_names
 from toolkit.calibration.registry.registry import Registry, instrument_of, today
@@ -108,8 +109,7 @@ def approve(
                 f"not after {status.in_force_from.isoformat()}; a withdrawal makes days void",
                 "approval",
             )  # fmt: skip
-        last = last_approved(registry, record.instrument, but=record_id, ledger=ledger)
-        failed = () if last is None else gates.sign_and_span(record, last)
+        failed = compared(record, history_of(registry, record, ledger, but=record_id))
         if check is not None:
             failed += gates.check_loads(record, check)
         terms = gates.unverifiable(record, check)

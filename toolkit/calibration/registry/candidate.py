@@ -34,11 +34,10 @@ from toolkit.calibration.records.record import (
     to_bytes,
 )
 from toolkit.calibration.registry.agreement import check_agrees, check_inputs
-from toolkit.calibration.registry.history import history_findings
+from toolkit.calibration.registry.history import history_findings, history_of
 from toolkit.calibration.registry.ledger import Ledger
 from toolkit.calibration.registry.refit import check_reproduces, polarity
-from toolkit.calibration.registry.registry import ID, Registry, load_checked, today
-from toolkit.calibration.registry.status import status_of
+from toolkit.calibration.registry.registry import ID, Registry, load_checked
 from toolkit.calibration.registry.store import Change, commit
 from toolkit.calibration.session.read import Session, read_session
 from toolkit.calibration.terms import term_matrix
@@ -111,11 +110,11 @@ def calibrate(session_file: Path, registry: Registry) -> Candidate:
 
     # Before the write: a last approved record that fails its gates must stop this, not follow it.
     ledger = registry.ledger(session.instrument)
-    last = last_approved(registry, session.instrument, but="", ledger=ledger)
+    history = history_of(registry, unnumbered, ledger)
     written = commit(folder, build)
     record = made[0]
     if written:
-        findings += history_findings(record, last)
+        findings += history_findings(record, history)
     return Candidate(
         record=record,
         path=folder / f"{record.id}.json",
@@ -138,6 +137,7 @@ def entering(record: CalibrationRecord, contents: Mapping[str, bytes], *, by: st
             "by": by,
             "record": record.sha256,
             "file": sha256_bytes(data),
+            "inputs": record.inputs_sha256,
         },
     )
 
@@ -150,32 +150,16 @@ def next_id(folder: Path, instrument: str, ledger: Ledger) -> str:
     return f"{instrument}-r{max(numbers, default=0) + 1}"
 
 
-def last_approved(
-    registry: Registry, instrument: str, *, but: str, ledger: Ledger
-) -> CalibrationRecord | None:
-    """Return the newest approved record that is not withdrawn; None where there is none.
-
-    Raises
-    ------
-    RecordError
-        that record fails a gate
-    """
-    best = None
-    for record_id in ledger.entered():
-        status = status_of(record_id, ledger.of(record_id), today())
-        if record_id != but and status.state == "approved" and status.in_force_from is not None:
-            rank = (status.in_force_from, max(e.seq for e in ledger.of(record_id)), record_id)
-            best = rank if best is None else max(best, rank)
-    return None if best is None else load_checked(registry.folder / instrument, best[2], ledger)
-
-
 def now() -> str:
     """Return the time of an entry, UTC to the second."""
     return datetime.now(tz=UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
 
 
 def _recorded(folder: Path, session: Session, ledger: Ledger) -> CalibrationRecord | None:
-    for record_id in ledger.entered():
+    for record_id, entry in ledger.entered().items():
+        # What the line tells is only where to look: the record found passes its gates, its inputs too.
+        if entry.inputs not in (None, session.inputs_sha256):
+            continue
         path = folder / f"{record_id}.json"
         try:
             # The gates cost a refit: only the record that claims these inputs goes through them.

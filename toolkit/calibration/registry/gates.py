@@ -6,6 +6,7 @@ inside the check loads' tolerance has a sign that noise decides.
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -31,13 +32,17 @@ class GateResult:
     message: str
 
 
-def sign_and_span(new: CalibrationRecord, old: CalibrationRecord) -> tuple[GateResult, ...]:
-    """Compare a record's coefficients with those of the last approved one, per serial and unit.
+def sign_and_span(
+    new: CalibrationRecord, old: CalibrationRecord, *, only: Collection[str] | None = None
+) -> tuple[GateResult, ...]:
+    """Compare a record's coefficients with those of an earlier one, per serial and unit.
 
-    An indication with another serial or unit starts a new history and is not compared (`new_history`).
+    An indication with another serial or unit is not compared (`new_history`); ``only`` names those that are.
     """
     failed: list[GateResult] = []
     fresh = set(new_history(new, old))
+    if only is not None:
+        fresh |= {cell.name for cell in new.cells} - set(only)
     cells = {cell.name: cell for cell in new.cells}
     for one in new.loads:
         other = next((o for o in old.loads if o.load == one.load and o.unit == one.unit), None)

@@ -27,7 +27,8 @@ EVENTS = ("entered", "approved", "withdrawn")
 class Entry:
     """One event of a record. What an event does not have is None or empty.
 
-    ``entered``: ``by``, ``record`` (its hash) and ``file`` (the hash of its file's bytes).
+    ``entered``: ``by``, ``record`` (its hash), ``file`` (the hash of its file's bytes) and ``inputs`` (of
+    its session's data and settings, by which the session is found again; older lines have none).
     ``approved``: ``known_on``, ``since`` (in force from), ``by`` (checked by), ``approved_by``, ``reason``,
     ``unverifiable`` terms as "load: term", ``note`` where ``since`` lies before ``known_on``, ``recall`` the
     recall interval such as "12 months", where one was set.
@@ -43,6 +44,7 @@ class Entry:
     by: str
     record: str | None = None
     file: str | None = None
+    inputs: str | None = None
     known_on: date | None = None
     since: date | None = None
     approved_by: str | None = None

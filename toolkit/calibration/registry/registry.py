@@ -7,6 +7,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import UTC, date, datetime
 from pathlib import Path
@@ -16,6 +17,7 @@ from toolkit.calibration.registry import store
 from toolkit.calibration.registry.agreement import check_agrees, check_inputs, check_transcribed
 from toolkit.calibration.registry.ledger import HEAD, LEDGER, Ledger
 from toolkit.calibration.registry.refit import check_reproduces
+from toolkit.calibration.registry.refit_many import reproducing
 from toolkit.calibration.registry.status import RecordStatus, status_of
 from toolkit.calibration.registry.stored import bad_record as _bad
 from toolkit.calibration.registry.stored import parse_loads, reason_of
@@ -120,11 +122,11 @@ class Registry:
         good: list[CalibrationRecord] = []
         bad: list[Refused] = []
         ledger = self.ledger(instrument)
-        for record_id in self.ids(instrument):
-            try:
-                good.append(load_checked(self.folder / instrument, record_id, ledger))
-            except ToolkitError as error:
-                bad.append(Refused(id=record_id, rule=error.rule or "unreadable", reason=reason_of(error)))
+        for record_id, found in load_many(self.folder / instrument, self.ids(instrument), ledger).items():
+            if isinstance(found, CalibrationRecord):
+                good.append(found)
+            else:
+                bad.append(Refused(id=record_id, rule=found.rule or "unreadable", reason=reason_of(found)))
         return tuple(good), tuple(bad)
 
     def status(self, record_id: str, *, known_at: date | None = None) -> RecordStatus:
@@ -204,6 +206,33 @@ class Registry:
 def load_checked(folder: Path, record_id: str, ledger: Ledger) -> CalibrationRecord:
     """Read one record and run every load-time gate, in the order of the rules in `Registry.load`."""
     return finish(start(folder, record_id, ledger))
+
+
+def load_many(
+    folder: Path, ids: Sequence[str], ledger: Ledger
+) -> dict[str, CalibrationRecord | ToolkitError]:
+    """Return records by id as `load_checked` does, or its error; those of one shape are refitted together."""
+    started: dict[str, Started | ToolkitError] = {}
+    for record_id in ids:
+        try:
+            started[record_id] = start(folder, record_id, ledger)
+        except ToolkitError as error:
+            started[record_id] = error
+    pairs = [
+        (one.record, one.table)
+        for one in started.values()
+        if isinstance(one, Started) and one.table is not None
+    ]
+    sound = {record.id for (record, _), good in zip(pairs, reproducing(pairs), strict=True) if good}
+    found: dict[str, CalibrationRecord | ToolkitError] = {}
+    for record_id, one in started.items():
+        try:
+            found[record_id] = (
+                one if isinstance(one, ToolkitError) else finish(one, reproduces=record_id in sound)
+            )
+        except ToolkitError as error:
+            found[record_id] = error
+    return found
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

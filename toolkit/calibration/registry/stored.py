@@ -61,7 +61,7 @@ def parse_loads(record: CalibrationRecord, data: bytes, folder: Path) -> Table:
     try:
         named = '"shared_group"' in record.settings
         group = group_column(json.loads(record.settings).get("reference", {})) if named else ()
-        table = read_table(data, where=where, required=needed, optional=[*uncertainties, *group])
+        table = read_table(data, where=where, required=needed, optional=uncertainties, labels=group)
         return _as_fitted(record, table, where)
     except RegistryError:
         raise

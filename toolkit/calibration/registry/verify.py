@@ -12,10 +12,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from toolkit.calibration.records.record import from_bytes
+from toolkit.calibration.records.record import CalibrationRecord, from_bytes
 from toolkit.calibration.registry.ledger import HEAD, LEDGER, Ledger
-from toolkit.calibration.registry.refit_many import reproducing
-from toolkit.calibration.registry.registry import ID, Started, finish, start
+from toolkit.calibration.registry.registry import ID, load_many
 from toolkit.errors import ToolkitError
 
 if TYPE_CHECKING:
@@ -122,31 +121,17 @@ def _judge_shared(folder: Path, ids: Sequence[str]) -> list[_Judged]:
 
 def _judge(folder: Path, ids: Sequence[str], ledger: Ledger) -> list[_Judged]:
     """Return the rows of some records and the names of their files."""
-    started: list[Started | ToolkitError] = []
-    for record_id in ids:
-        try:
-            started.append(start(folder, record_id, ledger))
-        except ToolkitError as error:
-            started.append(error)
-    pairs = [(one.record, one.table) for one in started if isinstance(one, Started) and one.table is not None]
-    sound = {record.id for (record, _), good in zip(pairs, reproducing(pairs), strict=True) if good}
-    return [
-        _row(folder, record_id, one, record_id in sound) for record_id, one in zip(ids, started, strict=True)
-    ]
+    return [_row(folder, record_id, one) for record_id, one in load_many(folder, ids, ledger).items()]
 
 
-def _row(folder: Path, record_id: str, started: Started | ToolkitError, reproduces: bool) -> _Judged:
-    try:
-        if isinstance(started, ToolkitError):
-            raise started
-        checked = finish(started, reproduces=reproduces)
-    except ToolkitError as error:
-        reason = f"{error.rule or 'unreadable'}: {error.what}"
-        reason += f" (got {error.got}, expected {error.expected})" if error.got else ""
+def _row(folder: Path, record_id: str, found: CalibrationRecord | ToolkitError) -> _Judged:
+    if isinstance(found, ToolkitError):
+        reason = f"{found.rule or 'unreadable'}: {found.what}"
+        reason += f" (got {found.got}, expected {found.expected})" if found.got else ""
         row = VerifyRow(id=record_id, ok=False, verified=False, reason=reason)
         return row, tuple(_owned_by_bad(folder, record_id))
-    row = VerifyRow(id=record_id, ok=True, verified=checked.verified, reason=None)
-    return row, tuple(one.file for one in checked.data)
+    row = VerifyRow(id=record_id, ok=True, verified=found.verified, reason=None)
+    return row, tuple(one.file for one in found.data)
 
 
 def _files(folder: Path) -> list[str]:

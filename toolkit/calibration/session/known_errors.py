@@ -13,9 +13,11 @@ loads L, so that the scatter of single rows is not taken for the scale (D'Agosti
 one, the residual standard deviation of the ordinary fit, which also holds what groups differ by.
 
 ``[reference] shared_group`` names what shares: ``"run"``, ``"rotation"``, ``"direction"``; a load (rows of
-the same nominal load hang on the same weights); a column of the data with numbers of its own, headed
-``name [1]``; any other text is the name of one standard behind every row. As a table:
-``{ column = "stack", error = "constant" }``; without ``column`` it means every row.
+the same nominal load hang on the same weights); a column of the data with names (headed ``name``) or numbers
+(``name [1]``) of its own. Any other text is the name of one standard behind every row: declared where it is
+that of ``[reference] standard`` or ``certificate``, else a note says how it was taken (`fit.findings`), and
+one that is nearly a column's name is an error. As a table: ``{ column = "stack", error = "constant" }``;
+without ``column`` it means every row.
 
 **odr.** Uncertainties of the loads are a column ``u_<LOAD>``, else U/k; of an indication ``[cells.X] u``,
 else its resolution over sqrt(12) (GUM F.2.2.1).
@@ -23,6 +25,7 @@ else its resolution over sqrt(12) (GUM F.2.2.1).
 
 from __future__ import annotations
 
+import difflib
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -37,7 +40,7 @@ from toolkit.units import unit
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from toolkit.calibration.session.statements import Statements
+    from toolkit.calibration.session.statements import Reference, Statements
     from toolkit.calibration.session.table import Table
 
 _LABELS = ("run", "direction", "rotation")
@@ -87,7 +90,7 @@ def known_errors(method: str, statements: Statements, table: Table, load: str, w
     of_reference = reference.u(load)
     group = np.zeros(table.rows, dtype=np.intp)
     if method == "gls":
-        group, proportional = _groups(reference.shared_group, table, where)
+        group, proportional = _groups(reference, table, where)
         if of_reference is None:
             expected = "{ U, k, unit } of the error that the rows of a group share"
             raise wrong(where, f"reference.uncertainty.{load}", None, expected)
@@ -110,8 +113,17 @@ def _u_cell(u: float | None, resolution: float | None, name: str, where: object)
     return value
 
 
-def _groups(entry: Any, table: Table, where: object) -> tuple[NDArray[np.intp], bool]:
-    error = _ERRORS[0]
+def undeclared_standard(reference: Reference, table: Table) -> str | None:
+    """Return the name that was taken for one standard behind every row although nothing else names it so."""
+    entry = reference.shared_group
+    if not isinstance(entry, str) or entry in _LABELS or _column(entry, table) is not None:
+        return None
+    declared = [name.strip().casefold() for name in (reference.standard, reference.certificate) if name]
+    return None if entry.strip().casefold() in declared else entry
+
+
+def _groups(reference: Reference, table: Table, where: object) -> tuple[NDArray[np.intp], bool]:
+    entry, error = reference.shared_group, _ERRORS[0]
     named = isinstance(entry, dict)
     if named:
         check_keys(entry, ("column", "error"), where=f"{where}: reference.shared_group")
@@ -126,6 +138,11 @@ def _groups(entry: Any, table: Table, where: object) -> tuple[NDArray[np.intp], 
     if labels is None:
         if named or entry in _LABELS:
             raise wrong(where, "reference.shared_group", entry, "a column of the data")
+        columns = [*_LABELS, *table.names, *(name for name, _ in table.labels)]
+        near = difflib.get_close_matches(entry, columns, n=1, cutoff=0.6)
+        if near and undeclared_standard(reference, table) is not None:
+            expected = f"{near[0]!r}, or the name of the standard as [reference] standard has it"
+            raise wrong(where, "reference.shared_group", entry, expected)
         return np.zeros(table.rows, dtype=np.intp), error == "proportional"
     _, group = np.unique(labels, return_inverse=True)
     return np.asarray(group, dtype=np.intp).ravel(), error == "proportional"
@@ -136,4 +153,7 @@ def _column(name: str, table: Table) -> NDArray[Any] | None:
         return table.up
     if name in _LABELS:
         return table.run if name == "run" else table.rotation
+    texts = dict(table.labels).get(name)
+    if texts is not None:
+        return np.array(texts)
     return table.column(name) if table.has(name) else None

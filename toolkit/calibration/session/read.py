@@ -112,7 +112,8 @@ def read_session(path: Path) -> Session:
         data_bytes,
         where=path.parent / str(raw["data"]),
         required=[*indications, *loads, *(uncertainties if settings.method == "wls" else ())],
-        optional=[*uncertainties, *group_column(raw.get("reference", {}))],
+        optional=uncertainties,
+        labels=group_column(raw.get("reference", {})),
     )
     check_columns(recorded, loads, path)
     check_statements(raw, recorded, loads, path)

@@ -29,9 +29,11 @@ METHODS = ("ols", "wls", "gls", "odr")
 DEFAULT_TOLERANCE = 1e-3
 _KEYS = (
     "schema instrument date operator temperature indications loads data check reference cells zero creep "
-    "phase model degree method drop certificate"
+    "phase model degree method drop certificate standard"
 ).split()
 _CHECK = "file data tolerance".split()
+_STANDARD = ("preloads",)
+_MOST_PRELOADS = 99
 INSTRUMENT = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]*\Z")
 _CHECK_VALUE, _CHECK_TABLE = re.compile(r"(?m)^\s*check\s*="), re.compile(r"(?m)^\s*\[\s*check\s*\]")
 
@@ -134,6 +136,7 @@ def settings_of(raw: Mapping[str, Any], *, where: object) -> Settings:
     if not isinstance(drop, list) or not all(isinstance(name, str) for name in drop):
         raise wrong(where, "drop", drop, "a list of term names")
     check, tolerances = _check_entry(raw, where)
+    preloads_of(raw, where)
     settings = {key: value for key, value in raw.items() if key not in ("data", "check")}
     settings["tolerance"] = tolerances
     return Settings(
@@ -154,6 +157,28 @@ def settings_of(raw: Mapping[str, Any], *, where: object) -> Settings:
         tolerances=tuple(tolerances.items()),
         text=_text_of(settings, where),
     )
+
+
+def preloads_of(raw: Mapping[str, Any], where: object) -> int | None:
+    """Return ``[standard] preloads``: how often the largest load was applied before the first run.
+
+    A class of ISO 376 needs it; None where it is not stated.
+
+    Raises
+    ------
+    ConfigError
+        it is no whole number from 0 to 99, or the table has another key
+    """
+    entry = raw.get("standard", {})
+    if not isinstance(entry, dict):
+        raise wrong(where, "standard", entry, "a table [standard] with preloads = 3")
+    check_keys(entry, _STANDARD, where=f"{where}: standard")
+    preloads = entry.get("preloads")
+    if preloads is None:
+        return None
+    if isinstance(preloads, bool) or not isinstance(preloads, int) or not 0 <= preloads <= _MOST_PRELOADS:
+        raise wrong(where, "standard.preloads", preloads, f"a whole number from 0 to {_MOST_PRELOADS}")
+    return preloads
 
 
 def zero_readings(raw: Mapping[str, Any]) -> Any:

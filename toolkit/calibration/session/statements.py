@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from toolkit.calibration.session.bridge import bridge_of, bridges_of
 from toolkit.calibration.session.reading_entries import Scope
-from toolkit.calibration.session.settings import zero_readings
+from toolkit.calibration.session.settings import preloads_of, zero_readings
 from toolkit.calibration.session.statement_checks import temperature_effect
 from toolkit.machine.definition import quantity
 from toolkit.units import unit
@@ -76,7 +76,10 @@ class CellStatement:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Statements:
-    """``zero`` and ``creep`` are the entries of [[zero]] and [[creep]] as written, in their order."""
+    """``zero`` and ``creep`` are the entries of [[zero]] and [[creep]] as written, in their order.
+
+    ``preloads`` to the largest load before the first run (ISO 376); None where not stated.
+    """
 
     date: dt.date
     temperature_C: float | None
@@ -86,6 +89,7 @@ class Statements:
     zero: tuple[Mapping[str, Any], ...]
     creep: tuple[Mapping[str, Any], ...]
     certificate: Mapping[str, Any]
+    preloads: int | None = None
 
     def cell(self, name: str) -> CellStatement:
         """Return one indication's statement."""
@@ -158,6 +162,7 @@ def parse_statements(
         zero=tuple(zero) if isinstance(zero, list) else (),
         creep=tuple(creep) if isinstance(creep, list) else (),
         certificate=settings.get("certificate", {}),
+        preloads=preloads_of(settings, where),
     )
 
 

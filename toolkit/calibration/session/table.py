@@ -15,7 +15,7 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -34,7 +34,7 @@ class Table:
     """A read file: ``names`` and ``units`` of the numeric columns, ``values`` (rows, columns) as written.
 
     ``run`` (rows,), ``up`` (rows,), True where the load was increased, and ``rotation`` [deg] are None where
-    the file has no such column.
+    the file has no such column; ``labels`` are columns of names (name, a text a row), see `known_errors`.
     """
 
     names: tuple[str, ...]
@@ -43,6 +43,7 @@ class Table:
     run: NDArray[np.float64] | None
     up: NDArray[np.bool_] | None
     rotation: NDArray[np.float64] | None
+    labels: tuple[tuple[str, tuple[str, ...]], ...] = ()
 
     @property
     def rows(self) -> int:
@@ -97,7 +98,13 @@ class Table:
 
 
 def read_table(
-    data: bytes, *, where: object, required: Sequence[str], optional: Sequence[str] = (), runs: bool = True
+    data: bytes,
+    *,
+    where: object,
+    required: Sequence[str],
+    optional: Sequence[str] = (),
+    labels: Sequence[str] = (),
+    runs: bool = True,
 ) -> Table:
     """Read reference-load data.
 
@@ -106,6 +113,7 @@ def read_table(
     data : the file's content
     where : the file, for messages
     required, optional : names of the numeric columns; each needs a unit in the header
+    labels : names of columns that may hold names, without a unit; with one they are numeric
     runs : whether ``run`` and ``direction`` are required (and ``rotation`` allowed), or not allowed
 
     Raises
@@ -118,7 +126,7 @@ def read_table(
     plain = _plain_columns(data)
     rows = [] if plain is not None else _rows(data, where)
     header = rows[0] if plain is None else plain[0]
-    head = _head(tuple(header), tuple(required), tuple(optional), runs, where)
+    head = _head(_Wanted(tuple(header), tuple(required), tuple(optional), tuple(labels), runs), where)
     columns = _turned(rows[1:], len(header), where) if plain is None else plain[1]
     if not columns[0]:
         raise _error(where, "the file has no rows", "0 rows", "one row a reference load", "no-data")
@@ -132,15 +140,21 @@ def read_table(
                 if cell not in ("up", "down"):
                     raise _cell(where, number, "direction", cell, "up or down")
         up = np.array([cell == "up" for cell in direction])
-    labels = [name for name in ("run", "rotation") if name in cells]
-    found = _numbers({name: cells[name] for name in (*head.numeric, *labels)}, where)
-    values, told = found[: len(head.numeric)].T, dict(zip(labels, found[len(head.numeric) :], strict=True))
+    more = [name for name in ("run", "rotation") if name in cells]
+    found = _numbers({name: cells[name] for name in (*head.numeric, *more)}, where)
+    values, told = found[: len(head.numeric)].T, dict(zip(more, found[len(head.numeric) :], strict=True))
     run = told.get("run")
     if run is not None and (fraction := np.flatnonzero(run != np.floor(run))).size:
         at = int(fraction[0])
         raise _cell(where, at + 1, "run", cells["run"][at], "a whole number")
     return Table(
-        names=head.numeric, units=head.units, values=values, run=run, up=up, rotation=told.get("rotation")
+        names=head.numeric,
+        units=head.units,
+        values=values,
+        run=run,
+        up=up,
+        rotation=told.get("rotation"),
+        labels=tuple((name, _texts(cells[name], name, where)) for name in head.labels),
     )
 
 
@@ -151,46 +165,63 @@ class _Head:
     names: tuple[str, ...]
     numeric: tuple[str, ...]
     units: tuple[str, ...]
+    labels: tuple[str, ...]
 
 
-def _head(
-    header: tuple[str, ...], required: tuple[str, ...], optional: tuple[str, ...], runs: bool, where: object
-) -> _Head:
+class _Wanted(NamedTuple):
+    """A header's cells, and what `read_table` was asked for."""
+
+    header: tuple[str, ...]
+    required: tuple[str, ...]
+    optional: tuple[str, ...]
+    labels: tuple[str, ...]
+    runs: bool
+
+
+def _head(wanted: _Wanted, where: object) -> _Head:
     try:
-        return _known_head(header, required, optional, runs)
+        return _known_head(wanted)
     except ToolkitError:
         # Said again with the file's name.
-        return _read_head(header, required, optional, runs, where)
+        return _read_head(wanted, where)
 
 
-def _read_head(
-    header: tuple[str, ...], required: tuple[str, ...], optional: tuple[str, ...], runs: bool, where: object
-) -> _Head:
+@lru_cache(maxsize=256)
+def _known_head(wanted: _Wanted) -> _Head:
+    # The files of a history have one header.
+    return _read_head(wanted, "")
+
+
+def _read_head(wanted: _Wanted, where: object) -> _Head:
+    header, required, optional, labels, runs = wanted
     parsed = [_HEADER.match(cell.strip()) for cell in header]
     names = [
         match["name"].strip() if match else cell.strip() for match, cell in zip(parsed, header, strict=True)
     ]
     extra = ("run", "direction", "rotation") if runs else ()
-    _check_header(names, list(header), [*required, *(extra[:2])], [*optional, *extra], where)
-    numeric = [name for name in names if name not in ("run", "direction", "rotation")]
-    units = []
-    for name in numeric:
-        match = parsed[names.index(name)]
+    _check_header(names, list(header), [*required, *(extra[:2])], [*optional, *labels, *extra], where)
+    numeric, units, texts = [], [], []
+    for name, cell, match in zip(names, header, parsed, strict=True):
+        if name in ("run", "direction", "rotation"):
+            continue
         if match is None or match["unit"] is None:
+            if name in labels and name not in required:
+                texts.append(name)
+                continue
             raise _error(
                 f"{where}, column {name}", f"column {name} has no unit",
-                header[names.index(name)], f"a header such as '{name} [N]' or '{name} [mV/V]'", "no-unit",
+                cell, f"a header such as '{name} [N]' or '{name} [mV/V]'", "no-unit",
             )  # fmt: skip
+        numeric.append(name)
         units.append(unit(match["unit"].strip(), where=f"{where}, column {name}").text)
-    return _Head(names=tuple(names), numeric=tuple(numeric), units=tuple(units))
+    return _Head(names=tuple(names), numeric=tuple(numeric), units=tuple(units), labels=tuple(texts))
 
 
-@lru_cache(maxsize=256)
-def _known_head(
-    header: tuple[str, ...], required: tuple[str, ...], optional: tuple[str, ...], runs: bool
-) -> _Head:
-    # The files of a history have one header.
-    return _read_head(header, required, optional, runs, "")
+def _texts(cells: Sequence[str], name: str, where: object) -> tuple[str, ...]:
+    texts = tuple(cell.strip() for cell in cells)
+    if not all(texts):
+        raise _cell(where, texts.index("") + 1, name, "", "a name in every row")
+    return texts
 
 
 def _turned(rows: list[list[str]], width: int, where: object) -> list[Sequence[str]]:

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from toolkit.calibration.session.statements import parse_statements
 from toolkit.calibration.standards.cell_rows import CellRows, CellSource, cell_rows
 from toolkit.calibration.standards.e74 import E74Result, evaluate_e74
 from toolkit.calibration.standards.iso376 import Iso376Result, evaluate_iso376
@@ -102,19 +101,12 @@ def evaluations(fit: SessionFit) -> tuple[Evaluation, ...]:
 
 def source_of(fit: SessionFit) -> CellSource:
     """Return the data of a fitted session."""
-    import json
+    from toolkit.calibration.fit.session_fit import session_statements
 
     session = fit.session
     return CellSource(
         table=session.table,
-        statements=parse_statements(
-            json.loads(session.settings),
-            indications={cell.name: cell.unit for cell in session.cells},
-            loads={one.name: one.unit for one in session.loads},
-            date=session.date,
-            where=session.path,
-            columns={cell.name: cell.column_unit or cell.unit for cell in session.cells},
-        ),
+        statements=session_statements(session),
         settings=session.settings,
         zero=session.zero,
         loads=tuple(one.name for one in session.loads),
@@ -134,14 +126,15 @@ def evaluate_source(
 ) -> tuple[Evaluation, ...]:
     """Evaluate one indication under one load; one result a sense, for E74 also one a direction.
 
-    ``preloads`` is stated nowhere in a session: without it ISO 376 gives figures and no class. ``degree``
-    of the curve: None lets E74 choose by its annex, and is 3 for ISO 376.
+    ``preloads`` are those of the session (``[standard] preloads``) unless given: without them ISO 376 gives
+    figures and no class. ``degree`` of the curve: None lets E74 choose by its annex, and is 3 for ISO 376.
 
     Raises
     ------
     SessionError
         ``standard``: no such load or indication, or no row in which the load acts alone
     """
+    preloads = source.statements.preloads if preloads is None else preloads
     found: list[Evaluation] = []
     for rows in cell_rows(source, load, indication):
         if standard == "iso376":
