@@ -35,7 +35,7 @@ def bristle(v: float, z: float, coulomb: float, presliding: float) -> tuple[floa
     return stiffness * z + 0.02 * stiffness * rate * presliding, rate
 
 
-def extra(x: float, v: float, z: float, e: Effects, presliding: float) -> tuple[float, float]:
+def left_out(x: float, v: float, z: float, e: Effects, presliding: float) -> tuple[float, float]:
     """Return the acceleration that the nominal leaves out, and the bristle's rate."""
     a, rate = 0.0, 0.0
     if "constant_force" in e:
@@ -68,7 +68,7 @@ def _motion(
     hidden = e.get("hidden_resonance")
 
     def rhs(_t: float, x: Array, u: dict[str, float]) -> Array:
-        added, bristle_rate = extra(x[0], x[1], x[2], e, presliding)
+        added, bristle_rate = left_out(x[0], x[1], x[2], e, presliding)
         a = rates(x[0], x[1], u) + added
         q_rate, w_rate = 0.0, 0.0
         if hidden:
@@ -252,7 +252,7 @@ def drive_force(rng: np.random.Generator, *, one_speed: bool = False) -> Scenari
         z, force = 0.0, np.empty_like(f["t"])
         h = float(f["t"][1] - f["t"][0])
         for i, (x, v) in enumerate(zip(f["x"].tolist(), f["v"].tolist(), strict=True)):
-            added, _ = extra(x, v, z, e, 5e-5)
+            added, _ = left_out(x, v, z, e, 5e-5)
             rest = math.copysign(5e-5, v)  # the bristle's exact relaxation towards sliding
             z = rest + (z - rest) * math.exp(-abs(v) * h / 5e-5)
             force[i] = -added

@@ -12,7 +12,7 @@ import pandas as pd
 from tests.concealed.model import Array, Run, Scenario
 
 
-def _value(x: Any) -> str:
+def toml_value(x: Any) -> str:
     """Return a TOML value: text, number, list or inline table."""
     if isinstance(x, bool):
         return "true" if x else "false"
@@ -21,16 +21,16 @@ def _value(x: Any) -> str:
     if isinstance(x, (int, float)):
         return repr(x)
     if isinstance(x, dict):
-        return "{ " + ", ".join(f"{k} = {_value(v)}" for k, v in x.items()) + " }"
-    return "[" + ", ".join(_value(v) for v in x) + "]"
+        return "{ " + ", ".join(f"{k} = {toml_value(v)}" for k, v in x.items()) + " }"
+    return "[" + ", ".join(toml_value(v) for v in x) + "]"
 
 
 def case_text(s: Scenario, *, order: dict[str, int]) -> str:
     """Return CASE.toml."""
-    lines = ["schema = 1", f"title = {_value(s.title)}", "", "[simulation]"]
-    lines += [f"{k} = {_value(v)}" for k, v in s.simulation.items()]
+    lines = ["schema = 1", f"title = {toml_value(s.title)}", "", "[simulation]"]
+    lines += [f"{k} = {toml_value(v)}" for k, v in s.simulation.items()]
     if s.simulated:
-        lines.append(f"simulated = {_value(dict(s.simulated))}")
+        lines.append(f"simulated = {toml_value(dict(s.simulated))}")
     for p in () if s.kind == "columns" else s.parameters:
         if s.kind == "machine" and p.sd is None:
             continue
@@ -39,19 +39,19 @@ def case_text(s: Scenario, *, order: dict[str, int]) -> str:
             lines.append(f"sd = {p.sd:.6g}")
     lines += ["", "[recording]", 'time = "t"']
     if s.axes:
-        lines.append(f"axes = {_value(s.axes)}")
+        lines.append(f"axes = {toml_value(s.axes)}")
     lines += ["", "[recording.channels]"]
     for name, c in s.channels.items():
         entry: dict[str, Any] = {"unit": c.unit, "role": c.role}
         if c.sd is not None:
             entry["sd"] = float(f"{c.sd:.4g}")
-        lines.append(f"{name} = {_value(entry)}")
+        lines.append(f"{name} = {toml_value(entry)}")
     for run in s.runs:
         lines += ["", "[[recording.run]]", f'file = "{run.name}"', f"order = {order[run.name]}"]
-        lines += [f"{k} = {_value(v)}" for k, v in run.conditions.items()]
+        lines += [f"{k} = {toml_value(v)}" for k, v in run.conditions.items()]
     for run in s.predict:
         lines += ["", "[[recording.predict]]", f'file = "{run.name}"']
-        lines += [f"{k} = {_value(v)}" for k, v in run.conditions.items() if v != "forward"]
+        lines += [f"{k} = {toml_value(v)}" for k, v in run.conditions.items() if v != "forward"]
     return "\n".join(lines) + "\n"
 
 

@@ -15,7 +15,7 @@ from typing import Any
 from tests.concealed.seal import verify
 
 
-def _one(case: Path, out: Path, tool: list[str], budget: float) -> dict[str, Any]:
+def run_case(case: Path, out: Path, tool: list[str], budget: float) -> dict[str, Any]:
     """Run one case and store how it went beside its answer; what is done is not done again."""
     log = out / "run.json"
     if log.exists():
@@ -60,7 +60,7 @@ def run_batch(
     cases = sorted(p for p in (folder / "cases").iterdir() if p.is_dir())
     rows = []
     with ThreadPoolExecutor(max_workers=workers) as pool:
-        jobs = [pool.submit(_one, case, folder / "runs" / case.name, tool, budget) for case in cases]
+        jobs = [pool.submit(run_case, case, folder / "runs" / case.name, tool, budget) for case in cases]
         for i, job in enumerate(jobs):
             rows.append(job.result())
             progress(f"{i + 1}/{len(cases)} {rows[-1]['case']} {rows[-1]['seconds']:.0f} s")

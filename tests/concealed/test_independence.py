@@ -1,0 +1,49 @@
+"""The generator shares nothing with the code that it tests."""
+
+from __future__ import annotations
+
+import ast
+import sys
+from pathlib import Path
+
+import pytest
+
+HERE = Path(__file__).parent
+ALLOWED = {"numpy", "scipy", "pandas", "openpyxl", "tests"}
+MODULES = sorted(p for p in HERE.rglob("*.py") if not p.name.startswith("test_"))
+
+
+def imports(path: Path) -> set[str]:
+    """Return every module that a file imports, wherever the import stands."""
+    out = set()
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            out |= {a.name for a in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f"{path.name}: relative import"
+            out.add(str(node.module))
+    return out
+
+
+@pytest.mark.parametrize("path", MODULES, ids=lambda p: p.stem)
+def test_a_module_imports_only_the_standard_library_and_the_four_packages(path: Path) -> None:
+    for name in imports(path):
+        top = name.split(".")[0]
+        assert top in ALLOWED or top in sys.stdlib_module_names, f"{path.name} imports {name}"
+        assert top != "tests" or name.startswith("tests.concealed"), f"{path.name} imports {name}"
+
+
+@pytest.mark.parametrize("path", MODULES, ids=lambda p: p.stem)
+def test_no_module_reaches_the_toolkit_by_another_way(path: Path) -> None:
+    text = path.read_text(encoding="utf-8")
+    assert "importlib" not in text
+    assert "__import__" not in text
+
+
+def test_a_case_simulator_stands_alone() -> None:
+    for path in (HERE / "simulators").glob("[a-z]*.py"):
+        assert {name.split(".")[0] for name in imports(path)} <= {"math", "numpy", "pandas"}
+
+
+def test_every_module_fits_the_house() -> None:
+    assert all(len(p.read_text(encoding="utf-8").splitlines()) <= 400 for p in HERE.rglob("*.py"))
