@@ -47,8 +47,10 @@ def _register() -> None:
         audit,
         calibrate,
         calibration,
+        compare,
         convert,
         demo,
+        diagnose,
         doctor,
         evaluate,
         explain,
@@ -65,10 +67,10 @@ def _register() -> None:
     for module in (demo, init, doctor, inspect, calibrate):
         app.command(module.NAME)(module.command)
     app.add_typer(calibration.app, name="calibration")
-    for module in (process, fit, evaluate, convert, report):
+    for module in (process, fit, evaluate, convert, compare, report):
         app.command(module.NAME)(module.command)
     app.add_typer(template.app, name="template")
-    for module in (audit, simulate, explain, qualify):
+    for module in (audit, simulate, diagnose, explain, qualify):
         app.command(module.NAME)(module.command)
 
 

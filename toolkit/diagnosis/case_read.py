@@ -48,7 +48,9 @@ def read_case(path: Path) -> Case:
     table = parse_toml(data, where=path)
     check_keys(table, _TOP, where=path)
     if table.get("schema") != 1:
-        raise _wrong("a case says which schema it follows", f"{path}: schema", table.get("schema"), "schema = 1")
+        raise _wrong(
+            "a case says which schema it follows", f"{path}: schema", table.get("schema"), "schema = 1"
+        )
     simulation, parameters = _simulation(table.get("simulation"), path)
     recording = _table(table.get("recording"), f"{path}: recording")
     check_keys(recording, _RECORDING, where=f"{path}: recording")
@@ -59,13 +61,33 @@ def read_case(path: Path) -> Case:
     time = _time(recording, channels, path)
     digest = hashlib.sha256(data)
     runs = [
-        _run(entry, f"{path}: recording.run[{i}]", path.parent, channels, time, simulation, digest, predict=False)
+        _run(
+            entry,
+            f"{path}: recording.run[{i}]",
+            path.parent,
+            channels,
+            time,
+            simulation,
+            digest,
+            predict=False,
+        )
         for i, entry in enumerate(_list(recording, "run", path), start=1)
     ]
     if not runs:
-        raise _wrong("a case has no recording", f"{path}: recording", "no [[recording.run]]", "one run or more")
+        raise _wrong(
+            "a case has no recording", f"{path}: recording", "no [[recording.run]]", "one run or more"
+        )
     predict = [
-        _run(entry, f"{path}: recording.predict[{i}]", path.parent, channels, time, simulation, digest, predict=True)
+        _run(
+            entry,
+            f"{path}: recording.predict[{i}]",
+            path.parent,
+            channels,
+            time,
+            simulation,
+            digest,
+            predict=True,
+        )
         for i, entry in enumerate(_list(recording, "predict", path), start=1)
     ]
     for one in (simulation.path, simulation.tire):
@@ -98,7 +120,7 @@ def _simulation(entry: object, path: Path) -> tuple[Simulation, tuple[CaseParame
         kind=kind,
         machine=_text(table.get("machine", "m15"), f"{where}.machine"),
         calibration=_text(table.get("calibration", ""), f"{where}.calibration"),
-        tire=_file(table, "tire", path, where) if kind == "machine" else None,
+        tire=_file(table, "tire", path, where) if kind == "machine" and "tire" in table else None,
         path=_file(table, "path", path, where) if kind in ("python", "ode") else None,
         function=_text(table.get("function", "simulate"), f"{where}.function"),
         states=_names(table.get("states", []), f"{where}.states"),
@@ -116,7 +138,9 @@ def _parameter(name: str, entry: object, where: str) -> CaseParameter:
     value = _number(table.get("value"), f"{where}.value")
     sd = None if "sd" not in table else _number(table["sd"], f"{where}.sd")
     if sd is not None and sd <= 0:
-        raise _wrong("a prior has no width", f"{where}.sd", sd, "a number above zero, or no sd where known exactly")
+        raise _wrong(
+            "a prior has no width", f"{where}.sd", sd, "a number above zero, or no sd where known exactly"
+        )
     bounds = None
     if "bounds" in table:
         given = table["bounds"]
@@ -124,7 +148,9 @@ def _parameter(name: str, entry: object, where: str) -> CaseParameter:
             raise _wrong("bounds are two numbers", f"{where}.bounds", given, "bounds = [low, high]")
         bounds = (_number(given[0], f"{where}.bounds"), _number(given[1], f"{where}.bounds"))
         if not bounds[0] <= value <= bounds[1] or bounds[0] >= bounds[1]:
-            raise _wrong("the value lies outside its bounds", f"{where}.bounds", given, f"bounds around {value:g}")
+            raise _wrong(
+                "the value lies outside its bounds", f"{where}.bounds", given, f"bounds around {value:g}"
+            )
     return CaseParameter(name=name, value=value, unit=text, sd=sd, bounds=bounds)
 
 
@@ -164,7 +190,10 @@ def _time(recording: dict[str, Any], channels: tuple[CaseChannel, ...], path: Pa
         )  # fmt: skip
     if timed and unit(timed[0].unit).dimension != "time":
         raise _wrong(
-            "the time is in no unit of time", f"{path}: recording.channels.{timed[0].name}", timed[0].unit, "s"
+            "the time is in no unit of time",
+            f"{path}: recording.channels.{timed[0].name}",
+            timed[0].unit,
+            "s",
         )
     return timed[0] if timed else None
 

@@ -46,7 +46,7 @@ class Fit:
     @property
     def parameters(self) -> int:
         """Number of the effects' parameters."""
-        return sum(len(one.effect.parameters) for one in self.active)
+        return sum(len(one.searched) for one in self.active)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -65,7 +65,7 @@ class _Space:
         n = len(self.problem.free)
         made, at = [], n
         for one in self.active:
-            names = one.effect.names
+            names = [each.name for each in one.searched]
             made.append(replace(one, values={**one.values, **dict(zip(names, values[at:], strict=False))}))
             at += len(names)
         return values[:n], tuple(made)
@@ -104,7 +104,7 @@ def fit(
     space = _space(problem, tuple(active))
     layouts = {name: problem.layout(name, rows) for name in problem.names}
     first = [one.value for one in problem.free] if start is None else list(start)
-    begin = [*first, *(_clipped(one, name) for one in active for name in one.effect.names)]
+    begin = [*first, *(_clipped(one, each.name) for one in active for each in one.searched)]
     x = np.clip(np.asarray(begin, dtype=np.float64) / space.sizes, space.low, space.high)
     best: tuple[float, NDArray[np.float64], dict[str, Noise]] | None = None
     known = noise
@@ -146,7 +146,9 @@ def fit(
     )  # fmt: skip
 
 
-def noise_of(problem: Problem, residual: Stacked, layouts: dict[str, Layout], *, used: int = 0) -> dict[str, Noise]:
+def noise_of(
+    problem: Problem, residual: Stacked, layouts: dict[str, Layout], *, used: int = 0
+) -> dict[str, Noise]:
     """Return the noise of every output's residual."""
     return {
         name: fit_noise(
@@ -159,7 +161,9 @@ def noise_of(problem: Problem, residual: Stacked, layouts: dict[str, Layout], *,
 
 def log_prior(problem: Problem, p: Sequence[float]) -> float:
     """Return the logarithm of the priors' density, without its constant."""
-    return -0.5 * sum(((value - one.value) / (one.sd or 1.0)) ** 2 for value, one in zip(p, problem.free, strict=True))
+    return -0.5 * sum(
+        ((value - one.value) / (one.sd or 1.0)) ** 2 for value, one in zip(p, problem.free, strict=True)
+    )
 
 
 def held_out_score(problem: Problem, made: Fit, rows: NDArray[np.bool_]) -> float:
@@ -175,7 +179,7 @@ def held_out_score(problem: Problem, made: Fit, rows: NDArray[np.bool_]) -> floa
 def jacobian(problem: Problem, made: Fit) -> tuple[dict[str, NDArray[np.float64]], NDArray[np.float64]]:
     """Return d(simulated)/d(x) over all rows of each output, and the sizes of x; x = (p, effects) / sizes."""
     space = _space(problem, made.active)
-    values = [*made.p, *(one.values[name] for one in made.active for name in one.effect.names)]
+    values = [*made.p, *(one.values[each.name] for one in made.active for each in one.searched)]
     x = np.asarray(values, dtype=np.float64) / space.sizes
     return _differences(space, x, made.simulated), space.sizes
 
@@ -189,7 +193,7 @@ def _space(problem: Problem, active: tuple[Active, ...]) -> _Space:
         low.append(bounds[0] / size)
         high.append(bounds[1] / size)
     for each in active:
-        for parameter in each.effect.parameters:
+        for parameter in each.searched:
             size = size_of(each, parameter.name)
             sizes.append(size)
             low.append(parameter.bounds[0] / size)
@@ -216,7 +220,9 @@ def _stack(
 ) -> NDArray[np.float64]:  # fmt: skip
     parts = [whiten(residual[name][where.index], where, noise[name]) for name, where in layouts.items()]
     p, _ = space.split(x)
-    parts.append(np.array([(v - one.value) / (one.sd or 1.0) for v, one in zip(p, problem.free, strict=True)]))
+    parts.append(
+        np.array([(v - one.value) / (one.sd or 1.0) for v, one in zip(p, problem.free, strict=True)])
+    )
     stacked = np.concatenate(parts)
     return np.where(np.isfinite(stacked), stacked, 1e6)
 
@@ -259,7 +265,11 @@ def _differences(space: _Space, x: NDArray[np.float64], base: Stacked) -> dict[s
 
 
 def _covariance(
-    problem: Problem, space: _Space, x: NDArray[np.float64], layouts: dict[str, Layout], noise: dict[str, Noise]
+    problem: Problem,
+    space: _Space,
+    x: NDArray[np.float64],
+    layouts: dict[str, Layout],
+    noise: dict[str, Noise],
 ) -> NDArray[np.float64]:
     if not len(x):
         return np.zeros((0, 0))
@@ -276,6 +286,8 @@ def _covariance(
     del u
     keep = s > 1e-10 * s.max()
     inverse = (vt[keep].T / s[keep] ** 2) @ vt[keep]
-    inverse[np.diag_indices_from(inverse)] += np.where(np.abs(vt[~keep]).max(axis=0) > 0.1, 1e12, 0.0) if (~keep).any() else 0.0
+    inverse[np.diag_indices_from(inverse)] += (
+        np.where(np.abs(vt[~keep]).max(axis=0) > 0.1, 1e12, 0.0) if (~keep).any() else 0.0
+    )
     scale = space.sizes / size
     return np.asarray(inverse * np.outer(scale, scale))

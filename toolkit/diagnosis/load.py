@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from toolkit.diagnosis.model import Model
+from toolkit.errors import ConfigError
 
 if TYPE_CHECKING:
     from toolkit.calibration.records.record import CalibrationRecord
@@ -47,15 +48,33 @@ def _machine(case: Case, calibrations: Path | None) -> Model:
 
     machine = load_machine(case.simulation.machine)
     record = record_of(case, calibrations) if case.simulation.calibration else None
-    assert case.simulation.tire is not None
+    roles = {one.name: one.role for one in case.channels}
+    if record is not None and all(roles.get(name) == "input" for name in record.indications):
+        from toolkit.diagnosis.kinds.acquisition import AcquisitionModel
+
+        return AcquisitionModel(case, record, _others(case, calibrations))
+    if case.simulation.tire is None:
+        raise ConfigError(
+            "the simulation has no tire", where=f"{case.path}: simulation.tire", got="nothing",
+            expected='tire = "tire.tir", or the cells as inputs with a calibration',
+            next_step="name the tire file", rule="case",
+        )  # fmt: skip
     return MachineModel(case, read_tir(case.simulation.tire), record, machine.drum.speed_m_s)
+
+
+def _others(case: Case, calibrations: Path | None) -> tuple[CalibrationRecord, ...]:
+    from toolkit.calibration.registry.registry import Registry
+
+    if calibrations is None:
+        return ()
+    registry = Registry(calibrations)
+    return tuple(record for instrument in registry.instruments() for record in registry.usable(instrument)[0])
 
 
 def record_of(case: Case, calibrations: Path | None) -> CalibrationRecord:
     """Return the calibration that a case names: a path beside the case file, or a registry's id."""
     from toolkit.calibration.records.record import from_bytes
     from toolkit.calibration.registry.registry import Registry
-    from toolkit.errors import ConfigError
     from toolkit.files import read_bytes
 
     named = case.simulation.calibration

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Protocol
 
-from toolkit.effects.effect import Effect
+from toolkit.effects.effect import Effect, EffectParameter
 
 if TYPE_CHECKING:
     import numpy as np
@@ -15,6 +15,10 @@ if TYPE_CHECKING:
     from toolkit.diagnosis.case import CaseParameter, Run
 
     Arrays = dict[str, NDArray[np.float64]]
+
+
+# Effects that are there or not: nothing of them is fitted.
+DISCRETE = frozenset(("channel_sign", "channel_swap", "unit_error", "rectification", "wrong_calibration"))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -39,6 +43,11 @@ class Active:
     source: str | None = None
     runs: frozenset[str] | None = None
     values: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def searched(self) -> tuple[EffectParameter, ...]:
+        """Parameters that a fit moves: none of an effect that is there or not."""
+        return () if self.effect.name in DISCRETE else self.effect.parameters
 
     def acts_in(self, run: Run) -> bool:
         """Tell whether the effect acts in a run."""

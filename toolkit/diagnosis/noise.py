@@ -148,24 +148,21 @@ def whiten(values: NDArray[np.float64], where: Layout, noise: Noise) -> NDArray[
 
     Exact for a stationary autoregression: the first values of a segment are predicted by lower orders.
     """
-    from scipy.signal import lfilter
-
     orders = predictor(noise.reflection)
     p = len(noise.reflection)
     if p == 0:
         return values / noise.sd
-    filter_ = np.concatenate([[1.0], -orders[p]])
+    made = values.copy()
+    for j, weight in enumerate(orders[p], start=1):
+        made[j:] -= weight * values[:-j]
     early = [
         math.sqrt(math.prod(1 - noise.reflection[j] ** 2 for j in range(k, p))) for k in range(p)
     ]  # innovation sd of order p over that of order k
-    made = np.empty_like(values)
     for one in where.segments:
-        x = values[one]
-        y = lfilter(filter_, [1.0], x, axis=0)
-        for k in range(min(p, len(x))):
+        x = values[one.start : min(one.start + p, one.stop)]
+        for k in range(len(x)):
             past = orders[k] @ x[:k][::-1] if k else 0.0
-            y[k] = (x[k] - past) * early[k]
-        made[one] = y
+            made[one.start + k] = (x[k] - past) * early[k]
     return made / noise.sd
 
 

@@ -60,7 +60,9 @@ def read_run(
     for channel in channels:
         if channel.role in ("input", "covariate") and channel.name in columns:
             columns[channel.name] = _filled(path, channel.name, t, columns[channel.name])
-    return Run(name=name, t=t, columns=columns, conditions=conditions(declared), declared=declared, simulated=others)
+    return Run(
+        name=name, t=t, columns=columns, conditions=conditions(declared), declared=declared, simulated=others
+    )
 
 
 def conditions(declared: Mapping[str, Any]) -> dict[str, str]:

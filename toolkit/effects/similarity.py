@@ -9,14 +9,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from toolkit.effects.signals import Drive, TireForces
 
 if TYPE_CHECKING:
+    import numpy as np
     from numpy.typing import NDArray
 
-    Steady = Callable[["NDArray[np.float64]", Drive], TireForces]
+Steady = Callable[["NDArray[np.float64]", Drive], TireForces]
 
 
 def similar(steady: Steady, drive: Drive) -> TireForces:

@@ -112,7 +112,7 @@ class Cells:
         made = dict(values)
         for output in outputs:
             if output.name in self.loads:
-                made[output.name] = made[output.name] + (shown[output.name] - without[output.name]) / unit(
-                    output.unit
-                ).factor
+                made[output.name] = (
+                    made[output.name] + (shown[output.name] - without[output.name]) / unit(output.unit).factor
+                )
         return made

@@ -68,10 +68,13 @@ class ColumnsModel:
         """Return every output of a run with effects in it."""
         here = self.setting(run)
         made = {
-            one.name: run.simulated[one.name] * p.get(f"{one.name}_gain", 1.0) + p.get(f"{one.name}_offset", 0.0)
+            one.name: run.simulated[one.name] * p.get(f"{one.name}_gain", 1.0)
+            + p.get(f"{one.name}_offset", 0.0)
             for one in self.outputs
         }
-        if self._surface is not None and any(one.effect.drive is not None and one.acts_in(run) for one in active):
+        if self._surface is not None and any(
+            one.effect.drive is not None and one.acts_in(run) for one in active
+        ):
             made = self._tire(run, made, active, here)
         forces = [one for one in active if one.effect.stage == "dynamics" and one.acts_in(run)]
         if forces and self.motion is not None:
@@ -95,7 +98,9 @@ class ColumnsModel:
     def setting(self, run: Run) -> Setting:
         """Return a run's setting."""
         if run.name not in self._settings:
-            self._settings[run.name] = setting(self.case, run, nominal_load_N=self._load, speed_m_s=NOMINAL_SPEED)
+            self._settings[run.name] = setting(
+                self.case, run, nominal_load_N=self._load, speed_m_s=NOMINAL_SPEED
+            )
         return self._settings[run.name]
 
     def _tire(
@@ -111,7 +116,9 @@ class ColumnsModel:
         def steady(SA: NDArray[np.float64], drive: Drive) -> TireForces:
             # The surface gives the difference to the row's own slip angle and load: nothing where neither moved.
             got = {
-                name: turn[name] * units[name] * (made[name] + surface.difference(name, run, SA, drive.FZ, start))
+                name: turn[name]
+                * units[name]
+                * (made[name] + surface.difference(name, run, SA, drive.FZ, start))
                 for name in units
             }
             return TireForces(FY=got.get("FY", zero), MZ=got.get("MZ", zero))

@@ -138,7 +138,11 @@ class MachineModel:
     def _setting(self, run: Run) -> Any:
         if run.name not in self._settings:
             self._settings[run.name] = setting(
-                self.case, run, nominal_load_N=self._load, speed_m_s=self._speed, work_kJ=self._work_before(run)
+                self.case,
+                run,
+                nominal_load_N=self._load,
+                speed_m_s=self._speed,
+                work_kJ=self._work_before(run),
             )
         return self._settings[run.name]
 
@@ -149,8 +153,9 @@ class MachineModel:
             if one.name == run.name:
                 break
             start = base_drive(self.case, one, load_N=self._load, speed_m_s=self._speed)
-            FY, _ = self._tire(values, SA=-start.SA, FZ=start.FZ, IA=start.IA, V=start.V, P=None, pressure_error=0.0)
+            FY, _ = self._tire(
+                values, SA=-start.SA, FZ=start.FZ, IA=start.IA, V=start.V, P=None, pressure_error=0.0
+            )
             power = np.abs(FY * start.V * np.sin(start.SA)) * 1e-3
             total += float(np.sum(0.5 * (power[1:] + power[:-1]) * np.diff(one.t))) if one.rows > 1 else 0.0
         return total
-

@@ -52,6 +52,17 @@ class Motion:
             return []
         return [(self.output, None)]
 
+    def scales(self) -> tuple[float, float, float]:
+        """Return sizes of acceleration, velocity and position of an output that moves."""
+        run = max(self.case.runs, key=lambda one: one.rows)
+        y = run.columns[self.output]
+        good = np.isfinite(y)
+        span = float(np.ptp(run.t)) or 1.0
+        size = float(np.ptp(y[good])) or 1.0
+        if self.kind == "position":
+            return size / span**2, size / span, size
+        return size / span, size, size * span
+
     def disturbed(
         self, made: Mapping[str, NDArray[np.float64]], forces: Sequence[Active], run: Run
     ) -> dict[str, NDArray[np.float64]]:

@@ -87,7 +87,9 @@ class OdeModel:
             points.append(x)
         for i in range(len(start)):
             for j in range(len(start)):
-                if i != j and all(abs(r[i] - x[j]) <= 1e-9 * (1 + abs(x[j])) for r, x in zip(rates, points, strict=True)):
+                if i != j and all(
+                    abs(r[i] - x[j]) <= 1e-9 * (1 + abs(x[j])) for r, x in zip(rates, points, strict=True)
+                ):
                     found[j] = i
         return found
 
@@ -97,9 +99,18 @@ class OdeModel:
         x = self._integrate(run, p, ())
         rates = np.gradient(x, run.t, axis=1) if run.rows > 2 else np.zeros_like(x)
         made = {}
+        self.largest = {name: float(x[i].max()) for i, name in enumerate(self.states)}
         for i, name in enumerate(self.states):
-            made[name] = (float(np.std(rates[i])) or 1.0, float(np.std(x[i])) or float(np.abs(x[i]).max()) or 1.0)
+            made[name] = (
+                float(np.std(rates[i])) or 1.0,
+                float(np.std(x[i])) or float(np.abs(x[i]).max()) or 1.0,
+            )
         return made
+
+    def position_of(self, name: str) -> str | None:
+        """Return the state whose rate is this state, None where there is none."""
+        at = self._derivative_of.get(self.states.index(name))
+        return None if at is None else self.states[at]
 
     def observed(self, run: Run) -> dict[str, NDArray[np.float64]]:
         """Return what was recorded of every output."""
@@ -110,7 +121,11 @@ class OdeModel:
     ) -> dict[str, NDArray[np.float64]]:
         """Return every output of a free simulation over the whole run."""
         forces = [one for one in active if one.effect.stage == "dynamics" and one.acts_in(run)]
-        key = (run.name, tuple(p.values()), tuple((one.effect.name, one.channel, tuple(one.values.values())) for one in forces))
+        key = (
+            run.name,
+            tuple(p.values()),
+            tuple((one.effect.name, one.channel, tuple(one.values.values())) for one in forces),
+        )
         if key not in self._kept:
             if len(self._kept) > 400:
                 self._kept.clear()
@@ -161,7 +176,9 @@ class OdeModel:
 
         return rhs
 
-    def _made(self, run: Run, p: Mapping[str, float], x: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
+    def _made(
+        self, run: Run, p: Mapping[str, float], x: NDArray[np.float64]
+    ) -> dict[str, NDArray[np.float64]]:
         values = dict(p)
         inputs = _Inputs(run, self._drivers)
         rows: dict[str, list[float]] = {one.name: [] for one in self.outputs}
@@ -188,7 +205,9 @@ class OdeModel:
                 return [(name, None) for i, name in enumerate(self.states) if i not in self._derivative_of]
             if effect.name in _POSITIONS:
                 return [
-                    (name, None) for name in self.force_units if self.states.index(name) in self._derivative_of
+                    (name, None)
+                    for name in self.force_units
+                    if self.states.index(name) in self._derivative_of
                 ] or ([(name, None) for name in self.force_units] if effect.name == "cubic_stiffness" else [])
             return [(name, None) for name in self.force_units]
         others = [(one.name, one.unit) for one in self.case.drivers]

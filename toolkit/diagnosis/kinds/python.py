@@ -39,7 +39,9 @@ class PythonModel:
         self._load = nominal_load(case)
         self._settings: dict[str, Setting] = {}
         drivers = {one.name for one in case.drivers}
-        self._is_tire = bool(drivers & {"SA", "SA_CMD"}) and bool({"FY", "MZ"} & {one.name for one in self.outputs})
+        self._is_tire = bool(drivers & {"SA", "SA_CMD"}) and bool(
+            {"FY", "MZ"} & {one.name for one in self.outputs}
+        )
         self.motion: Motion | None = None if self._is_tire else motion_of(case)
 
     def observed(self, run: Run) -> dict[str, NDArray[np.float64]]:
@@ -83,7 +85,9 @@ class PythonModel:
         result = {}
         for one in self.outputs:
             if one.name not in made.columns:
-                raise _failed(self.case, run, f"no column {one.name!r}; it has {', '.join(map(str, made.columns))}")
+                raise _failed(
+                    self.case, run, f"no column {one.name!r}; it has {', '.join(map(str, made.columns))}"
+                )
             values = np.asarray(made[one.name], dtype=np.float64)
             if not np.isfinite(values).all():
                 raise _failed(self.case, run, f"no number in column {one.name!r}, row {_first_bad(values)}")
@@ -107,7 +111,9 @@ class PythonModel:
     def setting(self, run: Run) -> Setting:
         """Return a run's setting."""
         if run.name not in self._settings:
-            self._settings[run.name] = setting(self.case, run, nominal_load_N=self._load, speed_m_s=NOMINAL_SPEED)
+            self._settings[run.name] = setting(
+                self.case, run, nominal_load_N=self._load, speed_m_s=NOMINAL_SPEED
+            )
         return self._settings[run.name]
 
     def _tire(
@@ -200,5 +206,3 @@ def _failed(case: Case, run: Run, got: str) -> FitError:
 
 def _first_bad(values: NDArray[np.float64]) -> int:
     return int(np.flatnonzero(~np.isfinite(values))[0]) + 1
-
-

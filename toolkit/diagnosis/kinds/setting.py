@@ -30,9 +30,7 @@ def setting(
 ) -> Setting:
     """Return the setting of a run; its channels are all drivers, in SI."""
     channels = {
-        one.name: si(case, one.name, run.columns[one.name])
-        for one in case.drivers
-        if one.name in run.columns
+        one.name: si(case, one.name, run.columns[one.name]) for one in case.drivers if one.name in run.columns
     }
     first = {}
     for one in case.drivers:

@@ -57,7 +57,9 @@ class Surface:
 
         inner = np.linspace(self._low, self._high, _KNOTS)
         step = inner[1] - inner[0]
-        knots = np.concatenate([inner[0] - step * np.arange(3, 0, -1), inner, inner[-1] + step * np.arange(1, 4)])
+        knots = np.concatenate(
+            [inner[0] - step * np.arange(3, 0, -1), inner, inner[-1] + step * np.arange(1, 4)]
+        )
         clipped = np.clip(SA, self._low, self._high - 1e-12)
         splines = BSpline.design_matrix(clipped, knots, 3).toarray()
         load = FZ / self._load

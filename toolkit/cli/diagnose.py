@@ -1,0 +1,154 @@
+"""`toolkit diagnose CASE.toml`: simulation against recording, and what physics was left out."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from toolkit.cli.console import Calibrations, Home, Json, Quiet, answer, finding_lines, table
+from toolkit.cli.home import calibrations_folder
+
+if TYPE_CHECKING:
+    from toolkit.diagnosis.answer import Diagnosis
+
+NAME = "diagnose"
+
+
+def command(
+    case: Annotated[Path, typer.Argument(metavar="CASE.toml", help="Simulation and recordings.")],
+    out: Annotated[Path, typer.Option("--out", help="Folder for diagnosis.json, the page and predictions.")],
+    budget: Annotated[
+        float, typer.Option("--budget", min=1.0, help="Seconds after which a partial answer is given.")
+    ] = 600.0,
+    calibrations: Calibrations = None,
+    home: Home = None,
+    json: Json = False,
+    quiet: Quiet = False,
+) -> int:
+    """Diagnose why a simulation and a recording differ: where, which physics was left out, how much better with it.
+
+    The answer is one of: named, equivalent (a class of effects that this recording cannot tell apart),
+    unknown (structure that no known effect explains), nothing, untestable. It ends with 0 for nothing and
+    1 for the rest.
+
+    Example: toolkit diagnose case.toml --out answer
+    """
+    _one_thread()
+    from toolkit.diagnosis.case_read import read_case
+    from toolkit.diagnosis.diagnose import diagnose
+    from toolkit.diagnosis.serial import as_json, prediction_csv
+    from toolkit.files import write_atomic
+
+    started = time.perf_counter()
+    read = read_case(case)
+    registry = _registry(calibrations, home) if read.simulation.kind == "machine" else None
+    tell = _teller(show=not quiet and not json)
+    result = diagnose(read, registry, budget_s=budget, tell=tell)
+    tell("")
+    made = result.diagnosis
+    payload = as_json(made)
+    unknown = not made.effects
+    for run in read.predict:
+        name = Path(run.name).with_suffix(".csv").name
+        write_atomic(out / "predictions" / name, prediction_csv(result.search, run, unknown=unknown))
+    payload["timing"] = {"seconds": time.perf_counter() - started}
+    import json as json_module
+
+    write_atomic(
+        out / "diagnosis.json",
+        json_module.dumps({"schema": 1, **payload}, ensure_ascii=False, indent=2, allow_nan=False) + "\n",
+    )
+    answer({**payload, "out": str(out)}, _text(made, out), as_json=json, quiet=quiet)
+    return 0 if made.verdict == "nothing" else 1
+
+
+def _one_thread() -> None:
+    """Keep linear algebra on one thread: its matrices are small, and threads only wait for each other."""
+    import os
+
+    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+        os.environ.setdefault(name, "1")
+
+
+def _registry(calibrations: Path | None, home: Path | None) -> Path | None:
+    from toolkit.errors import ToolkitError
+
+    try:
+        return calibrations_folder(calibrations, home)
+    except ToolkitError:
+        if calibrations is not None or home is not None:
+            raise
+        return None
+
+
+def _teller(*, show: bool) -> Any:
+    import sys
+
+    started = time.monotonic()
+
+    def tell(what: str) -> None:
+        if show and sys.stderr.isatty():
+            text = f"{time.monotonic() - started:5.0f} s  {what}" if what else ""
+            sys.stderr.write(f"\r\x1b[K{text[:110]}")
+            sys.stderr.flush()
+
+    return tell
+
+
+def _text(made: Diagnosis, out: Path) -> str:
+    lines = [f"{made.title}: {_VERDICTS[made.verdict]}"]
+    for one in made.effects:
+        channel = f" on {one.channel}" if one.channel else ""
+        lines += ["", f"{one.name}{channel} ({one.stage}): {one.statement}", f"  {one.equation}"]
+        for each in one.parameters:
+            if isinstance(each.value, str):
+                lines.append(f"  {each.name} = {each.value}")
+                continue
+            reach = "" if each.ci95 is None else f"  [{each.ci95[0]:.4g}, {each.ci95[1]:.4g}] 95 %"
+            lines.append(f"  {each.name} = {each.value:.4g} {each.unit}{reach}")
+        if one.equivalent_to:
+            lines.append(f"  this recording cannot tell it from: {', '.join(one.equivalent_to)}")
+        lines.append(
+            f"  held-out log score +{one.held_out_log_score_gain:.1f}, p = {one.p_value:.2g} in the search"
+        )
+    for channel, names in made.depends_on:
+        lines.append(f"{channel}: structure that no named effect explains, over {' and '.join(names)}")
+    for place in made.mismatch:
+        for at in place.where[:1]:
+            lines.append(
+                f"{place.channel}: mismatch mostly where {at.variable} is {at.start} to {at.end} {at.unit}"
+            )
+    rows = [
+        [
+            o.channel,
+            o.unit,
+            *(f"{v:.4g}" for v in (o.nominal_rmse, o.refitted_rmse, o.augmented_rmse, o.noise_floor)),
+        ]
+        for o in made.held_out
+    ]
+    lines += ["", f"error on held-out rows (by {made.held_out_by}):"]
+    lines.append(table(["output", "unit", "nominal", "refitted", "augmented", "noise"], rows, align="<<>>>>"))
+    moved = [one for one in made.nominal_parameters if one.prior_sd]
+    if moved:
+        cells = [
+            [o.name, o.unit, f"{o.before:.5g}", f"{o.after:.5g}", f"{o.shift_in_sd or 0:+.1f}"] for o in moved
+        ]
+        lines += ["", table(["parameter", "unit", "before", "after", "shift/sd"], cells, align="<<>>>")]
+    lines += ["", *made.next_measurements] if made.next_measurements else []
+    if not made.complete:
+        lines += ["", f"incomplete: the budget was spent before {made.skipped[0]}; a larger --budget goes on"]
+    if made.findings:
+        lines += ["", "findings (toolkit explain RULE tells more):", *finding_lines(made.findings)]
+    return "\n".join([*lines, "", f"written to {out}"])
+
+
+_VERDICTS = {
+    "named": "the missing physics has a name",
+    "equivalent": "a class of effects explains it, which this recording cannot tell apart",
+    "unknown": "something is missing that no known effect explains",
+    "nothing": "nothing is missing that this recording could show",
+    "untestable": "this recording cannot tell",
+}

@@ -1,0 +1,215 @@
+"""Every effect at every place where it could act in a case, with the values from which a search starts."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from toolkit.diagnosis.model import DISCRETE, Active
+from toolkit.effects.catalogue import effects
+from toolkit.effects.effect import Effect, EffectParameter
+
+if TYPE_CHECKING:
+    from toolkit.diagnosis.case import Case
+    from toolkit.diagnosis.problem import Problem
+
+# Effects in which time passes: nothing can be said of them where rows have no time.
+_IN_TIME = frozenset(
+    "channel_delay filter_lag zero_drift creep relaxation thermal_friction wear viscoelastic_settling turn_slip load_lag"
+    .split()
+)  # fmt: skip
+_SUBSETS = 8
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Start:
+    """One way to switch a candidate on: its full values, and one set of values for each direction."""
+
+    values: dict[str, float]
+    directions: tuple[dict[str, float], ...]
+    amplitudes: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Candidate:
+    """An effect at a place, and how a search may start; ``discrete`` ones are there or not."""
+
+    active: Active
+    starts: tuple[Start, ...]
+    discrete: bool
+
+    @property
+    def key(self) -> tuple[str, str | None, str | None, frozenset[str] | None]:
+        """What tells candidates apart."""
+        return (self.active.effect.name, self.active.channel, self.active.source, self.active.runs)
+
+    @property
+    def name(self) -> str:
+        """The effect's name."""
+        return self.active.effect.name
+
+
+def candidates(problem: Problem) -> tuple[Candidate, ...]:
+    """Return every candidate of a case."""
+    made = []
+    for effect in effects().values():
+        if effect.name in _IN_TIME and not problem.case.has_time:
+            continue
+        for channel, source in problem.model.places(effect):
+            whole = Active(effect=effect, channel=channel, source=source)
+            for runs in (None, *_subsets(problem.case, problem, effect)):
+                active = replace(whole, runs=runs)
+                starts = _starts(problem, active)
+                if starts:
+                    made.append(Candidate(active=active, starts=starts, discrete=effect.name in DISCRETE))
+    return tuple(made)
+
+
+def _starts(problem: Problem, active: Active) -> tuple[Start, ...]:
+    effect = active.effect
+    if not effect.parameters:
+        return (Start(values={}, directions=({},), amplitudes=()),)
+    scales = {one.name: _scale(problem, active, one) for one in effect.parameters}
+    extra = {f"_size_{one.name}": scales[one.name] * _middle(one) for one in effect.parameters}
+    extra |= _smoothing(problem, active)
+    shapes = [one for one in effect.parameters if one.off is None]
+    amplitudes = [one for one in effect.parameters if one.off is not None]
+    made = []
+    for shape in itertools.product(
+        *([v * scales[one.name] for v in one.starts or (_middle(one),)] for one in shapes)
+    ):
+        fixed = dict(zip((one.name for one in shapes), shape, strict=True)) | extra
+        off = {one.name: float(one.off or 0.0) for one in amplitudes}
+        if len(amplitudes) == 1 and amplitudes[0].starts:
+            one = amplitudes[0]
+            for value in one.starts:
+                values = fixed | {one.name: value * scales[one.name]}
+                made.append(Start(values=values, directions=(values,), amplitudes=(one.name,)))
+            continue
+        directions = []
+        for one in amplitudes:
+            directions.append(fixed | off | {one.name: _middle(one) * scales[one.name]})
+        values = fixed | {one.name: _middle(one) * scales[one.name] for one in amplitudes}
+        made.append(
+            Start(
+                values=values, directions=tuple(directions), amplitudes=tuple(one.name for one in amplitudes)
+            )
+        )
+    return tuple(made)
+
+
+def _middle(one: EffectParameter) -> float:
+    low, high = one.typical
+    if low * high > 0:
+        return math.copysign(math.sqrt(low * high), low)
+    return high or low
+
+
+def _scale(problem: Problem, active: Active, one: EffectParameter) -> float:
+    if not one.relative:
+        return 1.0
+    if active.effect.stage == "dynamics":
+        return _dynamic_scale(problem, active, one)
+    own = _spread(problem, active.channel)
+    name = active.effect.name
+    if name == "nonlinearity":
+        return 1 / own if one.name == "quadratic" else 1 / own**2
+    if name == "zero_drift":
+        minutes = sum(float(run.t[-1] - run.t[0]) for run in problem.runs if run.rows > 1) / 60
+        return 20 * own / max(minutes, 1e-9)
+    if name == "thermal_drift":
+        return 100 * own / max(_temperature_range(problem), 0.1)
+    if name == "crosstalk":
+        return own / _spread(problem, active.source)
+    return own
+
+
+def _dynamic_scale(problem: Problem, active: Active, one: EffectParameter) -> float:
+    force, speed, place = _motion_scales(problem, active)
+    return {
+        "force": force, "coulomb": force, "amplitude": force, "viscous": force / speed, "drag": force / speed**2,
+        "k3": force / place**3, "period": place, "level": place,
+    }[one.name]  # fmt: skip
+
+
+def _motion_scales(problem: Problem, active: Active) -> tuple[float, float, float]:
+    """Return the sizes of force, velocity and position of the equation that an effect enters."""
+    from toolkit.diagnosis.kinds.ode import OdeModel
+
+    model = problem.model
+    if isinstance(model, OdeModel):
+        name = str(active.channel)
+        rate, own = model.scale[name]
+        position = model.position_of(name)
+        place = own if position is None else model.scale[position][1]
+        if active.effect.name == "overflow":
+            place = model.largest[name]
+        return rate, own, place
+    motion = getattr(model, "motion", None)
+    force = _spread(problem, active.channel)
+    speed = place = 1.0
+    if motion is not None:
+        if motion.kind == "force":
+            speed = _spread(problem, motion.velocity) if motion.velocity else 1.0
+            place = _spread(problem, motion.position) if motion.position else 1.0
+        else:
+            force, speed, place = motion.scales()
+    return force, speed, place
+
+
+def _smoothing(problem: Problem, active: Active) -> dict[str, float]:
+    if active.effect.name != "coulomb_friction":
+        return {}
+    return {"smooth": 1e-3 * _motion_scales(problem, active)[1]}
+
+
+def _spread(problem: Problem, name: str | None) -> float:
+    if name is None:
+        return 1.0
+    if name in problem.observed:
+        values = problem.observed[name]
+    else:
+        columns = [run.columns[name] for run in problem.runs if name in run.columns]
+        values = np.concatenate(columns) if columns else np.ones(1)
+    values = np.abs(values[np.isfinite(values)])
+    return float(values.max()) if len(values) and values.max() > 0 else 1.0
+
+
+def _temperature_range(problem: Problem) -> float:
+    for name in ("T_CELL", "T_AMBIENT", "T", "T_TREAD"):
+        columns = [run.columns[name] for run in problem.runs if name in run.columns]
+        if columns:
+            return float(np.ptp(np.concatenate(columns)))
+    return 1.0
+
+
+def _subsets(case: Case, problem: Problem, effect: Effect) -> list[frozenset[str]]:
+    made: list[frozenset[str]] = []
+    names = {run.name for run in problem.runs}
+    for key in effect.confined_by:
+        levels: dict[str, list[str]] = {}
+        for run in problem.runs:
+            if key in run.conditions:
+                levels.setdefault(run.conditions[key], []).append(run.name)
+        if len(levels) < 2:
+            continue
+        ordered = _in_order(list(levels))
+        groups: list[Sequence[str]] = [[one] for one in ordered]
+        groups += [ordered[:k] for k in range(2, len(ordered))]
+        for group in groups[:_SUBSETS]:
+            chosen = frozenset(itertools.chain.from_iterable(levels[one] for one in group))
+            if chosen not in made and chosen != names:
+                made.append(chosen)
+    return made
+
+
+def _in_order(levels: list[str]) -> list[str]:
+    try:
+        return sorted(levels, key=float)
+    except ValueError:
+        return sorted(levels)

@@ -1,0 +1,40 @@
+"""Classes of effects that a recording cannot tell apart, and the measurement that would."""
+
+from __future__ import annotations
+
+from toolkit.diagnosis.model import Active
+from toolkit.diagnosis.problem import Problem
+from toolkit.diagnosis.search import Step
+
+_CLOSE = 3.0  # log-likelihood within which the data prefer neither
+_PULL = ("conicity", "camber_offset", "crosstalk")
+_ANGLE = ("plysteer", "steer_offset")
+
+
+def equivalent_to(problem: Problem, step: Step) -> tuple[str, ...]:
+    """Return the other names that explain a step as well, without the step's own."""
+    names = [one.active.effect.name for one in step.rivals if one.difference > -_CLOSE]
+    names += _always(problem, step.active)
+    own = step.active.effect.name
+    return tuple(dict.fromkeys(name for name in names if name != own))
+
+
+def _always(problem: Problem, active: Active) -> list[str]:
+    """Return the classes that hold on this machine whatever the recording."""
+    name = active.effect.name
+    turned = any(run.conditions.get("mounting") == "turned" for run in problem.runs)
+    if name in _ANGLE:
+        return list(_ANGLE)
+    is_load = name == "crosstalk" and active.channel == "FY" and active.source in ("FZ", "FZ_CMD")
+    if (name in ("conicity", "camber_offset") or is_load) and not turned:
+        return list(_PULL)
+    cells = getattr(problem.model, "cells", None)
+    record = getattr(problem.model, "record", None)
+    of_cells = (cells.names if cells is not None else ()) or (
+        record.indications if record is not None else ()
+    )
+    if name == "channel_sign" and active.channel in of_cells:
+        return ["channel_sign", "wrong_calibration"]
+    if name == "wrong_calibration":
+        return ["wrong_calibration", "channel_sign"]
+    return []

@@ -1,0 +1,75 @@
+"""Held-out rows: whole runs; with one run contiguous blocks of it. Never random rows."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from toolkit.diagnosis.fit import Fit, fit, held_out_score
+from toolkit.diagnosis.model import Active
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from toolkit.diagnosis.problem import Problem
+
+_FOLDS = 5
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Folds:
+    """Rows that each fold holds out, and whether they are whole runs."""
+
+    held: tuple[NDArray[np.bool_], ...]
+    by_run: bool
+
+
+def folds_of(problem: Problem) -> Folds:
+    """Return the folds of a problem, at most five, runs dealt out in turn."""
+    runs = [one for one in problem.slices if one.stop > one.start]
+    if len(runs) >= 2:
+        count = min(_FOLDS, len(runs))
+        held = []
+        for k in range(count):
+            mask = np.zeros(problem.rows, dtype=bool)
+            for one in runs[k::count]:
+                mask[one] = True
+            held.append(mask)
+        return Folds(held=tuple(held), by_run=True)
+    held = []
+    for block in np.array_split(np.arange(problem.rows), _FOLDS):
+        mask = np.zeros(problem.rows, dtype=bool)
+        mask[block] = True
+        if mask.any():
+            held.append(mask)
+    return Folds(held=tuple(held), by_run=False)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class HeldOut:
+    """A hypothesis on rows that it has not seen: log score of each fold, and its simulation of those rows."""
+
+    scores: tuple[float, ...]
+    simulated: dict[str, NDArray[np.float64]]
+    fits: tuple[Fit, ...]
+
+    @property
+    def total(self) -> float:
+        """Log score over all folds."""
+        return sum(self.scores)
+
+
+def hold_out(problem: Problem, folds: Folds, active: Sequence[Active], start: Fit) -> HeldOut:
+    """Fit a hypothesis without each fold and score it there; the simulation is free over whole runs."""
+    scores, fits = [], []
+    simulated = {name: np.full(problem.rows, np.nan) for name in problem.names}
+    for held in folds.held:
+        made = fit(problem, active, start=start.p, rows=~held, noise=start.noise, rounds=2)
+        scores.append(held_out_score(problem, made, held))
+        fits.append(made)
+        for name in problem.names:
+            simulated[name][held] = made.simulated[name][held]
+    return HeldOut(scores=tuple(scores), simulated=simulated, fits=tuple(fits))

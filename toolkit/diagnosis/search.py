@@ -1,0 +1,235 @@
+"""The search: forward steps of joint fits, each judged on held-out runs and against the whole search's null."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from toolkit.diagnosis.candidates import Candidate, candidates
+from toolkit.diagnosis.fit import Fit, fit
+from toolkit.diagnosis.folds import Folds, HeldOut, folds_of, hold_out
+from toolkit.diagnosis.model import Active
+from toolkit.diagnosis.null import search_p_values
+from toolkit.diagnosis.problem import Problem, without_outliers
+from toolkit.diagnosis.screen import Scored, Screen, best_of
+from toolkit.diagnosis.structure import Group, groups
+
+ALPHA = 0.01  # of the whole search, a step
+ALPHA_STRUCTURE = 0.002
+MOST_EFFECTS = 4
+_REFINED = 8  # candidates that are fitted jointly, of those that screening ranks first
+_CLOSE = 3.0  # log-likelihood within which two effects cannot be told apart
+_LEAST_GAIN = 1.5  # of the held-out log score
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Rival:
+    """A candidate fitted jointly in an effect's place: its log-likelihood less that of the chosen one."""
+
+    active: Active
+    difference: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Step:
+    """An effect that was found: its evidence, and what else would explain the same."""
+
+    active: Active
+    p_value: float
+    held_out_gain: float
+    gain: float
+    rivals: tuple[Rival, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class StructureFound:
+    """Structure that stays: where it is, and its p-value in the search."""
+
+    output: str
+    variables: tuple[str, ...]
+    gain: float
+    p_value: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Search:
+    """What a search has found, with the fits that show it."""
+
+    problem: Problem
+    folds: Folds
+    nominal: Fit
+    refitted: Fit
+    augmented: Fit
+    steps: tuple[Step, ...]
+    structure: tuple[StructureFound, ...]
+    structure_before: tuple[StructureFound, ...]
+    held_refitted: HeldOut
+    held_augmented: HeldOut
+    considered: tuple[Candidate, ...]
+    screen: Screen
+    scored: tuple[Scored, ...]
+    skipped: tuple[str, ...]
+
+
+class OutOfTime(Exception):
+    """The budget is spent."""
+
+
+@dataclass(slots=True)
+class Budget:
+    """How long a search may take; ``check`` raises where the time is over."""
+
+    now: Callable[[], float]
+    until: float
+    tell: Callable[[str], None]
+
+    def check(self, what: str) -> None:
+        """Tell what comes next, or raise."""
+        if self.now() > self.until:
+            raise OutOfTime(what)
+        self.tell(what)
+
+
+def search(problem: Problem, *, seed: int, budget: Budget) -> Search:
+    """Search for what a simulation leaves out.
+
+    Parameters
+    ----------
+    problem : runs, outputs, nominal parameters
+    seed : of the null's draws; from the case's hash, so that an answer repeats
+    budget : of time; a spent one ends the search with what it has
+    """
+    nominal = _as_declared(problem)
+    budget.check("refit of the nominal parameters")
+    refitted = fit(problem)
+    problem = without_outliers(problem, refitted.residual)
+    refitted = fit(problem, start=refitted.p)
+    folds = folds_of(problem)
+    listed = candidates(problem)
+    skipped: list[str] = []
+    steps: list[Step] = []
+    base = refitted
+    held_base = held_refitted = hold_out(problem, folds, (), refitted)
+    screen = Screen.of(problem, base)
+    scored: list[Scored] = []
+    before: tuple[StructureFound, ...] = ()
+    structure: tuple[StructureFound, ...] = ()
+    try:
+        for turn in range(MOST_EFFECTS + 1):
+            budget.check(f"step {turn + 1}: screening {len(listed)} candidates")
+            screen = Screen.of(problem, base)
+            scored = [one for each in listed for one in screen.score(each)]
+            ranked = best_of(scored)
+            p_values = search_p_values(
+                screen, [one.directions for one in scored], [one.gain for one in scored], seed + turn
+            )
+            p_of = {id(one): p for one, p in zip(scored, p_values, strict=True)}
+            budget.check(f"step {turn + 1}: structure of the residual")
+            structure = _structure(problem, screen, base, seed + 100 + turn)
+            if turn == 0:
+                before = structure
+            if turn == MOST_EFFECTS:
+                break
+            promising = [one for one in ranked if p_of[id(one)] < ALPHA][:_REFINED]
+            if not promising:
+                break
+            budget.check(
+                f"step {turn + 1}: joint fits of {', '.join(dict.fromkeys(o.candidate.name for o in promising))}"
+            )
+            found = _best_step(problem, folds, base, held_base, promising, p_of)
+            if found is None:
+                break
+            base, held_base, step = found
+            steps.append(step)
+        if len(steps) > 1:
+            budget.check("swaps")
+            base, held_base, steps = _pruned(problem, folds, base, held_base, steps)
+    except OutOfTime as error:
+        skipped.append(str(error))
+    return Search(
+        problem=problem, folds=folds, nominal=nominal, refitted=refitted, augmented=base, steps=tuple(steps),
+        structure=structure, structure_before=before, held_refitted=held_refitted, held_augmented=held_base,
+        considered=listed, screen=screen, scored=tuple(scored), skipped=tuple(skipped),
+    )  # fmt: skip
+
+
+def _best_step(
+    problem: Problem, folds: Folds, base: Fit, held_base: HeldOut, promising: Sequence[Scored],
+    p_of: dict[int, float],
+) -> tuple[Fit, HeldOut, Step] | None:  # fmt: skip
+    n = sum(int(one.sum()) for one in problem.kept.values())
+    tried: list[tuple[float, Scored, Fit]] = []
+    for one in promising:
+        made = fit(problem, (*base.active, one.active), start=base.p, noise=None)
+        penalty = 0.5 * len(one.active.searched) * math.log(n)
+        tried.append((made.log_posterior - penalty, one, made))
+    tried.sort(key=lambda each: -each[0])
+    for score, one, made in tried[:3]:
+        held = hold_out(problem, folds, made.active, made)
+        gain = held.total - held_base.total
+        if gain < _LEAST_GAIN or made.log_posterior - base.log_posterior < _LEAST_GAIN:
+            continue
+        rivals = tuple(
+            Rival(active=other_fit.active[-1], difference=other_score - score)
+            for other_score, other, other_fit in tried
+            if other is not one
+        )
+        step = Step(
+            active=made.active[-1], p_value=p_of[id(one)], held_out_gain=gain,
+            gain=made.log_posterior - base.log_posterior, rivals=rivals,
+        )  # fmt: skip
+        return made, held, step
+    return None
+
+
+def _pruned(
+    problem: Problem, folds: Folds, base: Fit, held_base: HeldOut, steps: list[Step]
+) -> tuple[Fit, HeldOut, list[Step]]:
+    """Drop effects that the later ones made superfluous: without them the held-out score is as good."""
+    for i in range(len(steps) - 1):
+        if len(base.active) < 2:
+            break
+        rest = tuple(one for one in base.active if _place(one) != _place(steps[i].active))
+        made = fit(problem, rest, start=base.p)
+        held = hold_out(problem, folds, made.active, made)
+        if held_base.total - held.total < _LEAST_GAIN:
+            base, held_base = made, held
+            kept = {_place(one) for one in rest}
+            steps = [one for one in steps if _place(one.active) in kept]
+            return _pruned(problem, folds, base, held_base, steps)
+    values = {_place(one): one for one in base.active}
+    return base, held_base, [replace(one, active=values[_place(one.active)]) for one in steps]
+
+
+def _place(one: Active) -> tuple[object, ...]:
+    return (one.effect.name, one.channel, one.source, one.runs)
+
+
+def _structure(problem: Problem, screen: Screen, base: Fit, seed: int) -> tuple[StructureFound, ...]:
+    listed: list[Group] = groups(problem, base)
+    directions = [one.directions(problem) for one in listed]
+    gains = [screen.gain(one)[0] for one in directions]
+    p_values = search_p_values(screen, directions, gains, seed)
+    found = [
+        StructureFound(output=one.output, variables=one.variables, gain=gain, p_value=p)
+        for one, gain, p in zip(listed, gains, p_values, strict=True)
+        if p < ALPHA_STRUCTURE
+    ]
+    return tuple(sorted(found, key=lambda one: -one.gain))
+
+
+def _as_declared(problem: Problem) -> Fit:
+    """Return the simulation as declared, its residual and noise, nothing fitted."""
+    from toolkit.diagnosis.fit import noise_of
+
+    p = tuple(one.value for one in problem.free)
+    simulated = problem.simulate(p, ())
+    residual = {name: problem.observed[name] - simulated[name] for name in simulated}
+    layouts = {name: problem.layout(name) for name in problem.names}
+    return Fit(
+        p=p, active=(), residual=residual, simulated=simulated, noise=noise_of(problem, residual, layouts),
+        log_posterior=0.0, covariance=np.zeros((len(p), len(p))), rows=None,
+    )  # fmt: skip

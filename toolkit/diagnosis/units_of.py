@@ -1,0 +1,54 @@
+"""Units of an effect's parameters in a case: the placeholders of the catalogue filled in."""
+
+from __future__ import annotations
+
+from toolkit.diagnosis.case import Case
+from toolkit.diagnosis.model import Active, Model
+
+
+def unit_of(case: Case, model: Model, active: Active, name: str) -> str:
+    """Return the unit of one parameter of an effect at its place."""
+    text = next(one.unit for one in active.effect.parameters if one.name == name)
+    if "{" not in text:
+        return text
+    if active.effect.stage == "dynamics":
+        force, velocity, position = _motion(case, model, active)
+        return text.format(force=force, velocity=velocity, position=position)
+    return text.format_map(
+        {"channel": _channel(case, model, active.channel), "from": _channel(case, model, active.source)}
+    )
+
+
+def _channel(case: Case, model: Model, name: str | None) -> str:
+    for one in model.outputs:
+        if one.name == name:
+            return one.unit
+    for each in case.channels:
+        if each.name == name:
+            return each.unit
+    return "1"
+
+
+def _motion(case: Case, model: Model, active: Active) -> tuple[str, str, str]:
+    forces = getattr(model, "force_units", None)
+    if forces is not None:
+        state = str(active.channel)
+        position = model.position_of(state)  # type: ignore[attr-defined]
+        return (
+            forces.get(state) or f"{_channel(case, model, state)}/s",
+            _state(case, model, state), _state(case, model, position or state),
+        )  # fmt: skip
+    motion = getattr(model, "motion", None)
+    own = _channel(case, model, active.channel)
+    if motion is None:
+        return own, "1", "1"
+    if motion.kind == "force":
+        return own, _channel(case, model, motion.velocity), _channel(case, model, motion.position)
+    length = own if motion.kind == "position" else f"{own}*s"
+    return f"{length}/s^2", f"{length}/s", length
+
+
+def _state(case: Case, model: Model, name: str) -> str:
+    """Return the unit of a state: that of the output of its name, else the state's name itself."""
+    unit = _channel(case, model, name)
+    return name if unit == "1" else unit
