@@ -1,11 +1,20 @@
 """Files: whole or not at all."""
 
+import os
 from pathlib import Path
 
 import pytest
 
 from toolkit.errors import ConfigError, OutputError
-from toolkit.files import atomic_path, check_keys, read_toml, sha256_bytes, sha256_file, write_atomic
+from toolkit.files import (
+    atomic_path,
+    check_keys,
+    read_regular,
+    read_toml,
+    sha256_bytes,
+    sha256_file,
+    write_atomic,
+)
 
 
 def test_write_and_hash(tmp_path: Path) -> None:
@@ -70,3 +79,19 @@ def test_missing_toml(tmp_path: Path) -> None:
 def test_mode_is_readable_by_others(tmp_path: Path) -> None:
     write_atomic(tmp_path / "a", b"x")
     assert (tmp_path / "a").stat().st_mode & 0o777 == 0o644
+
+
+def test_only_a_regular_file_is_read(tmp_path: Path) -> None:
+    (tmp_path / "file").write_bytes(b"whole")
+    (tmp_path / "link").symlink_to("file")
+    (tmp_path / "endless").symlink_to("/dev/zero")
+    os.mkfifo(tmp_path / "pipe")
+    assert read_regular(tmp_path / "file") == read_regular(tmp_path / "link") == b"whole"
+    for name in ("pipe", "endless", "."):
+        with pytest.raises(OSError, match="not a regular file"):
+            read_regular(tmp_path / name)
+    with pytest.raises(FileNotFoundError):
+        read_regular(tmp_path / "none")
+    with pytest.raises(ConfigError) as caught:
+        read_toml(tmp_path / "pipe")
+    assert (caught.value.rule, str(caught.value.got)) == ("no-file", "not a regular file")

@@ -42,7 +42,7 @@ from toolkit.calibration.registry.store import Change, commit
 from toolkit.calibration.session.read import Session, read_session
 from toolkit.calibration.terms import term_matrix
 from toolkit.errors import ToolkitError
-from toolkit.files import sha256_bytes
+from toolkit.files import read_regular, sha256_bytes
 from toolkit.findings import Finding
 
 if TYPE_CHECKING:
@@ -163,7 +163,7 @@ def _recorded(folder: Path, session: Session, ledger: Ledger) -> CalibrationReco
         path = folder / f"{record_id}.json"
         try:
             # The gates cost a refit: only the record that claims these inputs goes through them.
-            if from_bytes(path.read_bytes(), where=path).inputs_sha256 == session.inputs_sha256:
+            if from_bytes(read_regular(path), where=path).inputs_sha256 == session.inputs_sha256:
                 return load_checked(folder, record_id, ledger)
         except (ToolkitError, OSError):
             continue

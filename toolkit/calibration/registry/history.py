@@ -16,6 +16,7 @@ from toolkit.calibration.registry.gates import GateResult, new_history, sign_and
 from toolkit.calibration.registry.registry import load_checked, today
 from toolkit.calibration.registry.status import status_of
 from toolkit.errors import ToolkitError
+from toolkit.files import read_regular
 from toolkit.findings import Finding
 
 if TYPE_CHECKING:
@@ -64,7 +65,7 @@ def history_of(registry: Registry, record: CalibrationRecord, ledger: Ledger, *,
     for record_id in ids[1:] if sought else ():
         path = folder / f"{record_id}.json"
         try:
-            had = from_bytes(path.read_bytes(), where=path)
+            had = from_bytes(read_regular(path), where=path)
         except (ToolkitError, OSError):
             # `verify` names it; what it held cannot be told.
             continue

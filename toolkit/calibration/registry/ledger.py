@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from toolkit.calibration.records.record import canonical
-from toolkit.files import sha256_bytes
+from toolkit.files import read_regular, sha256_bytes
 
 LEDGER = "ledger.jsonl"
 HEAD = "head.json"
@@ -104,8 +104,8 @@ def head_bytes(count: int, digest: str) -> bytes:
 def read_ledger(folder: Path) -> Ledger:
     """Read an instrument's ledger and check chain and head; damage is told in the result, not raised."""
     try:
-        lines = (folder / LEDGER).read_bytes() if (folder / LEDGER).exists() else None
-        head = (folder / HEAD).read_bytes() if (folder / HEAD).exists() else None
+        lines = read_regular(folder / LEDGER) if (folder / LEDGER).exists() else None
+        head = read_regular(folder / HEAD) if (folder / HEAD).exists() else None
     except OSError as error:
         return Ledger(entries=(), damage=f"the ledger cannot be read: {error.strerror}")
     if lines is None and head is None:

@@ -23,7 +23,7 @@ from toolkit.calibration.registry.stored import bad_record as _bad
 from toolkit.calibration.registry.stored import parse_loads, reason_of
 from toolkit.calibration.session.table import Table
 from toolkit.errors import RecordError, RegistryError, ToolkitError
-from toolkit.files import sha256_bytes
+from toolkit.files import read_regular, sha256_bytes
 
 ID = re.compile(r"(?P<instrument>[A-Za-z0-9][A-Za-z0-9_.-]*)-r(?P<number>[1-9][0-9]*)\Z")
 
@@ -248,7 +248,7 @@ def start(folder: Path, record_id: str, ledger: Ledger) -> Started:
     path = folder / f"{record_id}.json"
     entered = ledger.entered().get(record_id)
     try:
-        data = path.read_bytes()
+        data = read_regular(path)
     except OSError as error:
         raise RecordError(
             f"record {record_id} is missing",
@@ -291,7 +291,7 @@ def finish(started: Started, *, reproduces: bool = False) -> CalibrationRecord:
 
 def _data_file(record_id: str, path: Path, expected: str) -> bytes:
     try:
-        data = path.read_bytes()
+        data = read_regular(path)
     except OSError as error:
         raise _bad(
             record_id, path, f"{path.name}: {error.strerror}", "the data that belong to the record", "data"

@@ -16,6 +16,7 @@ from toolkit.calibration.records.record import CalibrationRecord, from_bytes
 from toolkit.calibration.registry.ledger import HEAD, LEDGER, Ledger
 from toolkit.calibration.registry.registry import ID, load_many
 from toolkit.errors import ToolkitError
+from toolkit.files import read_regular
 
 if TYPE_CHECKING:
     from toolkit.calibration.registry.registry import Registry
@@ -147,7 +148,7 @@ def _files(folder: Path) -> list[str]:
 def _owned_by_bad(folder: Path, record_id: str) -> set[str]:
     path = folder / f"{record_id}.json"
     try:
-        return {one.file for one in from_bytes(path.read_bytes(), where=path).data}
+        return {one.file for one in from_bytes(read_regular(path), where=path).data}
     except (ToolkitError, OSError):
         # What belongs to a record that cannot be read is told by the record's own row.
         return {one.name for one in folder.glob(f"{record_id}.*")}
