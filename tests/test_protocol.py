@@ -103,9 +103,23 @@ def test_a_statement_of_an_uncertainty_says_who_draws_it(tmp_path: Path) -> None
     assert (stated["FZ"].common, stated["SA"].common) == ("machine", "test")
     assert stated["SA"].u == pytest.approx(math.radians(0.05))
     assert stated["P"].u == 3500.0
-    path = tmp_path / "own.toml"
-    for wrong in ('common = "all"', "relative = -1", "u = nan", 'effect = "0.5"'):
-        path.write_text(text.replace("[type_b]\n", f'[type_b]\nX = {{ source = "s", {wrong} }}\n'))
+    line = next(one for one in text.splitlines() if one.startswith("P = "))
+    for number, wrong in enumerate(
+        (
+            'P = { source = "s", common = "all" }',
+            'P = { source = "s", relative = -1 }',
+            'P = { source = "s", u = nan }',
+            'P = { source = "s", effect = "0.5" }',
+            'PP = { source = "s", u = 1 }',
+            line + '\nXX = { source = "s" }',
+        )
+    ):
+        path = tmp_path / f"own{number}.toml"
+        path.write_text(text.replace(line, wrong))
         with pytest.raises(ConfigError):
             load_machine(str(path))
-        path = tmp_path / f"own{wrong[0]}.toml"
+    # The zero of the slip angle has no relative part: its scale is a statement of its own.
+    path = tmp_path / "scale.toml"
+    path.write_text(text.replace("SA = { u = 0.05,", "SA = { relative = 0.01, u = 0.05,"))
+    with pytest.raises(ConfigError):
+        load_machine(str(path))

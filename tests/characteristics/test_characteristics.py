@@ -176,7 +176,10 @@ def test_a_common_zero_of_the_cells_is_certain_in_plysteer_and_not_in_conicity(
             for one in virtual_record.loads
         ),
     )
-    none = {name: TypeB(symbol=name, u=0.0, relative=0.0, source="") for name in ("SA", "FZ", "P", "zero")}
+    none = {
+        name: TypeB(symbol=name, u=0.0, relative=0.0, source="")
+        for name in ("SA", "SA_scale", "FZ", "P", "zero")
+    }
     shared = Shared(record=record, machine_axes="machine", tared=True, **none)
     forward = next(c for c in result.reduced.conditions if c.rotation == "forward")
     reverse = next(c for c in result.reduced.conditions if c.rotation == "reverse")

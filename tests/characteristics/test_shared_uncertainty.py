@@ -49,7 +49,10 @@ def result(virtual_test: Path, fitted: CalibrationRecord) -> TestResult:
 
 
 def shared_of(record: CalibrationRecord) -> Shared:
-    none = {name: TypeB(symbol=name, u=0.0, relative=0.0, source="") for name in ("SA", "FZ", "P", "zero")}
+    none = {
+        name: TypeB(symbol=name, u=0.0, relative=0.0, source="")
+        for name in ("SA", "SA_scale", "FZ", "P", "zero")
+    }
     return Shared(record=record, machine_axes=MACHINE.axes, tared=True, **none)
 
 

@@ -137,6 +137,24 @@ class Reader:
         estimate = Estimate(value=slope, u=u, unit=f"{UNIT[channel]}/rad")
         return self._read(channel, estimate, weights / span, "secant", parts)
 
+    def chord(self, channel: Channel) -> Uncertain | None:
+        """Return the +-1 deg secant [per rad] off the curve alone, for data without steps of a protocol."""
+        fit = self.direction.curve(channel)
+        one = float(np.radians(1.0))
+        SA = self.group.SA
+        if fit is None or SA[0] > -one or SA[-1] < one:
+            return None
+        at = model(fit.model)
+        gradient = (at.jacobian(fit.values, one) - at.jacobian(fit.values, -one)) / (2 * one)
+        low, high = value_at(fit, np.array([-one, one])).tolist()
+        left, right = slope_at(fit, np.array([-one, one])).tolist()
+        slope = (high - low) / (2 * one)
+        u = float(np.sqrt(max(float(gradient @ np.asarray(fit.covariance) @ gradient), 0.0)))
+        dof = estimate_at(fit, 0.0).dof
+        estimate = Estimate(value=slope, u=u, unit=f"{UNIT[channel]}/rad", dof=dof)
+        parts = self.shared.angle_parts((right - left) / (2 * one), (right + left) / 2)
+        return self._read(channel, estimate, self._weights(channel, fit, gradient), "chord", parts)
+
     def moment_without_force(self) -> Uncertain | None:
         """Return MZ where the direction's own FY is zero: the residual aligning torque.
 

@@ -53,7 +53,7 @@ def directions_of(reduced: ReducedTest, fits: Sequence[DirectionFit]) -> tuple[D
 
 def rows_of(directions: Sequence[Direction], *, shared: Shared) -> tuple[Row, ...]:
     """Return every characteristic of a test: pull, stiffness, and FY and MZ at its slip angle steps."""
-    steps = {c.step_SA for one in directions for c in one.group.conditions if c.step_SA}
+    steps = {c.step_SA for one in directions for c in one.group.conditions if c.step_SA is not None}
     readers = [Reader(one, shared=shared) for one in directions]
     found: list[Row] = []
     for load in sorted({one.group.load_N for one in directions}):
@@ -159,6 +159,6 @@ def _squares(directions: Sequence[Direction], channel: Channel, shared: Shared) 
         if fit is not None:
             SA = one.group.SA
             slope = slope_at(fit, SA)
-            total = total + (slope * shared.SA.u) ** 2 + (slope * SA * shared.SA.relative) ** 2
+            total = total + (slope * shared.SA.u) ** 2 + (slope * SA * shared.SA_scale.relative) ** 2
         found[id(one)] = total
     return found

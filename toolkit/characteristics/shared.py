@@ -50,10 +50,10 @@ class Shared:
     ``record`` computed the rows (None where it is not at hand: its share is then zero); ``machine_axes``
     are the axes of its cells; ``tared`` says that a tare was subtracted; ``u_cell_zero`` is the standard
     uncertainty of each cell's zero in the record's units, one shift of every row (the open zero of an
-    untared bridge, or the scatter of a tare that serves all files). ``SA FZ P zero`` are what the machine
-    states of the slip angle, the load, the pressure and the cells' zeros; ``pressure_Pa`` None where the
-    test does not say it. ``machine`` and ``test`` name the owners of variables; ``reversal`` says what was
-    turned for the runs called reverse.
+    untared bridge, or the scatter of a tare that serves all files). ``SA SA_scale FZ P zero`` are what the
+    machine states of the slip angle's zero and scale, the load, the pressure and the cells' zeros;
+    ``pressure_Pa`` None where the test does not say it. ``machine`` and ``test`` name the owners of
+    variables; ``reversal`` says what was turned for the runs called reverse.
     ``covariance`` of each load's coefficients follows from the record and what its session stated.
     """
 
@@ -61,6 +61,7 @@ class Shared:
     machine_axes: Axes
     tared: bool
     SA: TypeB
+    SA_scale: TypeB
     FZ: TypeB
     P: TypeB
     zero: TypeB
@@ -143,10 +144,10 @@ class Shared:
 
         An angle that reads too large by e stands for one smaller by e: both enter with a minus.
         """
-        owner = self.owner(self.SA)
+        zero, scale = self.owner(self.SA), self.owner(self.SA_scale)
         return [
-            Part(source="slip angle zero", key=f"SA zero/{owner}", u=-slope * self.SA.u),
-            Part(source="slip angle scale", key=f"SA scale/{owner}", u=-stretch * self.SA.relative),
+            Part(source="slip angle zero", key=f"SA zero/{zero}", u=-slope * self.SA.u),
+            Part(source="slip angle scale", key=f"SA scale/{scale}", u=-stretch * self.SA_scale.relative),
         ]
 
     def load_part(self, slope: float, FZ: float) -> Part:
@@ -181,6 +182,7 @@ def shared_of(reduced: ReducedTest, *, machine: Machine, record: CalibrationReco
         machine_axes=machine.axes,
         tared=reduced.tare.source != "none",
         SA=machine.stated_uncertainty("SA"),
+        SA_scale=machine.stated_uncertainty("SA_scale"),
         FZ=machine.stated_uncertainty("FZ"),
         P=machine.stated_uncertainty("P"),
         zero=machine.stated_uncertainty("zero"),

@@ -161,6 +161,7 @@ def _merged(path: Path) -> dict[str, Any]:
 
 
 def _build(table: dict[str, Any], path: Path) -> Machine:
+    check_keys(table.get("type_b", {}), list(_STATED), where=f"{path}: type_b")
     try:
         indication_unit = table.get("indication_unit")
         columns = tuple(
@@ -217,9 +218,19 @@ def _protocol(entry: object, path: Path) -> Protocol:
     return build_protocol(entry, path)
 
 
+# What may be stated, and with which of u and relative: what is not used is not accepted either.
+_STATED = {
+    "FZ": ("u", "relative"),
+    "zero": ("relative",),
+    "SA": ("u",),
+    "SA_scale": ("relative",),
+    "P": ("u", "relative", "effect"),
+}
+
+
 def _type_b(symbol: str, entry: dict[str, Any], where: Path) -> TypeB:
     here = f"{where}: type_b.{symbol}"
-    check_keys(entry, ("u", "unit", "relative", "source", "common", "effect"), where=here)
+    check_keys(entry, (*_STATED[symbol], "unit", "source", "common"), where=here)
     for key in ("u", "relative", "effect"):
         value = entry.get(key, 0.0)
         number = not isinstance(value, bool) and isinstance(value, int | float) and math.isfinite(value)

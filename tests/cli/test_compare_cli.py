@@ -1,0 +1,232 @@
+"""`toolkit compare`: what it answers, what it ends with, what it refuses; nothing is written by halves."""
+
+from __future__ import annotations
+
+import json
+import math
+import shutil
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from toolkit.cli.home import packaged_home
+from toolkit.cli.main import run
+
+CALIBRATIONS = packaged_home() / "calibrations"
+
+
+def toolkit(capsys: pytest.CaptureFixture[str], *words: object, as_json: bool = True) -> tuple[int, Any]:
+    with pytest.raises(SystemExit) as caught:
+        run([*map(str, words), "--calibrations", str(CALIBRATIONS), *(["--json"] if as_json else [])])
+    out = capsys.readouterr().out
+    return int(caught.value.code or 0), json.loads(out) if as_json else out
+
+
+@pytest.fixture(scope="module")
+def other_test(tmp_path_factory: pytest.TempPathFactory, virtual_plan: Any) -> Path:
+    """A second virtual test on another surface: the tire has 5 % less force."""
+    import dataclasses
+
+    from toolkit.simulation.run import simulate
+    from toolkit.simulation.write import write_test
+
+    folder = tmp_path_factory.mktemp("other") / "steel"
+    tire = dataclasses.replace(virtual_plan.tire, conicity_N=90.0)
+    write_test(simulate(dataclasses.replace(virtual_plan, seed=2, tire=tire)), folder)
+    toml = folder / "test.toml"
+    toml.write_text(toml.read_text().replace("convex drum (simulated)", "steel"))
+    return folder
+
+
+def maker(path: Path) -> Path:
+    """A maker's table: a Magic Formula at two loads inside those of the virtual test."""
+    lines = ["SA [deg],FZ [N],FY [N],MZ [N*m]"]
+    for load in (2500.0, 5000.0):
+        for degrees in np.linspace(-12, 12, 49).tolist():
+            x = math.radians(degrees)
+            FY = -0.95 * load * math.sin(1.3 * math.atan(13 * x))
+            lines.append(f"{degrees},{load},{FY},{0.012 * load * math.sin(2.3 * math.atan(15 * x))}")
+    path.write_text("\n".join(lines))
+    return path
+
+
+def test_two_surfaces(
+    virtual_test: Path, other_test: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    code, answer = toolkit(capsys, "compare", virtual_test, other_test, "--figures", tmp_path / "figures")
+    # The acquisition program of the virtual machine computed its own columns wrongly: a finding of the data.
+    assert code == 1
+    assert {one["rule"] for one in answer["findings"]} == {"acquired-differs"}
+    assert (answer["mode"], answer["axes"], answer["reference"]) == ("surfaces", "SAE", "test")
+    assert [one["label"] for one in answer["entries"]] == ["test", "steel"]
+    assert answer["entries"][1]["conditions"]["surface"] == "steel"
+    assert all(one["simulated"] for one in answer["entries"])
+    conicity = [one for one in answer["differences"] if one["quantity"] == "conicity"]
+    assert len(conicity) == 5
+    for one in conicity:
+        assert one["significant"]
+        assert one["p_holm"] >= one["p"]
+        # Twice the conicity of the tire is twice the value, by the virtual machine's own model.
+        assert one["difference_percent"] == pytest.approx(100, abs=8)
+        U = one["difference"]["expanded_uncertainty"]
+        assert U == pytest.approx(one["difference"]["k"] * one["difference"]["standard_uncertainty"])
+    assert answer["significant"] == sum(one["significant"] for one in answer["differences"])
+    assert answer["repeats"] is None
+    assert sorted(answer["figures"]) == sorted(
+        "conicity plysteer crat prat prat_at_fy_zero cornering_stiffness aligning_stiffness".split()
+    )
+    for path in answer["figures"].values():
+        assert Path(path).read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_reduced_test_compares_as_its_folder_does(
+    virtual_test: Path, other_test: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    reduced = tmp_path / "steel.xlsx"
+    toolkit(capsys, "process", other_test, "--out", reduced)
+    _, from_folder = toolkit(capsys, "compare", virtual_test, other_test)
+    _, from_file = toolkit(capsys, "compare", virtual_test, reduced)
+    assert from_file["differences"] == from_folder["differences"]
+
+
+def test_two_runs_answer_the_same(
+    virtual_test: Path, other_test: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    answers = [toolkit(capsys, "compare", virtual_test, other_test)[1] for _ in range(2)]
+    for one in answers:
+        one.pop("timing")
+    assert answers[0] == answers[1]
+
+
+def test_against_a_maker_s_table(
+    virtual_test: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = maker(tmp_path / "maker.csv")
+    _, answer = toolkit(capsys, "compare", path, virtual_test)
+    assert answer["mode"] == "table"
+    assert {round(one["load_N"]) for one in answer["differences"]} == {2500, 5000}
+    names = {one["quantity"] for one in answer["differences"]}
+    assert names == {"FY", "MZ", "secant_cornering", "slope_cornering", "secant_aligning", "slope_aligning"}
+    slope = next(
+        one for one in answer["differences"] if one["quantity"] == "slope_cornering" and one["load_N"] < 3000
+    )
+    assert slope["reference"]["value"] == pytest.approx(0.95 * 2500 * 1.3 * 13, rel=1e-4)
+    # The test's loads are met by its neighbours: the other way round gives the same difference with its sign.
+    _, turned = toolkit(capsys, "compare", virtual_test, path)
+    assert any("does not reach the load" in one for one in turned["left_out"])
+    assert any("has no conicity" in one for one in turned["left_out"])
+
+
+def test_against_a_maker_s_characteristics(
+    virtual_test: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "company.csv"
+    path.write_text("FZ [N],conicity [N],U_conicity [N]\n2500,40,6\n5000,80,6\n")
+    _, answer = toolkit(capsys, "compare", path, virtual_test)
+    assert answer["entries"][0]["kind"] == "characteristics"
+    assert [one["reference"]["standard_uncertainty"] for one in answer["differences"]] == [3.0, 3.0]
+
+
+def test_repeats_have_their_precision(
+    virtual_test: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], virtual_plan: Any
+) -> None:
+    import dataclasses
+
+    from toolkit.simulation.run import simulate
+    from toolkit.simulation.write import write_test
+
+    again = tmp_path / "again"
+    write_test(simulate(dataclasses.replace(virtual_plan, seed=7)), again)
+    toml = again / "test.toml"
+    toml.write_text(
+        toml.read_text()
+        .replace("virtual operator", "another one")
+        .replace("[tire]", 'mounting = "2"\n[tire]')
+    )
+    _, answer = toolkit(capsys, "compare", virtual_test, again)
+    assert answer["mode"] == "repeats"
+    factors = {one["factor"]: one for one in answer["repeats"]["factors"]}
+    assert factors["operator"]["varied"]
+    assert not factors["day"]["varied"]
+    assert factors["mounting"]["note"] == "not stated by 1 of 2 tests"
+    row = answer["repeats"]["precision"][0]
+    assert row["repeatability_s_r"] is None
+    assert row["s"]["dof"] == 1
+    assert row["intermediate"][0]["factor"] == "operator"
+    assert answer["repeats"]["reproducibility"] is None
+    assert "another laboratory" in answer["repeats"]["reproducibility_note"]
+    code, refused = toolkit(capsys, "compare", virtual_test, again, "--reproducibility")
+    assert (code, refused["error"]["rule"]) == (2, "no-other-laboratory")
+
+
+def test_people_read_it_in_their_units(
+    virtual_test: Path, other_test: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    _, si = toolkit(capsys, "compare", virtual_test, other_test, as_json=False)
+    _, lbf = toolkit(capsys, "compare", virtual_test, other_test, "--units", "lbf", as_json=False)
+    assert "SIMULATED" in si
+    assert "N·m/deg" in si
+    assert "lbf·ft/deg" in lbf
+    assert "FZ [lbf]" in lbf
+
+    def first(text: str) -> float:
+        line = next(one for one in text.splitlines() if one.startswith("conicity"))
+        return float(line.split()[3])
+
+    assert first(si) / first(lbf) == pytest.approx(4.448, rel=0.02)
+
+
+@pytest.mark.parametrize(
+    ("words", "rule"),
+    [
+        (("{test}",), "too-few-entries"),
+        (("{test}", "{test}"), "same-test"),
+        (("{test}", "{none}"), "no-test"),
+        (("{test}", "{none}.csv"), "no-file"),
+        (("{test}", "{maker}", "--axes", "SEA"), "unknown-axes"),
+        (("{test}", "{maker}", "--level", "2"), "wrong-value"),
+        (("{test}", "{maker}", "--mode", "table?"), "unknown-mode"),
+        (("{test}", "{maker}", "--mode", "repeats"), "mode"),
+        (("{test}", "{maker}", "--units", "kgf"), "unknown-units"),
+        (("{test}", "{maker}", "--protocol", "{none}.toml"), "no-file"),
+    ],
+)
+def test_bad_input_ends_with_2_and_writes_nothing(
+    words: tuple[str, ...],
+    rule: str,
+    virtual_test: Path,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    maker(tmp_path / "maker.csv")
+    places = {"test": virtual_test, "none": tmp_path / "none", "maker": tmp_path / "maker.csv"}
+    figures = tmp_path / "figures"
+    code, answer = toolkit(capsys, "compare", *(one.format(**places) for one in words), "--figures", figures)
+    assert (code, answer["error"]["rule"]) == (2, rule)
+    assert all(answer["error"][key] for key in ("what", "where", "got", "expected", "next_step"))
+    assert not figures.exists()
+
+
+def test_a_protocol_for_a_test_that_is_reduced_already(
+    virtual_test: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    reduced = tmp_path / "t.xlsx"
+    toolkit(capsys, "process", virtual_test, "--out", reduced)
+    protocol = tmp_path / "p.toml"
+    protocol.write_text(
+        'source = "other"\nslip_angles = { value = [0, 1, -1], unit = "deg" }\n'
+        'loads = { value = [250, 567], unit = "lbf" }\nslip_angle_tolerance = { value = 0.5, unit = "deg" }\n'
+        "load_tolerance = 0.05\nsettle_revolutions = 2.5\naverage_revolutions = 1\n"
+        'acquisition = "after_settling"\n'
+    )
+    code, answer = toolkit(capsys, "process", reduced, "--protocol", protocol)
+    assert (code, answer["error"]["rule"]) == (2, "protocol-of-reduced")
+    code, answer = toolkit(capsys, "compare", virtual_test, reduced, "--protocol", protocol)
+    assert (code, answer["error"]["rule"]) == (2, "protocol-of-reduced")
+    copy = tmp_path / "copy"
+    shutil.copytree(virtual_test, copy)
+    code, answer = toolkit(capsys, "process", copy, "--protocol", protocol)
+    assert answer["protocol"] == "other"
+    assert {"slip-angle-tolerance", "unplanned-load"} <= {one["rule"] for one in answer["findings"]}

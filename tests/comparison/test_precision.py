@@ -1,0 +1,123 @@
+"""Repeatability and intermediate precision against published and hand-worked analyses of variance."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from comparison_factory import conicity
+from scipy import stats
+
+from toolkit.comparison.precision import factor_spread, factors_of, repeats_of, spread
+
+
+def test_gum_h5_zener_voltage_standard() -> None:
+    """JCGM 100:2008, H.5: ten days of five readings. Table H.9: daily means and standard deviations.
+
+    Published: s_b = 85 uV inside a day, 57 uV of the daily means, F = 2.25, and 43 uV between days.
+    """
+    means = np.array([172, 116, 13, 144, 106, 31, 60, 125, 163, 41], dtype=float)  # uV above 10 V
+    sds = np.array([60, 77, 111, 101, 67, 93, 80, 73, 88, 86], dtype=float)
+    pattern = np.array([-2.0, -1.0, 0.0, 1.0, 2.0])
+    pattern /= pattern.std(ddof=1)
+    values = (means[:, None] + sds[:, None] * pattern).ravel()
+    levels = [str(day) for day in range(10) for _ in range(5)]
+    found = factor_spread(values, levels, factor="day")
+    assert found.s_between == pytest.approx(43, abs=0.5)
+    assert found.F == pytest.approx(2.25, abs=0.02)
+    within = math.sqrt(found.s**2 - (found.s_between or 0.0) ** 2)
+    assert within == pytest.approx(85, abs=0.5)
+    assert means.std(ddof=1) == pytest.approx(57, abs=0.5)
+    # F 0.95 with 9 and 40 degrees of freedom is 2.124 there; 0.975 is 2.452.
+    assert found.p is not None
+    assert 0.025 < found.p < 0.05
+
+
+def test_unequal_levels_by_hand() -> None:
+    """1, 3 | 6, 8, 10: within 10/3; between 43.2; n0 = (5 - 13/5)/1 = 2.4."""
+    found = factor_spread(np.array([1.0, 3.0, 6.0, 8.0, 10.0]), list("aabbb"), factor="day")
+    assert found.F == pytest.approx(43.2 / (10 / 3))
+    assert (found.s_between or 0.0) ** 2 == pytest.approx((43.2 - 10 / 3) / 2.4)
+    assert found.s**2 == pytest.approx(10 / 3 + (43.2 - 10 / 3) / 2.4)
+    assert found.p == pytest.approx(stats.f.sf(12.96, 1, 3))
+
+
+def test_a_factor_that_adds_nothing_is_zero_and_not_negative() -> None:
+    found = factor_spread(np.array([1.0, 3.0, 1.0, 3.0]), list("aabb"), factor="day")
+    assert found.s_between == 0.0
+    assert found.s == pytest.approx(math.sqrt(2.0))
+
+
+def test_a_level_of_its_own_for_every_test_leaves_nothing_to_tell_apart() -> None:
+    found = factor_spread(np.array([1.0, 2.0, 4.0]), list("abc"), factor="operator")
+    assert (found.s_between, found.F, found.p) == (None, None, None)
+    assert found.s == pytest.approx(np.std([1, 2, 4], ddof=1))
+
+
+def test_the_interval_of_a_standard_deviation_covers() -> None:
+    rng = np.random.default_rng(8)
+    s = rng.normal(0, 3.0, (4000, 5)).std(axis=1, ddof=1)
+    hits = sum(one.low <= 3.0 <= one.high for one in (spread(float(x), 4) for x in s))
+    assert hits / 4000 == pytest.approx(0.95, abs=4 * math.sqrt(0.95 * 0.05 / 4000))
+
+
+def test_the_variance_components_are_unbiased() -> None:
+    """Levels of two and three tests, s_w = 1 and s_b = 2: the mean of s_I^2 over many sets is 5."""
+    rng = np.random.default_rng(4)
+    found = []
+    for _ in range(3000):
+        effects = rng.normal(0, 2, 4)
+        values = np.repeat(effects, [2, 3, 2, 3]) + rng.normal(0, 1, 10)
+        found.append(factor_spread(values, list("aabbbccddd"), factor="day").s ** 2)
+    # s_b^2 is cut at zero, which lifts the mean by a little; four standard errors and that.
+    assert np.mean(found) == pytest.approx(5.0, abs=4 * np.std(found) / math.sqrt(3000) + 0.05)
+
+
+def five(**columns: tuple[str | None, ...]) -> list[object]:
+    return [
+        conicity(f"t{i}", *(float(10 * i + j) for j in range(3)), **{k: v[i] for k, v in columns.items()})
+        for i in range(len(next(iter(columns.values()))))
+    ]
+
+
+def test_factors_that_changed_together_are_told_as_one() -> None:
+    entries = five(
+        day=("1", "1", "2", "2"), operator=("A", "A", "B", "B"), mounting=("x", "y", "x", "y"),
+        laboratory=(None, None, None, None), machine=("m", "m", "m", "m"), calibration=("r", "r", "r", "r"),
+    )  # fmt: skip
+    found = {one.name: one for one in factors_of(entries)}  # type: ignore[arg-type]
+    assert found["day"].same_as == ("operator",)
+    assert "operator" in (found["day"].note or "")
+    assert found["mounting"].note is None
+    assert (found["machine"].varied, found["machine"].note) == (False, "the same in all tests")
+    assert "not stated by 4 of 4" in (found["laboratory"].note or "")
+
+
+def test_repeatability_needs_two_tests_of_everything_the_same() -> None:
+    apart = repeats_of(five(day=("1", "2", "3")), level=0.05)  # type: ignore[arg-type]
+    assert all(one.repeatability is None and one.limit_r is None for one in apart.precisions)
+    assert all(one.total.dof == 2 for one in apart.precisions)
+    pairs = repeats_of(five(day=("1", "1", "2")), level=0.05)  # type: ignore[arg-type]
+    (first, *_) = pairs.precisions
+    assert first.repeatability is not None
+    # t0 and t1 differ by 10: s_r = 10/sqrt 2, and the limit 1.96 sqrt 2 s_r is 19.6.
+    assert first.repeatability.value == pytest.approx(10 / math.sqrt(2))
+    assert first.limit_r == pytest.approx(19.6)
+
+
+def test_tests_whose_operator_is_unknown_are_not_repeats_of_one_operator() -> None:
+    entries = five(day=("1", "1"), operator=(None, None))
+    found = repeats_of(entries, level=0.05)  # type: ignore[arg-type]
+    operator = next(one for one in found.factors if one.name == "operator")
+    assert not operator.varied
+    assert "not stated" in (operator.note or "")
+
+
+def test_reproducibility_needs_another_laboratory() -> None:
+    one = repeats_of(five(laboratory=("A", "A", "A")), level=0.05)  # type: ignore[arg-type]
+    assert one.reproducibility is None
+    assert "another laboratory" in one.reproducibility_note
+    two = repeats_of(five(laboratory=("A", "A", "B", "B")), level=0.05)  # type: ignore[arg-type]
+    assert two.reproducibility == "laboratory"
+    assert all(f.factor == "laboratory" for p in two.precisions for f in p.factors)

@@ -1,0 +1,173 @@
+"""`toolkit compare`: tests against each other, or against a maker's table."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, cast
+
+import typer
+
+from toolkit.cli.console import (
+    Calibrations,
+    Home,
+    Json,
+    KnownAt,
+    ProtocolFile,
+    Quiet,
+    Reader,
+    answer,
+    day,
+    exit_code,
+    progress,
+)
+from toolkit.cli.console import reader as choose_reader
+
+if TYPE_CHECKING:
+    from toolkit.comparison.model import Entry, Mode
+    from toolkit.findings import Finding
+
+NAME = "compare"
+
+
+def command(
+    sources: Annotated[
+        list[Path],
+        typer.Argument(
+            metavar="A B ...",
+            help="Tests (folders or reduced .xlsx) and makers' tables (.csv); A is the reference.",
+        ),
+    ],
+    mode: Annotated[
+        str | None,
+        typer.Option("--mode", help="table, surfaces, tires or repeats; default: by what the tests state."),
+    ] = None,
+    axes: Annotated[
+        str, typer.Option("--axes", help="Axes of the tables: SAE, adapted-SAE, ISO-W, machine.")
+    ] = "SAE",
+    level: Annotated[
+        float, typer.Option("--level", help="Chance of even one false decision in a table (Holm).")
+    ] = 0.05,
+    reproducibility: Annotated[
+        bool,
+        typer.Option("--reproducibility", help="Demand it: an error without another laboratory's tests."),
+    ] = False,
+    units: Annotated[
+        str, typer.Option("--units", help="SI or lbf, for text and figures; JSON is SI.")
+    ] = "SI",
+    figures: Annotated[
+        Path | None,
+        typer.Option("--figures", help="Folder for the figures (PNG), as the thesis's 6.6 to 6.29."),
+    ] = None,
+    protocol: ProtocolFile = None,
+    known_at: KnownAt = None,
+    reader: Reader = "calamine",
+    calibrations: Calibrations = None,
+    home: Home = None,
+    json: Json = False,
+    quiet: Quiet = False,
+) -> int:
+    """Compare tests with each other, or with a maker's table.
+
+    Differences from the first, each with its uncertainty: what tests share (one calibration record, the
+    load cell) cancels. Which are significant is decided over the whole table. Repeats of one tire give
+    repeatability and intermediate precision by day, operator, mounting.
+
+    Ends with 0 whether or not there are differences: they are results. 1: the data has findings.
+
+    Example: toolkit compare tests/steel tests/sandpaper --figures figures
+    """
+    from toolkit.cli.compare_answer import comparison_payload, comparison_text, unit_choice
+    from toolkit.comparison.compare import compare
+
+    chosen = choose_reader(reader)
+    style = unit_choice(units)
+    started = time.perf_counter()
+    with progress(None, "reading", show=not (json or quiet)) as step:
+        entries, findings = read_entries(
+            sources, axes=axes, protocol=protocol, known_at=day(known_at), calibrations=calibrations,
+            home=home, reader=chosen, step=step,
+        )  # fmt: skip
+    found = compare(entries, mode=cast("Mode | None", mode), level=level, reproducibility=reproducibility)
+    drawn = _draw(found, style, figures) if figures else {}
+    every = [*findings, *found.findings]
+    payload: dict[str, Any] = comparison_payload(found) | {
+        "figures": drawn,
+        "findings": [finding.as_dict() for finding in every],
+        "timing": {"seconds": time.perf_counter() - started},
+    }
+    answer(payload, comparison_text(found, style, every, drawn), as_json=json, quiet=quiet)
+    return exit_code(every)
+
+
+def read_entries(sources: Sequence[Path], *, axes: str, **options: Any) -> tuple[list[Entry], list[Finding]]:
+    """Return what is compared, tests first read so that tables are read at their slip angles."""
+    from toolkit.comparison.compare import DEFAULT_ANGLES
+
+    found: dict[int, Entry] = {}
+    findings: list[Finding] = []
+    tables = [i for i, path in enumerate(sources) if path.suffix.lower() == ".csv" and not path.is_dir()]
+    for place, path in enumerate(sources):
+        if place not in tables:
+            found[place], more = _test(path, **options)
+            findings += more
+    angles = sorted(
+        {row.SA_rad for one in found.values() for row in one.rows if row.SA_rad is not None}
+    ) or list(DEFAULT_ANGLES)
+    for place in tables:
+        found[place], more = _table(sources[place], axes=axes, angles=angles)
+        findings += more
+    return [found[place] for place in range(len(sources))], findings
+
+
+def _test(path: Path, **options: Any) -> tuple[Entry, list[Finding]]:
+    from dataclasses import replace
+
+    from toolkit.cli.resolve import resolve_test
+    from toolkit.comparison.compare import test_entry
+    from toolkit.machine import load_machine
+
+    resolved = resolve_test(path, **options)
+    reduced = resolved.result.reduced
+    entry = test_entry(
+        reduced,
+        resolved.result.characteristics,
+        machine=load_machine(reduced.info.machine),
+        record=resolved.record,
+        source=str(path),
+    )
+    return entry, [replace(one, where=f"{entry.label}: {one.where}") for one in resolved.findings]
+
+
+def _table(path: Path, *, axes: str, angles: Sequence[float]) -> tuple[Entry, list[Finding]]:
+    import hashlib
+
+    from toolkit.comparison.maker_characteristics import is_characteristics_table, maker_characteristics
+    from toolkit.comparison.maker_table import maker_rows
+    from toolkit.comparison.model import Entry
+
+    if path.is_file() and is_characteristics_table(path):
+        identity = hashlib.sha256(path.read_bytes()).hexdigest()[:12]
+        rows = maker_characteristics(path, identity=identity)
+        return Entry(
+            label=path.stem, kind="characteristics", identity=identity, source=str(path), rows=rows
+        ), []
+    identity = hashlib.sha256(path.read_bytes()).hexdigest()[:12] if path.is_file() else ""
+    read, findings = maker_rows(path, axes=axes, angles_rad=angles, identity=identity)
+    return Entry(label=path.stem, kind="table", identity=identity, source=str(path), rows=read), list(
+        findings
+    )
+
+
+def _draw(found: Any, style: Any, folder: Path) -> dict[str, Path]:
+    from toolkit.files import write_atomic
+    from toolkit.report.comparison_plots import comparison_plots
+    from toolkit.report.figures import draw
+
+    drawn = {}
+    for name, plot in comparison_plots(found, style).items():
+        path = folder / f"{name}.png"
+        write_atomic(path, draw(plot).png)
+        drawn[name] = path
+    return drawn

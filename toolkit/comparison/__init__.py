@@ -1,0 +1,1 @@
+"""Tests against each other, against a maker's table: differences, their significance, precision."""

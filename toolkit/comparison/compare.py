@@ -1,0 +1,207 @@
+"""Compare tests with each other, or with what a maker states: the first entry is the reference."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from toolkit.characteristics.characterise import characteristic_rows
+from toolkit.characteristics.shared import identity_of
+from toolkit.comparison.differences import differences
+from toolkit.comparison.model import MODES, Comparison, Entry, Mode
+from toolkit.comparison.pattern import pattern_effect
+from toolkit.comparison.precision import repeats_of
+from toolkit.errors import ConfigError
+from toolkit.findings import Finding
+from toolkit.units import from_si
+
+if TYPE_CHECKING:
+    from toolkit.calibration.records.record import CalibrationRecord
+    from toolkit.characteristics.model import Characteristics
+    from toolkit.machine import Machine
+    from toolkit.reduction.model import ReducedTest
+
+# Slip angles at which two tables are read, where no test says which [deg].
+DEFAULT_ANGLES = tuple(math.radians(s * a) for a in (0, 1, 2, 4, 6, 8, 10) for s in ((1, -1) if a else (1,)))
+# What a comparison takes as the same; another value in a condition of this list is told.
+_WATCHED = ("machine", "surface", "speed", "pressure", "rim", "protocol", "calibration", "reversal")
+# What each mode is about, and so does not tell.
+_SUBJECT: dict[Mode, tuple[str, ...]] = {
+    "table": ("machine", "protocol", "calibration", "reversal"),
+    "surfaces": ("surface",),
+    "tires": ("rim",),
+    "repeats": (),
+}
+
+
+def test_entry(
+    reduced: ReducedTest,
+    characteristics: Characteristics,
+    *,
+    machine: Machine,
+    record: CalibrationRecord,
+    source: str,
+) -> Entry:
+    """Return a test as an entry; its rows keep the parts that it shares with others."""
+    info = reduced.info
+    tire = " ".join(t for t in (info.tire_company, info.tire_series, info.tire_size, info.tire_DOT) if t)
+    return Entry(
+        label=info.name,
+        kind="test",
+        identity=identity_of(reduced),
+        source=source,
+        rows=characteristic_rows(reduced, characteristics, machine=machine, record=record),
+        conditions=(
+            ("tire", tire or None),
+            ("belt", info.tire_belt),
+            ("rim", info.tire_rim),
+            ("surface", info.surface),
+            ("pressure", _shown(info.pressure_Pa, "kPa", 1)),
+            ("speed", _shown(info.speed_m_s, "km/h", 2)),
+            ("machine", machine.name),
+            ("calibration", record.id),
+            ("protocol", reduced.protocol or None),
+            ("reversal", info.reversal),
+            ("day", info.date),
+            ("operator", info.operator),
+            ("mounting", info.mounting),
+            ("laboratory", info.laboratory),
+            ("special", info.special),
+        ),
+        simulated=info.simulated,
+        unverified=reduced.calibration.unverified,
+    )
+
+
+def compare(
+    entries: Sequence[Entry], *, mode: Mode | None = None, level: float = 0.05, reproducibility: bool = False
+) -> Comparison:
+    """Compare entries with the first.
+
+    Parameters
+    ----------
+    mode : what the comparison is about; by default inferred from what the entries state
+    level : chance of even one false decision in a table of differences
+    reproducibility : demand it; an error where no two laboratories are named
+
+    Raises
+    ------
+    ConfigError
+        fewer than two entries, the same data twice, a level that is none, a mode that the entries do not
+        bear, reproducibility without another laboratory
+    """
+    _check(entries, mode, level)
+    named = _labelled(entries)
+    chosen = mode or infer_mode(named)
+    found, left_out = differences(named, level=level)
+    if not found:
+        raise ConfigError(
+            "nothing can be compared",
+            where=", ".join(one.source for one in named),
+            got="; ".join(left_out) or "no characteristic in common",
+            expected="loads and characteristics in common",
+            next_step="compare tests whose loads overlap, in the same direction of rotation",
+            rule="nothing-in-common",
+        )
+    repeats = repeats_of(named, level=level) if chosen == "repeats" else None
+    if reproducibility and (repeats is None or repeats.reproducibility is None):
+        known = {one.condition("laboratory") for one in named} - {None}
+        named_ones = ", ".join(map(str, known)) or "none named"
+        raise ConfigError(
+            "reproducibility cannot be stated",
+            where="--reproducibility",
+            got=f"tests of {len(known)} laboratories ({named_ones})",
+            expected="repeats of one tire in two laboratories or more, named in test.toml (laboratory = ...)",
+            next_step="leave the option away; repeatability and intermediate precision are given",
+            rule="no-other-laboratory",
+        )
+    return Comparison(
+        mode=chosen,
+        entries=named,
+        level=level,
+        differences=found,
+        repeats=repeats,
+        pattern=pattern_effect(named),
+        left_out=left_out,
+        findings=tuple(_findings(named, chosen, stated=mode is not None)),
+    )
+
+
+def infer_mode(entries: Sequence[Entry]) -> Mode:
+    """Return what a comparison is about: a maker's table, surfaces, tires, or repeats of one tire."""
+    if any(one.kind != "test" for one in entries):
+        return "table"
+    if len({(one.condition("tire"), one.condition("belt")) for one in entries}) > 1:
+        return "tires"
+    return "surfaces" if len({one.condition("surface") for one in entries}) > 1 else "repeats"
+
+
+def _check(entries: Sequence[Entry], mode: Mode | None, level: float) -> None:
+    if len(entries) < 2:
+        raise ConfigError(
+            "one thing cannot be compared", where="compare", got=f"{len(entries)} argument(s)",
+            expected="two or more: tests, reduced tests, a maker's table", next_step="name another one",
+            rule="too-few-entries",
+        )  # fmt: skip
+    if not 0 < level < 1:
+        raise ConfigError(
+            "the level is no probability", where="--level", got=level, expected="a number between 0 and 1",
+            next_step="0.05 is usual", rule="wrong-value",
+        )  # fmt: skip
+    if mode is not None and mode not in MODES:
+        raise ConfigError(
+            f"unknown mode {mode!r}", where="--mode", got=mode, expected=", ".join(MODES),
+            next_step="name one of those expected", rule="unknown-mode",
+        )  # fmt: skip
+    for identity, count in Counter(one.identity for one in entries).items():
+        if count > 1:
+            twice = [one.source for one in entries if one.identity == identity]
+            raise ConfigError(
+                "the same data is compared with itself", where=", ".join(twice), got="the same recordings",
+                expected="different tests", next_step="name each test once", rule="same-test",
+            )  # fmt: skip
+    tests = [one for one in entries if one.kind == "test"]
+    if mode == "repeats" and len(tests) < len(entries):
+        raise ConfigError(
+            "a maker's table is no repeat of a test", where="--mode", got="repeats", expected="tests only",
+            next_step="leave --mode away", rule="mode",
+        )  # fmt: skip
+
+
+def _labelled(entries: Sequence[Entry]) -> tuple[Entry, ...]:
+    """Return the entries with a label of their own each: equal names take a number."""
+    count = Counter(one.label for one in entries)
+    seen: Counter[str] = Counter()
+    found = []
+    for one in entries:
+        seen[one.label] += 1
+        label = f"{one.label} ({seen[one.label]})" if count[one.label] > 1 else one.label
+        found.append(replace(one, label=label))
+    return tuple(found)
+
+
+def _findings(entries: Sequence[Entry], mode: Mode, *, stated: bool) -> list[Finding]:
+    found = []
+    tests = [one for one in entries if one.kind == "test"]
+    for name in _WATCHED:
+        values = {one.label: one.condition(name) for one in tests}
+        if name in _SUBJECT[mode] or len(set(values.values())) < 2:
+            continue
+        told = ", ".join(f"{label}: {value or 'not stated'}" for label, value in values.items())
+        message = f"the tests differ in {name} ({told}): a difference may come from it"
+        found.append(Finding(rule="conditions-differ", where=name, message=message, level="note"))
+    inferred = infer_mode(entries)
+    if stated and mode != inferred and inferred != "repeats":
+        message = f"compared as {mode}; by what the tests state it is a comparison of {inferred}"
+        found.append(Finding(rule="mode", where="--mode", message=message))
+    if len({one.simulated for one in tests}) > 1:
+        message = "simulated and measured tests are compared with each other"
+        found.append(Finding(rule="simulated-and-measured", where="compare", message=message))
+    return found
+
+
+def _shown(value: float | None, unit: str, digits: int) -> str | None:
+    return None if value is None else f"{float(from_si(value, unit)):.{digits}f} {unit}"

@@ -1,0 +1,113 @@
+"""Differences from the reference, each with what is left of the uncertainty when the shared has cancelled."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+from toolkit.characteristics.rows import Row
+from toolkit.characteristics.uncertain import Uncertain, weighted
+from toolkit.comparison.at_load import at_load
+from toolkit.comparison.holm import holm
+from toolkit.comparison.model import PARTS, Difference, Entry, Part
+from toolkit.comparison.quantities import CHARACTERISTICS, CURVES
+
+Series = tuple[str, str, float | None]
+_SAME_ANGLE = 1e-6  # rad
+
+
+def series_of(rows: Sequence[Row]) -> dict[Series, list[Row]]:
+    """Return the rows that are compared, by (name, rotation, slip angle)."""
+    names = {one.name for one in (*CHARACTERISTICS, *CURVES)}
+    found: dict[Series, list[Row]] = {}
+    for row in rows:
+        if row.name in names:
+            angle = None if row.SA_rad is None else round(row.SA_rad / _SAME_ANGLE) * _SAME_ANGLE
+            found.setdefault((row.name, row.rotation, angle), []).append(row)
+    return found
+
+
+def differences(entries: Sequence[Entry], *, level: float) -> tuple[tuple[Difference, ...], tuple[str, ...]]:
+    """Return every difference of the others from the first entry, and what could not be compared.
+
+    Significance is decided over each table as a whole: characteristics, and forces at slip angles.
+    """
+    reference = entries[0]
+    base = series_of(reference.rows)
+    found: list[Difference] = []
+    left_out: list[str] = []
+    for other in entries[1:]:
+        theirs = series_of(other.rows)
+        lacking: dict[str, None] = {}
+        beyond: dict[float, None] = {}
+        for series, rows in base.items():
+            if series not in theirs:
+                lacking[_said(series)] = None
+                continue
+            for row in sorted(rows, key=lambda one: one.load_N):
+                number = at_load(theirs[series], row.load_N, owner=other.identity)
+                if number is None:
+                    beyond[round(row.load_N)] = None
+                else:
+                    found.append(_difference(series, row, number, other.label))
+        left_out += _left_out(other.label, lacking, beyond)
+    return tuple(one for part in PARTS for one in _decided(found, part, level)), tuple(left_out)
+
+
+def _difference(series: Series, row: Row, number: Uncertain, label: str) -> Difference:
+    name, rotation, angle = series
+    difference = weighted([(1.0, number), (-1.0, row.number)]).estimate()
+    reference, other = row.number.estimate(), number.estimate()
+    return Difference(
+        part="curves" if angle is not None else "characteristics",
+        name=name,
+        rotation=rotation,
+        SA_rad=angle,
+        load_N=row.load_N,
+        label=label,
+        reference=reference,
+        other=other,
+        difference=difference,
+        u_apart=math.hypot(reference.u, other.u),
+        p=two_sided_p(difference.value, difference.u, difference.dof),
+        p_holm=None,
+        significant=False,
+    )
+
+
+def two_sided_p(value: float, u: float, dof: float) -> float | None:
+    """Return the two-sided p of a value that has standard uncertainty ``u`` being zero; None without one.
+
+    Student's t; normal for infinite degrees of freedom.
+    """
+    from scipy.special import ndtr, stdtr
+
+    if not u > 0 or math.isnan(dof):
+        return None
+    t = -abs(value) / u
+    return float(2 * (ndtr(t) if math.isinf(dof) else stdtr(dof, t)))
+
+
+def _decided(found: Sequence[Difference], part: Part, level: float) -> list[Difference]:
+    mine = [one for one in found if one.part == part]
+    adjusted = holm([one.p for one in mine])
+    return [
+        replace(one, p_holm=p, significant=p is not None and p < level)
+        for one, p in zip(mine, adjusted, strict=True)
+    ]
+
+
+def _said(series: Series) -> str:
+    name, rotation, angle = series
+    return name + ("" if rotation == "both" else f" {rotation}") if angle is None else f"{name} {rotation}"
+
+
+def _left_out(label: str, lacking: dict[str, None], beyond: dict[float, None]) -> list[str]:
+    found = []
+    if lacking:
+        found.append(f"{label} has no {', '.join(lacking)}")
+    if beyond:
+        loads = ", ".join(f"{load:.0f}" for load in beyond)
+        found.append(f"{label} does not reach the load {loads} N")
+    return found

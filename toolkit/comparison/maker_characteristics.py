@@ -1,0 +1,169 @@
+"""A maker's characteristics against load, as the source document's figures 6.6 to 6.11 compare them.
+
+    FZ [N],conicity [N],U_conicity [N],plysteer [N],secant_cornering [N/deg]
+
+One row a load; any of the names of `quantities`, each with its unit, and optionally its expanded uncertainty
+(k = 2) as ``U_<name>``. SAE axes that follow the travel; conicity and plysteer by symmetry.
+"""
+
+from __future__ import annotations
+
+import csv
+import difflib
+import io
+import math
+import re
+from pathlib import Path
+from typing import NoReturn
+
+from toolkit.characteristics.rows import BOTH, Row
+from toolkit.characteristics.uncertain import Part, Uncertain
+from toolkit.comparison.quantities import CHARACTERISTICS
+from toolkit.errors import CellError, ColumnError, UnreadableError
+from toolkit.units import unit
+
+_HEADER = re.compile(r"\s*([A-Za-z_]+)\s*\[([^\]]*)\]\s*")
+_SI = {"N": "N", "N*m": "N*m", "N/deg": "N/rad", "N*m/deg": "N*m/rad"}
+_NAMES = {one.name: _SI[one.unit] for one in CHARACTERISTICS}
+
+
+def is_characteristics_table(path: Path) -> bool:
+    """Tell whether a CSV file's header has FZ and a characteristic, and no slip angle."""
+    names = {match[1] for match in map(_HEADER.fullmatch, _header(_text(path))) if match}
+    return "SA" not in names and bool(names & set(_NAMES))
+
+
+def maker_characteristics(path: Path, *, identity: str) -> tuple[Row, ...]:
+    """Return a table's rows in SI.
+
+    Raises
+    ------
+    UnreadableError
+        no text, no rows
+    ColumnError
+        a column is unknown, doubled, missing, or without a unit; a load stands twice
+    CellError
+        a cell that is no finite number; an empty one is a value that the maker does not give
+    """
+    text = _text(path)
+    head = _header(text)
+    columns = [_column(cell, path) for cell in head]
+    names = [name for name, _ in columns]
+    for name in names:
+        if names.count(name) > 1:
+            _refuse(path, "doubled-column", f"the column {name} stands twice", ", ".join(head), f"one {name}")
+    if "FZ" not in names:
+        _refuse(path, "missing-column", "the table has no column FZ", ", ".join(head), "FZ [N]")
+    found: list[Row] = []
+    loads: set[float] = set()
+    for number, cells in enumerate(list(csv.reader(io.StringIO(text, newline="")))[1:], start=2):
+        if not any(cell.strip() for cell in cells):
+            continue
+        if len(cells) != len(head):
+            raise CellError(
+                f"row {number} has another number of cells than the header", where=f"{path}, row {number}",
+                got=len(cells), expected=len(head), next_step="mend that row; decimals take a point",
+                rule="ragged-row",
+            )  # fmt: skip
+        values = {
+            name: _number(cell, factor, f"{path}, row {number}, column {name}", needed=name == "FZ")
+            for (name, factor), cell in zip(columns, cells, strict=True)
+        }
+        load = abs(values["FZ"] or 0.0)
+        if load in loads or load <= 0:
+            what = f"row {number}: the load {'stands twice' if load else 'is zero'}"
+            _refuse(path, "doubled-load", what, f"{load:g} N", "each load once, above zero")
+        loads.add(load)
+        found += _rows_of(values, load, identity)
+    if not found:
+        raise UnreadableError(
+            "the table has no data", where=path, got="a header and no values", expected="one row a load",
+            next_step="add the rows", rule="no-data",
+        )  # fmt: skip
+    return tuple(found)
+
+
+def _rows_of(values: dict[str, float | None], load: float, identity: str) -> list[Row]:
+    found = []
+    for name, si in _NAMES.items():
+        value = values.get(name)
+        if value is None:
+            continue
+        U = values.get(f"U_{name}")
+        parts = (
+            ()
+            if not U
+            else (Part(source="maker's statement", key=f"maker/{identity}/{name}/{load:.9g}", u=abs(U) / 2),)
+        )
+        found.append(
+            Row(
+                name=name,
+                load_N=load,
+                rotation="forward" if name.startswith(("secant", "slope")) else BOTH,
+                number=Uncertain(value=value, unit=si, parts=parts),
+            )
+        )
+    return found
+
+
+def _text(path: Path) -> str:
+    try:
+        return path.read_bytes().decode("utf-8-sig")
+    except OSError as error:
+        raise UnreadableError(
+            "the table cannot be read", where=path, got=error.strerror, expected="a readable CSV file",
+            next_step="check the path", rule="no-file",
+        ) from error  # fmt: skip
+    except UnicodeDecodeError as error:
+        raise UnreadableError(
+            "the table is not a text file in UTF-8", where=path, got=f"a wrong byte at {error.start}",
+            expected="CSV in UTF-8", next_step="save it as 'CSV UTF-8'", rule="encoding",
+        ) from error  # fmt: skip
+
+
+def _header(text: str) -> list[str]:
+    return next(csv.reader(io.StringIO(text, newline="")), [])
+
+
+def _column(cell: str, path: Path) -> tuple[str, float]:
+    match = _HEADER.fullmatch(cell)
+    name = match[1] if match else cell.partition("[")[0].strip()
+    bare = name.removeprefix("U_")
+    if bare not in _NAMES and name != "FZ":
+        near = difflib.get_close_matches(bare, ["FZ", *_NAMES], n=1, cutoff=0.5)
+        _refuse(
+            path, "unknown-column", f"unknown column {name!r}", repr(cell),
+            f"{near[0]} [unit]" if near else ", ".join(["FZ", *_NAMES]),
+        )  # fmt: skip
+    if match is None:
+        _refuse(
+            path, "unknown-unit", f"the column {name} has no unit", repr(cell), f"'{name} [unit]', e.g. [N]"
+        )
+    where = f"{path}, column {cell.strip()!r}"
+    wanted = unit("N" if name == "FZ" else _NAMES[bare])
+    given = unit(match[2], where=where)
+    # An angle has no dimension of its own: N and N/deg are told apart by what they are per.
+    if given.dimension != wanted.dimension or ("/" in given.text) != ("/" in wanted.text):
+        _refuse(path, "unit-dimension", f"the unit of {name} is of another kind", match[2], wanted.text)
+    return name, given.factor / wanted.factor
+
+
+def _number(cell: str, factor: float, where: str, *, needed: bool) -> float | None:
+    text = cell.strip()
+    if not text and not needed:
+        return None
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise CellError(
+            "no number", where=where, got=repr(text) if text else "an empty cell",
+            expected="a finite number with a decimal point", next_step="mend that cell",
+            rule="text-cell" if text else "empty-cell",
+        )  # fmt: skip
+    return value * factor
+
+
+def _refuse(path: Path, rule: str, what: str, got: str, expected: str) -> NoReturn:
+    raise ColumnError(what, where=path, got=got, expected=expected, next_step="mend the table", rule=rule)

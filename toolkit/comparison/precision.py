@@ -1,0 +1,184 @@
+"""Precision of repeats: ISO 5725-2 repeatability, ISO 5725-3 intermediate precision by factor.
+
+A one-way random-effects analysis of variance with unequal cells: with n_i tests in level i of p levels
+and N in all,
+
+    s_w^2 = sum_i sum_j (y_ij - y_i)^2 / (N - p)
+    n_0   = (N - sum n_i^2 / N) / (p - 1)
+    s_b^2 = max(0, (MS_between - s_w^2) / n_0)
+
+and the intermediate precision with that factor different is sqrt(s_w^2 + s_b^2). A factor is told apart from
+another only where they did not change together; repeatability needs two tests of the same day, operator,
+mounting, calibration, machine and laboratory. Reproducibility needs another laboratory.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Hashable, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from toolkit.comparison.at_load import at_load
+from toolkit.comparison.differences import Series, series_of
+from toolkit.comparison.holm import holm
+from toolkit.comparison.model import Entry, Factor, FactorSpread, Precision, Repeats, Spread
+
+FACTORS = ("day", "operator", "mounting", "calibration", "machine", "laboratory")
+
+
+def repeats_of(entries: Sequence[Entry], *, level: float) -> Repeats:
+    """Return the precision of tests of one tire, in every characteristic at the first test's loads."""
+    factors = factors_of(entries)
+    varied = [one for one in factors if one.varied]
+    cells = list(zip(*(one.levels for one in factors if None not in one.levels), strict=True)) or [
+        () for _ in entries
+    ]
+    found = []
+    everywhere = [series_of(one.rows) for one in entries]
+    for series, rows in everywhere[0].items():
+        if series[2] is not None or any(series not in other for other in everywhere):
+            continue
+        for row in sorted(rows, key=lambda one: one.load_N):
+            numbers = [
+                at_load(mine[series], row.load_N, owner=entry.identity)
+                for mine, entry in zip(everywhere, entries, strict=True)
+            ]
+            values = [one.value for one in numbers if one is not None]
+            if len(values) == len(entries):
+                found.append(_precision(series, row.load_N, np.array(values), cells, varied))
+    labs = next(one for one in factors if one.name == "laboratory")
+    reproducible = labs.varied and None not in labs.levels
+    return Repeats(
+        precisions=_decided(found, level),
+        factors=factors,
+        reproducibility="laboratory" if reproducible else None,
+        reproducibility_note="the spread with factor laboratory different is the reproducibility"
+        if reproducible
+        else "not stated: reproducibility needs tests of another laboratory (ISO 5725-1)",
+    )
+
+
+def factors_of(entries: Sequence[Entry]) -> tuple[Factor, ...]:
+    """Return the factors of the tests and which of them changed together."""
+    levels = {name: tuple(entry.condition(name) for entry in entries) for name in FACTORS}
+    split = {name: _partition(one) for name, one in levels.items() if None not in one}
+    found = []
+    for name, mine in levels.items():
+        stated = None not in mine
+        varied = stated and len(set(mine)) > 1
+        same = tuple(
+            other for other, parts in split.items() if varied and other != name and parts == split[name]
+        )
+        if not stated:
+            note = f"not stated by {sum(one is None for one in mine)} of {len(mine)} tests"
+        elif not varied:
+            note = "the same in all tests"
+        elif same:
+            note = f"changed together with {', '.join(same)}: what they add cannot be told apart"
+        else:
+            note = None
+        found.append(Factor(name=name, levels=mine, varied=varied, same_as=same, note=note))
+    return tuple(found)
+
+
+def _partition(levels: Sequence[Hashable]) -> tuple[int, ...]:
+    """Return the levels as numbers in the order in which they first come."""
+    seen: dict[Hashable, int] = {}
+    return tuple(seen.setdefault(level, len(seen)) for level in levels)
+
+
+def _precision(
+    series: Series,
+    load_N: float,
+    values: NDArray[np.float64],
+    cells: Sequence[Hashable],
+    varied: Sequence[Factor],
+) -> Precision:
+    name, rotation, _ = series
+    variance, dof = _within(values, cells)
+    repeatability = spread(math.sqrt(variance), dof) if dof else None
+    return Precision(
+        name=name,
+        rotation=rotation,
+        load_N=load_N,
+        n=len(values),
+        mean=float(values.mean()),
+        total=spread(float(values.std(ddof=1)), len(values) - 1),
+        repeatability=repeatability,
+        limit_r=1.96 * math.sqrt(2.0) * repeatability.value if repeatability else None,
+        factors=tuple(factor_spread(values, one.levels, factor=one.name) for one in varied),
+    )
+
+
+def _within(values: NDArray[np.float64], levels: Sequence[Hashable]) -> tuple[float, int]:
+    """Return the pooled variance inside levels and its degrees of freedom."""
+    squares, dof = 0.0, 0
+    for level in set(levels):
+        mine = values[[one == level for one in levels]]
+        squares += float(np.sum((mine - mine.mean()) ** 2))
+        dof += len(mine) - 1
+    return (squares / dof if dof else 0.0), dof
+
+
+def factor_spread(values: NDArray[np.float64], levels: Sequence[Hashable], *, factor: str) -> FactorSpread:
+    """Return what a factor with at least two levels adds to the spread of values (tests,)."""
+    from scipy.special import fdtrc
+
+    N = len(values)
+    sizes = np.array([sum(one == level for one in levels) for level in dict.fromkeys(levels)], dtype=float)
+    p = len(sizes)
+    if p == N:
+        # Every test has a level of its own: the spread of all is the intermediate precision itself.
+        s = float(values.std(ddof=1))
+        return FactorSpread(factor=factor, levels=p, s=s, s_between=None, F=None, p=None)
+    within, dof = _within(values, levels)
+    means = np.array([values[[one == level for one in levels]].mean() for level in dict.fromkeys(levels)])
+    between = float(np.sum(sizes * (means - values.mean()) ** 2)) / (p - 1)
+    n0 = (N - float(np.sum(sizes**2)) / N) / (p - 1)
+    s_between = math.sqrt(max(0.0, (between - within) / n0))
+    F = between / within if within > 0 else None
+    return FactorSpread(
+        factor=factor,
+        levels=p,
+        s=math.hypot(math.sqrt(within), s_between),
+        s_between=s_between,
+        F=F,
+        p=None if F is None else float(fdtrc(p - 1, dof, F)),
+    )
+
+
+def spread(s: float, dof: int) -> Spread:
+    """Return a standard deviation with its 95 % interval from the chi-squared distribution.
+
+    >>> one = spread(1.0, 4)
+    >>> round(one.low, 3), round(one.high, 3)  # sqrt(4/11.143), sqrt(4/0.4844)
+    (0.599, 2.874)
+    """
+    from scipy.special import chdtri
+
+    high = math.sqrt(dof / float(chdtri(dof, 0.975)))
+    return Spread(value=s, dof=dof, low=s * math.sqrt(dof / float(chdtri(dof, 0.025))), high=s * high)
+
+
+def _decided(found: Sequence[Precision], level: float) -> tuple[Precision, ...]:
+    """Adjust each factor's F tests over its table."""
+    names = dict.fromkeys(one.factor for row in found for one in row.factors)
+    adjusted: dict[tuple[int, str], float | None] = {}
+    for name in names:
+        tests = [(i, one) for i, row in enumerate(found) for one in row.factors if one.factor == name]
+        for (i, _), p in zip(tests, holm([one.p for _, one in tests]), strict=True):
+            adjusted[i, name] = p
+    return tuple(
+        replace(
+            row,
+            factors=tuple(
+                replace(one, p_holm=p, significant=p is not None and p < level)
+                for one in row.factors
+                for p in (adjusted[i, one.factor],)
+            ),
+        )
+        for i, row in enumerate(found)
+    )
