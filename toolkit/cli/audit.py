@@ -33,6 +33,10 @@ def command(
         Path | None,
         typer.Option("--repair", help="Folder for corrected copies; the originals are never touched."),
     ] = None,
+    template: Annotated[
+        Path | None,
+        typer.Option("--template", help="Word template of a summary, audit.docx and audit.pdf in --out."),
+    ] = None,
     known_at: KnownAt = None,
     calibrations: Calibrations = None,
     home: Home = None,
@@ -62,6 +66,13 @@ def command(
     drift = None if since_good is None else drift_since(registry, since_good)
     if repair is not None:
         check_target(archive, repair)
+    opened = None
+    if template is not None:
+        from toolkit.report.package import read_template
+
+        if out is None:
+            raise typer.BadParameter("a summary needs --out, where it is written", param_hint="--template")
+        opened = read_template(template)
     began = time.perf_counter()
     show = not quiet and not json
     with progress(len(names), "audit", show=show) as step:
@@ -85,7 +96,7 @@ def command(
         drifted=drifted,
         copies=copies,
     )
-    written = () if out is None else write_folder(out, told, registry)
+    written = () if out is None else write_folder(out, told, registry, opened)
     if json:
         seconds = time.perf_counter() - began
         rate = len(names) / seconds if seconds else None

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from toolkit.audit.linked import Linked
     from toolkit.audit.since_good import Drift, DriftedFile
     from toolkit.calibration.registry.registry import Registry
+    from toolkit.report.package import Template
 
 PAGE, LINES = "audit.html", "audit.jsonl"
 _SHOWN, _WORST = 40, 6
@@ -71,13 +72,15 @@ def _tests(told: Answer) -> Iterator[dict[str, Any]]:
         yield one
 
 
-def write_folder(out: Path, told: Answer, registry: Registry) -> tuple[Path, ...]:
-    """Write the page for people and the lines for machines; return them.
+def write_folder(out: Path, told: Answer, registry: Registry, template: Template | None) -> tuple[Path, ...]:
+    """Write the page for people, the lines for machines and, by a template, the summary; return them.
 
     Raises
     ------
     OutputError
         the folder cannot be written to
+    TemplateError, RenderError
+        the summary cannot be made; the page and the lines are there
     """
     from toolkit.audit.timeline import timelines
     from toolkit.audit.traces import traces
@@ -100,7 +103,15 @@ def write_folder(out: Path, told: Answer, registry: Registry) -> tuple[Path, ...
         drifted=told.drifted,
     )
     write_page(out / PAGE, view)
-    return out / PAGE, out / LINES
+    if template is None:
+        return out / PAGE, out / LINES
+    from toolkit.report.audit_content import build_audit_content
+    from toolkit.report.deliver import deliver
+    from toolkit.report.style import read_style, style_file
+
+    content = build_audit_content(view, read_style(style_file(template.path)))
+    done = deliver(template, content, out, name="audit")
+    return out / PAGE, out / LINES, done.docx, done.pdf
 
 
 def text_of(told: Answer) -> str:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Mapping
 
+from toolkit.report.audit_vocabulary import AUDIT
 from toolkit.report.certificate.vocabulary import CERTIFICATE
 from toolkit.report.check_around import surroundings
 from toolkit.report.fonts import missing_fonts
@@ -101,8 +102,10 @@ def check_stories(
 
 def vocabulary_of(sites: list[Site]) -> Vocabulary:
     """Return the vocabulary that a template was made for, by its own tags."""
-    certificate = any(site.tag.path.startswith("certificate.") for site in sites)
-    return CERTIFICATE if certificate else REPORT
+    for words in (CERTIFICATE, AUDIT):
+        if any(site.tag.path.startswith(f"{words.name}.") for site in sites):
+            return words
+    return REPORT
 
 
 def _at(site: Site, rule: str, message: str) -> LintFinding:

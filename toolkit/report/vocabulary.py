@@ -70,8 +70,11 @@ class Vocabulary:
 
     def of_kind(self, tag: str) -> bool:
         """Tell whether a required tag can be meant for this kind of document."""
-        return tag.startswith("tk:certificate.") == (self.name == "certificate")
+        own = _KINDS.get(self.name)
+        return tag.startswith(own) if own else not tag.startswith(tuple(_KINDS.values()))
 
+
+_KINDS = {"certificate": "tk:certificate.", "audit": "tk:audit."}
 
 REPORT = Vocabulary(
     name="report",
