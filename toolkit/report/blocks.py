@@ -45,8 +45,17 @@ class Pieces:
             f'<w:id w:val="{next(self.ids)}"/><w:lock w:val="sdtLocked"/>{kind}</w:sdtPr>'
         )
 
-    def figure(self, name: str, width_mm: float) -> str:
-        """Return a figure with its numbered caption, kept only when the test has it."""
+    def figure(self, name: str, width_mm: float, *, kind: str = "Figure", caption: str | None = None) -> str:
+        """Return a figure with its numbered caption, kept only when the test has it.
+
+        ``caption`` is the template's own text; default: the one that the report makes from its data.
+        """
+        control = self.picture(name, width_mm)
+        text = self.inline(f"tk:caption.{name}", "caption") if caption is None else run(caption)
+        return self.block(f"tk:if.{name}", paragraph(control, style="Figure") + self.caption(kind, text))
+
+    def picture(self, name: str, width_mm: float) -> str:
+        """Return the control of a figure alone."""
         cx, cy = int(width_mm * MM), int(width_mm * MM * 3.7 / 6.3)
         number = next(self.ids)
         picture = (
@@ -58,14 +67,9 @@ class Pieces:
             '<a:prstGeom prst="rect"><a:avLst/></a:prstGeom></pic:spPr></pic:pic></a:graphicData></a:graphic>'
             "</wp:inline></w:drawing>"
         )
-        control = (
+        return (
             f"<w:sdt>{self._head(f'tk:figure.{name}', '<w:picture/>')}<w:sdtContent><w:r>{picture}</w:r>"
             "</w:sdtContent></w:sdt>"
-        )
-        return self.block(
-            f"tk:if.{name}",
-            paragraph(control, style="Figure")
-            + self.caption("Figure", self.inline(f"tk:caption.{name}", "caption")),
         )
 
     def caption(self, kind: str, content: str, *, before: bool = False) -> str:
@@ -86,6 +90,8 @@ class Pieces:
         cells: Sequence[str],
         widths_mm: Sequence[float],
         align: str,
+        *,
+        kind: str = "Table",
     ) -> str:
         """Return a captioned data table with one prototype row, kept only when it has rows.
 
@@ -102,7 +108,7 @@ class Pieces:
         grid = table(row(header, header=True) + row(prototype), widths_mm, rules="data")
         return self.block(
             f"tk:if.{name}",
-            self.caption("Table", run(caption), before=True)
+            self.caption(kind, run(caption), before=True)
             + self.block(f"tk:table.{name}", grid)
             + paragraph("", style="Gap"),
         )
@@ -179,12 +185,12 @@ def row(cells: str, *, header: bool = False) -> str:
 
 
 def table(rows: str, widths_mm: Sequence[float], *, rules: str) -> str:
-    """Return a table of fixed columns; ``rules`` is ``data`` (horizontal hairlines) or ``box``."""
+    """Return a table of fixed columns; ``rules`` is ``data`` (horizontal hairlines), ``box`` or ``none``."""
     hair = f'w:val="single" w:sz="4" w:space="0" w:color="{RULE}"'
     thick = f'w:val="single" w:sz="8" w:space="0" w:color="{INK}"'
     none = 'w:val="nil"'
-    outer = thick if rules == "data" else hair
-    side = none if rules == "data" else hair
+    outer = {"data": thick, "box": hair}.get(rules, none)
+    side = hair if rules == "box" else none
     borders = "".join(
         f"<w:{edge} {kind}/>"
         for edge, kind in (
@@ -192,8 +198,8 @@ def table(rows: str, widths_mm: Sequence[float], *, rules: str) -> str:
             ("left", side),
             ("bottom", outer),
             ("right", side),
-            ("insideH", hair),
-            ("insideV", none if rules == "data" else hair),
+            ("insideH", none if rules == "none" else hair),
+            ("insideV", side),
         )
     )
     grid = "".join(f'<w:gridCol w:w="{round(w * TWIP_MM)}"/>' for w in widths_mm)

@@ -18,6 +18,7 @@ from toolkit.report.plots import build_plots, load_groups
 from toolkit.report.style import Style
 from toolkit.report.tables import build_tables
 from toolkit.report.tags import FIGURES, catalogue, format_number
+from toolkit.report.words import say_plot, say_table, say_values
 
 if TYPE_CHECKING:
     from toolkit.calibration.records.record import CalibrationRecord
@@ -55,7 +56,11 @@ def build_content(
         (*result.reduced.findings, *result.characteristics.findings) if findings is None else findings
     )
     info, use = result.reduced.info, result.reduced.calibration
-    plots = build_plots(result, style, SIMULATED if info.simulated else None)
+    drawn = build_plots(result, style, SIMULATED if info.simulated else None)
+    plots = {
+        name: replace(say_plot(plot, dict(style.words)), decimal_comma=style.decimal_comma)
+        for name, plot in drawn.items()
+    }
     details = details or ReportDetails()
     tables = build_tables(result, record, listed, style, details.opinions)
     values = _values(result, record, listed, style, day)
@@ -64,6 +69,10 @@ def build_content(
     values |= {
         f"caption.{name}": Value(kind="text", value=plots[name].caption) for name in FIGURES if name in plots
     }
+    words = dict(style.words)
+    if words:
+        values = say_values(values, words)
+        tables = {name: say_table(table, words) for name, table in tables.items()}
     marks = []
     if info.simulated:
         marks.append(("simulated", f"{SIMULATED}: made by simulation, not a measurement of a tire."))

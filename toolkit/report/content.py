@@ -74,6 +74,7 @@ class Plot:
     watermark: str | None = None
     zero_x: bool = False
     legend_title: str | None = None
+    decimal_comma: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -185,7 +185,8 @@ def _entries(
             if not in_fallback(p) and _counts(p, named[1])
         ]
     lowest, highest, extra, outline = _switches(field.code)
-    own = {id(p) for p in field.paragraphs or ()}
+    inside = field.paragraphs or []  # held, so that an identity stays that of one element
+    own = {id(p) for p in inside}
     found = []
     for one in headings(root, sheet):
         level = extra.get(sheet.names.get(style_of(one.element), ""))

@@ -67,18 +67,26 @@ def build_document(
     body: Callable[[Pieces], list[str]],
     header: Callable[[Pieces], str],
     footer: Callable[[Pieces], str],
+    styles: Callable[[Any], None] = make_styles,
+    margins_mm: tuple[float, float, float, float] = (27.0, 22.0, 22.0, 22.0),
+    letterhead: tuple[bytes, Callable[[Pieces, str], str]] | None = None,
 ) -> bytes:
-    """Return a template in the house's layout: an A4 page, its styles, header and footer on every page."""
+    """Return a template in the house's layout: an A4 page, its styles, header and footer on every page.
+
+    Parameters
+    ----------
+    margins_mm : top, right, bottom, left of the page
+    letterhead : a picture, and the first page's own header, given the picture's relation
+    """
     import docx
     from docx.opc.constants import RELATIONSHIP_TYPE
     from docx.shared import Mm
 
     document: Any = docx.Document()
-    make_styles(document)
+    styles(document)
     section = document.sections[0]
     section.page_width, section.page_height = Mm(210), Mm(297)
-    section.left_margin = section.right_margin = Mm(22)
-    section.top_margin, section.bottom_margin = Mm(27), Mm(22)
+    section.top_margin, section.right_margin, section.bottom_margin, section.left_margin = map(Mm, margins_mm)
     section.header_distance = section.footer_distance = Mm(11)
     part = document.part
     image = part.package.get_or_add_image_part(io.BytesIO(placeholder_png()))
@@ -92,6 +100,14 @@ def build_document(
             story.insert(len(story) - 1, element)
     _replace(section.header._element, header(pieces))
     _replace(section.footer._element, footer(pieces))
+    if letterhead is not None:
+        section.different_first_page_header_footer = True
+        first = section.first_page_header
+        emblem = part.package.get_or_add_image_part(io.BytesIO(letterhead[0]))
+        rel = first.part.relate_to(emblem, RELATIONSHIP_TYPE.IMAGE)
+        _replace(first._element, letterhead[1](pieces, rel))
+        _replace(section.first_page_footer._element, footer(pieces))
+    _lead_the_first_section(story)
     core = document.core_properties
     core.author, core.title, core.comments = "", title, ""
     core.created = core.modified = dt.datetime(2026, 11, 21)  # noqa: DTZ001  python-docx wants it naive
@@ -99,6 +115,20 @@ def build_document(
     stream = io.BytesIO()
     document.save(stream)
     return _same_bytes(stream.getvalue())
+
+
+def _lead_the_first_section(story: Element) -> None:
+    """Move headers and footers to the first section, whose followers inherit them."""
+    sections = list(story.iter(q("w:sectPr")))
+    first, last = sections[0], sections[-1]
+    if first is last:
+        return
+    for tag in ("w:footerReference", "w:headerReference"):
+        for reference in reversed(last.findall(q(tag))):
+            first.insert(0, reference)
+    for title in last.findall(q("w:titlePg")):
+        last.remove(title)
+        first.append(title)
 
 
 def _same_bytes(data: bytes) -> bytes:

@@ -97,11 +97,26 @@ def _furnish(axes: Axes, plot: Plot) -> None:
         axes.axvline(0.0, color="#606060", linewidth=0.8, zorder=1)
     for side in ("top", "right"):
         axes.spines[side].set_visible(False)
+    if plot.decimal_comma:
+        for axis in (axes.xaxis, axes.yaxis):
+            axis.set_major_formatter(_comma_formatter())
     round_steps = [1, 2, 2.5, 5, 10]
     axes.yaxis.set_major_locator(MaxNLocator(nbins=8, steps=round_steps))
     axes.xaxis.set_major_locator(
         MultipleLocator(2) if plot.zero_x else MaxNLocator(nbins=9, steps=round_steps)
     )
+
+
+def _comma_formatter() -> Any:
+    from matplotlib.ticker import ScalarFormatter
+
+    class Comma(ScalarFormatter):
+        """Axis numbers with a decimal comma."""
+
+        def __call__(self, x: float, pos: int | None = None) -> str:
+            return str(super().__call__(x, pos)).replace(".", ",")
+
+    return Comma(useOffset=False)
 
 
 def _curve(axes: Axes, curve: Curve) -> None:

@@ -11,8 +11,8 @@ from toolkit.errors import ConfigError
 from toolkit.files import check_keys, read_toml
 from toolkit.units import si_scale
 
-_KEYS = "schema laboratory report decimal_comma dates missing required styles decimals units".split()
-_TABLES = ("laboratory", "report", "styles", "decimals", "units")
+_KEYS = "schema laboratory report words decimal_comma dates missing required styles decimals units".split()
+_TABLES = ("laboratory", "report", "words", "styles", "decimals", "units")
 _LABORATORY = "name address contact place country accreditation".split()
 _REPORT = "method authorised_by function".split()
 _STYLES = ("heading", "caption", "table")
@@ -26,7 +26,8 @@ class Style:
 
     ``method``, ``authorised_by``, ``function`` stand in a report whose test names none. ``decimals`` maps a
     unit, a tag's path or ``<table>.<column>`` to digits after the point; ``styles`` maps heading, caption and
-    table to the names of the template's Word styles.
+    table to the names of the template's Word styles; ``words`` are the organisation's own for the terms that
+    figures and tables print.
     """
 
     laboratory: str | None = None
@@ -44,6 +45,7 @@ class Style:
     required: tuple[str, ...] = _DEFAULT_REQUIRED
     styles: tuple[tuple[str, str], ...] = ()
     decimals: tuple[tuple[str, int], ...] = ()
+    words: tuple[tuple[str, str], ...] = ()
     force: str = "N"
     moment: str = "N*m"
 
@@ -115,6 +117,7 @@ def read_style(path: Path | None) -> Style:
         required=tuple(dict.fromkeys([*_DEFAULT_REQUIRED, *(str(one) for one in required)])),
         styles=tuple((str(k), str(v)) for k, v in parts["styles"].items()),
         decimals=tuple(parts["decimals"].items()),
+        words=tuple((key, str(_text(parts["words"], key, path))) for key in parts["words"]),
         force=str(parts["units"].get("force", "N")),
         moment=str(parts["units"].get("moment", "N*m")),
     )

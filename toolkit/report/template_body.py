@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from toolkit.report.blocks import Pieces, literal, paragraph, run
+from toolkit.report.template_pieces import contents
 
 
 def title_page(p: Pieces) -> list[str]:
@@ -66,6 +67,7 @@ def title_page(p: Pieces) -> list[str]:
             ],
             quarter,
         ),
+        contents("Contents"),
         paragraph(
             run(
                 "The results relate only to the item tested, as received. The report may be reproduced only as a whole. "
@@ -129,7 +131,27 @@ def chapters(p: Pieces) -> list[str]:
     force, moment = "{{tk:unit.force}}", "{{tk:unit.moment}}"
     stiff = "{{tk:unit.force_per_angle}}", "{{tk:unit.moment_per_angle}}"
     return [
-        heading("1  Test", fresh=True),
+        heading("1  Item, customer and method", fresh=True),
+        p.facts(
+            [
+                [("REPLACES?", "report.amends")],
+                [("REASON?", "report.amendment")],
+                [("CUSTOMER?", "report.customer")],
+                [("CONTACT?", "report.customer_contact")],
+                [("ITEM?", "item.description")],
+                [("CONDITION?", "item.condition")],
+                [("RECEIVED?", "item.received")],
+                [("TESTED?", "test.date")],
+                [("LOCATION?", "report.location")],
+                [("METHOD?", "report.method")],
+                [("DEVIATIONS", "report.deviations")],
+                [("SAMPLING?", "report.sampling")],
+                [("CONFORMITY?", "report.conformity")],
+                [("EXTERNAL?", "report.external")],
+            ],
+            (38.0, 128.0),
+        ),
+        heading("2  Test"),
         p.facts(
             [
                 [("MACHINE", "test.machine")],
@@ -152,21 +174,21 @@ def chapters(p: Pieces) -> list[str]:
             "the load cells by calibration record {{tk:calibration.id}}; all results are in {{tk:test.axes}} axes: z down, "
             "y to the right, a positive slip angle gives a negative lateral force and a positive aligning moment."
         ),
-        heading("2  Lateral force and aligning moment"),
-        p.figure("fy_vs_slip", 160),
-        p.figure("mz_vs_slip", 160),
-        p.figure("fy_vs_load", 160),
-        p.figure("mz_vs_load", 160),
-        p.figure("gough", 160),
+        heading("3  Lateral force and aligning moment"),
+        p.figure("fy_vs_slip", 150),
+        p.figure("mz_vs_slip", 150),
+        p.figure("fy_vs_load", 150),
+        p.figure("mz_vs_load", 150),
+        p.figure("gough", 150),
         p.block(
             "tk:if.stiffness",
-            heading("3  Cornering and aligning stiffness")
+            heading("4  Cornering and aligning stiffness")
             + text(
                 "Both are positive in SAE axes. The secant runs through the ±1 deg steps, as the source standard has it; "
                 "the slope is that of the fitted curve at 0 deg."
             )
-            + p.figure("cornering_stiffness", 160)
-            + p.figure("aligning_stiffness", 160)
+            + p.figure("cornering_stiffness", 150)
+            + p.figure("aligning_stiffness", 150)
             + p.table(
                 "stiffness",
                 "Cornering and aligning stiffness with expanded uncertainties (95 %).",
@@ -190,7 +212,7 @@ def chapters(p: Pieces) -> list[str]:
                 "rlrrrr",
             ),
         ),
-        heading("4  Pull"),
+        heading("5  Pull"),
         p.block(
             "tk:if.no_pull",
             text("The test has no pull characteristics: they need a forward and a reversed run."),
@@ -201,10 +223,10 @@ def chapters(p: Pieces) -> list[str]:
                 "From the forward and the reversed run at slip angle zero, read off each direction's own curve at a common "
                 "load. Conicity keeps its sign when the drum is reversed; plysteer changes it."
             )
-            + p.figure("conicity", 160)
-            + p.figure("plysteer", 160)
-            + p.figure("crat", 160)
-            + p.figure("prat", 160)
+            + p.figure("conicity", 150)
+            + p.figure("plysteer", 150)
+            + p.figure("crat", 150)
+            + p.figure("prat", 150)
             + p.table(
                 "pull",
                 "Pull characteristics by symmetry with expanded uncertainties (95 %).",
@@ -251,7 +273,7 @@ def chapters(p: Pieces) -> list[str]:
         ),
         p.block(
             "tk:if.fits",
-            heading("5  Fitted curves")
+            heading("6  Fitted curves")
             + text(
                 "Magic Formula y = D sin(C arctan(Bx - E(Bx - arctan Bx))) + Sv with x = SA + Sh, one curve a load. D and Sv "
                 "are in the channel's unit; below each parameter stands its standard error, n/a where the data do not "
@@ -291,7 +313,7 @@ def chapters(p: Pieces) -> list[str]:
                 "llrrrrrrrrr",
             ),
         ),
-        heading("6  Calibration"),
+        heading("7  Calibration"),
         p.table(
             "calibration",
             "Coefficients of the calibration record.",
@@ -308,7 +330,7 @@ def chapters(p: Pieces) -> list[str]:
             [90, 38, 38],
             "lrr",
         ),
-        heading("7  Findings"),
+        heading("8  Findings"),
         p.block("tk:if.no_findings", text("There are no findings.")),
         p.table(
             "findings",
@@ -318,7 +340,7 @@ def chapters(p: Pieces) -> list[str]:
             [30, 16, 36, 84],
             "llll",
         ),
-        heading("8  Measured conditions"),
+        heading("9  Measured conditions"),
         p.table(
             "results",
             "Means of the load blocks as measured; U (k = 2) is the repeatability of the mean and, without a tare, the open zero of the cells.",
@@ -336,7 +358,7 @@ def chapters(p: Pieces) -> list[str]:
             [19, 17, 19, 20, 17, 20, 17, 37],
             "lrrrrrrl",
         ),
-        heading("9  Provenance"),
+        heading("10  Provenance"),
         text(
             "Made by {{tk:software.name}} {{tk:software.version}} from the recordings below and calibration record "
             "{{tk:calibration.id}}, SHA-256 {{tk:calibration.hash}}."
@@ -348,6 +370,34 @@ def chapters(p: Pieces) -> list[str]:
             ["file", "rotation", "sha256"],
             [36, 20, 110],
             "lll",
+        ),
+        p.block(
+            "tk:if.opinions",
+            heading("Opinions and interpretations")
+            + text(
+                "What follows are opinions and interpretations (ISO/IEC 17025, 7.8.7). They are not results of the test, "
+                "and no uncertainty is stated for them."
+            )
+            + p.table(
+                "opinions",
+                "Opinions and interpretations, and what they rest on.",
+                ["opinion or interpretation", "basis"],
+                ["statement", "basis"],
+                [96, 70],
+                "ll",
+            ),
+        ),
+        p.block(
+            "tk:if.report.authorised_by",
+            paragraph(
+                run("Authorised by ")
+                + p.inline("tk:report.authorised_by", "name")
+                + p.block(
+                    "tk:if.report.authorised_function",
+                    run(", ") + p.inline("tk:report.authorised_function", "function"),
+                ),
+                style="Signature",
+            ),
         ),
         paragraph(run("End of report ") + p.inline("tk:report.id", "report id"), style="EndMark"),
     ]

@@ -13,7 +13,7 @@ _WIDE = 166.0
 def make_styles(document: Any) -> None:
     """Give a python-docx document the styles that the template's pieces name."""
     from docx.enum.style import WD_STYLE_TYPE
-    from docx.enum.text import WD_ALIGN_PARAGRAPH, WD_TAB_ALIGNMENT
+    from docx.enum.text import WD_ALIGN_PARAGRAPH, WD_TAB_ALIGNMENT, WD_TAB_LEADER
     from docx.shared import Mm, Pt, RGBColor
 
     ink, grey = RGBColor.from_string(INK), RGBColor(0x55, 0x5F, 0x6B)
@@ -72,6 +72,10 @@ def make_styles(document: Any) -> None:
     style("Gap", 6)
     style("Small", 8.5, before=16, colour=grey)
     style("EndMark", 10, before=18, colour=grey, align=centre)
+    signature = style("Signature", 10.5, before=44)
+    signature.paragraph_format.keep_together = True
+    _borders(signature.element, _edge("top", RULE, 4, 4))
+    signature.paragraph_format.right_indent = Mm(80)
     notice = style(
         "Notice", 11.5, before=2, after=8, bold=True, colour=RGBColor(0x9C, 0x1C, 0x1C), align=centre
     )
@@ -82,6 +86,13 @@ def make_styles(document: Any) -> None:
         one.paragraph_format.tab_stops.add_tab_stop(Mm(_WIDE / 2), WD_TAB_ALIGNMENT.CENTER)
         one.paragraph_format.tab_stops.add_tab_stop(Mm(_WIDE), WD_TAB_ALIGNMENT.RIGHT)
         _ruled(one.element, "bottom" if name == "Header" else "top")
+    toc_heading = style("TOC Heading", 13, before=6, after=4, bold=True, colour=ink)
+    toc_heading.element.set(q("w:styleId"), "TOCHeading")
+    for level, indent in ((1, 0), (2, 5)):
+        line = style(f"toc {level}", 10.5, after=2)
+        line.element.set(q("w:styleId"), f"TOC{level}")
+        line.paragraph_format.left_indent = Mm(indent)
+        line.paragraph_format.tab_stops.add_tab_stop(Mm(_WIDE), WD_TAB_ALIGNMENT.RIGHT, WD_TAB_LEADER.DOTS)
     prompt = styles.add_style("Placeholder Text", WD_STYLE_TYPE.CHARACTER)
     prompt.element.set(q("w:styleId"), "PlaceholderText")
     prompt.font.color.rgb = RGBColor(0x80, 0x80, 0x80)

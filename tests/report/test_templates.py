@@ -1,0 +1,185 @@
+"""The templates that come with the toolkit: clean, built by code, and each taken to its PDF."""
+
+from __future__ import annotations
+
+import datetime as dt
+import re
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+from report_factory import make_record, make_result
+
+from toolkit.errors import ConfigError
+from toolkit.recording.details import read_details
+from toolkit.report.build import build_content, report_id
+from toolkit.report.check import check_template
+from toolkit.report.contents_pages import pdf_outline
+from toolkit.report.deliver import Delivered, deliver
+from toolkit.report.package import read_template
+from toolkit.report.style import Style, read_style, style_file
+from toolkit.report.template_files import packaged_templates
+from toolkit.report.verify import pdf_text
+from toolkit.report.words import say
+
+FOLDER = Path(__file__).resolve().parents[2] / "report_templates"
+DAY = dt.date(2026, 11, 21)
+DETAILS = {
+    "customer": "Example Tyres",
+    "customer_contact": "1 Rubber Road",
+    "received": dt.date(2019, 5, 28),
+    "condition": "new",
+    "authorised_by": "A. Authoriser",
+    "function": "head of laboratory",
+    "opinions": ["The belt may be off centre.", {"statement": "Carcass buckling.", "basis": "Table 2"}],
+}
+office_needed = pytest.mark.skipif(
+    not (shutil.which("soffice") and shutil.which("pdftohtml")),
+    reason="LibreOffice or poppler is not installed",
+)
+
+
+def report(name: str, out: Path, details: dict | None = None, **changes: object) -> Delivered:
+    path = FOLDER / f"{name}.docx"
+    content = build_content(
+        make_result(**changes),
+        make_record(),
+        style=read_style(style_file(path)),
+        issued=DAY,
+        details=read_details(DETAILS if details is None else details, where="test.toml"),
+    )
+    return deliver(read_template(path), content, out)
+
+
+@pytest.mark.parametrize("name", ["org", "summary", "pruefbericht"])
+def test_each_is_what_its_builder_makes_and_is_clean(name: str) -> None:
+    one, path = packaged_templates()[name], FOLDER / f"{name}.docx"
+    assert path.read_bytes() == one.build()
+    if one.style is not None:
+        assert path.with_suffix(".toml").read_text() == one.style
+    assert check_template(read_template(path), read_style(style_file(path))) == ()
+
+
+def test_all_of_them_are_there() -> None:
+    assert set(packaged_templates()) <= {path.stem for path in FOLDER.glob("*.docx")}
+
+
+@office_needed
+def test_the_default_has_what_the_standard_asks_of_a_report(tmp_path: Path) -> None:
+    done = report("org", tmp_path / "out")
+    assert done.warnings == ()
+    pages = pdf_text(done.pdf).split("\f")[:-1]
+    text = " ".join(" ".join(pages).split())
+    for words in (
+        "Tire Force and Moment Laboratory",  # 7.8.2.1 b
+        "Example Tyres", "1 Rubber Road",  # e
+        "tire 265/35 ZR 18, Continental, Altimax, DOT 4MY8-009X-0713", "new",  # g
+        "2019-05-28",  # h
+        "2019-06-04",  # i
+        "The results relate only to the item tested, as received",  # l
+        "A. Authoriser, head of laboratory",  # o
+        "opinions and interpretations (ISO/IEC 17025, 7.8.7). They are not results",
+        "The belt may be off centre.",
+    ):  # fmt: skip
+        assert words in text, words
+    identity = report_id(make_result(), read_details(DETAILS, where=""))
+    # d: the id and "page x of y" on every page, and where the report ends.
+    for number, page in enumerate(pages, start=1):
+        assert identity in page
+        assert f"page {number} of {done.pages}" in page
+    assert f"End of report {identity}" in " ".join(pages[-1].split())
+    titles = [title for title, _ in pdf_outline(done.pdf)]
+    assert titles[0].endswith("Item, customer and method")
+    assert titles[-1] == "Opinions and interpretations"
+
+
+@office_needed
+def test_a_report_without_details_leaves_their_places_out(tmp_path: Path) -> None:
+    done = report("org", tmp_path / "out", {})
+    text = pdf_text(done.pdf)
+    assert done.warnings == ()
+    assert "Opinions" not in text
+    assert "Authorised by" not in text
+    assert "RECEIVED" not in text
+
+
+@office_needed
+def test_the_summary_is_one_page(tmp_path: Path) -> None:
+    done = report("summary", tmp_path / "out", simulated=True, unverified=True)
+    assert done.pages == 1
+    assert "SIMULATED DATA" in pdf_text(done.pdf)
+    assert "page 1 of 1" in pdf_text(done.pdf)
+
+
+@office_needed
+def test_the_german_report_has_its_own_look(tmp_path: Path) -> None:
+    done = report("pruefbericht", tmp_path / "out")
+    assert done.warnings == ()
+    text = " ".join(pdf_text(done.pdf).split())
+    for words in (
+        "Reifenprüfstelle Musterstadt",
+        "Eingang 28.05.2019",
+        "Seite 1 von",
+        "Abbildung 1. Seitenkraft",
+        "vorwärts",
+        "-0,30",  # the first slip angle, with a decimal comma
+    ):
+        assert words in text, words
+    sizes = subprocess.run(
+        ["pdfinfo", "-f", "1", "-l", str(done.pages), str(done.pdf)], capture_output=True, check=True
+    ).stdout.decode()
+    shapes = {
+        float(wide) > float(tall) for wide, tall in re.findall(r"size:\s+([\d.]+) x ([\d.]+) pts", sizes)
+    }
+    assert shapes == {True, False}  # upright, and across for the tables
+    titles = [title for title, _ in pdf_outline(done.pdf)]
+    assert titles == [
+        "Prüfbedingungen", "Kennlinien", "Geradeauslauf", "Messwerte", "Feststellungen",
+        "Meinungen und Interpretationen",
+    ]  # fmt: skip
+
+
+def test_an_amended_report_has_an_id_of_its_own() -> None:
+    amended = read_details({"amends": "TR-1", "amendment": "the operator was wrong"}, where="")
+    assert report_id(make_result(), amended) != report_id(make_result())
+
+
+@pytest.mark.parametrize(
+    ("table", "rule"),
+    [
+        ({"custumer": "x"}, "unknown-key"),
+        ({"customer": 3}, "wrong-value"),
+        ({"received": "yesterday"}, "wrong-value"),
+        ({"amends": "TR-1"}, "wrong-value"),
+        ({"opinions": "one"}, "wrong-value"),
+        ({"opinions": [{"statement": "x", "becuase": "y"}]}, "unknown-key"),
+        ("text", "wrong-value"),
+    ],
+)
+def test_details_with_a_slip_are_refused(table: object, rule: str) -> None:
+    with pytest.raises(ConfigError) as caught:
+        read_details(table, where="test.toml")
+    assert caught.value.rule == rule
+
+
+def test_own_words_are_whole_words_of_the_toolkit_and_never_of_people() -> None:
+    words = {"load": "Radlast", "forward": "vorwärts", "none": "keine"}
+    assert say("load FZ, reload, payload", words) == "Radlast FZ, reload, payload"
+    style = Style(words=tuple(words.items()))
+    made = build_content(make_result(special="load forward"), make_record(), style=style, issued=DAY)
+    assert made.values["test.special"].value == "load forward"
+    assert made.values["report.deviations"].value == "keine"
+    assert made.tables["results"].rows[0][0] == "vorwärts"
+    assert made.plots["fy_vs_load"].x_label == "Radlast FZ [N]"
+
+
+def test_any_result_can_be_a_condition(tmp_path: Path) -> None:
+    made = build_content(make_result(both=False), make_record(), issued=DAY)
+    for name, held in (
+        ("figure.gough", True), ("figure.conicity", False), ("table.files", True), ("table.opinions", False),
+        ("calibration.FY.D51", True), ("item.received", False), ("caption.gough", True), ("pull", False),
+    ):  # fmt: skip
+        assert made.holds(name) is held, name
+        assert made.vocabulary.knows_condition(name)
+    assert not made.vocabulary.knows_condition("figure.rain")
