@@ -15,8 +15,10 @@ patch, and with it FX, moves aside.
 
 Source: Pacejka, Tire and Vehicle Dynamics, 3rd ed. (2012), 3.3, with its approximations that friction depends
 on the speed of the bristle's base and that a sliding bristle keeps its direction. The pressure's law and the
-dependence on load are ours. 64 bristles, and 5 lines over the width with camber or longitudinal slip: FX, FY
-and MZ come within 1e-3 of their largest values to what finer ones give.
+dependence on load are ours. The sums over the bristles know where a bristle begins to slide between two
+middles, so that 40 of them come within 1e-4 of the forces under a parabola, and for all pressures within 1e-3
+(FY) and 5e-3 (MZ) of their largest values; where slips along and across turn a bristle while it slides, within
+3e-3 and 2e-2.
 """
 
 from __future__ import annotations
@@ -26,7 +28,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from toolkit.tires.bristles import Tread, balance, middles
+from toolkit.tires.bristles import Tread, balance, middles, summed
 from toolkit.tires.contact import bulged, half_length, slips, with_load
 from toolkit.tires.global_model import GlobalModel, GlobalParameter, Responses, Rows, Seeds
 
@@ -35,7 +37,7 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-BRISTLES = 64
+BRISTLES = 40
 LINES = 5
 _THIN = 1e-2  # of the mean pressure: friction does not grow without end where the pressure vanishes
 
@@ -77,7 +79,7 @@ def _limit(p: Mapping[str, Any], load: Array, growth: Any, shape: tuple[int, ...
     # (bristles, cases): friction at standstill times the pressure of each bristle, over FZ/a.
     u = middles(bristles).reshape(-1, *(1 for _ in shape))
     q = bulged(u, p["N"], p["SKEW"])
-    q = q / (q.mean(axis=0) * 2)
+    q = q / summed(q)
     pressure = np.maximum(2 * q, _THIN) * np.power(np.maximum(load, _THIN), 1 - growth)
     limit = p["MU"] * np.power(pressure, -p["MU_P"]) * q
     return np.ascontiguousarray(np.broadcast_to(limit, (bristles, *shape))).reshape(bristles, -1)
@@ -138,7 +140,7 @@ MODEL = GlobalModel(
             text="its growth with load: a = A (FZ/FNOMIN)^A_P", stage="MZ", needs=("two_loads",),
         ),
         GlobalParameter(
-            name="N", unit="1", default=2.0, low=1.0, high=20.0, size=0.5,
+            name="N", unit="1", default=2.0, low=1.0, high=12.0, size=0.5,
             text="exponent of the pressure: 2 a parabola, large an even one",
         ),
         GlobalParameter(
@@ -150,7 +152,7 @@ MODEL = GlobalModel(
             text="friction at the mean pressure of FNOMIN without sliding",
         ),
         GlobalParameter(
-            name="MU_P", unit="1", default=0.0, low=-0.9, high=0.9, size=0.05,
+            name="MU_P", unit="1", default=0.0, low=0.0, high=0.9, size=0.05,
             text="fall of friction with local pressure, exponent", needs=("two_loads",),
         ),
         GlobalParameter(
