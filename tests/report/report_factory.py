@@ -7,7 +7,7 @@ import hashlib
 import math
 
 from toolkit.calibration.records.record import CalibrationRecord, Golden, Indication, LoadFit
-from toolkit.characteristics.model import Characteristics, DirectionFit, Pull, Stiffness
+from toolkit.characteristics.model import Characteristics, DirectionFit, Point, Pull, Stiffness
 from toolkit.estimate import Estimate
 from toolkit.findings import Finding
 from toolkit.pipeline import TestResult
@@ -178,7 +178,13 @@ def make_result(
             code_version="0.1.0",
         ),
         characteristics=Characteristics(
-            fits=tuple(direction_fits), stiffness=tuple(stiffness), pull=tuple(pull), findings=()
+            fits=tuple(direction_fits),
+            stiffness=tuple(stiffness),
+            pull=tuple(pull),
+            findings=(),
+            points=tuple(
+                Point(file=c.file, first_row=c.first_row, u_FY=c.u_FY, u_MZ=c.u_MZ) for c in conditions
+            ),
         ),
     )
 

@@ -69,19 +69,9 @@ TABLES: dict[str, tuple[str, tuple[Column, ...]]] = {
             _number("SA", "measured slip angle", ".2f", unit="deg"),
             _number("FZ", "measured load", ".0f", quantity="force"),
             _number("FY", "lateral force", ".1f", quantity="force"),
-            _number(
-                "U_FY",
-                "repeatability of FY and the open zero of an untared cell, k = 2",
-                ".1f",
-                quantity="force",
-            ),
+            _number("U_FY", "expanded uncertainty of FY, every source, k = 2", ".1f", quantity="force"),
             _number("MZ", "aligning moment", ".2f", quantity="moment"),
-            _number(
-                "U_MZ",
-                "repeatability of MZ and the open zero of an untared cell, k = 2",
-                ".2f",
-                quantity="moment",
-            ),
+            _number("U_MZ", "expanded uncertainty of MZ, every source, k = 2", ".2f", quantity="moment"),
             _text("file", "recording"),
         ),
     ),
@@ -117,8 +107,33 @@ TABLES: dict[str, tuple[str, tuple[Column, ...]]] = {
             _number("load", "load", ".0f", quantity="force"),
             *_with_u("thesis_CRAT", "CRAT by the thesis's formula", ".2f", "moment"),
             *_with_u("thesis_PRAT", "PRAT by the thesis's formula", ".2f", "moment"),
+            *_with_u(
+                "thesis_PRAT_at_FY_zero", "PRAT by the thesis's formula on MZ at FY = 0", ".2f", "moment"
+            ),
             *_with_u("residual_forward", "residual aligning torque, forward, MZ at FY = 0", ".2f", "moment"),
             *_with_u("residual_reverse", "residual aligning torque, reverse, MZ at FY = 0", ".2f", "moment"),
+        ),
+    ),
+    "at_angles": (
+        "FY and MZ off the curves at the slip angles of the protocol, one row a load, direction and angle",
+        (
+            _text("rotation", "direction of rotation"),
+            _number("load", "load", ".0f", quantity="force"),
+            _number("SA", "slip angle", ".0f", unit="deg"),
+            *_with_u("FY", "lateral force", ".1f", "force"),
+            *_with_u("MZ", "aligning moment", ".2f", "moment"),
+        ),
+    ),
+    "budget": (
+        "what makes each characteristic uncertain, one row a source",
+        (
+            _text("quantity", "name of the characteristic"),
+            _text("rotation", "direction of rotation, or both"),
+            _number("load", "load", ".0f", quantity="force"),
+            _text("source", "source of uncertainty"),
+            _number("u", "standard uncertainty in the row's unit", ".3g"),
+            _number("share", "share of the variance", ".0f", unit="%"),
+            _text("unit", "unit of the row"),
         ),
     ),
     "characteristics": (

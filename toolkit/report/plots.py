@@ -152,12 +152,22 @@ class _Plots:
             zero_x=True,
         )
 
-    def _at_angle(self, channel: str, load: float, group: Sequence[Condition], angle: float) -> float | None:
+    def _at_angle(
+        self, channel: str, load: float, group: Sequence[Condition], angle: float
+    ) -> tuple[float, float] | None:
+        """Return a value at a slip angle [deg] and its expanded uncertainty, 0 where none is known."""
+        for rotation in self._rotations():
+            for one in self.result.characteristics.at_angles:
+                here = one.rotation == rotation and self._group(one.load_N) == self._group(load)
+                found: Estimate | None = getattr(one, channel)
+                if here and found is not None and abs(math.degrees(one.SA_rad) - angle) < 1e-6:
+                    U, _ = found.expanded()
+                    return found.value, U if math.isfinite(U) else 0.0
         fit = self._fit("forward", load, channel) or self._fit("reverse", load, channel)
         if fit is not None:
-            return float(curve_values(fit, np.radians([angle]))[0])
+            return float(curve_values(fit, np.radians([angle]))[0]), 0.0
         near = [c for c in group if abs(math.degrees(c.SA) - angle) <= 0.5]
-        return float(np.mean([getattr(c, f"{channel}_common") for c in near])) if near else None
+        return (float(np.mean([getattr(c, f"{channel}_common") for c in near])), 0.0) if near else None
 
     def against_load(self, channel: str) -> Plot | None:
         """Values at +-1, 2, 4, 6, 8, 10 deg against load."""
@@ -167,15 +177,15 @@ class _Plots:
         for index, size in enumerate(ANGLES_DEG):
             for angle in (size, -size):
                 found = [
-                    (load * load_factor, value * factor)
+                    (load * load_factor, value[0] * factor, value[1] * factor)
                     for load, group in self.groups
                     if _covers(group, angle)
                     and (value := self._at_angle(channel, load, group, angle)) is not None
                 ]
                 if not found:
                     continue
-                x, y = zip(*found, strict=True)
-                curves.append(_curve(f"±{size} deg", x, y, index, "both", open_=angle < 0))
+                x, y, U = zip(*found, strict=True)
+                curves.append(_curve(f"±{size} deg", x, y, index, "both", open_=angle < 0, error=U))
                 said.append(f"{angle:+d} deg: {self._number(y[0])} to {self._number(y[-1])} {unit}")
         what = _SYMBOLS[channel]
         return self._plot(
@@ -184,7 +194,8 @@ class _Plots:
             f"{what} [{unit}]",
             curves,
             f"{_upper(what)} against load at constant slip angles, from the curves fitted to the means; "
-            f"filled: positive, open and dashed: negative slip angle. {_AXES_NOTE}",
+            "filled: positive, open and dashed: negative slip angle; bars: expanded uncertainty (95 %). "
+            f"{_AXES_NOTE}",
             f"{_upper(what)} [{unit}] against load [{load_unit}] at constant slip angles of plus and minus "
             f"{', '.join(str(a) for a in ANGLES_DEG)} deg. {'; '.join(said)}.",
             legend="slip angle",

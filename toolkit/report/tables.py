@@ -35,6 +35,8 @@ def build_tables(
         "stiffness": lambda: _stiffness(result),
         "pull": lambda: _pull(result, _PULL),
         "pull_thesis": lambda: _pull(result, _THESIS),
+        "at_angles": lambda: _at_angles(result),
+        "budget": lambda: _budget(result, style),
         "characteristics": lambda: _characteristics(result, style),
         "fits": lambda: _fits(result, style),
         "calibration": lambda: _calibration(record),
@@ -71,15 +73,16 @@ def _put(row: Row, name: str, estimate: Estimate | None, factor: float = 1.0) ->
 
 
 def _results(result: TestResult) -> list[Row]:
+    u = {(p.file, p.first_row): p for p in result.characteristics.points}
     return [
         {
             "rotation": c.rotation,
             "SA": c.SA / _DEG,
             "FZ": c.FZ,
             "FY": c.FY,
-            "U_FY": 2 * c.u_FY_total,
+            "U_FY": 2 * u[c.file, c.first_row].u_FY,
             "MZ": c.MZ,
-            "U_MZ": 2 * c.u_MZ_total,
+            "U_MZ": 2 * u[c.file, c.first_row].u_MZ,
             "file": c.file,
         }
         for c in result.reduced.used()
@@ -88,7 +91,13 @@ def _results(result: TestResult) -> list[Row]:
 
 _STIFFNESS = ("cornering_secant", "cornering_slope", "aligning_secant", "aligning_slope")
 _PULL = ("conicity", "plysteer", "CRAT", "PRAT", "PRAT_at_FY_zero")
-_THESIS = ("thesis_CRAT", "thesis_PRAT", "residual_forward", "residual_reverse")
+_THESIS = (
+    "thesis_CRAT",
+    "thesis_PRAT",
+    "thesis_PRAT_at_FY_zero",
+    "residual_forward",
+    "residual_reverse",
+)
 
 
 def _stiffness(result: TestResult) -> list[Row]:
@@ -126,9 +135,43 @@ _LONG = {
     "PRAT_at_FY_zero": ("PRAT at FY = 0", "N*m"),
     "thesis_CRAT": ("CRAT, the thesis's formula", "N*m"),
     "thesis_PRAT": ("PRAT, the thesis's formula", "N*m"),
+    "thesis_PRAT_at_FY_zero": ("PRAT at FY = 0, the thesis's formula", "N*m"),
     "residual_forward": ("residual aligning torque, forward", "N*m"),
     "residual_reverse": ("residual aligning torque, reverse", "N*m"),
 }
+
+
+def _at_angles(result: TestResult) -> list[Row]:
+    rows = []
+    for one in result.characteristics.at_angles:
+        row: Row = {"rotation": one.rotation, "load": one.load_N, "SA": one.SA_rad / _DEG}
+        _put(row, "FY", one.FY)
+        _put(row, "MZ", one.MZ)
+        rows.append(row)
+    return rows
+
+
+def _budget(result: TestResult, style: Style) -> list[Row]:
+    rows: list[Row] = []
+    for one in result.characteristics.budgets:
+        way, _, kind = one.name.partition("_")
+        text, unit = _LONG[f"{kind}_{way}" if way in ("secant", "slope") else one.name]
+        shown, factor = style.unit(unit)
+        factor *= _DEG if "/" in unit else 1.0
+        total = sum(u * u for _, u in one.sources)
+        rows += [
+            {
+                "quantity": text,
+                "rotation": one.rotation,
+                "load": one.load_N,
+                "source": source,
+                "u": u * factor,
+                "share": 100 * u * u / total,
+                "unit": str(shown).replace("*", "·"),
+            }
+            for source, u in one.sources
+        ]
+    return rows
 
 
 def _characteristics(result: TestResult, style: Style) -> list[Row]:
