@@ -5,6 +5,7 @@ from __future__ import annotations
 import datetime as dt
 import re
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -106,6 +107,28 @@ def test_as_found_and_as_left_have_each_their_own_uncertainty(tmp_path: Path) ->
     assert float(found[1]) == pytest.approx(newtons, rel=0.05)
     # The as-found session is told here, under the number that both of them state.
     assert "certificate-number" not in {one.rule for one in made.findings}
+
+
+def test_a_decimal_comma_stands_in_every_number_and_in_no_name(tmp_path: Path) -> None:
+    more = FULL.format("").replace('serial = "SA1"', 'serial = "12.5"')
+    made = collect(registry_of(tmp_path, more), "pair-r1", STYLE, issued=DAY)
+    content = build_content(made, replace(STYLE, decimal_comma=True))
+    texts = {
+        name: str(content.values[f"certificate.{name}"].value) for name in ("temperature", "traceability")
+    }
+    assert texts["temperature"] == "20,5 °C"
+    assert "U = 0,02 lbf, k = 2" in texts["traceability"]
+    assert "tolerance 0," in str(content.values["certificate.conformity"].value)
+    rule = str(content.values["certificate.decision_rule"].value)
+    # The clause of the guide is no number.
+    assert "2,5 %" in rule
+    assert "4.2.3" in rule
+    cells = content.tables["cells"].rows[0]
+    assert cells[1] == "12.5"
+    assert "," in str(cells[3])
+    assert all(plot.decimal_comma for plot in content.plots.values())
+    # The digital certificate has its own rules.
+    assert "U = 0.02 lbf" in build_dcc(made).decode()
 
 
 def test_the_items_of_17025_are_there(tmp_path: Path) -> None:

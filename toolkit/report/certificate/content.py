@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterable
+from dataclasses import replace
 
 from toolkit import __version__
 from toolkit.calibration.uncertainty.rounding import round_to_uncertainty, round_uncertainty
@@ -15,6 +17,9 @@ from toolkit.report.content import Cell, ReportContent, Table, Value
 from toolkit.report.style import Style
 
 GAP = "NOT STATED"
+_PERCENT = re.compile(r"\d+\.\d+(?= %)")
+# Columns of names: a serial number such as 12.5 stays what it is.
+_NAMES = {"cell", "serial", "load", "term", "unit", "found_by", "row"}
 SIMULATED = "SIMULATED: the instrument is a virtual machine. No real load cell was calibrated."
 DRAFT = "DRAFT: the record is not approved. This paper is not a calibration certificate."
 UNCERTAINTY = (
@@ -29,7 +34,8 @@ def build_content(certificate: Certificate, style: Style | None = None) -> Repor
     """Return what a certificate's template can ask for; dates and decimal signs by the style file."""
     style = style or Style()
     values = {
-        f"certificate.{name}": Value(kind="text", value=text) for name, text in _texts(certificate).items()
+        f"certificate.{name}": Value(kind="text", value=text)
+        for name, text in _texts(certificate, style).items()
     }
     values |= {
         f"certificate.{name}": Value(kind="date", value=None if day is None else day.isoformat())
@@ -40,7 +46,10 @@ def build_content(certificate: Certificate, style: Style | None = None) -> Repor
             ("approved_on", certificate.approved_on),
         )
     }
-    plots = build_plots(certificate)
+    plots = {
+        name: replace(plot, decimal_comma=style.decimal_comma)
+        for name, plot in build_plots(certificate).items()
+    }
     values |= {f"caption.{name}": Value(kind="text", value=plot.caption) for name, plot in plots.items()}
     tables = _tables(certificate, style)
     conditions = dict.fromkeys(CERTIFICATE.conditions, False)
@@ -85,8 +94,9 @@ def build_content(certificate: Certificate, style: Style | None = None) -> Repor
     )
 
 
-def _texts(c: Certificate) -> dict[str, str | None]:
-    temperature = None if c.temperature_C is None else f"{c.temperature_C:.4g} °C"
+def _texts(c: Certificate, style: Style) -> dict[str, str | None]:
+    temperature = None if c.temperature_C is None else f"{_signed(f'{c.temperature_C:.4g}', style)} °C"
+    rule = _PERCENT.sub(lambda found: _signed(found[0], style), RULES[c.rule]) if c.rule else None
     return {
         "id": c.id,
         "title": "Calibration certificate" + (", amended" if c.replaces else ""),
@@ -103,10 +113,10 @@ def _texts(c: Certificate) -> dict[str, str | None]:
         "temperature": temperature or GAP,
         "reference": c.reference or GAP,
         "reference_certificate": c.reference_certificate or GAP,
-        "traceability": traceability(c),
+        "traceability": traceability(c, style),
         "uncertainty": uncertainty(c),
-        "decision_rule": RULES[c.rule] if c.rule else f"{GAP}: no decision rule was agreed.",
-        "conformity": conformity(c),
+        "decision_rule": rule or f"{GAP}: no decision rule was agreed.",
+        "conformity": conformity(c, style),
         "adjustment": c.adjustment,
         "unverifiable": unverifiable(c),
         "opinions": c.opinions,
@@ -129,8 +139,11 @@ def _texts(c: Certificate) -> dict[str, str | None]:
     }
 
 
-def traceability(c: Certificate) -> str:
-    """Return the statement of metrological traceability (ISO/IEC 17025:2017, 7.8.4.1 c, annex A)."""
+def traceability(c: Certificate, style: Style | None = None) -> str:
+    """Return the statement of metrological traceability (ISO/IEC 17025:2017, 7.8.4.1 c, annex A).
+
+    Without a style its numbers have a decimal point, as in the DCC.
+    """
     if c.reference is None:
         return f"{GAP}: the session names no reference standard."
     text = (
@@ -138,7 +151,8 @@ def traceability(c: Certificate) -> str:
         f"{c.reference_certificate or GAP}."
     )
     for load, U, k, unit in c.reference_uncertainties:
-        text += f" Its uncertainty for {load}: U = {round_uncertainty(U)} {shown(unit)}, k = {k:g}."
+        told, factor = _signed(round_uncertainty(U), style), _signed(f"{k:g}", style)
+        text += f" Its uncertainty for {load}: U = {told} {shown(unit)}, k = {factor}."
     return text
 
 
@@ -150,7 +164,7 @@ def uncertainty(c: Certificate) -> str:
     return f"{UNCERTAINTY} It holds no contribution of {', '.join(absent)}: nothing was stated or measured."
 
 
-def conformity(c: Certificate) -> str:
+def conformity(c: Certificate, style: Style | None = None) -> str:
     """Return the statement of conformity, or why there is none (ISO/IEC 17025:2017, 7.8.6)."""
     if c.rule is None:
         return "No conformity is stated: no decision rule was agreed."
@@ -158,7 +172,7 @@ def conformity(c: Certificate) -> str:
         return "No conformity is stated: the session has no check loads."
     parts = []
     for one in c.loads:
-        limit = f"tolerance {one.tolerance:.4g} {shown(one.unit)}"
+        limit = f"tolerance {_signed(f'{one.tolerance:.4g}', style)} {shown(one.unit)}"
         if one.verdict is None:
             parts.append(f"{one.load}: not stated for all check loads ({limit})")
         else:
@@ -210,7 +224,11 @@ def _tables(c: Certificate, style: Style) -> dict[str, Table]:
         "unverifiable": [list(pair) for pair in c.unverifiable],
     }
     return {
-        name: Table(name=name, columns=columns, rows=tuple(_localised(row, style) for row in rows[name]))
+        name: Table(
+            name=name,
+            columns=columns,
+            rows=tuple(_localised(row, [column.name for column in columns], style) for row in rows[name]),
+        )
         for name, (_, columns) in TABLES.items()
     }
 
@@ -257,7 +275,7 @@ def _checks(one: LoadResult) -> Iterable[list[str]]:
 def _adjustment(one: LoadResult) -> list[str]:
     told = one.adjustment
     assert told is not None  # noqa: S101  only loads with one are asked
-    left, left_U = "no adjustment", "-"
+    left, left_U = "not measured", "-"
     if told.as_left is not None and told.left is not None:
         left, left_U = round_to_uncertainty(told.as_left, told.left.U), round_uncertainty(told.left.U)
     U = told.found.U
@@ -271,11 +289,16 @@ def _g(value: float | None) -> str:
     return "-" if value is None else f"{value:.6g}"
 
 
-def _localised(row: list[str], style: Style) -> tuple[Cell, ...]:
+def _localised(row: list[str], names: list[str], style: Style) -> tuple[Cell, ...]:
     # Numbers are texts here, rounded to their uncertainty: only the decimal sign is the organisation's.
-    if not style.decimal_comma:
-        return tuple(row)
-    return tuple(cell.replace(".", ",") if _is_number(cell) else cell for cell in row)
+    return tuple(
+        _signed(cell, style) if name not in _NAMES and _is_number(cell) else cell
+        for name, cell in zip(names, row, strict=True)
+    )
+
+
+def _signed(number: str, style: Style | None) -> str:
+    return number.replace(".", ",") if style and style.decimal_comma else number
 
 
 def _is_number(text: str) -> bool:
