@@ -1,11 +1,13 @@
 from __future__ import annotations
 
+import hashlib
 import json
 import shutil
 import sys
 from pathlib import Path
 from types import SimpleNamespace
 
+import openpyxl
 import pytest
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "report"))
@@ -13,12 +15,17 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "report"))
 from report_factory import make_record, make_result
 from template_factory import make, p, tbl
 
+import toolkit
 from toolkit.cli import resolve
 from toolkit.cli.delivery import home_template
+from toolkit.cli.handover import details_of
 from toolkit.cli.report import command
 from toolkit.cli.template import check, new, tags
-from toolkit.errors import OutputError, TemplateError
+from toolkit.errors import ConfigError, OutputError, TemplateError
 from toolkit.findings import Finding
+from toolkit.recording.marks import is_own_output
+from toolkit.tires.tir import read_tir
+from toolkit.tires.tydex import read_tydex
 
 CHECKOUT = Path(__file__).resolve().parents[2]
 office_needed = pytest.mark.skipif(
@@ -45,7 +52,7 @@ def test_report_answers_with_the_contract(tmp_path: Path, resolved, capsys) -> N
     body += p("{{tk:table.acquisition}}") + tbl(["a", "b"], ["{{tk:row.file}}", "{{tk:row.FY_difference}}"])
     template = make(tmp_path, body)
     out = tmp_path / "out"
-    assert command(Path("any"), template=template, out=out, json=True) == 0
+    assert command([Path("any")], template=template, out=out, json=True) == 0
     said = answer(capsys)
     assert said["schema"] == 1
     assert said["verified"] is True
@@ -68,7 +75,7 @@ def test_an_unverified_record_or_a_finding_ends_with_one(tmp_path: Path, resolve
     template = make(tmp_path, p("{{tk:calibration.status}} {{tk:test.special}}"))
     resolved.result = make_result(unverified=True, special=None)
     resolved.findings = (Finding(rule="no-tare", where="test.toml", message="no tare"),)
-    assert command(Path("any"), template=template, out=tmp_path / "out", allow_missing=True) == 1
+    assert command([Path("any")], template=template, out=tmp_path / "out", allow_missing=True) == 1
     said = capsys.readouterr().out
     assert "UNVERIFIED" in said
     assert "no-tare" in said
@@ -83,7 +90,7 @@ def test_a_refused_template_is_told_before_the_test_is_read(tmp_path: Path, monk
     bad = tmp_path / "t.docx"
     bad.write_text("no word file")
     with pytest.raises(TemplateError):
-        command(Path("any"), template=bad, out=tmp_path / "out")
+        command([Path("any")], template=bad, out=tmp_path / "out")
     assert not (tmp_path / "out").exists()
 
 
@@ -121,3 +128,97 @@ def test_template_check_new_and_tags(tmp_path: Path, resolved, capsys) -> None:
     assert listed["tk:figure.conicity"]["available"] is True
     assert listed["tk:if.simulated"]["value"] is False
     assert listed["tk:calibration.FY.D51"]["value"] == "1.01235"
+
+
+def named(name: str, **changes: object) -> SimpleNamespace:
+    return SimpleNamespace(
+        result=make_result(name=name, **changes), record=make_record(), findings=(), recordings=()
+    )
+
+
+@office_needed
+def test_several_tests_are_made_in_one_command_and_a_bad_one_stops_no_other(
+    tmp_path: Path, monkeypatch, capsys
+) -> None:
+    def resolve_one(test: Path, **_options: object) -> SimpleNamespace:
+        if test.name == "bad":
+            raise ConfigError("the test does not exist", rule="no-test")
+        return named(test.name, operator=None if test.name == "silent" else "A. Operator")
+
+    monkeypatch.setattr(resolve, "resolve_test", resolve_one)
+    template = make(tmp_path, p("{{tk:test.operator}} {{tk:test.name}}"))
+    tests = [Path(name) for name in ("one", "bad", "two", "silent", "one")]
+    assert command(tests, template=template, out=tmp_path / "out", json=True) == 2
+    told = answer(capsys)["reports"]
+    assert [one["verified"] for one in told] == [True, False, True, False, False]
+    rules = [one["error"]["rule"] for one in told if "error" in one]
+    assert rules == [
+        "no-test",
+        "missing-value",
+        "not-empty",
+    ]
+    # Nothing is left of what was refused, and every report is in a folder of its own.
+    assert sorted(one.name for one in (tmp_path / "out").iterdir()) == ["one", "two"]
+    assert sorted(one.name for one in (tmp_path / "out" / "two").iterdir()) == [
+        "manifest.json", "report.docx", "report.pdf",
+    ]  # fmt: skip
+
+
+@office_needed
+def test_the_hand_over_has_one_manifest_and_the_content_hash_is_the_same_twice(
+    tmp_path: Path, monkeypatch, capsys
+) -> None:
+    made = named("altimax-89", special="=1+1")
+    monkeypatch.setattr(resolve, "resolve_test", lambda _test, **_options: made)
+    template = make(tmp_path, p("{{tk:report.date}} {{tk:test.special}}") + p("{{tk:figure.gough}}"))
+    out = tmp_path / "out"
+    told = []
+    for _ in range(2):  # the second run replaces the first one's files: they are the toolkit's own
+        assert command([Path("any")], template=template, out=out, hand_over=True, json=True) == 0
+        told.append(answer(capsys))
+    assert told[0]["content_sha256"] == told[1]["content_sha256"]
+    manifest = json.loads((out / "manifest.json").read_text())
+    assert manifest["content_sha256"] == told[1]["content_sha256"]
+    assert [one["name"] for one in manifest["outputs"]] == [
+        "report.docx", "report.pdf", "test.xlsx", "test.tdx", "tire.tir",
+    ]  # fmt: skip
+    for one in manifest["outputs"]:
+        assert one["sha256"] == hashlib.sha256((out / one["name"]).read_bytes()).hexdigest()
+    assert manifest["calibrations"] == [{"id": "m15-r2", "sha256": make_record().sha256, "unverified": False}]
+    hashes = {one["name"]: one["sha256"] for one in manifest["inputs"]}
+    assert hashes["f+0"] == hashlib.sha256(b"f+0").hexdigest()
+    assert manifest["template"]["sha256"] == hashlib.sha256(template.read_bytes()).hexdigest()
+    assert manifest["software"]["toolkit"] == toolkit.__version__
+    assert all(map(is_own_output, out.iterdir()))
+    # Numbers are numbers in the workbook, and a text that looks like a formula is a text.
+    book = openpyxl.load_workbook(out / "test.xlsx")
+    cells = {row[0].value: row[1] for row in book["provenance"].iter_rows()}
+    assert (cells["info.special"].value, cells["info.special"].data_type) == ("=1+1", "s")
+    table = read_tydex(out / "test.tdx")
+    FZ = next(one for one in table.channels if one.symbol == "FZ")
+    assert FZ.values == pytest.approx([one.FZ for one in made.result.reduced.used()], rel=1e-6)
+    assert read_tir(out / "tire.tir").version is not None
+
+
+@office_needed
+def test_the_content_hash_follows_the_content(tmp_path: Path, monkeypatch, capsys) -> None:
+    template = make(tmp_path, p("{{tk:test.operator}}"))
+    told = set()
+    for operator in ("A. Operator", "B. Operator"):
+        made = named("altimax-89", operator=operator)
+        monkeypatch.setattr(resolve, "resolve_test", lambda _test, made=made, **_options: made)
+        command([Path("any")], template=template, out=tmp_path / "out", json=True)
+        told.add(answer(capsys)["content_sha256"])
+    assert len(told) == 2
+
+
+def test_details_are_those_of_the_test_or_of_a_file(tmp_path: Path) -> None:
+    (tmp_path / "test.toml").write_text('[report]\ncustomer = "Example Tyres"\nreceived = 2026-03-01\n')
+    other = tmp_path / "other.toml"
+    other.write_text('customer = "Another"\n')
+    assert details_of(tmp_path, None).customer == "Example Tyres"
+    assert details_of(tmp_path, None).received == "2026-03-01"
+    assert details_of(tmp_path, other).customer == "Another"
+    other.write_text('[report]\ncustmer = "x"\n')
+    with pytest.raises(ConfigError, match="custmer"):
+        details_of(tmp_path, other)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -14,7 +15,6 @@ from toolkit.cli.console import (
     Home,
     Json,
     KnownAt,
-    ProtocolFile,
     Quiet,
     Reader,
     answer,
@@ -27,28 +27,73 @@ from toolkit.cli.console import reader as choose_reader
 from toolkit.cli.delivery import file_name, home_template
 
 if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
     from toolkit.cli.resolve import Resolved
-    from toolkit.report.deliver import Delivered
+    from toolkit.errors import ToolkitError
+    from toolkit.report.deliver import Delivered, Job
     from toolkit.report.drawer import Drawer
+    from toolkit.report.package import Template
     from toolkit.report.pdf import Office
 
 NAME = "report"
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Options:
+    """What every report of a command has in common; ``None`` in ``details``: those of each ``test.toml``."""
+
+    template: Template
+    resolve: Callable[[Path], Resolved]
+    details: Path | None = None
+    xlsx: bool = False
+    tydex: bool = False
+    tir: bool = False
+    allow_missing: bool = False
+    keep: bool = False
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Made:
+    """One report of a command: the test and its report, or the error that stands in its place."""
+
+    test: Path
+    resolved: Resolved | None
+    outcome: Delivered | ToolkitError
+
+
 def command(
-    test: Annotated[
-        Path, typer.Argument(metavar="TEST", help="Folder with test.toml and recordings, or a reduced test.")
+    tests: Annotated[
+        list[Path],
+        typer.Argument(metavar="TEST...", help="Folders with test.toml and recordings, or reduced tests."),
     ],
     template: Annotated[
         Path | None,
         typer.Option("--template", help="Word template; default: report_templates/org.docx of the home."),
     ] = None,
     out: Annotated[
-        Path | None, typer.Option("--out", help="Output folder; default: report-<test name> here.")
+        Path | None,
+        typer.Option(
+            "--out",
+            help="Output folder; of several tests, each has its own in it. Default: report-<test name> here.",
+        ),
     ] = None,
+    details: Annotated[
+        Path | None,
+        typer.Option("--details", help="TOML file with customer, method, opinions ... in place of [report]."),
+    ] = None,
+    xlsx: Annotated[
+        bool, typer.Option("--xlsx", help="Hand over test.xlsx: the whole test in one file.")
+    ] = False,
+    tydex: Annotated[bool, typer.Option("--tydex", help="Hand over test.tdx (TYDEX 1.3).")] = False,
+    tir: Annotated[
+        bool, typer.Option("--tir", help="Hand over tire.tir: MF 6.1 over all loads, forward run.")
+    ] = False,
+    hand_over: Annotated[
+        bool, typer.Option("--hand-over", help="All of the three: test.xlsx, test.tdx, tire.tir.")
+    ] = False,
     calibration: CalibrationId = None,
     known_at: KnownAt = None,
-    protocol: ProtocolFile = None,
     reader: Reader = "calamine",
     allow_missing: Annotated[
         bool, typer.Option("--allow-missing", help="Print n/a for a value that the test has not.")
@@ -63,10 +108,14 @@ def command(
 ) -> int:
     """Fill the Word template and make the verified PDF.
 
-    Delivers report.docx and report.pdf, or nothing where the PDF does not show every value and figure.
+    Delivers report.docx, report.pdf and manifest.json, or nothing where the PDF does not show every value
+    and figure. Several tests are converted in one call of LibreOffice; one that is refused does not stop
+    the others.
 
     Example: toolkit report tests/2019-06-04 --template report_templates/org.docx --out reports/89
     """
+    from functools import partial
+
     from toolkit.cli.resolve import resolve_test
     from toolkit.report.drawer import Drawer
     from toolkit.report.package import read_template
@@ -77,103 +126,178 @@ def command(
     # The template is judged before anything is read: its error must not wait for a long reduction.
     opened = read_template(template or home_template("org.docx", home))
     with Office() as office, Drawer() as drawer, progress(None, "report", show=not (json or quiet)) as step:
-        resolved = resolve_test(
-            test,
-            calibration=calibration,
-            calibrations=calibrations,
-            home=home,
-            known_at=day(known_at),
-            reader=chosen,
-            protocol=protocol,
-            step=step,
-        )
-        target = (
-            out or Path.cwd() / f"report-{file_name(resolved.result.reduced.info.name, otherwise='test')}"
-        )
-        made = make_report(
-            resolved,
-            opened.path,
-            target,
+        options = Options(
+            template=opened,
+            resolve=partial(
+                resolve_test,
+                calibration=calibration,
+                calibrations=calibrations,
+                home=home,
+                known_at=day(known_at),
+                reader=chosen,
+                step=step,
+            ),
+            details=details,
+            xlsx=xlsx or hand_over,
+            tydex=tydex or hand_over,
+            tir=tir or hand_over,
             allow_missing=allow_missing,
             keep=keep,
-            office=office,
-            drawer=drawer,
-            step=step,
         )
-    payload = report_payload(made, resolved) | {"timing": {"seconds": time.perf_counter() - started}}
-    answer(payload, _text(made, resolved), as_json=json, quiet=quiet)
-    return report_code(made, resolved)
+        made = make_reports(tests, options, out, office=office, drawer=drawer, step=step)
+    timing = {"timing": {"seconds": time.perf_counter() - started}}
+    if len(made) == 1:
+        payload = report_payload(made[0]) | timing
+    else:
+        payload = {"reports": [_entry(one) for one in made]} | timing
+    answer(payload, "\n\n".join(_text(one) for one in made), as_json=json, quiet=quiet)
+    return max(report_code(one) for one in made)
 
 
-def make_report(
-    resolved: Resolved,
-    template: Path,
-    out: Path,
+def make_reports(
+    tests: Sequence[Path],
+    options: Options,
+    out: Path | None,
     *,
-    allow_missing: bool = False,
-    keep: bool = False,
     office: Office | None = None,
     drawer: Drawer | None = None,
-    step: Any = lambda _text: None,
-) -> Delivered:
-    """Return the delivered report of a resolved test."""
+    step: Callable[[str], None] = lambda _text: None,
+) -> list[Made]:
+    """Return the report of every test, converted in one call; with one test its error is raised.
+
+    Raises
+    ------
+    ToolkitError
+        the only test cannot be read, or its report is not delivered
+    """
+    from toolkit.errors import ToolkitError
+    from toolkit.report.deliver import deliver_all
+
+    resolved: list[Resolved | ToolkitError] = []
+    jobs: list[Job] = []
+    taken: set[Path] = set()
+    for test in tests:
+        try:
+            one = options.resolve(test)
+            jobs.append(_job(test, one, _folder(one, out, alone=len(tests) == 1, taken=taken), options))
+            resolved.append(one)
+        except ToolkitError as error:
+            if len(tests) == 1:
+                raise
+            resolved.append(error)
+    done = iter(
+        deliver_all(
+            jobs,
+            office=office,
+            drawer=drawer,
+            allow_missing=options.allow_missing,
+            keep=options.keep,
+            step=step,
+        )
+    )
+    made = [
+        Made(test=test, resolved=None, outcome=one)
+        if isinstance(one, ToolkitError)
+        else Made(test=test, resolved=one, outcome=next(done))
+        for test, one in zip(tests, resolved, strict=True)
+    ]
+    if len(made) == 1 and isinstance(made[0].outcome, ToolkitError):
+        raise made[0].outcome
+    return made
+
+
+def _folder(resolved: Resolved, out: Path | None, *, alone: bool, taken: set[Path]) -> Path:
+    from toolkit.errors import OutputError
+
+    name = file_name(resolved.result.reduced.info.name, otherwise="test")
+    folder = out if out is not None and alone else (out or Path.cwd()) / (name if out else f"report-{name}")
+    if folder in taken:
+        raise OutputError(
+            "two tests would have the same output folder",
+            where=folder,
+            got=f"another test named {resolved.result.reduced.info.name!r}",
+            expected="tests with names of their own",
+            next_step="make this report by itself, with --out",
+            rule="not-empty",
+        )
+    taken.add(folder)
+    return folder
+
+
+def _job(test: Path, resolved: Resolved, folder: Path, options: Options) -> Job:
+    from toolkit.cli.handover import details_of, provenance, writers
     from toolkit.report.build import build_content
-    from toolkit.report.deliver import deliver
-    from toolkit.report.package import read_template
+    from toolkit.report.deliver import Job
     from toolkit.report.style import read_style, style_file
 
     content = build_content(
-        resolved.result, resolved.record, findings=resolved.findings, style=read_style(style_file(template))
+        resolved.result,
+        resolved.record,
+        findings=resolved.findings,
+        style=read_style(style_file(options.template.path)),
+        details=details_of(test, options.details),
     )
-    return deliver(
-        read_template(template),
-        content,
-        out,
-        office=office,
-        drawer=drawer,
-        allow_missing=allow_missing,
-        keep=keep,
-        step=step,
+    return Job(
+        template=options.template,
+        content=content,
+        out=folder,
+        extras=writers(resolved, test, xlsx=options.xlsx, tydex=options.tydex, tir=options.tir),
+        provenance=provenance(resolved, test),
     )
 
 
-def report_code(made: Delivered, resolved: Resolved) -> int:
-    """Return 0, or 1 where findings, an unverified record or the template ask for attention."""
-    unverified = resolved.result.reduced.calibration.unverified
-    return 1 if made.warnings or unverified else exit_code(resolved.findings)
+def report_code(made: Made) -> int:
+    """Return 2 without a report, 1 where findings, an unverified record or the template ask for attention."""
+    if made.resolved is None or isinstance(made.outcome, Exception):
+        return 2
+    unverified = made.resolved.result.reduced.calibration.unverified
+    return 1 if made.outcome.warnings or unverified else exit_code(made.resolved.findings)
 
 
-def report_payload(made: Delivered, resolved: Resolved) -> dict[str, Any]:
+def report_payload(made: Made) -> dict[str, Any]:
     """Return a delivered report as the JSON answer."""
+    resolved, done = made.resolved, made.outcome
+    if resolved is None or isinstance(done, Exception):
+        return {"verified": False, "error": done.as_dict() if isinstance(done, Exception) else None}
     use = resolved.result.reduced.calibration
     return {
-        "docx": made.docx,
-        "pdf": made.pdf,
-        "pages": made.pages,
+        "docx": done.docx,
+        "pdf": done.pdf,
+        "pages": done.pages,
         "verified": True,
-        "checks": [check.as_dict() for check in made.checks],
-        "template_sha256": made.template_sha256,
+        "checks": [check.as_dict() for check in done.checks],
+        "template_sha256": done.template_sha256,
+        "content_sha256": done.content_sha256,
         "calibrations": [{"id": use.id, "sha256": use.sha256, "unverified": use.unverified}],
-        "figures": [{"tag": tag, "alt": alt} for tag, alt in made.filled.figures],
-        "manifest": [entry.as_dict() for entry in made.filled.manifest],
+        "figures": [{"tag": tag, "alt": alt} for tag, alt in done.filled.figures],
+        "manifest": [entry.as_dict() for entry in done.filled.manifest],
+        "manifest_file": done.manifest,
+        "handed_over": list(done.extras),
         "simulated": resolved.result.reduced.info.simulated,
-        "warnings": list(made.warnings),
+        "warnings": list(done.warnings),
         "findings": [finding.as_dict() for finding in resolved.findings],
     }
 
 
-def _text(made: Delivered, resolved: Resolved) -> str:
+def _entry(made: Made) -> dict[str, Any]:
+    return {"test": made.test, **report_payload(made)}
+
+
+def _text(made: Made) -> str:
+    resolved, done = made.resolved, made.outcome
+    if resolved is None or isinstance(done, Exception):
+        return f"{made.test}: no report\n{done}"
     use = resolved.result.reduced.calibration
     marks = ("  SIMULATED" if resolved.result.reduced.info.simulated else "") + (
         "  UNVERIFIED" if use.unverified else ""
     )
     lines = [
-        f"{made.pdf}",
-        f"{made.docx}",
-        f"{made.pages} pages, {len(made.filled.figures)} figures, "
-        f"{len(made.filled.manifest)} values verified{marks}",
+        *(f"{path}" for path in (done.pdf, done.docx, done.manifest, *done.extras) if path is not None),
+        f"{done.pages} pages, {len(done.filled.figures)} figures, "
+        f"{len(done.filled.manifest)} values verified{marks}",
         f"calibration {use.id} ({use.sha256[:12]}...)",
-        *(f"  warning {one}" for one in made.warnings),
+        f"content {done.content_sha256[:12]}...",
+        *(f"  warning {one}" for one in done.warnings),
         *finding_lines(resolved.findings),
     ]
     return "\n".join(lines)

@@ -148,10 +148,11 @@ def deliver_all(
             run.attempt(partial(run.fill, _Own(index, pictures), allow_missing))
         filled = [run for run in runs if run.filled is not None]
         step("PDF")
+        documents = [run.filled for run in filled if run.filled is not None]
         with ThreadPoolExecutor(1) as pool:
             # Workbooks and tire files are written while LibreOffice works in its own process.
             waiting = [(run, pool.submit(run.attempt, run.write_extras)) for run in filled]
-            printed = print_copies([run.filled for run in filled if run.filled is not None], office, work)
+            printed = print_copies(documents, office, work)
             for _, job in waiting:
                 job.result()
         step("verification")

@@ -1,0 +1,156 @@
+"""What is handed over with a report: the whole test, tire and TYDEX files, and where all of it is from."""
+
+from __future__ import annotations
+
+import platform
+import sys
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from toolkit import __version__
+from toolkit.recording.marks import OWN_OUTPUT
+
+if TYPE_CHECKING:
+    from toolkit.cli.resolve import Resolved
+    from toolkit.recording.details import ReportDetails
+
+WHOLE, TYDEX, TIR = "test.xlsx", "test.tdx", "tire.tir"
+
+
+def details_of(test: Path, given: Path | None) -> ReportDetails:
+    """Return ``[report]`` of a folder's ``test.toml``, or what a file says in its place.
+
+    Raises
+    ------
+    ConfigError
+        the file cannot be read, has an unknown key or a value of the wrong type
+    """
+    from toolkit.files import read_toml
+    from toolkit.recording.details import ReportDetails, read_details
+    from toolkit.recording.folder import TEST_FILE
+
+    if given is not None:
+        table = read_toml(given)
+        return read_details(table.get("report", table), where=given)
+    toml = test / TEST_FILE
+    return read_details(read_toml(toml).get("report", {}), where=toml) if toml.is_file() else ReportDetails()
+
+
+def writers(
+    resolved: Resolved, test: Path, *, xlsx: bool, tydex: bool, tir: bool
+) -> dict[str, Callable[[Path], object]]:
+    """Return the functions that write the files asked for, by name."""
+    made: dict[str, Callable[[Path], object]] = {}
+    if xlsx:
+        made[WHOLE] = partial(_whole, resolved, test)
+    if tydex:
+        made[TYDEX] = partial(_tydex, resolved)
+    if tir:
+        made[TIR] = partial(_tir, resolved)
+    return made
+
+
+def provenance(resolved: Resolved, test: Path) -> dict[str, Any]:
+    """Return inputs and software for the manifest: every recording with its hash, and the test's own file."""
+    from toolkit.files import sha256_file
+    from toolkit.recording.folder import TEST_FILE
+
+    reduced = resolved.result.reduced
+    inputs = {one.file: one.file_sha256 for one in reduced.conditions}
+    named = test / TEST_FILE if test.is_dir() else test
+    if named.is_file():
+        inputs[named.name] = sha256_file(named)
+    return {
+        "test": reduced.info.name,
+        "simulated": reduced.info.simulated,
+        "inputs": [{"name": name, "sha256": digest} for name, digest in sorted(inputs.items())],
+        "software": {
+            "toolkit": __version__,
+            "reduced_by": reduced.code_version,
+            "python": ".".join(map(str, sys.version_info[:3])),
+            "platform": platform.system(),
+        },
+    }
+
+
+def _whole(resolved: Resolved, test: Path, path: Path) -> None:
+    from toolkit.testfile import write_test_file
+
+    if test.is_file():
+        # A reduced test is handed over as it is: what was read back has no raw rows any more.
+        path.write_bytes(test.read_bytes())
+        return
+    write_test_file(path, resolved.result, dict(resolved.recordings))
+
+
+def _tydex(resolved: Resolved, path: Path) -> None:
+    import numpy as np
+
+    from toolkit.channels import signs
+    from toolkit.tires.tydex import tydex_text
+
+    used = resolved.result.reduced.used()
+    turn = signs("SAE", "ISO-W")
+    columns = {
+        "SA": ("deg", np.degrees([one.SA for one in used])),
+        "FZ": ("N", np.array([one.FZ for one in used])),
+        "FY": ("N", np.array([one.FY for one in used])),
+        "MZ": ("N*m", np.array([one.MZ for one in used])),
+    }
+    turned = {symbol: (unit, turn.get(symbol, 1) * values) for symbol, (unit, values) in columns.items()}
+    text, _ = tydex_text(turned, comments=_comments(resolved))
+    path.write_text(text, encoding="utf-8")
+
+
+def _tir(resolved: Resolved, path: Path) -> None:
+    """Write MF 6.1 over all loads of the first direction; the radius is that of the tire's size."""
+    import numpy as np
+
+    from toolkit.characteristics.groups import group
+    from toolkit.cli.fit_tir import STAND_IN_RADIUS
+    from toolkit.errors import FitError
+    from toolkit.reduction.averaging import free_radius_m
+    from toolkit.tires.global_data import measured, what_varies
+    from toolkit.tires.global_fit import fit_global
+    from toolkit.tires.models.mf61 import MODEL
+    from toolkit.tires.tir_write import tire_fit, write_tir
+
+    reduced = resolved.result.reduced
+    every = group(reduced)
+    run = [one for one in every if one.rotation == every[0].rotation]
+    radius = free_radius_m(reduced.info.tire_size)
+    data = measured(
+        {
+            "SA": np.concatenate([one.SA for one in run]),
+            "FZ": np.concatenate([np.full(len(one.SA), one.load_N) for one in run]),
+            **{name: np.concatenate([one.values(name) for one in run]) for name in ("FY", "MZ")},
+        },
+        axes="SAE",
+        rated_load_N=reduced.info.rated_load_N,
+        unloaded_radius_m=radius or STAND_IN_RADIUS,
+    )
+    if radius is None or "two_loads" not in what_varies(data):
+        raise FitError(
+            "a tire file needs the tire's size and two loads or more",
+            where=reduced.info.name,
+            got=f"size {reduced.info.tire_size or 'unknown'}, {len(data.loads)} loads",
+            expected="a size such as 205/55 R16 in [tire] of test.toml, and several loads",
+            next_step="leave out --tir, or complete the test",
+            rule="one-load",
+        )
+    fit = fit_global(MODEL, data, predict=False)
+    write_tir(path, tire_fit(MODEL, fit, data), comments=[*_comments(resolved), f"drum {run[0].rotation}"])
+
+
+def _comments(resolved: Resolved) -> list[str]:
+    reduced = resolved.result.reduced
+    use = reduced.calibration
+    said = [
+        f"{OWN_OUTPUT}: toolkit {__version__}, test {' '.join(reduced.info.name.split())}",
+        f"calibration {use.id} {use.sha256}",
+    ]
+    if use.unverified:
+        said.append("UNVERIFIED CALIBRATION")
+    return [*said, *(["SIMULATED DATA"] if reduced.info.simulated else [])]
