@@ -28,7 +28,9 @@ def command(
     json: Json = False,
     quiet: Quiet = False,
 ) -> int:
-    """Diagnose why a simulation and a recording differ: where, which physics was left out, how much better with it.
+    """Diagnose why a simulation and a recording differ.
+
+    It tells where they differ, which physics was left out, and how much better the fit is with it.
 
     The answer is one of: named, equivalent (a class of effects that this recording cannot tell apart),
     unknown (structure that no known effect explains), nothing, untestable. It ends with 0 for nothing and

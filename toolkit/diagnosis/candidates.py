@@ -15,14 +15,15 @@ from toolkit.effects.catalogue import effects
 from toolkit.effects.effect import Effect, EffectParameter
 
 if TYPE_CHECKING:
-    from toolkit.diagnosis.case import Case
     from toolkit.diagnosis.problem import Problem
 
 # Effects in which time passes: nothing can be said of them where rows have no time.
 _IN_TIME = frozenset(
-    "channel_delay filter_lag zero_drift creep relaxation thermal_friction wear viscoelastic_settling turn_slip load_lag"
-    .split()
-)  # fmt: skip
+    (
+        "channel_delay filter_lag zero_drift creep relaxation thermal_friction wear viscoelastic_settling "
+        "turn_slip load_lag"
+    ).split()
+)
 _SUBSETS = 8
 
 
@@ -62,7 +63,7 @@ def candidates(problem: Problem) -> tuple[Candidate, ...]:
             continue
         for channel, source in problem.model.places(effect):
             whole = Active(effect=effect, channel=channel, source=source)
-            for runs in (None, *_subsets(problem.case, problem, effect)):
+            for runs in (None, *_subsets(problem, effect)):
                 active = replace(whole, runs=runs)
                 starts = _starts(problem, active)
                 if starts:
@@ -91,9 +92,7 @@ def _starts(problem: Problem, active: Active) -> tuple[Start, ...]:
                 values = fixed | {one.name: value * scales[one.name]}
                 made.append(Start(values=values, directions=(values,), amplitudes=(one.name,)))
             continue
-        directions = []
-        for one in amplitudes:
-            directions.append(fixed | off | {one.name: _middle(one) * scales[one.name]})
+        directions = [fixed | off | {one.name: _middle(one) * scales[one.name]} for one in amplitudes]
         values = fixed | {one.name: _middle(one) * scales[one.name] for one in amplitudes}
         made.append(
             Start(
@@ -132,9 +131,15 @@ def _scale(problem: Problem, active: Active, one: EffectParameter) -> float:
 def _dynamic_scale(problem: Problem, active: Active, one: EffectParameter) -> float:
     force, speed, place = _motion_scales(problem, active)
     return {
-        "force": force, "coulomb": force, "amplitude": force, "viscous": force / speed, "drag": force / speed**2,
-        "k3": force / place**3, "period": place, "level": place,
-    }[one.name]  # fmt: skip
+        "force": force,
+        "coulomb": force,
+        "amplitude": force,
+        "viscous": force / speed,
+        "drag": force / speed**2,
+        "k3": force / place**3,
+        "period": place,
+        "level": place,
+    }[one.name]
 
 
 def _motion_scales(problem: Problem, active: Active) -> tuple[float, float, float]:
@@ -188,7 +193,7 @@ def _temperature_range(problem: Problem) -> float:
     return 1.0
 
 
-def _subsets(case: Case, problem: Problem, effect: Effect) -> list[frozenset[str]]:
+def _subsets(problem: Problem, effect: Effect) -> list[frozenset[str]]:
     made: list[frozenset[str]] = []
     names = {run.name for run in problem.runs}
     for key in effect.confined_by:

@@ -101,6 +101,10 @@ class Case:
         """Inputs and covariates."""
         return tuple(one for one in self.channels if one.role in ("input", "covariate"))
 
+    def file(self) -> Path:
+        """Return the simulator's file; kinds ``python`` and ``ode`` always have one."""
+        return self.simulation.path or self.path
+
     def channel(self, name: str) -> CaseChannel:
         """Return a channel by name; KeyError where the case has none."""
         return {one.name: one for one in self.channels}[name]

@@ -95,14 +95,23 @@ def read_case(path: Path) -> Case:
             digest.update(read_bytes(one))
     if not any(one.role == "output" for one in channels):
         raise _wrong(
-            "a case has nothing to be judged on", f"{path}: recording.channels", "no output",
+            "a case has nothing to be judged on",
+            f"{path}: recording.channels",
+            "no output",
             'a channel with role = "output"',
-        )  # fmt: skip
+        )
     return Case(
-        path=path, title=str(table.get("title", path.stem)), simulation=simulation, parameters=parameters,
-        axes=cast("Axes", axes), has_time=time is not None, channels=channels, runs=tuple(runs),
-        predict=tuple(predict), sha256=digest.hexdigest(),
-    )  # fmt: skip
+        path=path,
+        title=str(table.get("title", path.stem)),
+        simulation=simulation,
+        parameters=parameters,
+        axes=cast("Axes", axes),
+        has_time=time is not None,
+        channels=channels,
+        runs=tuple(runs),
+        predict=tuple(predict),
+        sha256=digest.hexdigest(),
+    )
 
 
 def _simulation(entry: object, path: Path) -> tuple[Simulation, tuple[CaseParameter, ...]]:
@@ -180,14 +189,18 @@ def _time(recording: dict[str, Any], channels: tuple[CaseChannel, ...], path: Pa
         timed = [one for one in channels if one.name == named]
         if not timed or timed[0].role != "time":
             raise _wrong(
-                "the time channel is not declared", f"{path}: recording.time", named,
+                "the time channel is not declared",
+                f"{path}: recording.time",
+                named,
                 'a channel of that name with role = "time"',
-            )  # fmt: skip
+            )
     if len(timed) > 1:
         raise _wrong(
-            "more than one channel is the time", f"{path}: recording.channels",
-            ", ".join(one.name for one in timed), "one",
-        )  # fmt: skip
+            "more than one channel is the time",
+            f"{path}: recording.channels",
+            ", ".join(one.name for one in timed),
+            "one",
+        )
     if timed and unit(timed[0].unit).dimension != "time":
         raise _wrong(
             "the time is in no unit of time",
@@ -199,9 +212,16 @@ def _time(recording: dict[str, Any], channels: tuple[CaseChannel, ...], path: Pa
 
 
 def _run(
-    entry: object, where: str, folder: Path, channels: tuple[CaseChannel, ...], time: CaseChannel | None,
-    simulation: Simulation, digest: Any, *, predict: bool,
-) -> Run:  # fmt: skip
+    entry: object,
+    where: str,
+    folder: Path,
+    channels: tuple[CaseChannel, ...],
+    time: CaseChannel | None,
+    simulation: Simulation,
+    digest: Any,
+    *,
+    predict: bool,
+) -> Run:
     table = _table(entry, where)
     file = table.get("file")
     if not isinstance(file, str) or not file:
@@ -212,9 +232,15 @@ def _run(
     path = folder / file
     digest.update(read_bytes(path))
     return read_run(
-        path, name=file, channels=channels, time=time, declared=table,
-        simulated=dict(simulation.simulated), labview=simulation.kind == "machine", predict=predict,
-    )  # fmt: skip
+        path,
+        name=file,
+        channels=channels,
+        time=time,
+        declared=table,
+        simulated=dict(simulation.simulated),
+        machine=simulation.machine if simulation.kind == "machine" else "",
+        predict=predict,
+    )
 
 
 def _pairs(table: Mapping[str, Any], where: str) -> tuple[tuple[str, str], ...]:
@@ -270,6 +296,10 @@ def _number(entry: object, where: str) -> float:
 
 def _wrong(what: str, where: str, got: object, expected: str) -> ConfigError:
     return ConfigError(
-        what, where=where, got="nothing" if got is None else got, expected=expected,
-        next_step="correct the case file; diagnosis.md and `toolkit diagnose --help` show one", rule="case",
-    )  # fmt: skip
+        what,
+        where=where,
+        got="nothing" if got is None else got,
+        expected=expected,
+        next_step="correct the case file; diagnosis.md and `toolkit diagnose --help` show one",
+        rule="case",
+    )

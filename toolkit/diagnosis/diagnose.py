@@ -135,9 +135,10 @@ def _effect(found: Search, step: Step) -> FoundEffect:
     runs = None if active.runs is None else tuple(run.name for run in problem.runs if run.name in active.runs)
     same = equivalent_to(problem, step)
     rejected = {
-        one.active.effect.name: one.difference for one in reversed(step.rivals)
+        one.active.effect.name: one.difference
+        for one in reversed(step.rivals)
         if one.active.effect.name not in (*same, active.effect.name)
-    }  # fmt: skip
+    }
     return FoundEffect(
         name=active.effect.name,
         stage=active.effect.stage,
@@ -158,10 +159,10 @@ def _parameters(found: Search, active: Active, runs: tuple[str, ...] | None) -> 
 
     problem, made = found.problem, found.augmented
     at = len(problem.free)
-    for one in made.active:
-        if one is active or _same(one, active):
+    for other in made.active:
+        if _same(other, active):
             break
-        at += len(one.searched)
+        at += len(other.searched)
     n = sum(int(one.sum()) for one in problem.kept.values())
     quantile = float(student.ppf(0.975, max(n - len(made.covariance), 1)))
     result = []
@@ -188,8 +189,11 @@ def _named(active: Active, runs: tuple[str, ...] | None) -> tuple[FoundParameter
 
 def _same(one: Active, other: Active) -> bool:
     return (one.effect.name, one.channel, one.source, one.runs) == (
-        other.effect.name, other.channel, other.source, other.runs,
-    )  # fmt: skip
+        other.effect.name,
+        other.channel,
+        other.source,
+        other.runs,
+    )
 
 
 def _nominal(found: Search, *, before_effects: bool) -> tuple[NominalParameter, ...]:
@@ -280,16 +284,19 @@ def _held_out(found: Search, *, unknown: bool) -> tuple[HeldOutFit, ...]:
 
         made.append(
             HeldOutFit(
-                channel=output.name, unit=output.unit, nominal_rmse=rmse(found.nominal.simulated[output.name]),
+                channel=output.name,
+                unit=output.unit,
+                nominal_rmse=rmse(found.nominal.simulated[output.name]),
                 refitted_rmse=rmse(found.held_refitted.simulated[output.name]),
-                augmented_rmse=rmse(augmented.simulated[output.name]), noise_floor=_floor(found, output.name, output.sd),
+                augmented_rmse=rmse(augmented.simulated[output.name]),
+                noise_floor=_floor(found, output.name, output.sd),
             )
-        )  # fmt: skip
+        )
     return tuple(made)
 
 
 def _floor(found: Search, name: str, sd: float | None) -> float:
-    """Return an output's noise: as stated, else what is left when the smooth structure is taken out as well."""
+    """Return an output's noise: as stated, else what is left when smooth structure is taken out too."""
     if sd is not None:
         return sd
     kept = found.problem.kept[name]
@@ -309,17 +316,18 @@ def _next(found: Search, effects: tuple[FoundEffect, ...], verdict: Verdict) -> 
         if one.equivalent_to:
             apart = dict.fromkeys(catalogue()[name].separates for name in (one.name, *one.equivalent_to))
             said.append(
-                f"To tell {one.name} from {', '.join(one.equivalent_to)}: {'; '.join(text for text in apart if text)}."
+                f"To tell {one.name} from {', '.join(one.equivalent_to)}: "
+                f"{'; '.join(text for text in apart if text)}."
             )
     if verdict == "unknown":
         names = dict.fromkeys(name for one in found.structure for name in one.variables)
         said.append(
-            f"The mismatch depends on {', '.join(names)}: repeat the run with {next(iter(names), 'one input')} "
-            "alone varied, everything else held."
+            f"The mismatch depends on {', '.join(names)}: repeat the run with "
+            f"{next(iter(names), 'one input')} alone varied, everything else held."
         )
     if verdict == "untestable":
         said.append(
-            "Tighten the priors of the parameters that moved (a certificate, a data sheet), or vary the inputs."
+            "Tighten the priors of the parameters that moved (certificate, data sheet), or vary the inputs."
         )
     if len(found.problem.runs) == 1:
         said.append("Repeat the run: with one recording alone, only blocks of it could be held out.")
@@ -334,15 +342,19 @@ def _findings(case: Case, found: Search) -> tuple[Finding, ...]:
         if left_out:
             made.append(
                 Finding(
-                    rule="case-outlier", where=f"{case.path.name}: {name}", level="note",
-                    message=f"{left_out} single values far off all their neighbours were left out of every fit",
+                    rule="case-outlier",
+                    where=f"{case.path.name}: {name}",
+                    level="note",
+                    message=f"{left_out} single values far off all their neighbours were left out of all fits",
                 )
-            )  # fmt: skip
+            )
     if len(problem.runs) == 1:
         made.append(
             Finding(
-                rule="case-one-run", where=case.path.name, level="note",
+                rule="case-one-run",
+                where=case.path.name,
+                level="note",
                 message="one run only: contiguous blocks of it are held out, not whole runs",
             )
-        )  # fmt: skip
+        )
     return tuple(made)

@@ -1,4 +1,4 @@
-"""Joint fits: nominal parameters within their priors, effects' parameters and the noise, by free simulation."""
+"""Joint fits by free simulation: nominal parameters within their priors, effects' parameters, noise."""
 
 from __future__ import annotations
 
@@ -113,18 +113,24 @@ def fit(
         if known is None:
             known = _white(problem, residual, layouts)
         if len(x):
-            weights, here = known, dict(layouts)
 
-            def cost(v: NDArray[np.float64], weights: dict[str, Noise] = weights) -> NDArray[np.float64]:
+            def cost(v: NDArray[np.float64], weights: dict[str, Noise] = known) -> NDArray[np.float64]:
                 try:
-                    return _stack(problem, space, v, _run(space, v)[1], here, weights)
+                    return _stack(problem, space, v, _run(space, v)[1], layouts, weights)
                 except FitError:
-                    return np.full(sum(one.n for one in here.values()) + len(problem.free), 1e6)
+                    return np.full(sum(one.n for one in layouts.values()) + len(problem.free), 1e6)
 
             solved = least_squares(
-                cost, x, bounds=(space.low, space.high), diff_step=_STEP, x_scale=1.0,
-                max_nfev=_INNER, ftol=1e-7, xtol=1e-7, gtol=1e-9,
-            )  # fmt: skip
+                cost,
+                x,
+                bounds=(space.low, space.high),
+                diff_step=_STEP,  # type: ignore[arg-type]
+                x_scale=1.0,
+                max_nfev=_INNER,
+                ftol=1e-7,
+                xtol=1e-7,
+                gtol=1e-9,
+            )
             x = solved.x
         simulated, residual = _run(space, x)
         known = noise_of(problem, residual, layouts, used=len(x))
@@ -136,14 +142,21 @@ def fit(
         best = (score, x, known)
         if not len(x) and turn:
             break
-    assert best is not None
+    if best is None:
+        raise FitError("a fit needs a round", got=rounds, expected="one or more")
     score, x, known = best
     simulated, residual = _run(space, x)
     p, made = space.split(x)
     return Fit(
-        p=tuple(p), active=made, residual=residual, simulated=simulated, noise=known, log_posterior=score,
-        covariance=_covariance(problem, space, x, layouts, known), rows=rows,
-    )  # fmt: skip
+        p=tuple(p),
+        active=made,
+        residual=residual,
+        simulated=simulated,
+        noise=known,
+        log_posterior=score,
+        covariance=_covariance(problem, space, x, layouts, known),
+        rows=rows,
+    )
 
 
 def noise_of(
@@ -152,11 +165,14 @@ def noise_of(
     """Return the noise of every output's residual."""
     return {
         name: fit_noise(
-            residual[name][layouts[name].index], layouts[name], floor=problem.floor[name],
-            sd=problem.sd_of(name), used=used // len(layouts),
+            residual[name][layouts[name].index],
+            layouts[name],
+            floor=problem.floor[name],
+            sd=problem.sd_of(name),
+            used=used // len(layouts),
         )
         for name in problem.names
-    }  # fmt: skip
+    }
 
 
 def log_prior(problem: Problem, p: Sequence[float]) -> float:
@@ -215,9 +231,13 @@ def _run(space: _Space, x: NDArray[np.float64]) -> tuple[Stacked, Stacked]:
 
 
 def _stack(
-    problem: Problem, space: _Space, x: NDArray[np.float64], residual: Stacked, layouts: dict[str, Layout],
+    problem: Problem,
+    space: _Space,
+    x: NDArray[np.float64],
+    residual: Stacked,
+    layouts: dict[str, Layout],
     noise: dict[str, Noise],
-) -> NDArray[np.float64]:  # fmt: skip
+) -> NDArray[np.float64]:
     parts = [whiten(residual[name][where.index], where, noise[name]) for name, where in layouts.items()]
     p, _ = space.split(x)
     parts.append(
@@ -237,9 +257,13 @@ def _white(problem: Problem, residual: Stacked, layouts: dict[str, Layout]) -> d
 
 
 def _score(
-    problem: Problem, space: _Space, x: NDArray[np.float64], residual: Stacked, layouts: dict[str, Layout],
+    problem: Problem,
+    space: _Space,
+    x: NDArray[np.float64],
+    residual: Stacked,
+    layouts: dict[str, Layout],
     noise: dict[str, Noise],
-) -> float:  # fmt: skip
+) -> float:
     p, _ = space.split(x)
     total = log_prior(problem, p)
     for name, where in layouts.items():

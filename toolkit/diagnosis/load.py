@@ -25,15 +25,12 @@ def model_of(case: Case, calibrations: Path | None) -> Model:
     if kind == "python":
         from toolkit.diagnosis.kinds.python import PythonModel, load_function
 
-        assert case.simulation.path is not None
-        return PythonModel(case, load_function(case.simulation.path, case.simulation.function))
+        return PythonModel(case, load_function(case.file(), case.simulation.function))
     if kind == "ode":
         from toolkit.diagnosis.kinds.ode import OdeModel
         from toolkit.diagnosis.kinds.python import load_function
 
-        path = case.simulation.path
-        assert path is not None
-        return OdeModel(case, *(load_function(path, name) for name in ("rhs", "outputs", "initial")))
+        return OdeModel(case, *(load_function(case.file(), name) for name in ("rhs", "outputs", "initial")))
     if kind == "columns":
         from toolkit.diagnosis.kinds.columns import ColumnsModel
 
@@ -52,17 +49,20 @@ def _machine(case: Case, calibrations: Path | None) -> Model:
     if record is not None and all(roles.get(name) == "input" for name in record.indications):
         from toolkit.diagnosis.kinds.acquisition import AcquisitionModel
 
-        return AcquisitionModel(case, record, _others(case, calibrations))
+        return AcquisitionModel(case, record, _others(calibrations))
     if case.simulation.tire is None:
         raise ConfigError(
-            "the simulation has no tire", where=f"{case.path}: simulation.tire", got="nothing",
+            "the simulation has no tire",
+            where=f"{case.path}: simulation.tire",
+            got="nothing",
             expected='tire = "tire.tir", or the cells as inputs with a calibration',
-            next_step="name the tire file", rule="case",
-        )  # fmt: skip
+            next_step="name the tire file",
+            rule="case",
+        )
     return MachineModel(case, read_tir(case.simulation.tire), record, machine.drum.speed_m_s)
 
 
-def _others(case: Case, calibrations: Path | None) -> tuple[CalibrationRecord, ...]:
+def _others(calibrations: Path | None) -> tuple[CalibrationRecord, ...]:
     from toolkit.calibration.registry.registry import Registry
 
     if calibrations is None:
@@ -83,8 +83,11 @@ def record_of(case: Case, calibrations: Path | None) -> CalibrationRecord:
         return from_bytes(read_bytes(path), where=path)
     if calibrations is None:
         raise ConfigError(
-            "the case names a calibration and there is no registry", where=f"{case.path}: simulation.calibration",
-            got=named, expected="the path of a record beside the case, or a home with calibrations/",
-            next_step="give --calibrations DIR", rule="case",
-        )  # fmt: skip
+            "the case names a calibration and there is no registry",
+            where=f"{case.path}: simulation.calibration",
+            got=named,
+            expected="the path of a record beside the case, or a home with calibrations/",
+            next_step="give --calibrations DIR",
+            rule="case",
+        )
     return Registry(calibrations).load(named)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -95,8 +95,7 @@ def _distance(screen: Screen, one: Scored) -> tuple[float, float, float]:
     return float(np.linalg.norm(left)), float(np.linalg.norm(left)) / max(whole, 1e-300), amplitude
 
 
-def _same(start: dict[str, float], values: object, amplitude: str) -> bool:
-    assert isinstance(values, dict)
+def _same(start: dict[str, float], values: Mapping[str, float], amplitude: str) -> bool:
     return all(values.get(name) == value for name, value in start.items() if name != amplitude)
 
 

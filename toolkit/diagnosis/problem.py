@@ -48,7 +48,7 @@ class Problem:
     @property
     def rows(self) -> int:
         """Rows of all runs."""
-        return self.slices[-1].stop
+        return int(self.slices[-1].stop)
 
     def layout(self, name: str, rows: NDArray[np.bool_] | None = None) -> Layout:
         """Return the layout of an output's kept values, confined to some rows."""
@@ -123,7 +123,7 @@ def _running_median(x: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _resolution(column: NDArray[np.float64]) -> float:
-    """Return the standard deviation that the printed digits leave: a twelfth of the smallest step, squared."""
+    """Return the standard deviation that printed digits leave: the smallest step over the root of twelve."""
     values = np.unique(column[np.isfinite(column)])
     size = float(np.abs(values).max()) if len(values) else 1.0
     steps = np.diff(values)
@@ -131,5 +131,5 @@ def _resolution(column: NDArray[np.float64]) -> float:
     least = float(steps.min()) if len(steps) else 1e-12 * max(size, 1e-300)
     # Only a lattice is a resolution: full doubles have steps of every size.
     if len(steps) and np.allclose(steps / least, np.round(steps / least), atol=1e-3) and size / least < 1e7:
-        return least / np.sqrt(12)
+        return float(least / np.sqrt(12))
     return max(1e-9 * size, 1e-300)

@@ -1,4 +1,4 @@
-"""The search: forward steps of joint fits, each judged on held-out runs and against the whole search's null."""
+"""The search: forward steps of joint fits, judged on held-out runs and against the whole search's null."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ class Search:
     skipped: tuple[str, ...]
 
 
-class OutOfTime(Exception):
+class BudgetSpentError(Exception):
     """The budget is spent."""
 
 
@@ -89,7 +89,7 @@ class Budget:
     def check(self, what: str) -> None:
         """Tell what comes next, or raise."""
         if self.now() > self.until:
-            raise OutOfTime(what)
+            raise BudgetSpentError(what)
         self.tell(what)
 
 
@@ -136,9 +136,8 @@ def search(problem: Problem, *, seed: int, budget: Budget) -> Search:
             promising = [one for one in ranked if p_of[id(one)] < ALPHA][:_REFINED]
             if not promising:
                 break
-            budget.check(
-                f"step {turn + 1}: joint fits of {', '.join(dict.fromkeys(o.candidate.name for o in promising))}"
-            )
+            told = ", ".join(dict.fromkeys(one.candidate.name for one in promising))
+            budget.check(f"step {turn + 1}: joint fits of {told}")
             found = _best_step(problem, folds, base, held_base, promising, p_of)
             if found is None:
                 break
@@ -147,19 +146,34 @@ def search(problem: Problem, *, seed: int, budget: Budget) -> Search:
         if len(steps) > 1:
             budget.check("swaps")
             base, held_base, steps = _pruned(problem, folds, base, held_base, steps)
-    except OutOfTime as error:
+    except BudgetSpentError as error:
         skipped.append(str(error))
     return Search(
-        problem=problem, folds=folds, nominal=nominal, refitted=refitted, augmented=base, steps=tuple(steps),
-        structure=structure, structure_before=before, held_refitted=held_refitted, held_augmented=held_base,
-        considered=listed, screen=screen, scored=tuple(scored), skipped=tuple(skipped),
-    )  # fmt: skip
+        problem=problem,
+        folds=folds,
+        nominal=nominal,
+        refitted=refitted,
+        augmented=base,
+        steps=tuple(steps),
+        structure=structure,
+        structure_before=before,
+        held_refitted=held_refitted,
+        held_augmented=held_base,
+        considered=listed,
+        screen=screen,
+        scored=tuple(scored),
+        skipped=tuple(skipped),
+    )
 
 
 def _best_step(
-    problem: Problem, folds: Folds, base: Fit, held_base: HeldOut, promising: Sequence[Scored],
+    problem: Problem,
+    folds: Folds,
+    base: Fit,
+    held_base: HeldOut,
+    promising: Sequence[Scored],
     p_of: dict[int, float],
-) -> tuple[Fit, HeldOut, Step] | None:  # fmt: skip
+) -> tuple[Fit, HeldOut, Step] | None:
     n = sum(int(one.sum()) for one in problem.kept.values())
     tried: list[tuple[float, Scored, Fit]] = []
     for one in promising:
@@ -178,9 +192,12 @@ def _best_step(
             if other is not one
         )
         step = Step(
-            active=made.active[-1], p_value=p_of[id(one)], held_out_gain=gain,
-            gain=made.log_posterior - base.log_posterior, rivals=rivals,
-        )  # fmt: skip
+            active=made.active[-1],
+            p_value=p_of[id(one)],
+            held_out_gain=gain,
+            gain=made.log_posterior - base.log_posterior,
+            rivals=rivals,
+        )
         return made, held, step
     return None
 
@@ -230,6 +247,12 @@ def _as_declared(problem: Problem) -> Fit:
     residual = {name: problem.observed[name] - simulated[name] for name in simulated}
     layouts = {name: problem.layout(name) for name in problem.names}
     return Fit(
-        p=p, active=(), residual=residual, simulated=simulated, noise=noise_of(problem, residual, layouts),
-        log_posterior=0.0, covariance=np.zeros((len(p), len(p))), rows=None,
-    )  # fmt: skip
+        p=p,
+        active=(),
+        residual=residual,
+        simulated=simulated,
+        noise=noise_of(problem, residual, layouts),
+        log_posterior=0.0,
+        covariance=np.zeros((len(p), len(p))),
+        rows=None,
+    )

@@ -1,8 +1,8 @@
 """Structure that no effect of the catalogue explains: smooth dependences of a residual, tested, never named.
 
-Each group is a set of columns for one output: splines over a channel, over time, over the output itself, their
-products with the load, offsets of runs, harmonics of a shaft's angle. They are tested like effects, in the same
-search; what is found is `unknown`, with the variables that it depends on.
+Each group is a set of columns for one output: splines over a channel, over time, over the output itself,
+products of two, offsets of runs, harmonics of a shaft's angle. They are tested like effects, against their
+own null; what is found is `unknown`, with the variables that it depends on.
 """
 
 from __future__ import annotations
@@ -66,10 +66,11 @@ def groups(problem: Problem, base: Fit) -> list[Group]:
 
 
 def _variables(problem: Problem) -> list[tuple[str, NDArray[np.float64]]]:
-    found = []
-    for one in problem.case.drivers:
-        if all(one.name in run.columns for run in problem.runs):
-            found.append((one.name, np.concatenate([run.columns[one.name] for run in problem.runs])))
+    found = [
+        (one.name, np.concatenate([run.columns[one.name] for run in problem.runs]))
+        for one in problem.case.drivers
+        if all(one.name in run.columns for run in problem.runs)
+    ]
     rates = []
     if problem.case.has_time:
         elapsed = np.concatenate([run.t - run.t[0] for run in problem.runs])

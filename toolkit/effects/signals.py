@@ -49,8 +49,8 @@ Tire = Callable[[Drive], TireForces]
 class Setting:
     """One run: its conditions, its other channels in SI under their names, and what is nominal.
 
-    ``elapsed_s`` is the time since the case's first row; ``first`` the values of channels at that row, to which
-    temperatures are counted; ``slip_work_before_kJ`` what earlier runs put into the tire.
+    ``elapsed_s`` is the time since the case's first row; ``first`` the values of channels at that row, to
+    which temperatures are counted; ``slip_work_before_kJ`` what earlier runs put into the tire.
     ``travel`` is +1 with the drum forward and -1 reversed (or +1 where the axes follow the travel);
     ``facing`` is the sign with which a force that is fixed to the tire's sides shows: -1 for a tire that
     was turned round on the hub.
@@ -84,6 +84,15 @@ def drive(
     """Return a drive that no effect has touched."""
     zero, one = np.zeros(len(t)), np.ones(len(t))
     return Drive(
-        t=t, SA=SA, FZ=FZ, IA=zero + IA, V=zero + V, pressure_error=zero + pressure_error, friction=one,
-        stiffness=one, trail=one, FY=zero, MZ=zero,
-    )  # fmt: skip
+        t=t,
+        SA=SA,
+        FZ=FZ,
+        IA=zero + IA,
+        V=zero + V,
+        pressure_error=zero + pressure_error,
+        friction=one,
+        stiffness=one,
+        trail=one,
+        FY=zero,
+        MZ=zero,
+    )

@@ -1,4 +1,4 @@
-"""Cells as inputs, FY and MZ as outputs: only the acquisition program is simulated, by a calibration record."""
+"""Cells as inputs, FY and MZ as outputs: the acquisition program alone, by a calibration record."""
 
 from __future__ import annotations
 
@@ -42,10 +42,13 @@ class AcquisitionModel:
         missing = [name for name in record.indications if name not in declared]
         if missing or not all(declared[name].role == "input" for name in record.indications):
             raise ConfigError(
-                "the calibration needs a cell that is no input", where=f"{case.path}: recording.channels",
-                got=", ".join(missing) or "another role", expected=f'{", ".join(record.indications)} as inputs',
-                next_step="declare the cells as inputs, or name a tire file", rule="case",
-            )  # fmt: skip
+                "the calibration needs a cell that is no input",
+                where=f"{case.path}: recording.channels",
+                got=", ".join(missing) or "another role",
+                expected=f"{', '.join(record.indications)} as inputs",
+                next_step="declare the cells as inputs, or name a tire file",
+                rule="case",
+            )
         self.case, self.record = case, record
         self._others = {one.id: one for one in others if one.id != record.id}
         self.parameters = case.parameters
@@ -56,17 +59,23 @@ class AcquisitionModel:
         )
         if len(self.outputs) != len(case.outputs):
             raise ConfigError(
-                "an output is nothing that a calibration gives", where=f"{case.path}: recording.channels",
-                got=", ".join(one.name for one in case.outputs), expected="FY, MZ", next_step="change its role",
+                "an output is nothing that a calibration gives",
+                where=f"{case.path}: recording.channels",
+                got=", ".join(one.name for one in case.outputs),
+                expected="FY, MZ",
+                next_step="change its role",
                 rule="case",
-            )  # fmt: skip
+            )
 
     def observed(self, run: Run) -> dict[str, NDArray[np.float64]]:
         """Return FY and MZ as the program wrote them."""
         return {one.name: run.columns[one.name] for one in self.outputs if one.name in run.columns}
 
     def simulate(
-        self, run: Run, p: Mapping[str, float], active: Sequence[Active]
+        self,
+        run: Run,
+        p: Mapping[str, float],
+        active: Sequence[Active],  # noqa: ARG002, the kinds' one signature
     ) -> dict[str, NDArray[np.float64]]:
         """Return FY and MZ by the record on cells with effects in them, then effects on FY and MZ."""
         here = setting(self.case, run, nominal_load_N=nominal_load(self.case))

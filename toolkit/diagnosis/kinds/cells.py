@@ -31,10 +31,12 @@ class Cells:
         if missing:
             raise ConfigError(
                 "the calibration needs a cell that the recording has not",
-                where=f"{case.path}: recording.channels", got=", ".join(missing),
-                expected=", ".join(record.indications), next_step="add the channels, or judge FY and MZ directly",
+                where=f"{case.path}: recording.channels",
+                got=", ".join(missing),
+                expected=", ".join(record.indications),
+                next_step="add the channels, or judge FY and MZ directly",
                 rule="case",
-            )  # fmt: skip
+            )
         self.case, self.record = case, record
         self.names = record.indications
         self.loads = tuple(one.load for one in record.loads if one.load in ("FY", "MZ"))
@@ -55,16 +57,20 @@ class Cells:
         here, there = unit(self._units[name]), unit(self._recorded_unit[name])
         if here.dimension != there.dimension:
             raise ConfigError(
-                "a cell's unit is not the calibration's", where=f"{self.case.path}: {name}", got=here.text,
-                expected=there.text, next_step="correct the unit, or name the right calibration", rule="case",
-            )  # fmt: skip
+                "a cell's unit is not the calibration's",
+                where=f"{self.case.path}: {name}",
+                got=here.text,
+                expected=there.text,
+                next_step="correct the unit, or name the right calibration",
+                rule="case",
+            )
         return run.columns[name] * (here.factor / there.factor)
 
     def load(self, run: Run, name: str) -> NDArray[np.float64]:
         """Return FY [N] or MZ [N·m] from the recorded cells, (n,)."""
-        return self.loads_of(run, {cell: self._cell(run, cell) for cell in self.names})[name]
+        return self.loads_of({cell: self._cell(run, cell) for cell in self.names})[name]
 
-    def loads_of(self, run: Run, cells: dict[str, NDArray[np.float64]]) -> dict[str, NDArray[np.float64]]:
+    def loads_of(self, cells: dict[str, NDArray[np.float64]]) -> dict[str, NDArray[np.float64]]:
         """Return FY and MZ [SI] of cells in the record's units."""
         return apply_record(self.record, cells, units=self._recorded_unit, tare=self._tare, only=self.loads)
 
@@ -108,7 +114,7 @@ class Cells:
         for one in reversed(here):
             name = str(one.channel)
             true[name] = undone(true[name], one, setting, true)
-        shown, without = self.loads_of(run, recorded), self.loads_of(run, true)
+        shown, without = self.loads_of(recorded), self.loads_of(true)
         made = dict(values)
         for output in outputs:
             if output.name in self.loads:

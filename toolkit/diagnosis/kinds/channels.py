@@ -16,7 +16,7 @@ from toolkit.effects.signals import Setting
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from toolkit.diagnosis.case import Case, Run
+    from toolkit.diagnosis.case import Run
 
 _FORCE_LIKE = ("force", "moment", "bridge_ratio", "count")
 _STEPS = 8
@@ -69,9 +69,10 @@ def through_channels(
 ) -> dict[str, NDArray[np.float64]]:
     """Return channels with their effects, stage by stage; each channel in its own unit."""
     made = dict(values)
-    here = [one for one in active if one.effect.channel is not None and one.acts_in(run)]
+    here = [one for one in active if one.acts_in(run)]
     for one in sorted(here, key=lambda each: STAGES.index(each.effect.stage)):
-        if one.channel is None or one.channel not in made:
+        hook = one.effect.channel
+        if hook is None or one.channel is None or one.channel not in made:
             continue
         if one.effect.name == "channel_swap":
             other = str(one.source)
@@ -83,7 +84,7 @@ def through_channels(
             if source is None:
                 continue
             seen = dataclasses.replace(setting, channels={**setting.channels, "from": source})
-        made[one.channel] = one.effect.channel(made[one.channel], one.values, seen)
+        made[one.channel] = hook(made[one.channel], one.values, seen)
     return made
 
 
@@ -91,7 +92,9 @@ def undone(
     recorded: NDArray[np.float64], one: Active, setting: Setting, others: Mapping[str, NDArray[np.float64]]
 ) -> NDArray[np.float64]:
     """Return what a channel would have shown without an effect: the hook's inverse by fixed point."""
-    assert one.effect.channel is not None
+    hook = one.effect.channel
+    if hook is None:
+        return recorded
     if one.effect.name == "channel_sign":
         return -recorded
     if one.effect.name == "unit_error":
@@ -103,13 +106,5 @@ def undone(
         seen = dataclasses.replace(setting, channels={**setting.channels, "from": others[one.source]})
     guess = recorded
     for _ in range(_STEPS):
-        guess = guess + (recorded - one.effect.channel(guess, one.values, seen))
+        guess = guess + (recorded - hook(guess, one.values, seen))
     return np.where(np.isfinite(guess), guess, recorded)
-
-
-def spread(case: Case, name: str) -> float:
-    """Return the largest magnitude of a channel over all runs, in its unit; 1 where it is empty."""
-    values = [run.columns[name] for run in case.runs if name in run.columns]
-    whole = np.concatenate(values) if values else np.array([1.0])
-    whole = np.abs(whole[np.isfinite(whole)])
-    return float(whole.max()) if len(whole) and whole.max() > 0 else 1.0

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 
 class ColumnsModel:
-    """Simulated columns; a parameter named like an output plus ``_gain`` or ``_offset`` scales or shifts it."""
+    """Simulated columns; a parameter named after an output with ``_gain`` or ``_offset`` scales or shifts it."""
 
     def __init__(self, case: Case) -> None:
         self.case = case
@@ -37,18 +37,24 @@ class ColumnsModel:
         missing = [one.name for one in case.outputs if one.name not in named]
         if missing:
             raise ConfigError(
-                "an output has no simulated column", where=f"{case.path}: simulation.simulated",
-                got=", ".join(missing), expected="a column for every output", next_step="name it, or drop the output",
+                "an output has no simulated column",
+                where=f"{case.path}: simulation.simulated",
+                got=", ".join(missing),
+                expected="a column for every output",
+                next_step="name it, or drop the output",
                 rule="case",
-            )  # fmt: skip
+            )
         allowed = {f"{name}_{what}" for name in named for what in ("gain", "offset")}
         unknown = [one.name for one in case.parameters if one.name not in allowed]
         if unknown:
             raise ConfigError(
                 "a simulation that cannot be run again has no such parameter",
-                where=f"{case.path}: simulation.parameters", got=", ".join(unknown), expected=", ".join(sorted(allowed)),
-                next_step="remove it, or give the simulation as kind python", rule="case",
-            )  # fmt: skip
+                where=f"{case.path}: simulation.parameters",
+                got=", ".join(unknown),
+                expected=", ".join(sorted(allowed)),
+                next_step="remove it, or give the simulation as kind python",
+                rule="case",
+            )
         self.parameters = case.parameters
         self.outputs = tuple(Output(name=one.name, unit=one.unit, sd=one.sd) for one in case.outputs)
         self._load = nominal_load(case)
@@ -87,9 +93,11 @@ class ColumnsModel:
         drivers = {one.name for one in self.case.drivers}
         if self._surface is not None and self._surface.good:
             found += tire_places(
-                effect, has_IA=False, has_P=False,
+                effect,
+                has_IA=False,
+                has_P=False,
                 varies={"load_commanded": "FZ_CMD" in drivers and "FZ" not in drivers},
-            )  # fmt: skip
+            )
         if self.motion is not None:
             found += self.motion.places(effect)
         others = [(one.name, one.unit) for one in self.case.drivers]
@@ -106,15 +114,16 @@ class ColumnsModel:
     def _tire(
         self, run: Run, made: dict[str, NDArray[np.float64]], active: Sequence[Active], here: Setting
     ) -> dict[str, NDArray[np.float64]]:
-        assert self._surface is not None
         surface, case = self._surface, self.case
+        if surface is None:
+            return made
         start = base_drive(case, run, load_N=self._load)
         turn, back = tire_signs(case.axes, "machine", run), tire_signs("machine", case.axes, run)
         units = {name: unit(case.unit(name)).factor for name in ("FY", "MZ") if name in made}
         zero = np.zeros(run.rows)
 
         def steady(SA: NDArray[np.float64], drive: Drive) -> TireForces:
-            # The surface gives the difference to the row's own slip angle and load: nothing where neither moved.
+            # The surface gives the difference to the row's own slip angle and load.
             got = {
                 name: turn[name]
                 * units[name]
@@ -125,6 +134,6 @@ class ColumnsModel:
 
         forces = through_tire(start, steady, active, run, here)
         result = dict(made)
-        for name in units:
-            result[name] = getattr(forces, name) * back[name] / units[name]
+        for name, factor in units.items():
+            result[name] = getattr(forces, name) * back[name] / factor
         return result

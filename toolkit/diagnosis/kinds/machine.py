@@ -1,4 +1,4 @@
-"""Kind ``machine``: a tire file on the machine, judged on FY and MZ (from the cells where they are recorded)."""
+"""Kind ``machine``: a tire file on the machine, judged on FY and MZ, from the cells where there are any."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ import numpy as np
 
 from toolkit.diagnosis.kinds.cells import Cells
 from toolkit.diagnosis.kinds.channels import channel_places, through_channels
-from toolkit.diagnosis.kinds.setting import nominal_load, setting, si
-from toolkit.diagnosis.kinds.tire import base_drive, first_of, rotation, through_tire, tire_places, tire_signs
+from toolkit.diagnosis.kinds.setting import setting, si
 from toolkit.diagnosis.kinds.tir_tire import TirTire
+from toolkit.diagnosis.kinds.tire import base_drive, first_of, rotation, through_tire, tire_places, tire_signs
 from toolkit.diagnosis.model import Active, Output
 from toolkit.effects.effect import Effect
 from toolkit.effects.filters import lag
@@ -45,10 +45,13 @@ class MachineModel:
             if one.name not in self._tire.names:
                 near = difflib.get_close_matches(one.name, sorted(self._tire.names), n=1)
                 raise ConfigError(
-                    f"the simulation has no parameter {one.name!r}", where=f"{case.path}: simulation.parameters",
-                    got=one.name, expected="a coefficient or scale factor of the tire file",
-                    next_step=f"did you mean {near[0]!r}?" if near else "correct the name", rule="case",
-                )  # fmt: skip
+                    f"the simulation has no parameter {one.name!r}",
+                    where=f"{case.path}: simulation.parameters",
+                    got=one.name,
+                    expected="a coefficient or scale factor of the tire file",
+                    next_step=f"did you mean {near[0]!r}?" if near else "correct the name",
+                    rule="case",
+                )
         self.outputs = self._outputs()
         self._settings: dict[str, Any] = {}
 
@@ -66,10 +69,13 @@ class MachineModel:
         unknown = [name for name in direct if name not in known]
         if unknown or not made:
             raise ConfigError(
-                "an output is nothing that the machine simulates", where=f"{self.case.path}: recording.channels",
-                got=", ".join(unknown) or "no output", expected="FY, MZ, FZ, or D51, D52, E5 with a calibration",
-                next_step="change the channel's role, or name the calibration", rule="case",
-            )  # fmt: skip
+                "an output is nothing that the machine simulates",
+                where=f"{self.case.path}: recording.channels",
+                got=", ".join(unknown) or "no output",
+                expected="FY, MZ, FZ, or D51, D52, E5 with a calibration",
+                next_step="change the channel's role, or name the calibration",
+                rule="case",
+            )
         return tuple(made)
 
     def observed(self, run: Run) -> dict[str, NDArray[np.float64]]:
@@ -93,9 +99,14 @@ class MachineModel:
 
         def steady(SA: NDArray[np.float64], drive: Drive) -> TireForces:
             FY, MZ = self._tire(
-                p, SA=-SA, FZ=drive.FZ, IA=-drive.IA if reverse else drive.IA, V=drive.V,
-                P=pressure, pressure_error=drive.pressure_error,
-            )  # fmt: skip
+                p,
+                SA=-SA,
+                FZ=drive.FZ,
+                IA=-drive.IA if reverse else drive.IA,
+                V=drive.V,
+                P=pressure,
+                pressure_error=drive.pressure_error,
+            )
             return TireForces(FY=FY if reverse else -FY, MZ=-MZ)
 
         forces = through_tire(start, steady, active, run, here)
@@ -124,9 +135,11 @@ class MachineModel:
         names = {one.name for one in case.channels}
         drivers = {one.name for one in case.drivers}
         found = tire_places(
-            effect, has_IA=self._tire.has_camber, has_P=self._tire.has_pressure,
+            effect,
+            has_IA=self._tire.has_camber,
+            has_P=self._tire.has_pressure,
             varies={"load_commanded": "FZ_CMD" in names},
-        )  # fmt: skip
+        )
         others = [(one.name, one.unit) for one in case.drivers if one.name in ("FZ", "FZ_CMD", "FX")]
         if "FZ" in {one.name for one in self.outputs}:
             others = [one for one in others if one[0] != "FZ"]

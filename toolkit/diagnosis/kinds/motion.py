@@ -10,8 +10,8 @@ alone, as in a free fall).
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
@@ -109,10 +109,15 @@ class Motion:
         return result
 
 
-def _step(acceleration, forces, t, h, x, v):  # type: ignore[no-untyped-def]
+def _step(
+    acceleration: Callable[[float], object], forces: Sequence[Active], t: float, h: float, x: float, v: float
+) -> tuple[float, float]:
+    """Return position and velocity after a step of Runge and Kutta's fourth order."""
+    terms = [(one.effect.force, one.values) for one in forces if one.effect.force is not None]
+
     def rate(at: float, position: float, speed: float) -> tuple[float, float]:
-        pull = sum(one.effect.force(position, speed, one.values) for one in forces)
-        return speed, float(acceleration(at)) - pull
+        pull = sum(force(position, speed, values) for force, values in terms)
+        return speed, float(cast("float", acceleration(at))) - pull
 
     k1 = rate(t, x, v)
     k2 = rate(t + h / 2, x + h / 2 * k1[0], v + h / 2 * k1[1])
@@ -129,10 +134,12 @@ def _resisting(
 ) -> NDArray[np.float64]:
     total = np.zeros(len(x))
     for one in forces:
-        assert one.effect.force is not None
+        force = one.effect.force
+        if force is None:
+            continue
         # A constant is reported as the term that stands in the output's own equation.
         sign = -1.0 if on_output and one.effect.name in ("constant_force", "periodic_ripple") else 1.0
-        force, values = one.effect.force, one.values
+        values = one.values
         total += sign * np.fromiter(
             (force(a, b, values) for a, b in zip(x.tolist(), v.tolist(), strict=True)), np.float64, len(x)
         )

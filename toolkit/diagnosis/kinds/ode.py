@@ -40,18 +40,25 @@ class OdeModel:
         names = case.simulation.states or tuple(f"x{i}" for i in range(len(start)))
         if len(names) != len(start):
             raise ConfigError(
-                "states and initial do not agree", where=f"{case.path}: simulation.states",
-                got=f"{len(names)} names, {len(start)} initial values", expected="one name for each",
-                next_step="correct the list of states", rule="case",
-            )  # fmt: skip
+                "states and initial do not agree",
+                where=f"{case.path}: simulation.states",
+                got=f"{len(names)} names, {len(start)} initial values",
+                expected="one name for each",
+                next_step="correct the list of states",
+                rule="case",
+            )
         self.states = names
         terms = dict(case.simulation.force_terms)
         unknown = [name for name in terms if name not in names]
         if unknown:
             raise ConfigError(
-                "a force term names no state", where=f"{case.path}: simulation.force_terms", got=", ".join(unknown),
-                expected=", ".join(names), next_step="correct the name", rule="case",
-            )  # fmt: skip
+                "a force term names no state",
+                where=f"{case.path}: simulation.force_terms",
+                got=", ".join(unknown),
+                expected=", ".join(names),
+                next_step="correct the name",
+                rule="case",
+            )
         self._derivative_of = self._kinematics(p)
         self.force_units = terms or {
             name: "" for i, name in enumerate(names) if i not in self._derivative_of.values()
@@ -142,9 +149,15 @@ class OdeModel:
             return start[:, None]
         try:
             made = solve_ivp(
-                rhs, (run.t[0], run.t[-1]), start, method="LSODA", t_eval=run.t, rtol=RTOL,
-                atol=ATOL * np.maximum(np.abs(start), 1.0), max_step=_longest(run),
-            )  # fmt: skip
+                rhs,
+                (run.t[0], run.t[-1]),
+                start,
+                method="LSODA",
+                t_eval=run.t,
+                rtol=RTOL,
+                atol=ATOL * np.maximum(np.abs(start), 1.0),
+                max_step=_longest(run),
+            )
         except FitError:
             raise
         except Exception as error:
@@ -169,8 +182,7 @@ class OdeModel:
                     width = 1e-3 * self.scale[self.states[i]][1]
                     if rate[i] > 0:
                         rate[i] *= min(max((one.values["level"] - x[i]) / width, 0.0), 1.0)
-                else:
-                    assert one.effect.force is not None
+                elif one.effect.force is not None:
                     rate[i] -= one.effect.force(float(x[j]), float(x[i]), one.values)
             return rate
 
@@ -192,8 +204,8 @@ class OdeModel:
                     raise _failed(self.case, run, f"outputs gives no {name!r}; it gives {', '.join(made)}")
                 column.append(float(made[name]))
         result = {name: np.array(column) for name, column in rows.items()}
-        for name, column in result.items():
-            if not np.isfinite(column).all():
+        for name, values_of in result.items():
+            if not np.isfinite(values_of).all():
                 raise _failed(self.case, run, f"no number in output {name!r}")
         return result
 
@@ -263,7 +275,10 @@ def _as_dict(run: Run) -> dict[str, Any]:
 
 def _failed(case: Case, run: Run, got: str) -> FitError:
     return FitError(
-        "the simulation cannot be integrated", where=f"{case.simulation.path}, {run.name}", got=got,
+        "the simulation cannot be integrated",
+        where=f"{case.simulation.path}, {run.name}",
+        got=got,
         expected="rhs, outputs and initial that give finite numbers over the whole run",
-        next_step="run the equation on that file by itself and mend it", rule="simulator",
-    )  # fmt: skip
+        next_step="run the equation on that file by itself and mend it",
+        rule="simulator",
+    )

@@ -69,10 +69,9 @@ class PythonModel:
         import pandas as pd
 
         columns: dict[str, NDArray[np.float64]] = {}
-        for one in self.case.channels:
-            if one.role == "output" or one.name not in run.columns:
-                continue
-            columns[one.name] = np.array(changed.get(one.name, run.columns[one.name]))
+        for channel in self.case.channels:
+            if channel.role != "output" and channel.name in run.columns:
+                columns[channel.name] = np.array(changed.get(channel.name, run.columns[channel.name]))
         inputs = pd.DataFrame(columns)
         try:
             made = self._function(inputs, dict(p))

@@ -19,8 +19,6 @@ if TYPE_CHECKING:
 
     from toolkit.diagnosis.case import Case, Run
 
-STAGE_OF_TIRE = ("road", "carriage", "tire")
-
 
 def rotation(run: Run) -> Rotation:
     """Return the drum's direction in a run."""
@@ -67,10 +65,10 @@ def through_tire(
     def tire(one: Drive) -> TireForces:
         return similar(steady, one)
 
-    here = [one for one in active if one.effect.drive is not None and one.acts_in(run)]
+    here = [one for one in active if one.acts_in(run)]
     for one in sorted(here, key=lambda each: STAGES.index(each.effect.stage)):
-        assert one.effect.drive is not None
-        start = one.effect.drive(start, one.values, setting, tire)
+        if one.effect.drive is not None:
+            start = one.effect.drive(start, one.values, setting, tire)
     return tire(start)
 
 
