@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from control_factory import enter, put_in_force
 
-from toolkit.calibration.control.as_found import as_found, as_found_before, last_good_as_found
+from toolkit.calibration.control.as_found import as_found, as_found_before, as_found_history
 from toolkit.calibration.control.in_use import in_use_before
 from toolkit.calibration.registry.approval import withdraw
 from toolkit.calibration.registry.registry import Registry
@@ -96,14 +96,10 @@ def test_as_left_belongs_to_the_as_found_before_it(used: Registry, tmp_path: Pat
     )
 
 
-def test_the_last_good_result_before_a_failure(used: Registry, tmp_path: Path) -> None:
+def test_a_history_of_results_without_those_withdrawn(used: Registry, tmp_path: Path) -> None:
     for at, (year, span) in enumerate(((2025, 1.0005), (2026, 1.0009), (2027, 1.004))):
         enter(used, tmp_path / f"y{at}", dt.date(year, 1, 10), span=span, phase="as_found")
-    good = last_good_as_found(used, "cell", dt.date(2027, 1, 10))
-    assert good is not None
-    assert good.date == dt.date(2026, 1, 10)
-    assert last_good_as_found(used, "cell", dt.date(2025, 1, 10)) is None
-    withdraw(used, good.session_record, on=dt.date(2027, 2, 1), reason="a wrong weight")
-    again = last_good_as_found(used, "cell", dt.date(2027, 1, 10))
-    assert again is not None
-    assert again.date == dt.date(2025, 1, 10)
+    found = as_found_history(used, "cell")
+    assert [(one.date.year, one.within) for one in found] == [(2025, True), (2026, True), (2027, False)]
+    withdraw(used, found[1].session_record, on=dt.date(2027, 2, 1), reason="a wrong weight")
+    assert [one.date.year for one in as_found_history(used, "cell")] == [2025, 2027]

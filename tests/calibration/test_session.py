@@ -9,8 +9,10 @@ import numpy as np
 import pytest
 from calibration_factory import SENSITIVITY, ZERO, hub_data
 
+from toolkit.calibration.fit.session_fit import fit_session, residual_correlation
 from toolkit.calibration.registry.candidate import Candidate, calibrate
 from toolkit.calibration.registry.registry import Registry
+from toolkit.calibration.session.read import read_session
 from toolkit.errors import ConfigError, SessionError, ToolkitError, UnitError
 
 Make = Callable[..., Path]
@@ -139,6 +141,19 @@ def test_noise_free_data_have_no_findings(tmp_path: Path, make_session: Make) ->
 
 
 # what is written into SESSION.toml, the error, and a word of its message
+def test_the_residuals_of_loads_are_correlated_as_the_cells_noise_feeds_them(
+    make_session: Callable[..., Path],
+) -> None:
+    # Equal independent noise e of the cells: load errors c_a.e and c_b.e, correlation c_a.c_b / |c_a||c_b|.
+    fit = fit_session(read_session(make_session(hub_data(20000, 7, noise=1e-3), digits=9)))
+    c = np.array([one.fit.coefficients[:3] for one in fit.loads])
+    length = np.linalg.norm(c, axis=1)
+    wanted = c @ c.T / np.outer(length, length)
+    # 20 000 rows tell a correlation to some 0.007.
+    np.testing.assert_allclose(residual_correlation(fit), wanted, atol=0.03)
+    assert (np.diag(residual_correlation(fit)) == 1).all()
+
+
 BAD_SETTINGS = [
     ({"operatr": '"x"'}, ConfigError, "did you mean 'operator'"),
     ({"instrument": '"../x"'}, ConfigError, "instrument"),

@@ -65,8 +65,14 @@ def command(
 
 def _payload(made: Candidate, status: str) -> dict[str, Any]:
     from toolkit.calibration.fit.readings import readings_json
+    from toolkit.calibration.fit.session_fit import residual_correlation
 
     record = made.record
+    names = [one.setting.name for one in made.fit.loads]
+
+    def by_load(values: list[Any]) -> dict[str, Any]:
+        return dict(zip(names, values, strict=True))
+
     loads = {}
     for one in made.fit.loads:
         fit, more = one.fit, one.diagnostics
@@ -97,6 +103,7 @@ def _payload(made: Candidate, status: str) -> dict[str, Any]:
         },
         "findings": [finding.as_dict() for finding in made.findings],
         "readings": readings_json(made.readings),
+        "residual_correlation": by_load([by_load(row) for row in residual_correlation(made.fit).tolist()]),
         "loads": loads,
     }
 

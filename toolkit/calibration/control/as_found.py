@@ -17,9 +17,10 @@ import numpy as np
 
 from toolkit.calibration.control.errors import errors_by
 from toolkit.calibration.control.in_use import in_use_before
-from toolkit.calibration.registry.registry import load_checked
+from toolkit.calibration.registry.registry import load_many
 from toolkit.calibration.registry.status import status_of
 from toolkit.calibration.registry.stored import stored_loads
+from toolkit.errors import ToolkitError
 from toolkit.findings import Finding
 
 if TYPE_CHECKING:
@@ -172,22 +173,17 @@ def as_found_before(registry: Registry, as_left: CalibrationRecord) -> AsFound |
     return as_found(registry, newest) if dt.date.fromisoformat(newest.date) <= day else None
 
 
-def last_good_as_found(registry: Registry, instrument: str, before: dt.date) -> AsFound | None:
-    """Return the newest as-found result before a day that was within tolerance.
-
-    The tests between its date and a failing as-found result are those that the failure concerns.
-    """
-    good = [one for one in as_found_history(registry, instrument) if one.date < before and one.within]
-    return good[-1] if good else None
-
-
 def _of_phase(registry: Registry, instrument: str, phase: str) -> list[CalibrationRecord]:
     ledger = registry.ledger(instrument)
+    standing = [
+        record_id
+        for record_id in ledger.entered()
+        if status_of(record_id, ledger.of(record_id), dt.date.max).state != "withdrawn"
+    ]
     made = []
-    for at, record_id in enumerate(ledger.entered()):
-        if status_of(record_id, ledger.of(record_id), dt.date.max).state == "withdrawn":
-            continue
-        record = load_checked(registry.folder / instrument, record_id, ledger)
+    for at, record in enumerate(load_many(registry.folder / instrument, standing, ledger).values()):
+        if isinstance(record, ToolkitError):
+            raise record
         if phase_of(record) == phase:
             made.append((record.date, at, record))
     return [record for _, _, record in sorted(made, key=lambda one: one[:2])]

@@ -59,8 +59,10 @@ def _data_findings(session: Session) -> list[Finding]:
         message = "no check loads: no term can be verified on approval"
         found.append(Finding(rule="no-check", where=where, message=message, level="note"))
     else:
-        fitted = {tuple(row) for row in rows.tolist()}
-        for number, row in enumerate(session.check.matrix(names).tolist(), start=1):
+        check = session.check.matrix(names)
+        # Most rows of a long session share no first value with a check load.
+        fitted = {tuple(row) for row in rows[np.isin(rows[:, 0], check[:, 0])].tolist()}
+        for number, row in enumerate(check.tolist(), start=1):
             if tuple(row) in fitted:
                 message = "a check load equals a row of the fit: it checks nothing"
                 found.append(Finding(rule="check-not-apart", where=f"check row {number}", message=message))

@@ -268,15 +268,25 @@ def _refit(
 ) -> list[_Sum]:
     """Return what other terms leave over of each load; the coefficients themselves are not wanted."""
     table, design = fit.session.table, build_basis(terms, columns).design
-    sums, q = [], None
-    for one in loads:
-        root = None if one.fit.weights is None else np.sqrt(one.fit.weights)
-        if q is None or root is not None:
-            q, _ = np.linalg.qr(design if root is None else design * root[:, None])
-        load = table.column(one.setting.name) * (1.0 if root is None else root)
-        rest = load - q @ (q.T @ load)
-        sums.append(_Sum(squares=float(rest @ rest), rows=len(rest), dof=len(rest) - len(terms)))
-    return sums
+    load = np.array([table.column(one.setting.name) for one in loads]).T
+    if all(one.fit.weights is None for one in loads):
+        return _left_over(design, load)
+    return [
+        _left_over(design * root[:, None], (y * root)[:, None])[0]
+        for y, root in zip(load.T, (_root(one, len(design)) for one in loads), strict=True)
+    ]
+
+
+def _left_over(design: NDArray[np.float64], loads: NDArray[np.float64]) -> list[_Sum]:
+    """Return what a design (rows, terms) leaves over of loads (rows, loads)."""
+    n, p = design.shape
+    # Of a triangle of both, what stands below the design's rows is as long as the residuals.
+    below = np.asarray(np.linalg.qr(np.hstack([design, loads]), mode="r"))[p:, p:]
+    return [_Sum(squares=float(one @ one), rows=n, dof=n - p) for one in below.T]
+
+
+def _root(one: LoadResult, rows: int) -> NDArray[np.float64]:
+    return np.ones(rows) if one.fit.weights is None else np.sqrt(one.fit.weights)
 
 
 def _exact(one: LoadResult) -> bool:

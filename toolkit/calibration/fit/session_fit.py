@@ -77,6 +77,20 @@ def fit_session(session: Session) -> SessionFit:
     )
 
 
+def residual_correlation(fit: SessionFit) -> NDArray[np.float64]:
+    """Return the correlation of the loads' residuals (loads, loads): one cell's noise feeds all of them.
+
+    Loads without scatter, or one load alone, have none: the identity.
+    """
+    rest = np.array([one.fit.residuals for one in fit.loads])
+    products = np.einsum("ij,kj->ik", rest, rest)
+    length = np.sqrt(np.diag(products))
+    safe = np.where(length > 0, length, 1.0)
+    found: NDArray[np.float64] = products / np.outer(safe, safe)
+    np.fill_diagonal(found, 1.0)
+    return found
+
+
 def _solved(session: Session, columns: dict[str, NDArray[np.float64]]) -> tuple[TermFit, ...]:
     loads = [session.table.column(setting.name) for setting in session.loads]
     if session.method == "ols":

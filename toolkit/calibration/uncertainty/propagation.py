@@ -14,7 +14,11 @@ differences where they must. Beside the scatter of the fit, which V_fit holds, f
   differences, and with a tare where the record's intercept does (``zero = "included"``).
 
 Loads are taken one at a time. A shared reference (``shared_group``) makes the scale errors of two loads the
-same, and a cell's shift moves both; that matters to a sum of forces with moments only.
+same, and a cell's shift moves both; that matters to a sum of forces with moments only. The fits' scatter is
+correlated too, as far as one cell's noise feeds both loads: V_ab = rho s_a s_b (X'X)^-1 with rho of the joint
+residuals, which `calibrate` tells (``residual_correlation``) and no record keeps. The one characteristic of
+two loads is the residual torque, MZ where FY is zero: of its variance by the two fits, u_a^2 + u_b^2, the
+correlation can change at most the share |rho|, since 2 |rho| u_a u_b <= |rho| (u_a^2 + u_b^2).
 
 Not in it: misfit and reversal, which are local in the load, need the session's rows and do not follow from
 the record alone; they stand in the budget. Resolution averages out over a block of readings.

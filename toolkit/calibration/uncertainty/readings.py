@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolkit.calibration.session.bridge import bridges_of
-from toolkit.calibration.session.reading_entries import Scope, creep_entries, zero_entries
+from toolkit.calibration.session.reading_entries import creep_entries, zero_entries
 from toolkit.calibration.session.settings import zero_readings
+from toolkit.calibration.session.statements import scope_of
 from toolkit.calibration.terms import term_matrix
 
 if TYPE_CHECKING:
@@ -71,7 +71,7 @@ def zero_drift(record: CalibrationRecord) -> tuple[float, ...] | str:
     The last reading whose ``when`` begins with *after* is held against the first that begins with *before*;
     without such words the last reading against the first. Readings with the shunt connected are no zeros.
     """
-    scope = _scope(record)
+    scope = scope_of(record)
     entries = [e for e in zero_entries(zero_readings(json.loads(record.settings)), scope) if not e.shunt]
     if len(entries) < 2:
         return "no zero before and after the session is stated"
@@ -93,7 +93,7 @@ def creep(record: CalibrationRecord, one: LoadFit) -> float | str:
     """
     series: dict[str, list[tuple[float, float]]] = {}
     slope = None
-    for entry in creep_entries(json.loads(record.settings).get("creep", []), _scope(record)):
+    for entry in creep_entries(json.loads(record.settings).get("creep", []), scope_of(record)):
         if entry.load != one.load and len(record.loads) > 1:
             continue
         if entry.shown is not None:
@@ -110,16 +110,6 @@ def creep(record: CalibrationRecord, one: LoadFit) -> float | str:
         abs(max(one_series)[1] - min(one_series)[1]) for one_series in series.values() if len(one_series) > 1
     ]
     return max(moved) / one.largest if moved else "no two creep readings of this load are stated"
-
-
-def _scope(record: CalibrationRecord) -> Scope:
-    cells = json.loads(record.settings).get("cells", {})
-    return Scope(
-        bridges=bridges_of(cells, record.indications, where=record.id),
-        columns={cell.name: cell.column_unit or cell.unit for cell in record.cells},
-        loads={one.load: one.unit for one in record.loads},
-        where=record.id,
-    )
 
 
 def _middle(record: CalibrationRecord) -> tuple[float, ...]:
