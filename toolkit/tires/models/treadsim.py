@@ -17,8 +17,8 @@ Source: Pacejka, Tire and Vehicle Dynamics, 3rd ed. (2012), 3.3, with its approx
 on the speed of the bristle's base and that a sliding bristle keeps its direction. The pressure's law and the
 dependence on load are ours. The sums over the bristles know where a bristle begins to slide between two
 middles, so that 40 of them come within 1e-4 of the forces under a parabola, and for all pressures within 1e-3
-(FY) and 5e-3 (MZ) of their largest values; where slips along and across turn a bristle while it slides, within
-3e-3 and 2e-2.
+(FY) and 5e-3 (MZ) of their largest values; where slips along and across turn a bristle while it slides,
+within 3e-3 and 2e-2.
 """
 
 from __future__ import annotations
