@@ -55,13 +55,12 @@ def writers(
 def provenance(resolved: Resolved, test: Path) -> dict[str, Any]:
     """Return inputs and software for the manifest: every recording with its hash, and the test's own file."""
     from toolkit.files import sha256_file
-    from toolkit.recording.folder import TEST_FILE
+    from toolkit.recording.folder import TEST_FILE, read_test_folder
 
     reduced = resolved.result.reduced
     inputs = {one.file: one.file_sha256 for one in reduced.conditions}
-    named = test / TEST_FILE if test.is_dir() else test
-    if named.is_file():
-        inputs[named.name] = sha256_file(named)
+    named = [test / TEST_FILE, read_test_folder(test).tare_file] if test.is_dir() else [test]
+    inputs |= {one.name: sha256_file(one) for one in named if one is not None and one.is_file()}
     return {
         "test": reduced.info.name,
         "simulated": reduced.info.simulated,

@@ -92,10 +92,11 @@ class Pieces:
         align: str,
         *,
         kind: str = "Table",
+        together: bool = False,
     ) -> str:
         """Return a captioned data table with one prototype row, kept only when it has rows.
 
-        ``head`` and ``cells`` may hold tags in double braces; ``align`` has ``l`` or ``r`` a column.
+        ``together`` keeps a short table on one page. ``head`` and ``cells`` may hold tags in double braces; ``align`` has ``l`` or ``r`` a column.
         """
         header = "".join(
             cell(literal(text), width, style="TableHead", align=side, shade=SHADE)
@@ -105,6 +106,12 @@ class Pieces:
             cell(self._row_cell(text), width, style="TableText", align=side)
             for text, width, side in zip(cells, widths_mm, align, strict=True)
         )
+        if together:
+            mark = '<w:pStyle w:val="{}"/>'
+            for style in ("TableHead", "TableText"):
+                named = mark.format(style)
+                header = header.replace(named, f"{named}<w:keepNext/>")
+                prototype = prototype.replace(named, f"{named}<w:keepNext/>")
         grid = table(row(header, header=True) + row(prototype), widths_mm, rules="data")
         return self.block(
             f"tk:if.{name}",

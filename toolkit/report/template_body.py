@@ -67,7 +67,6 @@ def title_page(p: Pieces) -> list[str]:
             ],
             quarter,
         ),
-        contents("Contents"),
         paragraph(
             run(
                 "The results relate only to the item tested, as received. The report may be reproduced only as a whole. "
@@ -120,18 +119,17 @@ def _rows(p: Pieces, rows: list[list[tuple[str, str]]], widths: tuple[float, ...
 def chapters(p: Pieces) -> list[str]:
     """Return the chapters, from the test's facts to the end mark."""
 
-    def heading(text: str, *, fresh: bool = False) -> str:
-        return paragraph(run(text), style="Heading1").replace(
-            "</w:pPr>", "<w:pageBreakBefore/></w:pPr>" if fresh else "</w:pPr>", 1
-        )
+    def heading(text: str) -> str:
+        return paragraph(run(text), style="Heading1")
 
-    def text(words: str) -> str:
-        return paragraph(literal(words))
+    def text(words: str, *, keep: bool = False) -> str:
+        return paragraph(literal(words), keep=keep)
 
     force, moment = "{{tk:unit.force}}", "{{tk:unit.moment}}"
     stiff = "{{tk:unit.force_per_angle}}", "{{tk:unit.moment_per_angle}}"
     return [
-        heading("1  Item, customer and method", fresh=True),
+        contents("Contents").replace("</w:pPr>", "<w:pageBreakBefore/></w:pPr>", 1),
+        heading("1  Item, customer and method"),
         p.facts(
             [
                 [("REPLACES?", "report.amends")],
@@ -185,7 +183,8 @@ def chapters(p: Pieces) -> list[str]:
             heading("4  Cornering and aligning stiffness")
             + text(
                 "Both are positive in SAE axes. The secant runs through the ±1 deg steps, as the source standard has it; "
-                "the slope is that of the fitted curve at 0 deg."
+                "the slope is that of the fitted curve at 0 deg.",
+                keep=True,
             )
             + p.figure("cornering_stiffness", 150)
             + p.figure("aligning_stiffness", 150)
@@ -221,7 +220,8 @@ def chapters(p: Pieces) -> list[str]:
             "tk:if.pull",
             text(
                 "From the forward and the reversed run at slip angle zero, read off each direction's own curve at a common "
-                "load. Conicity keeps its sign when the drum is reversed; plysteer changes it."
+                "load. Conicity keeps its sign when the drum is reversed; plysteer changes it.",
+                keep=True,
             )
             + p.figure("conicity", 150)
             + p.figure("plysteer", 150)
@@ -248,6 +248,7 @@ def chapters(p: Pieces) -> list[str]:
                 ],
                 [22, 28, 28, 28, 30, 30],
                 "rrrrrr",
+                together=True,
             )
             + p.table(
                 "pull_thesis",
@@ -269,6 +270,7 @@ def chapters(p: Pieces) -> list[str]:
                 ],
                 [22, 36, 36, 36, 36],
                 "rrrrr",
+                together=True,
             ),
         ),
         p.block(
