@@ -68,6 +68,7 @@ def run_real(
     data: Path, out: Path, *, tool: list[str], budget: float, progress: Callable[[str], None] = lambda _: None
 ) -> list[dict[str, Any]]:
     """Make and run every case whose recording is there; write real.json and return its rows."""
+    out.mkdir(parents=True, exist_ok=True)
     rows = []
     for case in CASES:
         progress(case.name)

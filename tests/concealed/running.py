@@ -4,6 +4,7 @@ sealed."""
 from __future__ import annotations
 
 import json
+import os
 import shutil
 import subprocess
 import time
@@ -13,6 +14,14 @@ from pathlib import Path
 from typing import Any
 
 from tests.concealed.seal import verify
+
+
+def _one_thread() -> dict[str, str]:
+    """Return the environment with one thread for each process: the workers share the cores."""
+    return {
+        **os.environ,
+        **dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1"),
+    }
 
 
 def run_case(case: Path, out: Path, tool: list[str], budget: float) -> dict[str, Any]:
@@ -34,7 +43,9 @@ def run_case(case: Path, out: Path, tool: list[str], budget: float) -> dict[str,
         f"{budget:g}",
     ]
     try:
-        ran = subprocess.run(command, capture_output=True, text=True, timeout=3 * budget + 60, check=False)
+        ran = subprocess.run(
+            command, capture_output=True, text=True, timeout=3 * budget + 60, check=False, env=_one_thread()
+        )
         code, text = ran.returncode, (ran.stderr or ran.stdout)[-2000:]
     except subprocess.TimeoutExpired:
         code, text = 124, "no answer within three budgets"

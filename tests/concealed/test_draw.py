@@ -1,0 +1,124 @@
+"""What a draw promises: its mix, its bytes, its nulls, its sizes, and silence about the answer."""
+
+from __future__ import annotations
+
+import csv
+import re
+import tomllib
+from collections import Counter
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.concealed import controls, draw, files
+from tests.concealed import size as sizing
+from tests.concealed.catalogue import CONFOUNDED, FAMILIES
+from tests.concealed.draw import draw_case, mix
+
+# the contract's table of names
+CATALOGUE = set(
+    """unit_error channel_sign channel_swap wrong_calibration channel_delay filter_lag saturation
+    quantisation dead_band rectification zero_offset zero_drift thermal_drift creep hysteresis
+    nonlinearity crosstalk sensitivity_error steer_offset camber_offset steer_compliance backlash
+    load_lag relaxation thermal_friction pressure_change wear plysteer conicity load_friction
+    speed_friction viscoelastic_settling nonuniformity turn_slip drum_curvature surface_friction
+    drum_runout constant_force coulomb_friction viscous_damping quadratic_drag cubic_stiffness
+    periodic_ripple overflow""".split()
+)
+QUICK = [
+    (3, 0, "null"),
+    (3, 1, "single"),
+    (3, 4, "outside"),
+    (3, 6, "confounded"),
+    (3, 9, "two"),
+    (3, 11, "control"),
+]
+
+
+def test_the_mix_of_a_batch_is_the_contracts() -> None:
+    count = Counter(mix(400, np.random.default_rng(1)))
+    assert count == {"single": 136, "two": 40, "null": 152, "outside": 40, "confounded": 32, "control": 24}
+
+
+def test_a_small_mix_still_adds_up() -> None:
+    for n in (1, 7, 33):
+        assert sum(v for k, v in Counter(mix(n, np.random.default_rng(2))).items() if k != "control") == n
+
+
+def test_names_are_the_contracts_and_what_is_outside_is_not() -> None:
+    for family in FAMILIES.values():
+        assert set(family.inside) <= CATALOGUE
+        assert not set(family.outside) & CATALOGUE
+    for group in CONFOUNDED.values():
+        assert set(group.present) <= group.members <= CATALOGUE
+
+
+@pytest.mark.parametrize(("seed", "index", "bucket"), QUICK)
+def test_a_case_is_drawn_the_same_again_and_tells_nothing(
+    seed: int, index: int, bucket: str, tmp_path: Path
+) -> None:
+    first, again = (draw_case(seed, index, bucket, compare=False) for _ in range(2))
+    for drawn, name in ((first, "a"), (again, "b")):
+        files.write_case(drawn.scenario, drawn.measured, tmp_path / name)
+    assert files.sha256_of_tree(tmp_path / "a") == files.sha256_of_tree(tmp_path / "b")
+    text = (tmp_path / "a" / "CASE.toml").read_text(encoding="utf-8")
+    case = tomllib.loads(text)
+    words = set(re.findall(r"[a-z_]+", text.lower()))
+    assert not words & (CATALOGUE | {"hidden", "effect", "concealed", "truth"})
+    assert "seed" not in text
+    for run in case["recording"]["run"]:
+        with (tmp_path / "a" / run["file"]).open(encoding="utf-8", newline="") as stream:
+            head = next(csv.reader(stream))
+        assert set(case["recording"]["channels"]) <= set(head)
+    outputs = {k for k, v in case["recording"]["channels"].items() if v["role"] == "output"}
+    for run in case["recording"]["predict"]:
+        head = (tmp_path / "a" / run["file"]).read_text(encoding="utf-8").splitlines()[0].split(",")
+        assert not outputs & set(head)
+
+
+@pytest.mark.parametrize("index", range(4))
+def test_a_null_is_a_null(index: int) -> None:
+    drawn = draw_case(17, index, "null")
+    s = drawn.scenario
+    assert drawn.answer["effects"] == []
+    p = s.true_parameters()
+    error = sizing.difference(
+        sizing.truth_of(s, s.runs, p, {}), sizing.nominal_of(s, s.runs, s.true_parameters())
+    )
+    assert sizing.size_of(s, error, sizing.jacobian(s, s.runs)).distance <= draw.LARGEST_MODEL_ERROR
+    for parameter in s.free():
+        assert abs(parameter.true - parameter.declared) <= 2.0 * float(parameter.sd or 0.0)
+
+
+def test_a_size_is_what_is_left_after_the_parameters() -> None:
+    # an error of the gain alone is a parameter's: nothing is left of it but what the prior holds back
+    s = draw_case(17, 0, "null").scenario
+    slopes = sizing.jacobian(s, s.runs)
+    if slopes:
+        found = sizing.size_of(s, slopes[0], slopes)
+        whole = np.linalg.norm(sizing.stacked(s, slopes[0]))
+        assert found.distance < 0.05 * whole
+
+
+def test_sizes_of_single_effects_span_the_range() -> None:
+    sizes = [draw_case(23, i, "single", compare=False).answer for i in (0, 2, 4, 6)]
+    for answer in sizes:
+        one = answer["effects"][0]["name"] in ("unit_error", "channel_sign", "rectification", "channel_swap")
+        assert one or 0.05 < answer["size"] < 13
+
+
+def test_the_surrogate_keeps_the_spectrum_and_loses_the_phase() -> None:
+    x = np.sin(np.linspace(0, 40, 501)) + np.linspace(0, 1, 501) ** 2
+    y = controls.phase_randomised(x, np.random.default_rng(3))
+    power = [np.abs(np.fft.rfft(z))[1:] for z in (x, y)]
+    assert np.allclose(*power, atol=1e-9)
+    assert abs(np.corrcoef(x, y)[0, 1]) < 0.9
+
+
+def test_swapped_labels_hold_as_many_of_either_surface() -> None:
+    s = FAMILIES["tire-columns"].build(np.random.default_rng(5), frozenset({"surface_friction"}))
+    runs = {label: [] for label in ("steel", "sandpaper")}
+    for true, labelled in zip(s.runs, controls.swapped(s).runs, strict=True):
+        runs[labelled.conditions["surface"]].append(true.conditions["surface"] == "sandpaper")
+    assert [np.mean(x) for x in runs.values()] == [0.5, 0.5]

@@ -1,0 +1,139 @@
+"""Draw, run, score and page with a stand-in for the tool; the real layer's own rules."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+
+import pytest
+
+from tests.concealed import real_cases
+from tests.concealed.__main__ import main
+from tests.concealed.real import right, run_real
+from tests.concealed.running import answer_of
+from tests.conftest import SHARED_DATA
+
+ANSWER = """
+import json, pathlib, sys
+out = pathlib.Path(sys.argv[sys.argv.index("--out") + 1])
+out.mkdir(parents=True)
+count = pathlib.Path(__file__).with_name("count")
+count.write_text(str(int(count.read_text() if count.exists() else 0) + 1))
+answer = {"schema": 1, "verdict": "nothing", "effects": [], "mismatch": [], "not_found": []}
+(out / "diagnosis.json").write_text(json.dumps(answer))
+"""
+
+
+@pytest.fixture(scope="module")
+def tool(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A program that answers "nothing" to every case, and counts."""
+    folder = tmp_path_factory.mktemp("tool")
+    (folder / "tool.py").write_text(ANSWER)
+    (folder / "tool").write_text(f'#!/bin/sh\nexec {sys.executable} {folder}/tool.py "$@"\n')
+    (folder / "tool").chmod(0o755)
+    return folder / "tool"
+
+
+@pytest.fixture(scope="module")
+def batch(tool: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A batch of four that was drawn and run."""
+    out = tmp_path_factory.mktemp("batch") / "b"
+    common = ["--out", str(out), "--workers", "1"]
+    assert main(["draw", "--seed", "106", "--cases", "4", *common]) == 0
+    assert main(["run", "--tool", str(tool), *common]) == 0
+    return out
+
+
+def test_a_case_is_run_once(batch: Path, tool: Path) -> None:
+    before = tool.with_name("count").read_text()
+    assert main(["run", "--tool", str(tool), "--out", str(batch), "--workers", "1"]) == 0
+    assert tool.with_name("count").read_text() == before
+    assert answer_of(batch, "case0001") is not None
+
+
+def test_an_answer_that_cannot_be_read_is_none(batch: Path, tmp_path: Path) -> None:
+    assert answer_of(tmp_path, "case0001") is None
+    path = tmp_path / "runs" / "case0001" / "answer"
+    path.mkdir(parents=True)
+    (path / "diagnosis.json").write_text("{")
+    assert answer_of(tmp_path, "case0001") is None
+
+
+def test_the_score_and_its_page(batch: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    given = [
+        "score",
+        "--out",
+        str(batch),
+        "--workers",
+        "1",
+        "--proof",
+        str(tmp_path),
+        "--log",
+        str(tmp_path / "log"),
+    ]
+    assert main([*given, "--changed", "first"]) == 0
+    assert main([*given, "--changed", "again"]) == 0  # the same batch stands in the log once
+    shown = capsys.readouterr().out
+    assert "false names on nulls: 0 of" in shown
+    text = (tmp_path / "PROOF.md").read_text(encoding="utf-8")
+    batch_json = json.loads((batch / "batch.json").read_text())
+    assert batch_json["answers_sha256"] in text
+    html = (tmp_path / "proof.html").read_text(encoding="utf-8")
+    assert "<script" not in html
+    assert "http" not in html
+    assert html.count("<svg") == 2
+    assert len((tmp_path / "log").read_text().splitlines()) == 1
+
+
+def test_a_broken_seal_ends_with_one(batch: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    import shutil
+
+    broken = Path(shutil.copytree(batch, tmp_path / "b"))
+    (broken / "cases" / "case0001" / "CASE.toml").write_text("schema = 1\n")
+    assert main(["verify", "--out", str(broken)]) == 1
+    assert "seal broken" in capsys.readouterr().err
+
+
+def _case(name: str) -> real_cases.RealCase:
+    return next(c for c in real_cases.CASES if c.name == name)
+
+
+@pytest.mark.parametrize(
+    ("case", "verdict", "reported", "good"),
+    [
+        ("pontius", "named", [{"nonlinearity"}], True),
+        ("pontius", "named", [{"hysteresis"}], False),
+        ("pontius", "nothing", [], False),
+        ("figure-4-4", "equivalent", [{"channel_sign", "wrong_calibration"}], True),
+        ("emps-force", "named", [{"coulomb_friction"}], False),
+        ("emps-force", "named", [{"coulomb_friction"}, {"constant_force", "zero_offset"}], True),
+        ("emps-force", "named", [{"coulomb_friction"}, {"constant_force"}, {"creep"}], False),
+        ("emps-loop", "named", [{"coulomb_friction"}, {"constant_force"}], True),
+        ("whiffle-1", "equivalent", [{"quadratic_drag", "viscous_damping"}], True),
+        ("golf", "nothing", [], True),
+        ("golf", "named", [{"quadratic_drag"}], True),
+        ("bowling", "named", [{"quadratic_drag"}], False),
+        ("zarr13", "unknown", [], False),
+    ],
+)
+def test_what_is_right_for_a_recording(case: str, verdict: str, reported: list[set[str]], good: bool) -> None:
+    assert right(_case(case), verdict, tuple(frozenset(r) for r in reported)) is good
+
+
+def test_recordings_that_are_not_there_are_skipped_with_a_reason(tool: Path, tmp_path: Path) -> None:
+    rows = run_real(tmp_path / "nowhere", tmp_path / "real", tool=[str(tool)], budget=5)
+    assert all(row["answered"].startswith("skipped: ") for row in rows)
+
+
+@pytest.mark.skipif(
+    not SHARED_DATA.is_dir(), reason="the folder of public recordings is not beside the project"
+)
+def test_every_recording_becomes_a_case(tool: Path, tmp_path: Path) -> None:
+    rows = run_real(SHARED_DATA, tmp_path / "real", tool=[str(tool)], budget=5)
+    assert [row["case"] for row in rows] == [c.name for c in real_cases.CASES]
+    assert {row["case"]: row["right"] for row in rows}["zarr13"] == "yes"  # the stand-in says nothing
+    assert {row["case"]: row["right"] for row in rows}["dziuba1"] == "no"
+    text = (tmp_path / "real" / "cases" / "dziuba1" / "run01.csv").read_text().splitlines()
+    assert len(text) == 1001
+    assert text[1] == "0,27.868"
