@@ -9,6 +9,7 @@ from toolkit.report.figures import COLOURS
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.axis import Axis
 
     from toolkit.calibration.control.chart import Chart, Series
 
@@ -46,8 +47,8 @@ def draw_chart(chart: Chart, kind: str) -> bytes:
         FigureCanvasAgg(figure)
         height = figure.get_figheight()
         outer = figure.add_gridspec(
-            rows, columns, left=0.62 / figure.get_figwidth(), right=1 - 0.55 / figure.get_figwidth(),
-            top=1 - 1.1 / height, bottom=0.62 / height, hspace=0.42, wspace=0.36,
+            rows, columns, left=0.85 / figure.get_figwidth(), right=1 - 0.55 / figure.get_figwidth(),
+            top=1 - 1.1 / height, bottom=0.62 / height, hspace=0.42, wspace=0.42,
         )  # fmt: skip
         for at, one in enumerate(drawn):
             inner = outer[at // columns, at % columns].subgridspec(2, 1, height_ratios=(2.6, 1), hspace=0.12)
@@ -68,6 +69,11 @@ def draw_chart(chart: Chart, kind: str) -> bytes:
         stream = io.BytesIO()
         figure.savefig(stream, format=kind, metadata={"Date": None} if kind == "svg" else None)
     return stream.getvalue()
+
+
+def whole_ticks(axis: Axis) -> None:
+    """Label an axis with whole numbers: a power of ten apart from them is overlooked, or hits the title."""
+    axis.set_major_formatter(lambda value, _at: f"{value:.6g}".replace("-", "\N{MINUS SIGN}"))
 
 
 def _reach(one: Series) -> float:
@@ -112,6 +118,7 @@ def _individuals(axes: Axes, one: Series) -> None:
         loc="left",
     )
     axes.set_ylabel(f"error [{one.unit}]")
+    whole_ticks(axes.yaxis)
     axes.tick_params(labelbottom=False)
 
 
@@ -122,6 +129,7 @@ def _ranges(axes: Axes, one: Series) -> None:
         axes.axhline(one.limits.upper_range, color=_RED, lw=1, ls=(0, (5, 3)))
     axes.set_ylim(bottom=0)
     axes.set_ylabel("range")
+    whole_ticks(axes.yaxis)
     step = -(-len(one.points) // 6)
     ticks = list(range(len(one.points) - 1, -1, -step))[::-1]
     axes.set_xticks(

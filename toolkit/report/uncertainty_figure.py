@@ -33,6 +33,8 @@ def write_figure(path: Path, budget: Budget, over_range: Sequence[Budget]) -> Pa
         )  # fmt: skip
     from matplotlib.figure import Figure
 
+    from toolkit.report.chart_figures import whole_ticks
+
     drawing = Figure(figsize=(8.0, 3.6), layout="constrained")
     left, right = drawing.subplots(1, 2, width_ratios=(1.15, 1.0))
     parts = sorted((one for one in budget.components if one.stated and one.u > 0), key=lambda one: one.u)
@@ -53,6 +55,9 @@ def write_figure(path: Path, budget: Budget, over_range: Sequence[Budget]) -> Pa
     right.set_ylim(0, 1.15 * max(one.U for one in over_range))
     right.set_xlabel(f"{budget.load} [{budget.unit}]")
     right.set_ylabel(f"U, {100 * budget.probability:.0f} % [{budget.unit}]")
+    for axis in (left.xaxis, right.yaxis):
+        whole_ticks(axis)
+    left.locator_params(axis="x", nbins=5)
     right.grid(visible=True, alpha=0.3)
     right.set_title("expanded uncertainty over the range", fontsize=10)
     buffer = io.BytesIO()
