@@ -345,7 +345,7 @@ def _findings(case: Case, found: Search) -> tuple[Finding, ...]:
                     rule="case-outlier",
                     where=f"{case.path.name}: {name}",
                     level="note",
-                    message=f"{left_out} single values far off all their neighbours were left out of all fits",
+                    message=f"{left_out} single values far off all neighbours were left out of every fit",
                 )
             )
     if len(problem.runs) == 1:

@@ -75,9 +75,10 @@ class AcquisitionModel:
         self,
         run: Run,
         p: Mapping[str, float],
-        active: Sequence[Active],  # noqa: ARG002, the kinds' one signature
+        active: Sequence[Active],
     ) -> dict[str, NDArray[np.float64]]:
         """Return FY and MZ by the record on cells with effects in them, then effects on FY and MZ."""
+        del p  # a record's coefficients are known exactly
         here = setting(self.case, run, nominal_load_N=nominal_load(self.case))
         record = self.record
         for one in active:

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 
 class ColumnsModel:
-    """Simulated columns; a parameter named after an output with ``_gain`` or ``_offset`` scales or shifts it."""
+    """Simulated columns; a parameter ``<output>_gain`` or ``<output>_offset`` scales or shifts one."""
 
     def __init__(self, case: Case) -> None:
         self.case = case

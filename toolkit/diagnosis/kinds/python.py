@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-import dataclasses
-from collections.abc import Callable, Mapping, Sequence
+import contextlib
+import io
+import warnings
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
@@ -74,7 +76,8 @@ class PythonModel:
                 columns[channel.name] = np.array(changed.get(channel.name, run.columns[channel.name]))
         inputs = pd.DataFrame(columns)
         try:
-            made = self._function(inputs, dict(p))
+            with silenced():
+                made = self._function(inputs, dict(p))
         except Exception as error:
             raise _failed(self.case, run, f"{type(error).__name__}: {error}") from error
         if not isinstance(made, pd.DataFrame):
@@ -163,7 +166,8 @@ def load_function(path: Path, name: str) -> Callable[..., Any]:
     import runpy
 
     try:
-        space = runpy.run_path(str(path))
+        with silenced():
+            space = runpy.run_path(str(path))
     except Exception as error:
         raise ConfigError(
             "the simulator cannot be loaded", where=path, got=f"{type(error).__name__}: {error}",
@@ -177,22 +181,15 @@ def load_function(path: Path, name: str) -> Callable[..., Any]:
             got=", ".join(key for key, one in space.items() if callable(one) and not key.startswith("_")),
             expected=f"def {name}(..)", next_step="name the function in the case", rule="simulator",
         )  # fmt: skip
-    return dataclasses.replace(_Called(), function=function)
+    return cast("Callable[..., Any]", function)
 
 
-@dataclasses.dataclass(frozen=True, slots=True)
-class _Called:
-    """A simulator's function, whose printing stays out of our output."""
-
-    function: Callable[..., Any] = print
-
-    def __call__(self, *arguments: Any) -> Any:
-        """Call it with its standard output silenced."""
-        import contextlib
-        import io
-
-        with contextlib.redirect_stdout(io.StringIO()), np.errstate(all="ignore"):
-            return self.function(*arguments)
+@contextlib.contextmanager
+def silenced() -> Iterator[None]:
+    """Keep what a simulator prints and warns out of our own output."""
+    with contextlib.redirect_stdout(io.StringIO()), np.errstate(all="ignore"), warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        yield
 
 
 def _failed(case: Case, run: Run, got: str) -> FitError:
