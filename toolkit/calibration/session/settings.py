@@ -290,7 +290,8 @@ def _degree(raw: Mapping[str, Any], model: str, where: object) -> int:
         return 1 if model == "linear" else 2
     degree = raw.get("degree")
     if isinstance(degree, bool) or not isinstance(degree, int) or not 1 <= degree <= 9:
-        raise wrong(where, "degree", degree, "a whole number from 1 to 9")
+        got = repr(degree) if isinstance(degree, str) else degree
+        raise wrong(where, "degree", got, "a whole number from 1 to 9")
     return degree
 
 
@@ -302,11 +303,14 @@ def _text_of(settings: dict[str, Any], where: object) -> str:
         return canonical(_plain(settings, where))
 
 
-def _plain(value: Any, where: object) -> Any:
+def _plain(value: Any, where: object, key: str = "") -> Any:
     if isinstance(value, dict):
-        return {str(key): _plain(item, where) for key, item in value.items()}
+        return {
+            str(name): _plain(item, where, f"{key}.{name}" if key else str(name))
+            for name, item in value.items()
+        }
     if isinstance(value, list):
-        return [_plain(item, where) for item in value]
+        return [_plain(item, where, f"{key} {at}") for at, item in enumerate(value, start=1)]
     if isinstance(value, float) and not math.isfinite(value):
-        raise wrong(where, "a number", value, "a finite number")
+        raise wrong(where, key, value, "a finite number")
     return value if value is None or isinstance(value, bool | int | float | str) else str(value)
