@@ -206,3 +206,33 @@ def test_every_variant_of_a_record_is_recognised_as_itself(order, turned, seed):
     assert found.grade == ("exact" if plain and own else "sign_variant" if own else "column_swap")
     assert found.record == "m15-r2"
     assert (found.variant is None) == (plain and own)
+
+
+def test_rows_that_a_candidate_meets_by_chance_do_not_part_an_unknown_file():
+    from toolkit.audit.segments import Hit, Run, without_chance
+
+    def hit(group):
+        return (Hit(group=group, signs=(("FY", 0), ("MZ", 0))),)
+
+    chance = (
+        Run(start=0, stop=209, hits=()),
+        Run(start=209, stop=210, hits=hit(7)),
+        Run(start=210, stop=500, hits=()),
+    )
+    assert [(r.start, r.stop, r.hits) for r in without_chance(chance)] == [(0, 500, ())]
+    # The same candidate twice, a long run, or a file that is mostly explained: no chance.
+    twice = (*chance[:2], Run(start=210, stop=300, hits=()), Run(start=300, stop=301, hits=hit(7)),
+             Run(start=301, stop=500, hits=()))  # fmt: skip
+    assert without_chance(twice) == twice
+    long = (
+        Run(start=0, stop=400, hits=()),
+        Run(start=400, stop=404, hits=hit(7)),
+        Run(start=404, stop=500, hits=()),
+    )
+    assert without_chance(long) == long
+    explained = (
+        Run(start=0, stop=6, hits=hit(1)),
+        Run(start=6, stop=7, hits=()),
+        Run(start=7, stop=8, hits=hit(2)),
+    )
+    assert without_chance(explained) == explained

@@ -81,3 +81,17 @@ def test_the_true_value_lies_within_the_bound(values):
     # Only where the finest place really occurs in the decade can it be known: never too large by a decade.
     assert np.all(half <= 0.5)
     assert np.all(half > 0)
+
+
+def test_a_fixed_width_has_one_place_less_beside_a_minus_sign():
+    # Figure 4.4: 98.59261, -182.415, -0.35393 and 371.3554 are all of eight characters.
+    size = np.linspace(1.0, 9.0, 40) + 1e-5 * np.arange(40)
+    values = np.concatenate([np.round(size, 5), -np.round(size + 0.37, 4)])
+    half = half_last_place(values)
+    np.testing.assert_array_equal(half[:40], 5e-6)
+    np.testing.assert_array_equal(half[40:], 5e-5)
+
+
+def test_a_few_coarse_values_of_a_sign_have_the_finest_place_of_their_decade():
+    values = np.array([1.23456, 2.34567, 3.45678, 4.56789, 5.67891, 6.78912, 7.89123, -1.5, -2.5, -3.5])
+    np.testing.assert_array_equal(half_last_place(values), 5e-6)

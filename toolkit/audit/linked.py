@@ -132,7 +132,7 @@ def _by_name(one: PastReport, names: Mapping[str, list[str]]) -> Iterator[str]:
             if not name or not (text == name or f" {name} " in f" {text} "):
                 continue
             # Tests of the same name in different folders: those whose folders are named too, if any are.
-            inside = [test for test in tests if f" {_words(test)} " in f" {text} "]
+            inside = [test for test in tests if set(_words(test).split()) <= set(text.split())]
             yield from inside or tests
 
 

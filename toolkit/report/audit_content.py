@@ -134,15 +134,19 @@ def _tables(view: AuditView) -> dict[str, Table]:
         for rule, count in rules.most_common()
     ]
     reports: list[tuple[Cell, ...]] = [
-        (one.report, ", ".join(sorted(one.linked_by)), ", ".join(sorted(one.tests)),
-         f"{one.not_clean} of {one.files}")
+        (
+            one.report,
+            ", ".join(sorted(one.linked_by)),
+            ", ".join(sorted(one.tests)),
+            f"{one.not_clean} of {one.files}",
+        )
         for one in (view.linked.reports if view.linked is not None else ())
         if one.not_clean
-    ][:_MOST_REPORTS]  # fmt: skip
+    ]
     rows: dict[str, list[tuple[Cell, ...]]] = {
         "audit_grades": grades,
         "audit_tests": _worst_tests(view),
-        "audit_reports": reports,
+        "audit_reports": reports[:_MOST_REPORTS],
         "audit_findings": findings,
     }
     return {

@@ -1,0 +1,39 @@
+"""Small archives for the tests: the generator of the benchmark, and single recordings of given columns."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
+from tests.benchmarks import archive_factory as factory
+
+HEADER = {"FZ": "FZ load", "D52": "D52 (Filtered)", "D51": "D51 (Filtered)", "E5": "E5 (Filtered)",
+          "SA": "SA (Filtered)", "FY": "Fy", "MZ": "Mz"}  # fmt: skip
+FY, MZ = (0.99719, 0.99718, 1.0228, 0.6473), (-0.15688, 0.16197, 0.0026666, 0.68759)
+
+
+def recording(*, angle=0.0, rows=50, seed=1, FY=FY, MZ=MZ, slope=-300.0):
+    """Columns of a recording in lbf, deg, lbf*ft: five loads, a side force that follows the slip angle."""
+    rng = np.random.default_rng(seed)
+    load = np.repeat([250.0, 567.0, 833.0, 1101.0, 1372.0], rows // 5) + rng.normal(0, 0.5, rows)
+    share = np.array([0.3, 0.2, -0.25])
+    x = load[:, None] * share + slope / 3 * angle * np.array([0.4, 0.3, 0.3]) * load[:, None] / 1000
+    x = factory.printed(x + rng.normal(0, 0.02, (rows, 3)))
+    table = {"FZ": load, "D52": x[:, 1], "D51": x[:, 0], "E5": x[:, 2],
+             "SA": angle + rng.normal(0, 0.001, rows), "FY": x @ FY[:3] + FY[3],
+             "MZ": x @ MZ[:3] + MZ[3]}  # fmt: skip
+    return {name: factory.printed(values) for name, values in table.items()}
+
+
+def write(path, table, headers=HEADER):
+    path.parent.mkdir(parents=True, exist_ok=True)
+    names = [headers.get(name, name) for name in table]
+    path.write_bytes(factory.workbook(np.column_stack(list(table.values())), tuple(names)))
+
+
+def dated(folder, date, more=""):
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / "test.toml").write_text(f'schema = 1\nmachine = "m15"\ndate = {date}\n{more}')

@@ -1,0 +1,128 @@
+"""Corrected copies: right by the record in force, named after what they replace, the originals untouched."""
+
+from __future__ import annotations
+
+import datetime as dt
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from archive_made import FY, HEADER, MZ, dated, recording, write
+
+from toolkit.audit.archive import audit_archive
+from toolkit.audit.corrected import INDEX, check_target, write_copies
+from toolkit.calibration.registry.registry import Registry
+from toolkit.errors import OutputError
+from toolkit.files import sha256_file
+from toolkit.machine import load_machine
+from toolkit.recording.read import read_recording
+
+REGISTRY = Registry(Path(__file__).resolve().parents[2] / "calibrations")
+WRONG = (*FY[:2], -FY[2], FY[3])
+
+
+def audit(folder):
+    return audit_archive(folder, REGISTRY, known_at=dt.date(2026, 1, 1))
+
+
+@pytest.fixture
+def archive(tmp_path):
+    root = tmp_path / "archive"
+    dated(root / "test", "2019-06-01")
+    write(root / "test" / "right.xlsx", recording())
+    write(
+        root / "test" / "wrong",
+        recording(seed=2, FY=WRONG) | {"T": np.full(50, 21.5)},
+        HEADER | {"T": "T [degC]"},
+    )
+    newton = recording(seed=3, FY=WRONG)
+    newton["FY"] = newton["FY"] * 4.4482216152605
+    write(root / "test" / "newton.xlsx", newton, HEADER | {"FY": "Fy [N]"})
+    table = recording(seed=4, MZ=(-MZ[0], *MZ[1:]))
+    lines = [",".join(HEADER[name] for name in table)]
+    lines += [",".join(repr(v) for v in row) for row in np.column_stack(list(table.values())).tolist()]
+    (root / "test" / "table.csv").write_text("\n".join(lines))
+    (root / "loose.csv").write_text("\n".join(lines))
+    return root
+
+
+def test_copies_are_exact_and_everything_else_is_as_it_was(archive, tmp_path):
+    before = {path: sha256_file(path) for path in archive.rglob("*") if path.is_file()}
+    made = audit(archive)
+    copies = write_copies(made, REGISTRY, tmp_path / "fixed")
+    assert [one.path for one in copies] == ["test/newton.xlsx", "test/table.csv", "test/wrong"]
+    assert {path: sha256_file(path) for path in archive.rglob("*") if path.is_file()} == before
+    again = audit(tmp_path / "fixed")
+    assert {one.path: one.grade for one in again.files} == {one.path: "exact" for one in copies}
+    machine = load_machine("m15")
+    for one in copies:
+        old, new = (read_recording(root / one.path, machine) for root in (archive, tmp_path / "fixed"))
+        assert {s.symbol for s in new.series} == {s.symbol for s in old.series}
+        for series in old.series:
+            if series.symbol not in ("FY", "MZ"):
+                np.testing.assert_array_equal(new[series.symbol].si, series.si)
+
+
+def test_the_index_names_what_each_copy_replaces_and_by_which_record(archive, tmp_path):
+    write_copies(audit(archive), REGISTRY, tmp_path / "fixed")
+    told = json.loads((tmp_path / "fixed" / INDEX).read_text())
+    one = next(one for one in told["files"] if one["path"] == "test/wrong")
+    assert one["replaces_sha256"] == sha256_file(archive / "test" / "wrong")
+    assert one["sha256"] == sha256_file(tmp_path / "fixed" / "test" / "wrong")
+    assert (one["record"], one["record_sha256"]) == ("m15-r2", REGISTRY.load("m15-r2").sha256)
+
+
+def test_a_second_run_writes_the_same(archive, tmp_path):
+    made = audit(archive)
+    first = write_copies(made, REGISTRY, tmp_path / "fixed")
+    assert write_copies(made, REGISTRY, tmp_path / "fixed") == first
+
+
+@pytest.mark.parametrize("where", ["archive", "archive/inside", "."])
+def test_a_folder_where_originals_are_is_refused(archive, tmp_path, where):
+    with pytest.raises(OutputError) as caught:
+        check_target(archive, tmp_path / where)
+    assert caught.value.rule == "repair-target"
+
+
+def test_a_link_to_the_archive_is_refused(archive, tmp_path):
+    (tmp_path / "link").symlink_to(archive)
+    with pytest.raises(OutputError):
+        check_target(archive, tmp_path / "link")
+
+
+def test_a_folder_with_other_files_and_a_file_are_refused(archive, tmp_path):
+    (tmp_path / "full").mkdir()
+    (tmp_path / "full" / "mine.txt").write_text("mine")
+    for name in ("full", "full/mine.txt"):
+        with pytest.raises(OutputError):
+            check_target(archive, tmp_path / name)
+
+
+def test_a_link_inside_the_folder_does_not_lead_out_of_it(archive, tmp_path):
+    made = audit(archive)
+    write_copies(made, REGISTRY, tmp_path / "fixed")
+    for path in (tmp_path / "fixed" / "test").iterdir():
+        path.unlink()
+    (tmp_path / "fixed" / "test").rmdir()
+    (tmp_path / "fixed" / "test").symlink_to(archive / "test")
+    with pytest.raises(OutputError, match="corrected copies"):
+        write_copies(made, REGISTRY, tmp_path / "fixed")
+
+
+def test_a_file_that_changed_since_the_audit_has_no_copy(archive, tmp_path):
+    made = audit(archive)
+    write(archive / "test" / "wrong", recording(seed=8))
+    copies = {one.path: one for one in write_copies(made, REGISTRY, tmp_path / "fixed")}
+    assert copies["test/wrong"].sha256 is None
+    assert "changed" in copies["test/wrong"].reason
+    assert not (tmp_path / "fixed" / "test" / "wrong").exists()
+
+
+def test_a_header_that_a_spreadsheet_would_run_becomes_text(archive, tmp_path):
+    text = (archive / "test" / "table.csv").read_text().splitlines()
+    lines = [text[0] + ',"=cmd [1]"', *(line + ",1.0" for line in text[1:])]
+    (archive / "test" / "table.csv").write_text("\n".join(lines))
+    write_copies(audit(archive), REGISTRY, tmp_path / "fixed")
+    assert "'=cmd [1]" in (tmp_path / "fixed" / "test" / "table.csv").read_text().splitlines()[0]

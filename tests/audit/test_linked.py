@@ -1,0 +1,121 @@
+"""Reports of past years: by manifest, by hash, by the name of the test; the rest are unknown."""
+
+from __future__ import annotations
+
+import datetime as dt
+import json
+from pathlib import Path
+
+import pytest
+from archive_made import FY, dated, recording, write
+
+from toolkit.audit.archive import audit_archive
+from toolkit.audit.linked import link, read_reports
+from toolkit.calibration.registry.registry import Registry
+from toolkit.errors import ConfigError
+from toolkit.files import sha256_file
+
+CALIBRATIONS = Path(__file__).resolve().parents[2] / "calibrations"
+
+
+@pytest.fixture(scope="module")
+def archive(tmp_path_factory):
+    root = tmp_path_factory.mktemp("archive")
+    for seed, name in enumerate(("2018/tire A", "2019/tire A", "2019/tire A2", "2019/tire B")):
+        dated(root / name, f"{name[:4]}-06-01")
+        write(root / name / "one.xlsx", recording(seed=20 + seed))
+    write(root / "2019/tire B" / "wrong.xlsx", recording(seed=5, FY=(*FY[:2], -FY[2], FY[3])))
+    write(root / "loose.xlsx", recording(seed=7))
+    return root
+
+
+@pytest.fixture(scope="module")
+def made(archive):
+    return audit_archive(archive, Registry(CALIBRATIONS), known_at=dt.date(2026, 1, 1))
+
+
+def by_name(linked):
+    return {one.report: one.as_dict() for one in linked.reports}
+
+
+def test_documents_are_linked_where_their_name_has_the_tests_as_whole_words(made, tmp_path):
+    for name in ("Report tire B.docx", "2018/final_TIRE-A.pdf", "holiday.pdf", "notes tire A2.bin"):
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_bytes(b"x")
+    linked = link(made, read_reports(tmp_path))
+    told = by_name(linked)
+    assert told["Report tire B.docx"]["tests"] == ["2019/tire B"]
+    assert (told["Report tire B.docx"]["files"], told["Report tire B.docx"]["not_clean"]) == (2, 1)
+    assert told["Report tire B.docx"]["to_amend"]
+    # "tire A" is a test of two years: the folder decides; "tire A2" is another word.
+    assert told["2018/final_TIRE-A.pdf"]["tests"] == ["2018/tire A"]
+    assert told["holiday.pdf"]["linked_by"] == []
+    assert "notes tire A2.bin" not in told
+    assert linked.unknown == ("2019/tire A", "2019/tire A2")
+
+
+def test_a_manifest_names_the_recordings_and_hides_its_own_outputs(made, archive, tmp_path):
+    sha = sha256_file(archive / "2019/tire A" / "one.xlsx")
+    folder = tmp_path / "tire B"
+    folder.mkdir()
+    for name in ("report.docx", "report.pdf"):
+        (folder / name).write_bytes(b"x")
+    manifest = {
+        "generator": "toolkit", "schema": 1, "report": "T-17",
+        "inputs": {"files": [{"name": "a", "sha256": sha}]},
+        "calibrations": [{"id": "m15-r1", "sha256": "0" * 64}],
+        "outputs": [{"name": "report.docx", "sha256": "0" * 64}, {"name": "report.pdf", "sha256": "0" * 64}],
+    }  # fmt: skip
+    (folder / "manifest.json").write_text(json.dumps(manifest))
+    (tmp_path / "other.json").write_text("[1, 2")
+    told = by_name(link(made, read_reports(tmp_path)))
+    assert list(told) == ["tire B"]
+    # What it says of its files is believed, not what its folder is called.
+    assert told["tire B"]["tests"] == ["2019/tire A"]
+    assert (told["tire B"]["id"], told["tire B"]["linked_by"]) == ("T-17", ["manifest"])
+    assert told["tire B"]["calibrations"] == ["m15-r1"]
+
+
+def test_a_list_links_by_test_by_path_and_by_hash(made, archive, tmp_path):
+    sha = sha256_file(archive / "loose.xlsx").upper()
+    (tmp_path / "list.csv").write_text(
+        f"report,test,sha256\nR 1,tire B,\nR 2,2018/tire A,\nR 3,,{sha}\nR 4,no such test,\n",
+        encoding="utf-8-sig",
+    )  # fmt: skip
+    told = by_name(link(made, read_reports(tmp_path / "list.csv")))
+    assert told["R 1"]["tests"] == ["2019/tire B"]
+    assert told["R 2"]["tests"] == ["2018/tire A"]
+    assert (told["R 3"]["tests"], told["R 3"]["files"], told["R 3"]["not_clean"]) == ([], 1, 1)  # undated
+    assert told["R 4"]["linked_by"] == []
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("report,tset\nR,a\n", "test"),
+        ("report\nR\n", "the columns report and test"),
+        ("", "the columns report"),
+        ("report,test\nR,\n", "row 2"),
+        ("report,sha256\nR,abc\n", "64 hexadecimal"),
+        ('report,test\nR,"open\n', "separated by commas"),
+    ],
+)
+def test_a_list_that_cannot_be_used_is_refused(tmp_path, text, said):
+    (tmp_path / "list.csv").write_text(text)
+    with pytest.raises(ConfigError) as caught:
+        read_reports(tmp_path / "list.csv")
+    assert said in str(caught.value)
+
+
+def test_links_are_not_followed(made, tmp_path):
+    (tmp_path / "real").mkdir()
+    (tmp_path / "real" / "tire B.pdf").write_bytes(b"x")
+    (tmp_path / "folder").mkdir()
+    (tmp_path / "folder" / "tire B.pdf").symlink_to(tmp_path / "real" / "tire B.pdf")
+    (tmp_path / "folder" / "sub").symlink_to(tmp_path / "real")
+    assert read_reports(tmp_path / "folder") == ()
+
+
+def test_there_is_no_such_list(tmp_path):
+    with pytest.raises(ConfigError):
+        read_reports(tmp_path / "none.csv")

@@ -1,0 +1,111 @@
+"""The tests between the last good as-found and the failing one, with the interpolated effect."""
+
+from __future__ import annotations
+
+import datetime as dt
+
+import numpy as np
+import pytest
+from archive_made import FY, MZ, dated, recording, write
+
+from toolkit.audit.archive import audit_archive
+from toolkit.audit.since_good import drift_since, drifted_files
+from toolkit.calibration.control.calibrate import calibrate
+from toolkit.calibration.registry.approval import approve
+from toolkit.calibration.registry.registry import Registry
+from toolkit.errors import ConfigError
+
+LBF = 4.4482216152605
+GROWTH = 0.01  # of FY: what the failing session finds
+
+
+def session(folder, day, *, growth=0.0, phase=None):
+    """A session of the machine's three cells whose FY follows the published equation times 1 + growth."""
+    folder.mkdir()
+    rng = np.random.default_rng(day.toordinal())
+
+    def rows(n, runs):
+        x = rng.uniform(-500, 500, (n, 3)).round(3)
+        y = np.column_stack([(x @ FY[:3] + FY[3]) * (1 + growth), x @ MZ[:3] + MZ[3]])
+        y += 1e-4 * (-1.0) ** np.arange(n)[:, None]
+        lines = []
+        for i, values in enumerate(np.column_stack([x, y]).tolist()):
+            tail = [str(i // 10 + 1), "up"] if runs else []
+            lines.append(",".join([*map(repr, values), *tail]))
+        return lines
+
+    head = "D51 [lbf],D52 [lbf],E5 [lbf],FY [lbf],MZ [lbf*ft]"
+    (folder / "loads.csv").write_text("\n".join([head + ",run,direction", *rows(30, True)]) + "\n")
+    (folder / "check.csv").write_text("\n".join([head, *rows(9, False)]) + "\n")
+    (folder / "SESSION.toml").write_text(
+        f'schema = 1\ninstrument = "m15"\ndate = {day}\noperator = "A"\nzero = "included"\n'
+        'indications = ["D51", "D52", "E5"]\nloads = ["FY", "MZ"]\ndata = "loads.csv"\n'
+        + (f'phase = "{phase}"\n' if phase else "")
+        + '[check]\nfile = "check.csv"\n'
+    )
+    return folder / "SESSION.toml"
+
+
+@pytest.fixture(scope="module")
+def home(tmp_path_factory):
+    root = tmp_path_factory.mktemp("drift")
+    registry = Registry(root / "calibrations")
+    first = calibrate(session(root / "s1", dt.date(2018, 1, 1)), registry).record
+    day = dt.date(2018, 1, 1)
+    assert approve(registry, first.id, in_force_from=day, checked_by="B", known_on=day).done
+    calibrate(session(root / "s2", dt.date(2019, 1, 1), phase="as_found"), registry)
+    calibrate(session(root / "s3", dt.date(2021, 1, 1), phase="as_found", growth=GROWTH), registry)
+    for number, date in enumerate(("2018-06-01", "2019-01-01", "2020-01-01", "2021-01-01", "2021-02-01")):
+        dated(root / "archive" / date, date)
+        write(root / "archive" / date / "run", recording(seed=number))
+    return root, registry
+
+
+def test_the_stretch_is_that_between_the_two_sessions(home):
+    drift = drift_since(home[1], "m15-r2")
+    assert (drift.good_date, drift.failed.session_record) == (dt.date(2019, 1, 1), "m15-r3")
+    told = drift.as_dict()
+    assert (told["failed_date"], told["record_in_use"], told["later_good"]) == ("2021-01-01", "m15-r1", [])
+    assert {one["load"] for one in told["loads"]} == {"FY", "MZ"}
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_each_test_has_the_share_of_its_days(home, workers):
+    root, registry = home
+    made = audit_archive(root / "archive", registry, known_at=dt.date(2022, 1, 1))
+    drift = drift_since(registry, "m15-r2")
+    files = {one.path: one for one in drifted_files(made, registry, drift, workers=workers)}
+    # The day of the good session is still good, the day of the failing one has all of it.
+    assert sorted(files) == ["2020-01-01/run", "2021-01-01/run"]
+    days = (dt.date(2021, 1, 1) - dt.date(2019, 1, 1)).days
+    share = (dt.date(2020, 1, 1) - dt.date(2019, 1, 1)).days / days
+    one = files["2020-01-01/run"]
+    assert one.share == share == pytest.approx(0.5, abs=0.01)
+    FY_N = recording(seed=2)["FY"] * LBF
+    # Both records are fits of data with 1e-4 lbf of scatter.
+    assert one.FY_N == pytest.approx(share * GROWTH * np.abs(FY_N).max(), rel=1e-4)
+    assert one.MZ_Nm == pytest.approx(0.0, abs=1e-3)
+    means = FY_N.reshape(5, 10).mean(axis=1)
+    np.testing.assert_allclose([c[2] for c in one.conditions], share * GROWTH * means, rtol=1e-3)
+    assert files["2021-01-01/run"].share == 1.0
+
+
+def test_the_first_record_may_be_named_too(home):
+    drift = drift_since(home[1], "m15-r1")
+    assert drift.good_date == dt.date(2018, 1, 1)
+    assert drift.later_good == ("m15-r2",)
+
+
+@pytest.mark.parametrize(
+    ("record", "said"), [("m15-r3", "out of tolerance itself"), ("m15-r2", "none of them")]
+)
+def test_without_such_a_stretch_it_is_refused(home, tmp_path, record, said):
+    root, registry = home
+    if record == "m15-r2":  # a registry that ends with the good one
+        registry = Registry(tmp_path / "calibrations")
+        calibrate(root / "s1" / "SESSION.toml", registry)
+        record = "m15-r1"
+    with pytest.raises(ConfigError) as caught:
+        drift_since(registry, record)
+    assert caught.value.rule == "since-good"
+    assert said in str(caught.value)

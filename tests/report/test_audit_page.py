@@ -1,0 +1,163 @@
+"""The audit's page: one file that needs no network, and says what the audit found; and its summary."""
+
+from __future__ import annotations
+
+import datetime as dt
+import json
+import re
+import sys
+from html.parser import HTMLParser
+from pathlib import Path
+from xml.etree import ElementTree as ET
+
+import numpy as np
+import pytest
+
+from toolkit.audit.archive import audit_archive
+from toolkit.audit.linked import PastReport, link
+from toolkit.audit.timeline import timelines
+from toolkit.audit.traces import traces, worst_files
+from toolkit.calibration.registry.registry import Registry
+from toolkit.cli.explain import rules_catalogue
+from toolkit.recording.marks import own_output
+from toolkit.report.audit_content import build_audit_content
+from toolkit.report.audit_page import AuditView, page, write_page
+from toolkit.report.audit_svg import COLOURS, rows_of
+from toolkit.report.audit_template import build_audit
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "audit"))
+from archive_made import factory
+
+CHECKOUT = Path(__file__).resolve().parents[2]
+
+
+class Reader(HTMLParser):
+    def __init__(self):
+        super().__init__()
+        self.links, self.open, self.text = [], [], []
+
+    def handle_starttag(self, tag, attrs):
+        self.links += [(tag, key, value) for key, value in attrs if key in ("src", "href", "action", "data")]
+
+    def handle_data(self, data):
+        self.text.append(data)
+
+
+@pytest.fixture(scope="module")
+def view(tmp_path_factory):
+    root = tmp_path_factory.mktemp("page")
+    made = factory.make_archive(root, files=60, rows=60, seed=5)
+    evil = made.folder / "1991" / "<script>alert(1) & co"
+    evil.write_bytes(b"nothing")
+    registry = Registry(made.calibrations)
+    audited = audit_archive(made.folder, registry, known_at=factory.KNOWN_AT)
+    first = next(one for one in audited.tests if one["not_clean"])["test"]
+    reports = (
+        PastReport(report="R <1>", words=factory_words(first)),
+        PastReport(report="other", words="none"),
+    )
+    return AuditView(
+        made=audited,
+        rules=rules_catalogue(),
+        timelines=timelines(audited, registry),
+        traces=tuple(traces(audited, registry, 3)),
+        linked=link(audited, reports),
+    )
+
+
+def factory_words(test):
+    return " ".join(re.findall(r"[a-z0-9]+", test.lower()))
+
+
+@pytest.fixture(scope="module")
+def text(view):
+    return "".join(page(view))
+
+
+def test_it_takes_nothing_from_outside(text):
+    reader = Reader()
+    reader.feed(text)
+    assert reader.links == []
+    assert "default-src 'none'" in text
+    assert not re.search(r"url\(|@import|https?://(?!www\.w3\.org/2000/svg)", text)
+
+
+def test_the_table_holds_every_file_and_a_hostile_name_stays_text(view, text):
+    data = json.loads(
+        re.search(r'<script type="application/json" id="data">(.*?)</script>', text, re.S).group(1)
+    )
+    assert [row[0] for row in data["rows"]] == [one["path"] for one in view.made.files.plain()]
+    assert any("<script>alert(1)" in row[0] for row in data["rows"])
+    assert text.count("<script") == 2  # the data and the page's own
+    assert set(data["colours"]) == set(view.made.grades)
+    assert "&lt;script&gt;alert(1)" in text  # among the findings
+
+
+def test_every_rule_is_explained_in_a_sentence(view, text):
+    for rule in {one.rule for one in view.made.findings}:
+        assert f"<code>{rule}</code>" in text
+        assert view.rules[rule]["means"].replace("'", "&#x27;") in text
+
+
+def test_pictures_are_well_formed_and_drawn_for_the_worst(view, text):
+    pictures = re.findall(r"<svg.*?</svg>", text, re.S)
+    assert len(pictures) == len(view.timelines) + 2 * len(view.traces)
+    for one in pictures:
+        ET.fromstring(one)  # noqa: S314  our own
+    worst = worst_files(view.made, 3)
+    repairs = [one["repair"]["FY_max_abs_N"] for one in view.made.files.plain()
+               if one["repair"] and one["grade"] not in ("exact", "rounding")]  # fmt: skip
+    assert [one["repair"]["FY_max_abs_N"] for one in worst] == sorted(repairs, reverse=True)[:3]
+
+
+def test_the_timeline_counts_every_dated_file(view):
+    (one,) = view.timelines
+    dated = [f for f in view.made.files.plain() if f["date"] is not None and f["instrument"] is not None]
+    assert sum(one.counts.values()) == len(dated)
+    stretches = {s.record: s for s in one.stretches}
+    assert stretches["m15-r1"].void
+    assert (stretches["m15-r3"].begin, stretches["m15-r3"].end) == (dt.date(1993, 1, 1), dt.date(1996, 1, 1))
+    assert stretches["m15-r13"].end is None
+
+
+def test_the_page_is_known_as_the_toolkits_own(view, tmp_path):
+    write_page(tmp_path / "audit.html", view)
+    assert own_output((tmp_path / "audit.html").read_bytes())
+
+
+def test_reports_stand_with_what_links_them(text, view):
+    assert "R &lt;1&gt;" in text
+    assert f"report unknown: {len(view.linked.unknown)} tests" in text
+
+
+def test_a_line_that_never_changes_is_drawn_in_a_range():
+    ET.fromstring(rows_of("FY", "N", np.zeros(10), np.zeros(10)))  # noqa: S314
+    assert set(COLOURS) == {
+        "exact", "rounding", "undated", "stale", "sign_variant", "column_swap", "ambiguous", "unknown",
+        "unreadable",
+    }  # fmt: skip
+
+
+class TestSummary:
+    def test_the_packaged_template_is_what_the_code_builds(self):
+        assert (CHECKOUT / "report_templates" / "audit.docx").read_bytes() == build_audit()
+
+    def test_its_numbers_are_those_of_the_audit(self, view):
+        content = build_audit_content(view)
+        grades = view.made.grades
+        assert content.values["audit.right"].value == grades["exact"] + grades["rounding"]
+        right, unreadable = content.values["audit.right"].value, grades["unreadable"]
+        assert content.values["audit.not_right"].value == len(view.made.files) - right - unreadable
+        table = {row[0]: row[1] for row in content.tables["audit_grades"].rows}
+        assert table == {grade: str(count) for grade, count in grades.items() if count}
+        assert [row[0] for row in content.tables["audit_reports"].rows] == ["R <1>"]
+        assert content.conditions["reports_to_amend"]
+
+    def test_it_is_filled_converted_and_verified(self, view, tmp_path):
+        from toolkit.report.deliver import deliver
+        from toolkit.report.package import read_template
+
+        template = read_template(CHECKOUT / "report_templates" / "audit.docx")
+        done = deliver(template, build_audit_content(view), tmp_path, name="audit")
+        assert done.pdf.read_bytes().startswith(b"%PDF")
+        assert not [one for one in done.checks if not one.ok and not one.warning]
