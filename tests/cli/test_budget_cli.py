@@ -118,3 +118,4 @@ def test_what_cannot_be_answered_is_refused(
 def test_a_legacy_record_has_no_budget(run: Any) -> None:
     code, found = run(record="m15-r1")
     assert (code, found["error"]["rule"]) == (2, "budget")
+    assert "calibrate" in found["error"]["next_step"]

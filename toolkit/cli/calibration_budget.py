@@ -63,8 +63,13 @@ def command(
     record = registry.load(record_id)
     rows, check = stored_loads(registry.folder, record), stored_check(registry.folder, record)
     if rows is None:
-        raise _wrong("the record has no data to make a budget of", record_id, "a legacy import",
-                     "a record that was fitted from reference loads")  # fmt: skip
+        raise _wrong(
+            "the record has no data to make a budget of",
+            record_id,
+            "a legacy import",
+            "a record that was fitted from reference loads",
+            "calibrate the instrument from a session",
+        )
     if at is not None and (indications is not None or (load is None and len(record.loads) > 1)):
         raise _wrong("--at needs one load, and no --indications", "--at", at, "--load NAME --at VALUE")
     temperature = _temperature(temperature_range, temperature_coefficient)
@@ -273,8 +278,11 @@ def _temperature(span: float | None, coefficient: float | None) -> Temperature |
     return Temperature(half_range_K=span, coefficient_per_K=coefficient)
 
 
-def _wrong(what: str, where: str, got: object, expected: str) -> ToolkitError:
-    return ConfigError(
-        what, where=where, got=got, expected=expected, next_step="see 'toolkit calibration budget --help'",
-        rule="budget",
-    )  # fmt: skip
+def _wrong(
+    what: str,
+    where: str,
+    got: object,
+    expected: str,
+    next_step: str = "see 'toolkit calibration budget --help'",
+) -> ToolkitError:
+    return ConfigError(what, where=where, got=got, expected=expected, next_step=next_step, rule="budget")

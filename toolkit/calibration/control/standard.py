@@ -37,7 +37,11 @@ def evaluate_record(
     table = stored_loads(registry.folder, record)
     if table is None:
         raise _refused(
-            record_id, "the record has no reference-load data", "a legacy import", "a fitted record"
+            record_id,
+            "the record has no reference-load data",
+            "a legacy import",
+            "a fitted record",
+            "calibrate the instrument from a session",
         )
     loads = tuple(one.load for one in record.loads)
     if (load is None and len(loads) > 1) or (indication is None and len(record.indications) > 1):
@@ -65,8 +69,11 @@ def evaluate_record(
     )
 
 
-def _refused(where: str, what: str, got: object, expected: object) -> SessionError:
-    return SessionError(
-        what, where=where, got=got, expected=expected,
-        next_step="name one of each with --load and --indication", rule="standard",
-    )  # fmt: skip
+def _refused(
+    where: str,
+    what: str,
+    got: object,
+    expected: object,
+    next_step: str = "name one of each with --load and --indication",
+) -> SessionError:
+    return SessionError(what, where=where, got=got, expected=expected, next_step=next_step, rule="standard")
