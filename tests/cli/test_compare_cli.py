@@ -178,6 +178,27 @@ def test_people_read_it_in_their_units(
     assert first(si) / first(lbf) == pytest.approx(4.448, rel=0.02)
 
 
+@pytest.mark.skipif(
+    not (shutil.which("soffice") and shutil.which("pdftotext")), reason="LibreOffice and poppler make the PDF"
+)
+def test_the_document_is_verified_and_two_runs_agree(
+    virtual_test: Path, other_test: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    made = []
+    for name in ("one", "two"):
+        _, answer = toolkit(
+            capsys, "compare", virtual_test, other_test, "--out", tmp_path / name, "--known-at", "2026-04-01"
+        )
+        made.append(answer["document"])
+        assert sorted(path.name for path in (tmp_path / name).iterdir()) == [
+            "comparison.docx", "comparison.pdf",
+        ]  # fmt: skip
+    assert made[0]["verified"]
+    assert made[0]["warnings"] == []
+    assert len(made[0]["figures"]) == 7
+    assert made[0]["content_sha256"] == made[1]["content_sha256"]
+
+
 @pytest.mark.parametrize(
     ("words", "rule"),
     [
@@ -190,6 +211,8 @@ def test_people_read_it_in_their_units(
         (("{test}", "{maker}", "--mode", "table?"), "unknown-mode"),
         (("{test}", "{maker}", "--mode", "repeats"), "mode"),
         (("{test}", "{maker}", "--units", "kgf"), "unknown-units"),
+        (("{test}", "{maker}", "--template", "{none}.docx"), "template-without-out"),
+        (("{test}", "{maker}", "--out", "{none}", "--template", "{none}.docx"), "no-template"),
         (("{test}", "{maker}", "--protocol", "{none}.toml"), "no-file"),
     ],
 )

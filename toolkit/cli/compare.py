@@ -25,8 +25,13 @@ from toolkit.cli.console import (
 from toolkit.cli.console import reader as choose_reader
 
 if TYPE_CHECKING:
-    from toolkit.comparison.model import Entry, Mode
+    from datetime import date
+
+    from toolkit.comparison.model import Comparison, Entry, Mode
     from toolkit.findings import Finding
+    from toolkit.report.deliver import Delivered
+    from toolkit.report.package import Template
+    from toolkit.report.style import Style
 
 NAME = "compare"
 
@@ -60,6 +65,13 @@ def command(
         Path | None,
         typer.Option("--figures", help="Folder for the figures (PNG), as the thesis's 6.6 to 6.29."),
     ] = None,
+    out: Annotated[
+        Path | None, typer.Option("--out", help="Folder for comparison.docx and its verified comparison.pdf.")
+    ] = None,
+    template: Annotated[
+        Path | None,
+        typer.Option("--template", help="Word template of --out; default: report_templates/comparison.docx."),
+    ] = None,
     protocol: ProtocolFile = None,
     known_at: KnownAt = None,
     reader: Reader = "calamine",
@@ -84,6 +96,7 @@ def command(
     chosen = choose_reader(reader)
     style = unit_choice(units)
     started = time.perf_counter()
+    opened = _template(template, out, home)
     with progress(None, "reading", show=not (json or quiet)) as step:
         entries, findings = read_entries(
             sources, axes=axes, protocol=protocol, known_at=day(known_at), calibrations=calibrations,
@@ -92,13 +105,63 @@ def command(
     found = compare(entries, mode=cast("Mode | None", mode), level=level, reproducibility=reproducibility)
     drawn = _draw(found, style, figures) if figures else {}
     every = [*findings, *found.findings]
+    made = None if opened is None or out is None else _document(found, opened, out, every, day(known_at))
     payload: dict[str, Any] = comparison_payload(found) | {
         "figures": drawn,
+        "document": None if made is None else _document_payload(made),
         "findings": [finding.as_dict() for finding in every],
         "timing": {"seconds": time.perf_counter() - started},
     }
-    answer(payload, comparison_text(found, style, every, drawn), as_json=json, quiet=quiet)
-    return exit_code(every)
+    text = comparison_text(found, style, every, drawn)
+    if made is not None:
+        text += f"\n\n{made.pdf}\n{made.docx}\n{made.pages} pages, verified"
+        text += "".join(f"\n  warning {one}" for one in made.warnings)
+    answer(payload, text, as_json=json, quiet=quiet)
+    return 1 if made is not None and made.warnings else exit_code(every)
+
+
+def _template(template: Path | None, out: Path | None, home: Path | None) -> Template | None:
+    """Return the template of a comparison's document, judged before anything is read; None without one."""
+    from toolkit.cli.delivery import home_template
+    from toolkit.errors import ConfigError
+    from toolkit.report.package import read_template
+
+    if out is None:
+        if template is not None:
+            raise ConfigError(
+                "a template needs a folder for what it makes", where="--template", got=template,
+                expected="--out DIR beside it", next_step="add --out DIR", rule="template-without-out",
+            )  # fmt: skip
+        return None
+    return read_template(template or home_template("comparison.docx", home))
+
+
+def _document(
+    found: Comparison, opened: Template, out: Path, findings: Sequence[Finding], known_at: date | None
+) -> Delivered:
+    from datetime import date
+
+    from toolkit.report.comparison_content import build_comparison_content
+    from toolkit.report.deliver import deliver
+    from toolkit.report.style import read_style, style_file
+
+    style = read_style(style_file(opened.path))
+    content = build_comparison_content(found, style, findings, issued=known_at or date.today())  # noqa: DTZ011
+    return deliver(opened, content, out, name="comparison")
+
+
+def _document_payload(made: Delivered) -> dict[str, Any]:
+    return {
+        "docx": made.docx,
+        "pdf": made.pdf,
+        "pages": made.pages,
+        "verified": True,
+        "checks": [check.as_dict() for check in made.checks],
+        "template_sha256": made.template_sha256,
+        "content_sha256": made.content_sha256,
+        "figures": [{"tag": tag, "alt": alt} for tag, alt in made.filled.figures],
+        "warnings": list(made.warnings),
+    }
 
 
 def read_entries(sources: Sequence[Path], *, axes: str, **options: Any) -> tuple[list[Entry], list[Finding]]:
@@ -160,7 +223,7 @@ def _table(path: Path, *, axes: str, angles: Sequence[float]) -> tuple[Entry, li
     )
 
 
-def _draw(found: Any, style: Any, folder: Path) -> dict[str, Path]:
+def _draw(found: Comparison, style: Style, folder: Path) -> dict[str, Path]:
     from toolkit.files import write_atomic
     from toolkit.report.comparison_plots import comparison_plots
     from toolkit.report.figures import draw

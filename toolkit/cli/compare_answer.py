@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -10,14 +9,10 @@ from typing import TYPE_CHECKING, Any
 from toolkit.cli.console import finding_lines, table
 
 if TYPE_CHECKING:
-    from toolkit.comparison.model import Comparison, Difference, Entry, FactorSpread, Precision, Spread
+    from toolkit.comparison.model import Comparison, Difference, Entry, FactorSpread, Spread
     from toolkit.estimate import Estimate
     from toolkit.findings import Finding
     from toolkit.report.style import Style
-
-
-# A table of more rows is for programs; people are shown what is significant.
-_ROWS = 90
 
 
 def unit_choice(units: str) -> Style:
@@ -157,22 +152,17 @@ def comparison_text(
     found: Comparison, style: Style, findings: Sequence[Finding], drawn: Mapping[str, Path]
 ) -> str:
     """Return a comparison for people."""
+    from toolkit.comparison.model import PARTS
+    from toolkit.report.comparison_cells import conclusion, shown_rows
+
     simulated = "  SIMULATED" if any(one.simulated for one in found.entries) else ""
-    parts = [f"comparison of {found.mode}, reference {found.reference.label}{simulated}", _conditions(found)]
-    for part, title in (("characteristics", "characteristics"), ("curves", "FY and MZ at slip angles")):
-        mine = [one for one in found.differences if one.part == part]
-        if not mine:
-            continue
-        certain = [one for one in mine if one.significant]
-        decided = sum(one.p is not None for one in mine)
-        parts.append(
-            f"{title}: {len(certain)} of {decided} differences are significant (Holm, {found.level:g} over "
-            "the table; * marks them)"
-        )
-        whole = part == "characteristics" and len(mine) <= _ROWS
-        parts.append(_table(mine if whole else certain, style))
-        if not whole and len(certain) < len(mine):
-            parts.append(f"the other {len(mine) - len(certain)} rows: --json")
+    parts = [f"comparison of {found.mode}, reference {found.reference.label}{simulated}"]
+    parts += [_conditions(found), conclusion(found)]
+    for part in PARTS:
+        rows, which = shown_rows(found, part)
+        if any(one.part == part for one in found.differences):
+            parts.append(f"{part}: {which}; * marks what is significant")
+            parts.append(_table(rows, style))
     if found.repeats is not None:
         parts += [_factors(found), _precision(found, style), found.repeats.reproducibility_note]
     if found.pattern:
@@ -185,26 +175,6 @@ def comparison_text(
         lines = finding_lines(findings)
         parts.append("\n".join([f"findings: {len(findings)} (toolkit explain RULE tells more)", *lines]))
     return "\n\n".join(one for one in parts if one)
-
-
-def _scale(name: str, style: Style) -> tuple[str, float]:
-    from toolkit.comparison.quantities import QUANTITIES
-
-    quantity = QUANTITIES[name]
-    unit, factor = style.unit(quantity.unit)
-    return str(unit).replace("*", "·"), factor * quantity.factor
-
-
-def _digits(value: float) -> int:
-    return 1 if value >= 100 else 2 if value >= 1 else 3
-
-
-def _pm(one: Estimate, factor: float) -> str:
-    U = one.expanded()[0] * factor
-    if not math.isfinite(U):
-        return f"{one.value * factor:.4g} ± -"
-    digits = _digits(max(U * 10, abs(one.value * factor) / 100))
-    return f"{one.value * factor:.{digits}f} ± {U:.{digits}f}"
 
 
 def _conditions(found: Comparison) -> str:
@@ -224,37 +194,27 @@ def _conditions(found: Comparison) -> str:
 
 
 def _table(rows: Sequence[Difference], style: Style) -> str:
+    from toolkit.report.comparison_cells import named, p_text, shown_unit, with_U
+
     load_unit, load_factor = style.unit("N")
     shown = []
     for one in rows:
-        unit, factor = _scale(one.name, style)
-        angle = "" if one.SA_rad is None else f" at {math.degrees(one.SA_rad):+.0f} deg"
-        way = "" if one.rotation == "both" else f", {one.rotation}"
+        unit, factor = shown_unit(one.name, style)
         shown.append(
             [
-                f"{one.name}{angle}{way}",
+                named(one.name, one.rotation, one.SA_rad),
                 f"{one.load_N * load_factor:.0f}",
                 unit,
-                _pm(one.reference, factor),
+                with_U(one.reference, factor, style),
                 one.label,
-                _pm(one.other, factor),
-                _pm(one.difference, factor),
-                "-" if one.p_holm is None else "< 0.0001" if one.p_holm < 1e-4 else f"{one.p_holm:.4f}",
+                with_U(one.other, factor, style),
+                with_U(one.difference, factor, style),
+                p_text(one.p_holm, style),
                 "*" if one.significant else "",
             ]
         )
-    head = [
-        "quantity",
-        f"FZ [{load_unit}]",
-        "unit",
-        "reference",
-        "other",
-        "value",
-        "difference",
-        "p (Holm)",
-        "",
-    ]
-    return table(head, shown, align="<><><>>><")
+    head = ["quantity", f"FZ [{load_unit}]", "unit", "reference", "other", "value", "difference", "p (Holm)"]
+    return table([*head, ""], shown, align="<><><>>><")
 
 
 def _factors(found: Comparison) -> str:
@@ -269,14 +229,15 @@ def _factors(found: Comparison) -> str:
 def _precision(found: Comparison, style: Style) -> str:
     assert found.repeats is not None  # noqa: S101  asked before
     load_unit, load_factor = style.unit("N")
+    from toolkit.report.comparison_cells import factor_text, named, shown_unit
+
     names = [one.name for one in found.repeats.factors if one.varied]
     rows = []
     for one in found.repeats.precisions:
-        unit, factor = _scale(one.name, style)
-        way = "" if one.rotation == "both" else f", {one.rotation}"
+        unit, factor = shown_unit(one.name, style)
         rows.append(
             [
-                f"{one.name}{way}",
+                named(one.name, one.rotation),
                 f"{one.load_N * load_factor:.0f}",
                 unit,
                 str(one.n),
@@ -284,26 +245,26 @@ def _precision(found: Comparison, style: Style) -> str:
                 f"{one.total.value * factor:.3g}",
                 "-" if one.repeatability is None else f"{one.repeatability.value * factor:.3g}",
                 "-" if one.limit_r is None else f"{one.limit_r * factor:.3g}",
-                *(_factor_cell(one, name, factor) for name in names),
+                *(
+                    factor_text(next(f for f in one.factors if f.factor == name), factor, style)
+                    for name in names
+                ),
             ]
         )
     head = ["quantity", f"FZ [{load_unit}]", "unit", "n", "mean", "s", "s_r", "limit r"]
     return table([*head, *(f"s_I({name})" for name in names)], rows, align="<><>" + ">" * (4 + len(names)))
 
 
-def _factor_cell(row: Precision, name: str, factor: float) -> str:
-    one = next(f for f in row.factors if f.factor == name)
-    return f"{one.s * factor:.3g}" + (" *" if one.significant else "")
-
-
 def _pattern(found: Comparison, style: Style) -> str:
+    from toolkit.report.comparison_cells import shown_unit, with_U
+
     load_unit, load_factor = style.unit("N")
     rows = []
     for one in found.pattern:
-        unit, factor = _scale(one.name, style)
+        unit, factor = shown_unit(one.name, style)
         rows.append(
             [one.name, f"{one.load_N * load_factor:.0f}", unit]
-            + [_pm(e, factor) for e in (one.regular, one.reversed, one.pattern, one.body)]
+            + [with_U(e, factor, style) for e in (one.regular, one.reversed, one.pattern, one.body)]
         )
     head = ["pattern effect", f"FZ [{load_unit}]", "unit", "regular belt", "reversed belt", "pattern", "body"]
     return table(head, rows, align="<><>>>>")

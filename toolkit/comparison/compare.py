@@ -71,6 +71,7 @@ def test_entry(
             ("laboratory", info.laboratory),
             ("special", info.special),
         ),
+        calibration=(record.id, record.sha256),
         simulated=info.simulated,
         unverified=reduced.calibration.unverified,
     )

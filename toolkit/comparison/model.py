@@ -32,7 +32,8 @@ class Entry:
     """One thing that is compared: a test, a maker's table, or a maker's table of characteristics.
 
     ``label`` is its name in tables and legends, different for each; ``identity`` tells two copies of the
-    same data. ``conditions`` are (what, value) as the entry states them, None where it is silent.
+    same data; ``calibration`` is (id, SHA-256) of the record that computed a test. ``conditions`` are
+    (what, value) as the entry states them, None where it is silent.
     """
 
     label: str
@@ -41,6 +42,7 @@ class Entry:
     source: str
     rows: tuple[Row, ...]
     conditions: tuple[tuple[str, str | None], ...] = ()
+    calibration: tuple[str, str] | None = None
     simulated: bool = False
     unverified: bool = False
 
@@ -105,8 +107,8 @@ class FactorSpread:
 class Precision:
     """How well tests of one tire agree in one quantity at one load.
 
-    ``repeatability`` pools tests whose stated factors were all the same, None where no two are; ``limit_r`` is
-    the repeatability limit, 1.96 sqrt(2) of it (ISO 5725-6). ``total`` is over all tests.
+    ``repeatability`` pools tests whose stated factors were all the same, None where no two are;
+    ``limit_r`` is the repeatability limit, 1.96 sqrt(2) of it (ISO 5725-6). ``total`` is over all tests.
     """
 
     name: str

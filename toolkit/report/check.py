@@ -12,6 +12,7 @@ from collections.abc import Iterator, Mapping
 from toolkit.report.audit_vocabulary import AUDIT
 from toolkit.report.certificate.vocabulary import CERTIFICATE
 from toolkit.report.check_around import surroundings
+from toolkit.report.comparison_vocabulary import COMPARISON
 from toolkit.report.fonts import missing_fonts
 from toolkit.report.lint import RULES, LintFinding
 from toolkit.report.package import Template, open_package
@@ -102,7 +103,7 @@ def check_stories(
 
 def vocabulary_of(sites: list[Site]) -> Vocabulary:
     """Return the vocabulary that a template was made for, by its own tags."""
-    for words in (CERTIFICATE, AUDIT):
+    for words in (CERTIFICATE, AUDIT, COMPARISON):
         if any(site.tag.path.startswith(f"{words.name}.") for site in sites):
             return words
     return REPORT

@@ -74,7 +74,7 @@ class Vocabulary:
         return tag.startswith(own) if own else not tag.startswith(tuple(_KINDS.values()))
 
 
-_KINDS = {"certificate": "tk:certificate.", "audit": "tk:audit."}
+_KINDS = {"certificate": "tk:certificate.", "audit": "tk:audit.", "comparison": "tk:comparison."}
 
 REPORT = Vocabulary(
     name="report",

@@ -1,0 +1,98 @@
+"""How a comparison's numbers are written: value and expanded uncertainty in the unit of choice."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from toolkit.comparison.quantities import QUANTITIES
+
+if TYPE_CHECKING:
+    from toolkit.comparison.model import Comparison, Difference, FactorSpread, Part
+    from toolkit.estimate import Estimate
+    from toolkit.report.style import Style
+
+# A table of more rows is for programs.
+MOST_ROWS = 90
+
+
+def shown_unit(name: str, style: Style) -> tuple[str, float]:
+    """Return a quantity's unit as it is shown, and the factor from SI."""
+    quantity = QUANTITIES[name]
+    unit, factor = style.unit(quantity.unit)
+    return str(unit).replace("*", "·"), factor * quantity.factor
+
+
+def with_U(one: Estimate, factor: float, style: Style) -> str:
+    """Return ``45.0 ± 0.6``: two digits of U, and the value to the same place."""
+    value, U = one.value * factor, one.expanded()[0] * factor
+    if not math.isfinite(U) or U <= 0:
+        return comma(f"{value:.4g}", style)
+    digits = max(0, 1 - math.floor(math.log10(U)))
+    near = round(value, digits) + 0.0  # a value that rounds to nothing has no sign
+    return comma(f"{near:.{digits}f} ± {U:.{digits}f}", style)
+
+
+def p_text(p: float | None, style: Style) -> str:
+    """Return a p value; a dash where none was decided."""
+    return "-" if p is None else comma("< 0.0001" if p < 1e-4 else f"{p:.4f}", style)
+
+
+def comma(text: str, style: Style) -> str:
+    """Return a number with the decimal mark of the style."""
+    return text.replace(".", ",") if style.decimal_comma else text
+
+
+def named(name: str, rotation: str, SA_rad: float | None = None, *, title: bool = False) -> str:
+    """Return what a row is about: the quantity, its slip angle, its direction.
+
+    >>> named("FY", "forward", math.radians(-2)), named("PRAT", "both", title=True)
+    ('FY at -2 deg, forward', 'PRAT at 0 deg')
+    """
+    text = QUANTITIES[name].title if title else name
+    angle = "" if SA_rad is None else f" at {math.degrees(SA_rad):+.0f} deg".replace("+0 ", "0 ")
+    return f"{text}{angle}" + ("" if rotation == "both" else f", {rotation}")
+
+
+def shown_rows(found: Comparison, part: Part) -> tuple[tuple[Difference, ...], str]:
+    """Return the rows of a table that people are shown, and in words which they are.
+
+    Characteristics: all of them while they are few. Forces at slip angles: the significant ones.
+    """
+    mine = tuple(one for one in found.differences if one.part == part)
+    certain = tuple(one for one in mine if one.significant)
+    if part == "characteristics" and len(mine) <= MOST_ROWS:
+        return mine, f"all {len(mine)} rows"
+    return certain, f"the {len(certain)} significant of {len(mine)} rows; the JSON answer holds all"
+
+
+def factor_text(one: FactorSpread, factor: float, style: Style) -> str:
+    """Return an intermediate precision; a star where its factor adds significantly."""
+    return comma(f"{one.s * factor:.3g}", style) + (" *" if one.significant else "")
+
+
+def conclusion(found: Comparison) -> str:
+    """Return what a comparison found, in sentences that its numbers alone make."""
+    parts = []
+    for part, title in (
+        ("characteristics", "characteristics"),
+        ("curves", "forces and moments at slip angles"),
+    ):
+        mine = [one for one in found.differences if one.part == part and one.p is not None]
+        if not mine:
+            continue
+        counts: dict[str, list[int]] = {}
+        for one in mine:
+            counts.setdefault(QUANTITIES[one.name].title, [0, 0])
+            counts[QUANTITIES[one.name].title][0] += one.significant
+            counts[QUANTITIES[one.name].title][1] += 1
+        certain = sum(n for n, _ in counts.values())
+        listed = "; ".join(f"{name}: {n} of {of}" for name, (n, of) in counts.items() if n)
+        parts.append(
+            f"{certain} of {len(mine)} differences in {title} are significant"
+            + (f" ({listed})." if listed else ".")
+        )
+    parts.append(
+        f"The chance of even one false decision in either table is at most {100 * found.level:g} % (Holm)."
+    )
+    return " ".join(parts)
