@@ -62,12 +62,13 @@ def _register() -> None:
         report,
         simulate,
         template,
+        watch,
     )
 
     for module in (demo, init, doctor, inspect, calibrate):
         app.command(module.NAME)(module.command)
     app.add_typer(calibration.app, name="calibration")
-    for module in (process, fit, evaluate, convert, compare, report):
+    for module in (process, fit, evaluate, convert, compare, report, watch):
         app.command(module.NAME)(module.command)
     app.add_typer(template.app, name="template")
     for module in (audit, simulate, diagnose, explain, qualify):

@@ -159,11 +159,14 @@ def make_reports(
     options: Options,
     out: Path | None,
     *,
+    folders: Sequence[Path] | None = None,
     office: Office | None = None,
     drawer: Drawer | None = None,
     step: Callable[[str], None] = lambda _text: None,
 ) -> list[Made]:
     """Return the report of every test, converted in one call; with one test its error is raised.
+
+    ``folders`` are the output folders of the tests; default: ``out``, or one for each test in it.
 
     Raises
     ------
@@ -176,10 +179,12 @@ def make_reports(
     resolved: list[Resolved | ToolkitError] = []
     jobs: list[Job] = []
     taken: set[Path] = set()
-    for test in tests:
+    for index, test in enumerate(tests):
         try:
             one = options.resolve(test)
-            jobs.append(_job(test, one, _folder(one, out, alone=len(tests) == 1, taken=taken), options))
+            alone = len(tests) == 1
+            folder = folders[index] if folders else _folder(one, out, alone=alone, taken=taken)
+            jobs.append(_job(test, one, folder, options))
             resolved.append(one)
         except ToolkitError as error:
             if len(tests) == 1:

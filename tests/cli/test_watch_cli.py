@@ -1,0 +1,257 @@
+"""Watching a folder: what is whole is reported, what is not is waited for, what is bad is set aside."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from toolkit.cli.home import packaged_home
+from toolkit.cli.report import Made
+from toolkit.cli.watching import SET_ASIDE, STATE, Round, Watcher
+from toolkit.errors import OutputError, RegistryError, RenderError, ToolkitError, UnreadableError
+from toolkit.findings import Finding
+from toolkit.recording.marks import is_own_output
+
+office_needed = pytest.mark.skipif(
+    not (shutil.which("soffice") and shutil.which("pdftotext")),
+    reason="LibreOffice or poppler is not installed",
+)
+
+
+class Bench:
+    """A watcher whose tests are read and reported by this class, with a clock that is turned by hand."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder, self.now = folder / "inbox", 0.0
+        self.folder.mkdir()
+        self.read: list[str] = []
+        self.reported: list[list[str]] = []
+        self.faults: dict[str, ToolkitError] = {}
+        self.findings: dict[str, tuple[Finding, ...]] = {}
+        self.refusals: dict[str, ToolkitError] = {}
+        self.watcher = self.start()
+
+    def start(self) -> Watcher:
+        self.watcher = Watcher(
+            self.folder, self.folder.parent / "out", resolve=self.resolve, report=self.report,
+            settle_s=3, patience_s=60, clock=lambda: self.now,
+        )  # fmt: skip
+        return self.watcher
+
+    def resolve(self, test: Path) -> Any:
+        self.read.append(test.name)
+        if test.name in self.faults:
+            raise self.faults[test.name]
+        return SimpleNamespace(findings=self.findings.get(test.name, ()))
+
+    def report(self, ready: dict[Path, Any], folders: Sequence[Path]) -> list[Made]:
+        self.reported.append([test.name for test in ready])
+        done = [SimpleNamespace(pdf=folder / "report.pdf", content_sha256="0") for folder in folders]
+        return [
+            Made(test=test, resolved=ready[test], outcome=self.refusals.get(test.name, one))  # type: ignore[arg-type]
+            for test, one in zip(ready, done, strict=True)
+        ]
+
+    def test(self, name: str, data: str = "x") -> Path:
+        folder = self.folder / name
+        folder.mkdir(parents=True, exist_ok=True)
+        (folder / "test.toml").write_text("")
+        (folder / "run").write_text(data)
+        return folder
+
+    def look(self, after: float = 0.0) -> Round:
+        self.now += after
+        return self.watcher.look()
+
+
+@pytest.fixture
+def bench(tmp_path: Path) -> Bench:
+    return Bench(tmp_path)
+
+
+def truncated() -> UnreadableError:
+    return UnreadableError("the file is cut off", where="run", rule="zip-truncated")
+
+
+def test_a_test_is_reported_once_its_files_have_settled(bench: Bench) -> None:
+    bench.test("one")
+    bench.test("year/two")
+    (bench.folder / "no test").mkdir()
+    assert [one.reason for one in bench.look().waiting] == ["files are arriving"] * 2
+    bench.test("one", "more")  # it still grows
+    assert {one.test for one in bench.look(after=4).waiting} == {"one"}
+    assert bench.reported == [["two"]]
+    bench.look(after=4)
+    bench.look(after=4)
+    assert bench.reported == [["two"], ["one"]]  # and not again
+    assert json.loads((bench.watcher.out / STATE).read_text())["tests"]["year/two"]["state"] == "made"
+
+
+def test_all_tests_that_are_whole_are_made_in_one_call(bench: Bench) -> None:
+    bench.test("one")
+    bench.test("two")
+    bench.look()
+    bench.look(after=4)
+    assert bench.reported == [["one", "two"]]
+
+
+def test_a_partial_file_is_waited_for(bench: Bench) -> None:
+    bench.test("one")
+    bench.faults["one"] = truncated()
+    bench.look()
+    assert "zip-truncated" in bench.look(after=4).waiting[0].reason
+    bench.look(after=4)
+    assert bench.read == ["one"]  # an unchanged file is not read again at every look
+    del bench.faults["one"]
+    bench.test("one", "the whole file")
+    bench.look(after=4)
+    bench.look(after=4)
+    assert bench.reported == [["one"]]
+
+
+def test_a_missing_step_is_waited_for_and_after_long_patience_it_is_a_finding(bench: Bench) -> None:
+    bench.test("one")
+    bench.findings["one"] = (Finding(rule="missing", where="SA +10 deg", message="no file"),)
+    bench.look()
+    assert "SA +10 deg: no file" in bench.look(after=4).waiting[0].reason
+    assert bench.reported == []
+    bench.look(after=60)
+    assert bench.reported == [["one"]]
+
+
+def test_a_bad_file_sets_its_test_aside_with_the_reason_until_it_changes(bench: Bench) -> None:
+    bench.test("year/bad")
+    bench.test("good")
+    bench.faults["bad"] = UnreadableError("the workbook holds macros", where="run", rule="macros")
+    bench.look()
+    found = bench.look(after=4)
+    assert [(one.test, one.rule) for one in found.set_aside] == [("year/bad", "macros")]
+    assert bench.reported == [["good"]]  # the other one is not held up
+    note = bench.watcher.out / SET_ASIDE / "year_bad.txt"
+    assert "the workbook holds macros" in note.read_text()
+    assert is_own_output(note)
+    assert (bench.folder / "year/bad/run").read_text() == "x"  # the original stays as it is
+    bench.look(after=4)
+    assert bench.read.count("bad") == 1
+    del bench.faults["bad"]
+    bench.test("year/bad", "mended")
+    bench.look(after=4)
+    bench.look(after=4)
+    assert bench.reported[-1] == ["bad"]
+    assert not note.exists()
+
+
+def test_a_cut_file_that_stays_cut_is_set_aside(bench: Bench) -> None:
+    bench.test("one")
+    bench.faults["one"] = truncated()
+    bench.look()
+    assert bench.look(after=30).set_aside == ()
+    assert [one.rule for one in bench.look(after=31).set_aside] == ["zip-truncated"]
+
+
+def test_a_refused_report_is_set_aside_and_a_full_disk_is_tried_again(bench: Bench) -> None:
+    bench.test("one")
+    bench.test("two")
+    bench.refusals["one"] = RenderError("the report was not verified", rule="not-verified")
+    bench.refusals["two"] = OutputError("the report cannot be written", got="No space left on device")
+    bench.look()
+    found = bench.look(after=4)
+    assert [one.rule for one in found.set_aside] == ["not-verified"]
+    assert "No space left" in found.waiting[0].reason
+    bench.refusals.clear()
+    bench.look(after=4)
+    assert bench.reported[-1] == ["two"]
+
+
+def test_a_restart_goes_on_where_the_last_one_ended(bench: Bench) -> None:
+    bench.test("one")
+    bench.test("bad")
+    bench.faults["bad"] = UnreadableError("the workbook holds macros", where="run", rule="macros")
+    bench.look()
+    bench.look(after=4)
+    bench.start()
+    bench.look()
+    os.utime(bench.folder / "one" / "run", (1, 1))  # a copy of the same test is the same test
+    bench.look(after=4)
+    bench.look(after=4)
+    assert bench.reported == [["one"]]
+    assert bench.read.count("bad") == 1
+
+
+def test_a_broken_registry_is_no_fault_of_a_test(bench: Bench) -> None:
+    bench.test("one")
+    bench.faults["one"] = RegistryError("the ledger is damaged", rule="ledger")  # type: ignore[assignment]
+    bench.look()
+    with pytest.raises(RegistryError):
+        bench.look(after=4)
+    assert not (bench.watcher.out / STATE).exists()
+
+
+@pytest.mark.parametrize(
+    "text", ["", "[]", '{"generator": "other", "tests": {}}', '{"generator": "toolkit"}']
+)
+def test_a_damaged_state_is_told(bench: Bench, text: str) -> None:
+    bench.watcher.out.mkdir()
+    (bench.watcher.out / STATE).write_text(text)
+    with pytest.raises(OutputError) as caught:
+        bench.start()
+    assert "delete it" in str(caught.value.next_step)
+
+
+def watch(*words: object) -> list[str]:
+    code = "from toolkit.cli.main import run; run()"
+    home = packaged_home()
+    return [sys.executable, "-c", code, "watch", *map(str, words), "--home", str(home), "--settle", "0.3",
+            "--interval", "0.1"]  # fmt: skip
+
+
+@office_needed
+def test_a_test_that_arrives_bit_by_bit_is_reported_when_it_is_whole(
+    virtual_test: Path, tmp_path: Path
+) -> None:
+    inbox, out = tmp_path / "inbox", tmp_path / "out"
+    test = inbox / "a"
+    test.mkdir(parents=True)
+    summary = packaged_home() / "report_templates" / "summary.docx"
+    running = subprocess.Popen(
+        watch(inbox, "--template", summary, "--out", out, "--json"), stdout=subprocess.PIPE, text=True
+    )
+    try:
+        files = sorted((path for path in virtual_test.iterdir()), key=lambda path: path.suffix == ".xlsx")
+        *rest, last = files  # the last one is a recording
+        for path in rest:
+            shutil.copy(path, test / path.name)
+        whole = last.read_bytes()
+        (test / last.name).write_bytes(whole[: len(whole) // 2])
+        time.sleep(1.5)
+        assert not (out / "a").exists()
+        (test / last.name).write_bytes(whole)
+        end = time.monotonic() + 90
+        while time.monotonic() < end and not (out / "a" / "manifest.json").is_file():
+            time.sleep(0.2)
+        again = subprocess.run(
+            watch(inbox, "--out", out, "--once", "--json"), capture_output=True, text=True, check=False
+        )
+        assert again.returncode == 2
+        assert json.loads(again.stdout)["error"]["rule"] == "watch-running"
+    finally:
+        running.send_signal(signal.SIGTERM)
+        told = json.loads(running.communicate(timeout=90)[0])
+    assert [one["verified"] for one in told["made"]] == [True]
+    assert sorted(one.name for one in (out / "a").iterdir()) == ["manifest.json", "report.docx", "report.pdf"]
+    once = subprocess.run(
+        watch(inbox, "--out", out, "--once", "--json"), capture_output=True, text=True, check=False
+    )
+    assert once.returncode == 0
+    assert json.loads(once.stdout)["made"] == []

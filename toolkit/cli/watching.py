@@ -1,0 +1,258 @@
+"""Watch a folder of tests: which are whole, which are waited for, which are set aside and why.
+
+A test is a folder with a ``test.toml``. Its files count as arrived when they have not changed for a while;
+what they hold then decides: a file that is cut off, or a step of the protocol that is missing, is waited for;
+a file that is damaged otherwise sets the test aside until its files change. Originals are never touched.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from toolkit.errors import OutputError, RegistryError, ToolkitError
+
+if TYPE_CHECKING:
+    from toolkit.cli.report import Made
+    from toolkit.cli.resolve import Resolved
+
+STATE = "watch.json"
+SET_ASIDE = "set-aside"
+# What a file looks like while it is being copied, and what a test lacks whose last file is on its way.
+_PARTIAL = frozenset(
+    "empty-file zip-truncated zip-damaged no-data no-recordings no-file xml not-toml".split()
+)
+_MISSING = frozenset(("missing", "missing-repeat", "short-block"))
+
+Listing = tuple[tuple[str, int, int], ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Waiting:
+    """A test that is not whole yet, and what is waited for."""
+
+    test: str
+    reason: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Aside:
+    """A test that was set aside: the rule and the reason, until its files change."""
+
+    test: str
+    rule: str
+    reason: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Round:
+    """What one look at the folder found and made."""
+
+    made: tuple[Made, ...]
+    waiting: tuple[Waiting, ...]
+    set_aside: tuple[Aside, ...]
+
+
+class Watcher:
+    """The state of a watched folder, kept in ``watch.json`` of the output folder: a restart goes on there.
+
+    Parameters
+    ----------
+    folder, out : what is watched, and where reports and the state go
+    resolve, report : read a test; make the reports of tests that were read, in one call, each in its folder
+    settle_s : files that did not change for so long have arrived
+    patience_s : after so long without a change a cut file sets its test aside, and a test that lacks steps
+        is reported with its findings
+    clock : seconds that never go back
+    """
+
+    def __init__(
+        self,
+        folder: Path,
+        out: Path,
+        *,
+        resolve: Callable[[Path], Resolved],
+        report: Callable[[dict[Path, Resolved], Sequence[Path]], list[Made]],
+        settle_s: float,
+        patience_s: float,
+        clock: Callable[[], float],
+    ) -> None:
+        self.folder, self.out = folder, out
+        self.resolve, self.report, self.clock = resolve, report, clock
+        self.settle_s, self.patience_s = settle_s, patience_s
+        self.seen: dict[str, tuple[Listing, float]] = {}
+        self.waited: dict[str, tuple[str, str]] = {}
+        self.state = self._load()
+
+    def look(self) -> Round:
+        """Look once: make the reports of all tests that have become whole."""
+        waiting: list[Waiting] = []
+        aside: list[Aside] = []
+        ready: dict[Path, Resolved] = {}
+        contents: dict[Path, str] = {}
+        for test in self._tests():
+            name = self._name(test)
+            listing = self._listing(test)
+            before = self.seen.get(name)
+            if before is None or before[0] != listing:
+                before = self.seen[name] = (listing, self.clock())
+            age = self.clock() - before[1]
+            if age < self.settle_s:
+                waiting.append(Waiting(test=name, reason="files are arriving"))
+                continue
+            try:
+                content = _content(test, listing)
+            except OSError as error:
+                waiting.append(Waiting(test=name, reason=f"a file cannot be read yet: {error.strerror}"))
+                continue
+            if self.state.get(name, {}).get("content") == content:
+                continue
+            known = self.waited.get(name)
+            if known is not None and known[0] == content and age < self.patience_s:
+                waiting.append(Waiting(test=name, reason=known[1]))
+                continue
+            contents[test] = content
+            found = self._read(test, age)
+            if isinstance(found, Waiting):
+                self.waited[name] = (content, found.reason)
+                waiting.append(found)
+            elif isinstance(found, Aside):
+                aside.append(found)
+                self._set_aside(found, content)
+            else:
+                ready[test] = found
+        made = self._make(ready, contents, waiting, aside)
+        return Round(made=tuple(made), waiting=tuple(waiting), set_aside=tuple(aside))
+
+    def _read(self, test: Path, age: float) -> Resolved | Waiting | Aside:
+        name = self._name(test)
+        try:
+            resolved = self.resolve(test)
+        except RegistryError:
+            raise  # no test is to blame for the registry
+        except ToolkitError as error:
+            if error.rule in _PARTIAL and age < self.patience_s:
+                return Waiting(test=name, reason=f"{error.rule}: {error.what} ({error.where})")
+            return Aside(test=name, rule=error.rule or "error", reason=str(error))
+        missing = [one for one in resolved.findings if one.rule in _MISSING]
+        if missing and age < self.patience_s:
+            return Waiting(test=name, reason="; ".join(f"{one.where}: {one.message}" for one in missing[:3]))
+        return resolved
+
+    def _make(
+        self,
+        ready: dict[Path, Resolved],
+        contents: dict[Path, str],
+        waiting: list[Waiting],
+        aside: list[Aside],
+    ) -> list[Made]:
+        if not ready:
+            return []
+        delivered = []
+        for one in self.report(ready, [self.out / self._name(test) for test in ready]):
+            name = self._name(one.test)
+            if isinstance(one.outcome, OutputError):
+                # A full disk is no fault of the test: the next look tries again.
+                waiting.append(Waiting(test=name, reason=str(one.outcome)))
+            elif isinstance(one.outcome, ToolkitError):
+                fault = Aside(test=name, rule=one.outcome.rule or "error", reason=str(one.outcome))
+                aside.append(fault)
+                self._set_aside(fault, contents[one.test])
+            else:
+                delivered.append(one)
+                self._note(name).unlink(missing_ok=True)
+                self.state[name] = {
+                    "state": "made",
+                    "content": contents[one.test],
+                    "report": str(one.outcome.pdf),
+                    "content_sha256": one.outcome.content_sha256,
+                }
+        self._save()
+        return delivered
+
+    def _tests(self) -> list[Path]:
+        found = []
+        for base, folders, files in os.walk(self.folder):
+            here = Path(base)
+            folders[:] = sorted(one for one in folders if not self._skipped(here / one))
+            if "test.toml" in files:
+                found.append(here)
+        return found
+
+    def _skipped(self, folder: Path) -> bool:
+        return folder.name.startswith(".") or folder.resolve() == self.out.resolve()
+
+    def _listing(self, test: Path) -> Listing:
+        """Return (path, size, time of change) of a test's files: what tells that one is still growing."""
+        found = []
+        for base, folders, files in os.walk(test):
+            folders[:] = [one for one in folders if not self._skipped(Path(base) / one)]
+            for name in files:
+                path = Path(base) / name
+                if name.startswith((".", "~$")) or path.is_symlink():
+                    continue
+                with contextlib.suppress(OSError):
+                    status = path.stat()
+                    found.append((path.relative_to(test).as_posix(), status.st_size, status.st_mtime_ns))
+        return tuple(sorted(found))
+
+    def _name(self, test: Path) -> str:
+        relative = test.relative_to(self.folder).as_posix()
+        return test.resolve().name if relative == "." else relative
+
+    def _note(self, name: str) -> Path:
+        return self.out / SET_ASIDE / f"{name.replace('/', '_')}.txt"
+
+    def _set_aside(self, fault: Aside, content: str) -> None:
+        from toolkit.files import write_atomic
+        from toolkit.recording.marks import OWN_OUTPUT
+
+        self.state[fault.test] = {
+            "state": SET_ASIDE,
+            "content": content,
+            "rule": fault.rule,
+            "reason": fault.reason,
+        }
+        write_atomic(self._note(fault.test), f"{OWN_OUTPUT}\n{fault.test}: {fault.rule}\n\n{fault.reason}\n")
+        self._save()
+
+    def _load(self) -> dict[str, dict[str, Any]]:
+        path = self.out / STATE
+        if not path.is_file():
+            return {}
+        try:
+            told = json.loads(path.read_text(encoding="utf-8"))
+            tests = told["tests"]
+            if told["generator"] != "toolkit" or not all(isinstance(one, dict) for one in tests.values()):
+                raise ValueError("not a state of toolkit watch")  # noqa: TRY301  one message for every fault
+        except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+            raise OutputError(
+                "the state of the watch cannot be read",
+                where=path,
+                got=error,
+                expected="the file as toolkit watch wrote it",
+                next_step="delete it: every test is reported anew, the same reports replace the old ones",
+                rule="original",
+            ) from error
+        return dict(tests)
+
+    def _save(self) -> None:
+        from toolkit.files import write_atomic
+
+        told = {"generator": "toolkit", "schema": 1, "tests": dict(sorted(self.state.items()))}
+        write_atomic(self.out / STATE, json.dumps(told, ensure_ascii=False, indent=2) + "\n")
+
+
+def _content(test: Path, listing: Listing) -> str:
+    """Return one hash of all of a test's files: a copy of the same test is the same test."""
+    from toolkit.files import sha256_bytes, sha256_file
+    from toolkit.recording.marks import is_own_output
+
+    # What the toolkit wrote itself, a reduced test or the truth of a simulation, is no part of the test.
+    parts = [name for name, _, _ in listing if not is_own_output(test / name)]
+    return sha256_bytes("\n".join(f"{name} {sha256_file(test / name)}" for name in parts).encode())
