@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
 from toolkit.diagnosis.model import Active
-from toolkit.diagnosis.noise import Layout, Noise, fit_noise, log_likelihood, whiten
+from toolkit.diagnosis.noise import Layout, Noise, autocovariance, fit_noise, log_likelihood, whiten
 from toolkit.errors import FitError
 
 if TYPE_CHECKING:
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 _OUTER = 4  # times that the noise is estimated anew
 _INNER = 12
 _BETTER = 0.02  # of the log-likelihood: less is no step worth another round
+_SAME = 0.05  # by which the coloured fit's residual variance may exceed the plain one's
 _STEP = 1e-4  # of a parameter's size, for differences
 
 
@@ -42,11 +43,22 @@ class Fit:
     log_posterior: float
     covariance: NDArray[np.float64]
     rows: NDArray[np.bool_] | None
+    plain: bool = False
 
     @property
     def parameters(self) -> int:
         """Number of the effects' parameters."""
         return sum(len(one.searched) for one in self.active)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Solved:
+    """One solution: the searched vector, its residual, the noise of that, and the log-posterior."""
+
+    x: NDArray[np.float64]
+    residual: Stacked
+    noise: dict[str, Noise]
+    score: float
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -89,6 +101,7 @@ def fit(
     rows: NDArray[np.bool_] | None = None,
     noise: dict[str, Noise] | None = None,
     rounds: int = _OUTER,
+    plain: bool | None = None,
 ) -> Fit:
     """Fit a hypothesis.
 
@@ -98,65 +111,111 @@ def fit(
     start : free parameters from which it starts; their declared values by default
     rows : rows of all runs on which it is fitted; the simulation is free over whole runs in any case
     noise : from which the whitening starts; None for white noise first
+    plain : ordinary least squares, or not; None lets a specification test decide
     """
-    from scipy.optimize import least_squares
-
     space = _space(problem, tuple(active))
     layouts = {name: problem.layout(name, rows) for name in problem.names}
     first = [one.value for one in problem.free] if start is None else list(start)
     begin = [*first, *(_clipped(one, each.name) for one in active for each in one.searched)]
     x = np.clip(np.asarray(begin, dtype=np.float64) / space.sizes, space.low, space.high)
-    best: tuple[float, NDArray[np.float64], dict[str, Noise]] | None = None
-    known = noise
-    simulated, residual = _run(space, x)
-    for turn in range(rounds):
-        if known is None:
-            known = _white(problem, residual, layouts)
-        if len(x):
-
-            def cost(v: NDArray[np.float64], weights: dict[str, Noise] = known) -> NDArray[np.float64]:
-                try:
-                    return _stack(problem, space, v, _run(space, v)[1], layouts, weights)
-                except FitError:
-                    return np.full(sum(one.n for one in layouts.values()) + len(problem.free), 1e6)
-
-            solved = least_squares(
-                cost,
-                x,
-                bounds=(space.low, space.high),
-                diff_step=_STEP,  # type: ignore[arg-type]
-                x_scale=1.0,
-                max_nfev=_INNER,
-                ftol=1e-7,
-                xtol=1e-7,
-                gtol=1e-9,
-            )
-            x = solved.x
-        simulated, residual = _run(space, x)
-        known = noise_of(problem, residual, layouts, used=len(x))
-        score = _score(problem, space, x, residual, layouts, known)
-        if best is not None and score < best[0] + _BETTER:
-            if score > best[0]:
-                best = (score, x, known)
-            break
-        best = (score, x, known)
-        if not len(x) and turn:
-            break
-    if best is None:
-        raise FitError("a fit needs a round", got=rounds, expected="one or more")
-    score, x, known = best
-    simulated, residual = _run(space, x)
-    p, made = space.split(x)
+    made = _coloured(space, layouts, x, noise, 2 if plain else rounds)
+    if plain is None:
+        other = _plain(space, layouts, made)
+        plain = other is not None and _absorbs(made, other, layouts)
+        chosen = other if plain and other is not None else made
+    else:
+        chosen = _plain(space, layouts, made) or made if plain else made
+    p, found = space.split(chosen.x)
     return Fit(
         p=tuple(p),
-        active=made,
-        residual=residual,
-        simulated=simulated,
-        noise=known,
-        log_posterior=score,
-        covariance=_covariance(problem, space, x, layouts, known),
+        active=found,
+        residual=chosen.residual,
+        simulated={name: problem.observed[name] - one for name, one in chosen.residual.items()},
+        noise=chosen.noise,
+        log_posterior=chosen.score,
+        covariance=covariance(space, chosen, layouts, plain=plain),
         rows=rows,
+        plain=plain,
     )
+
+
+def _coloured(
+    space: _Space,
+    layouts: dict[str, Layout],
+    x: NDArray[np.float64],
+    noise: dict[str, Noise] | None,
+    rounds: int,
+) -> _Solved:
+    """Return generalised least squares, the noise estimated anew in every round."""
+    best: _Solved | None = None
+    known = noise
+    for turn in range(max(rounds, 1)):
+        if known is None:
+            known = _white(space.problem, _run(space, x)[1], layouts)
+        here = _solve(space, layouts, x, known)
+        if best is not None and here.score < best.score + _BETTER:
+            return here if here.score > best.score else best
+        best, x, known = here, here.x, here.noise
+        if not len(x) and turn:
+            break
+    return cast("_Solved", best)
+
+
+def _plain(space: _Space, layouts: dict[str, Layout], from_: _Solved) -> _Solved | None:
+    """Return ordinary least squares, every output weighed by what its rows are worth; None for white noise."""
+    if not len(from_.x) or not any(one.reflection for one in from_.noise.values()):
+        return None
+    weights = {
+        name: Noise(reflection=(), sd=one.marginal_sd * math.sqrt(one.correlation_rows))
+        for name, one in from_.noise.items()
+    }
+    return _solve(space, layouts, from_.x, weights)
+
+
+def _absorbs(coloured: _Solved, plain: _Solved, layouts: dict[str, Layout]) -> bool:
+    """Tell whether the coloured fit leaves a larger residual than noise alone can explain.
+
+    Under the right model both estimate the same, and the plain one is smaller by what its parameters take.
+    Where the coloured one is much larger, its noise has absorbed physics (a specification test in the
+    manner of Hausman), and the plain one is to be trusted.
+    """
+    for name, where in layouts.items():
+        one = float(np.mean(coloured.residual[name][where.index] ** 2)) if where.n else 0.0
+        other = float(np.mean(plain.residual[name][where.index] ** 2)) if where.n else 0.0
+        worth = plain.noise[name].correlation_rows / max(where.n, 1)
+        if one > other * (1 + _SAME + 3 * len(plain.x) * worth):
+            return True
+    return False
+
+
+def _solve(
+    space: _Space, layouts: dict[str, Layout], x: NDArray[np.float64], weights: dict[str, Noise]
+) -> _Solved:
+    from scipy.optimize import least_squares
+
+    problem = space.problem
+
+    def cost(v: NDArray[np.float64]) -> NDArray[np.float64]:
+        try:
+            return _stack(problem, space, v, _run(space, v)[1], layouts, weights)
+        except FitError:
+            return np.full(sum(one.n for one in layouts.values()) + len(problem.free), 1e6)
+
+    if len(x):
+        x = least_squares(
+            cost,
+            x,
+            bounds=(space.low, space.high),
+            diff_step=_STEP,  # type: ignore[arg-type]
+            x_scale=1.0,
+            max_nfev=_INNER,
+            ftol=1e-7,
+            xtol=1e-7,
+            gtol=1e-9,
+        ).x
+    residual = _run(space, x)[1]
+    noise = noise_of(problem, residual, layouts, used=len(x))
+    return _Solved(x, residual, noise, _score(problem, space, x, residual, layouts, noise))
 
 
 def noise_of(
@@ -288,30 +347,52 @@ def _differences(space: _Space, x: NDArray[np.float64], base: Stacked) -> dict[s
     return made
 
 
-def _covariance(
-    problem: Problem,
-    space: _Space,
-    x: NDArray[np.float64],
-    layouts: dict[str, Layout],
-    noise: dict[str, Noise],
+def covariance(
+    space: _Space, solved: _Solved, layouts: dict[str, Layout], *, plain: bool
 ) -> NDArray[np.float64]:
+    """Return the covariance of (p, effects' parameters) in their units.
+
+    Of ordinary least squares it is the sandwich with the residual's autocovariance in it.
+    """
+    x, noise, problem = solved.x, solved.noise, space.problem
     if not len(x):
         return np.zeros((0, 0))
-    base, _ = _run(space, x)
-    J = _differences(space, x, base)
-    parts = [whiten(J[name][where.index], where, noise[name]) for name, where in layouts.items()]
+    J = _differences(space, x, {name: problem.observed[name] - one for name, one in solved.residual.items()})
     prior = np.zeros((len(problem.free), len(x)))
     for i, one in enumerate(problem.free):
         prior[i, i] = space.sizes[i] / (one.sd or 1.0)
+    parts, spread = [], prior.T @ prior
+    for name, where in layouts.items():
+        columns = J[name][where.index]
+        if plain:
+            weight = 1 / (noise[name].marginal_sd ** 2 * noise[name].correlation_rows)
+            parts.append(columns * math.sqrt(weight))
+            spread = spread + weight**2 * columns.T @ _correlated(columns, where, noise[name])
+        else:
+            parts.append(whiten(columns, where, noise[name]))
     whole = np.vstack([*parts, prior])
     size = np.sqrt((whole**2).sum(axis=0))
     size[size == 0] = 1.0
-    u, s, vt = np.linalg.svd(whole / size, full_matrices=False)
-    del u
+    _, s, vt = np.linalg.svd(whole / size, full_matrices=False)
     keep = s > 1e-10 * s.max()
     inverse = (vt[keep].T / s[keep] ** 2) @ vt[keep]
-    inverse[np.diag_indices_from(inverse)] += (
-        np.where(np.abs(vt[~keep]).max(axis=0) > 0.1, 1e12, 0.0) if (~keep).any() else 0.0
-    )
+    if plain:
+        inverse = inverse @ (spread / np.outer(size, size)) @ inverse
+    if not keep.all():
+        # What the data leave open altogether has no finite interval.
+        inverse[np.diag_indices_from(inverse)] += np.where(np.abs(vt[~keep]).max(axis=0) > 0.1, 1e12, 0.0)
     scale = space.sizes / size
     return np.asarray(inverse * np.outer(scale, scale))
+
+
+def _correlated(columns: NDArray[np.float64], where: Layout, noise: Noise) -> NDArray[np.float64]:
+    """Return the noise's covariance matrix times columns, segment by segment."""
+    from scipy.signal import fftconvolve
+
+    made = np.empty_like(columns)
+    for one in where.segments:
+        n = one.stop - one.start
+        gamma = autocovariance(noise, n)
+        kernel = np.concatenate([gamma[:0:-1], gamma])[:, None]
+        made[one] = fftconvolve(columns[one], kernel, mode="full", axes=0)[n - 1 : 2 * n - 1]
+    return made

@@ -67,7 +67,7 @@ def hold_out(problem: Problem, folds: Folds, active: Sequence[Active], start: Fi
     scores, fits = [], []
     simulated = {name: np.full(problem.rows, np.nan) for name in problem.names}
     for held in folds.held:
-        made = fit(problem, active, start=start.p, rows=~held, noise=start.noise, rounds=2)
+        made = fit(problem, active, start=start.p, rows=~held, noise=start.noise, rounds=2, plain=start.plain)
         scores.append(held_out_score(problem, made, held))
         fits.append(made)
         for name in problem.names:

@@ -54,6 +54,22 @@ def predictor(reflection: Sequence[float]) -> list[NDArray[np.float64]]:
     return made
 
 
+def autocovariance(noise: Noise, count: int) -> NDArray[np.float64]:
+    """Return the noise's autocovariance at lags 0 to ``count`` - 1, shape (count,)."""
+    orders = predictor(noise.reflection)
+    gamma = np.zeros(count)
+    gamma[0] = noise.marginal_sd**2
+    left, p = gamma[0], len(noise.reflection)
+    for k in range(1, min(p + 1, count)):
+        # Levinson's recursion read backwards: the reflection coefficient gives the next lag.
+        known = float(orders[k - 1] @ gamma[k - 1 : 0 : -1]) if k > 1 else 0.0
+        gamma[k] = known + noise.reflection[k - 1] * left
+        left *= 1 - noise.reflection[k - 1] ** 2
+    for k in range(p + 1, count):
+        gamma[k] = float(orders[p] @ gamma[k - 1 : k - p - 1 : -1]) if p and k > p else 0.0
+    return gamma
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Layout:
     """Where the values of one output stand in all its runs: segments without a gap, and what is masked.

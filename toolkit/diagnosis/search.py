@@ -23,6 +23,7 @@ MOST_EFFECTS = 4
 _REFINED = 8  # candidates that are fitted jointly, of those that screening ranks first
 _CLOSE = 3.0  # log-likelihood within which two effects cannot be told apart
 _LEAST_GAIN = 1.5  # of the held-out log score
+_NOTICED = 0.01  # of an output's held-out error: a smaller gain is real perhaps, and matters to nobody
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -186,6 +187,8 @@ def _best_step(
         gain = held.total - held_base.total
         if gain < _LEAST_GAIN or made.log_posterior - base.log_posterior < _LEAST_GAIN:
             continue
+        if not _matters(problem, held_base, held):
+            continue
         rivals = tuple(
             Rival(active=other_fit.active[-1], difference=other_score - score)
             for other_score, other, other_fit in tried
@@ -200,6 +203,18 @@ def _best_step(
         )
         return made, held, step
     return None
+
+
+def _matters(problem: Problem, before: HeldOut, after: HeldOut) -> bool:
+    """Tell whether some output's held-out error falls by what a user of the simulation would notice."""
+    for name, kept in problem.kept.items():
+        observed = problem.observed[name]
+        one, other = (
+            float(np.mean((observed[kept] - each.simulated[name][kept]) ** 2)) for each in (before, after)
+        )
+        if other < one * (1 - 2 * _NOTICED):
+            return True
+    return False
 
 
 def _pruned(
@@ -233,9 +248,17 @@ def _structure(problem: Problem, screen: Screen, base: Fit, seed: int) -> tuple[
     found = [
         StructureFound(output=one.output, variables=one.variables, gain=gain, p_value=p)
         for one, gain, p in zip(listed, gains, p_values, strict=True)
-        if p < ALPHA_STRUCTURE
+        if p < ALPHA_STRUCTURE and _share(problem, base, one) > 2 * _NOTICED
     ]
     return tuple(sorted(found, key=lambda one: -one.gain))
+
+
+def _share(problem: Problem, base: Fit, group: Group) -> float:
+    """Return the share of a residual's variance that a group's columns explain."""
+    kept = problem.kept[group.output]
+    residual, columns = base.residual[group.output][kept], group.columns[kept]
+    found = np.linalg.lstsq(columns, residual, rcond=None)[0]
+    return 1 - float(np.sum((residual - columns @ found) ** 2)) / max(float(np.sum(residual**2)), 1e-300)
 
 
 def _as_declared(problem: Problem) -> Fit:
