@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tests.concealed import dynamic_cases, slow_cases, tire_cases
+from tests.concealed import cell_cases, dynamic_cases, slow_cases, tire_cases
 from tests.concealed.model import Scenario
 
 Builder = Callable[[np.random.Generator, frozenset[str]], Scenario]
@@ -41,7 +41,13 @@ _BEAM_OUTSIDE = ("hidden_slip", "hidden_ambient")
 FAMILIES: dict[str, Family] = {
     "tire-machine": Family(
         build=lambda rng, needs: tire_cases.build(rng, kind="machine", needs=needs),
-        weight=5, inside=(*_TIRE, "pressure_change"), outside=_TIRE_OUTSIDE,
+        weight=4, inside=(*_TIRE, "pressure_change"), outside=_TIRE_OUTSIDE,
+    ),
+    "tire-cells": Family(
+        build=cell_cases.build, weight=2,
+        inside=("relaxation", "steer_compliance", "backlash", "thermal_friction", "wear", "nonuniformity",
+                "drum_runout", "turn_slip", *cell_cases.CELL_EFFECTS),
+        outside=("hidden_ambient", "hidden_line", "hidden_pulse"),
     ),
     "tire-python": Family(
         build=lambda rng, needs: tire_cases.build(rng, kind="python", needs=needs),

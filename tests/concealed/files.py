@@ -3,6 +3,12 @@
 from __future__ import annotations
 
 import hashlib
+import json
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -61,6 +67,8 @@ def table(s: Scenario, run: Run, measured: dict[str, Array] | None) -> pd.DataFr
     if s.simulated:
         for output, y in s.nominal(df, run, s.declared_parameters()).items():
             df[s.simulated[output]] = y
+    if measured and s.written:
+        measured = s.written(measured)
     for name, y in (measured or {}).items():
         df[name] = y
     return df
@@ -71,11 +79,32 @@ def write_csv(df: pd.DataFrame, path: Path) -> None:
     df.to_csv(path, index=False, float_format="%.10g", lineterminator="\n")
 
 
+def _record(session: Mapping[str, str], target: Path) -> None:
+    """Write the record that the public command makes of a session; its exit may be 1 for findings."""
+    with tempfile.TemporaryDirectory() as place:
+        for name, text in session.items():
+            (Path(place) / name).write_text(text, encoding="utf-8")
+        command = [Path(sys.executable).with_name("toolkit"), "calibrate", "SESSION.toml"]
+        ran = subprocess.run(
+            [*command, "--calibrations", "registry", "--json"],
+            cwd=place,
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        if ran.returncode not in (0, 1):
+            raise RuntimeError(f"no record of the session: {ran.stderr or ran.stdout}")
+        path = Path(place) / json.loads(ran.stdout)["record"]["path"]
+        shutil.copyfile(path, target)
+
+
 def write_case(s: Scenario, measured: list[dict[str, Array]], folder: Path) -> None:
     """Write the case into a new folder."""
     folder.mkdir(parents=True)
     for name, text in s.files.items():
         (folder / name).write_text(text, encoding="utf-8")
+    if s.session:
+        _record(s.session, folder / "record.json")
     for run, y in zip(s.runs, measured, strict=True):
         write_csv(table(s, run, y), folder / run.name)
     for run in s.predict:

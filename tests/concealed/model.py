@@ -111,6 +111,10 @@ class Scenario:
     axes: str | None = None
     simulated: Mapping[str, str] = field(default_factory=dict)
     """For kind `columns`: output -> column of the other program."""
+    written: Callable[[dict[str, Array]], dict[str, Array]] | None = None
+    """The measured outputs as the file has them, where it has others (load cells)."""
+    session: Mapping[str, str] | None = None
+    """Files of a reference-load session whose record the case names as record.json."""
 
     def true_parameters(self) -> Params:
         """Return the true values by name."""

@@ -35,8 +35,8 @@ def nominal_of(scenario: Scenario, runs: tuple[Run, ...], p: Params) -> Signals:
 
 
 def difference(a: Signals, b: Signals) -> Signals:
-    """Return a - b."""
-    return [{k: x[k] - y[k] for k in x} for x, y in zip(a, b, strict=True)]
+    """Return a - b in the outputs that both have."""
+    return [{k: x[k] - y[k] for k in x if k in y} for x, y in zip(a, b, strict=True)]
 
 
 def stacked(scenario: Scenario, signals: Signals) -> Array:
@@ -64,7 +64,7 @@ def _left(scenario: Scenario, effect: Signals, slopes: list[Signals]) -> Signals
     wanted = np.concatenate([stacked(scenario, effect), np.zeros(J.shape[1])])
     d = lsq_linear(ridge, wanted, bounds=(-3.0, 3.0)).x
     return [
-        {k: row[k] - sum(d[j] * slopes[j][i][k] for j in range(d.size)) for k in row}
+        {k: row[k] - sum(d[j] * slopes[j][i][k] for j in range(d.size)) for k in scenario.outputs}
         for i, row in enumerate(effect)
     ]
 
