@@ -134,7 +134,7 @@ def test_what_another_minimum_leaves_open_is_not_determined():
     channel, truth = TRUTHS[3]
     one = curve(channel, truth, SA61, 0.002)
     problems, scale = _normalise([one])
-    solution = solve(problems)
+    solution = solve([problems])[0]
     variance = solution.state.cost / 55
 
     def determined(solution):

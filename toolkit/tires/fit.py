@@ -10,6 +10,7 @@ import numpy as np
 
 from toolkit.errors import FitError
 from toolkit.estimate import Estimate
+from toolkit.tires.autocorrelation import autocorrelation_time
 from toolkit.tires.evaluate import estimate_at, slope_at, slope_estimate_at, value_at, zero_crossing
 from toolkit.tires.kernel import (
     C_HIGH,
@@ -26,7 +27,7 @@ from toolkit.tires.model import CHANNEL_UNIT, LOSSES, Curve, CurveFit, Loss, Par
 from toolkit.tires.models.magic_formula import MODEL
 from toolkit.tires.quality import error_percent, scatter_floor_percent
 from toolkit.tires.solver import solve, solve_robust
-from toolkit.tires.uncertainty import Spread, autocorrelation_time, spread
+from toolkit.tires.uncertainty import Spread, curve_columns, spread
 
 if TYPE_CHECKING:
     from toolkit.tires.kernel import Array
@@ -45,6 +46,7 @@ __all__ = [
 ]
 
 MIN_POINTS = 7  # six parameters and one degree of freedom
+_BATCH = 1024  # curves that are searched at once
 _SHIFT = np.deg2rad(10.0)
 _TINY_VARIANCE = 1e-24  # of max|y|^2: rounding of noise-free data
 
@@ -75,8 +77,14 @@ def fit_curves(curves: Sequence[Curve], *, loss: Loss = "linear") -> tuple[Curve
         if (problem := why_not(curve)) is not None:
             raise problem
     fits: dict[int, CurveFit] = {}
-    for group in _groups([len(curve.y) for curve in curves]):
-        fits.update(zip(group, _fit_group([curves[i] for i in group], loss), strict=True))
+    for first in range(0, len(curves), _BATCH):
+        batch = curves[first : first + _BATCH]
+        groups = _groups([len(curve.y) for curve in batch])
+        parts = [[batch[i] for i in group] for group in groups]
+        scaled = [_normalise(part) for part in parts]
+        solved = _solved([problems for problems, _ in scaled], loss)
+        for group, part, (_, scale), one in zip(groups, parts, scaled, solved, strict=True):
+            fits.update(zip([first + i for i in group], _fit_group(part, scale, *one, loss), strict=True))
     return tuple(fits[i] for i in range(len(curves)))
 
 
@@ -180,18 +188,29 @@ def _normalise(curves: Sequence[Curve]) -> tuple[Problems, _Scale]:
     return problems, _Scale(middle=middle, half=half, top=top, known=known)
 
 
-def _fit_group(curves: Sequence[Curve], loss: Loss) -> list[CurveFit]:
-    problems, scale = _normalise(curves)
+def _solved(groups: Sequence[Problems], loss: Loss) -> list[tuple[Problems, Solution, Array]]:
+    # Each group's problems with their final weights, its minima, and the inflation of their variance.
     if loss == "robust":
-        solution, problems, inflation = solve_robust(problems)
-    else:
-        solution, inflation = solve(problems), np.ones(len(curves))
+        robust = [solve_robust(one) for one in groups]
+        return [(problems, solution, inflation) for solution, problems, inflation in robust]
+    return [(one, solution, np.ones(len(one.u))) for one, solution in zip(groups, solve(groups), strict=True)]
+
+
+def _fit_group(
+    curves: Sequence[Curve],
+    scale: _Scale,
+    problems: Problems,
+    solution: Solution,
+    inflation: Array,
+    loss: Loss,
+) -> list[CurveFit]:
     linear = solution.state.linear
     residual = problems.y - linear[:, :1] * sine(solution.state.p, problems.u) - linear[:, 1:]
     lengths = np.array([len(curve.y) for curve in curves])
+    columns = curve_columns(solution, problems)
     times = np.array([
-        autocorrelation_time(row[:n] * weight[:n])
-        for row, weight, n in zip(residual, problems.sw, lengths, strict=True)
+        autocorrelation_time(row[:n] * weight[:n], own[:, :n])
+        for row, weight, own, n in zip(residual, problems.sw, columns, lengths, strict=True)
     ])  # fmt: skip
     # Known uncertainties are a floor: scatter or misfit beyond them widens the intervals (Birge).
     variance = inflation * solution.state.cost / (lengths - 6)

@@ -15,9 +15,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from toolkit.estimate import coverage_factor
+from toolkit.tires.autocorrelation import autocorrelation_time
 from toolkit.tires.global_data import Measured
 from toolkit.tires.global_solver import Box, Descent, descend, linearise, spread_starts
-from toolkit.tires.uncertainty import autocorrelation_time
 
 if TYPE_CHECKING:
     from toolkit.tires.global_model import Array, GlobalModel
@@ -231,8 +231,16 @@ def _reweight(misfit: Misfit, x: Array) -> tuple[Array, Array]:
 
 def _noise(rows: Misfit, x: Array) -> tuple[float, float, float]:
     # Autocorrelation time, variance of a row of weight one with it, degrees of freedom.
-    r = rows(x)[0]
-    time = max(autocorrelation_time(part) for part in np.split(r, len(rows.channels)))
+    if rows.free:
+        residual, J = linearise(rows, x, rows.box())
+        r, columns = residual[0], J[0]
+    else:
+        r, columns = rows(x)[0], np.zeros((0, len(rows.y)))
+    channels = len(rows.channels)
+    time = max(
+        autocorrelation_time(part, own)
+        for part, own in zip(np.split(r, channels), np.split(columns, channels, axis=1), strict=True)
+    )
     used = float(np.count_nonzero(rows.weight > 1e-3 * rows.weight.max()))  # outliers are no rows
     left = max(used - len(rows.free), 1.0)
     return time, max(float(r @ r) / left, 1e-26) * time, max(used / time - len(rows.free), 1.0)

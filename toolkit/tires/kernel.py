@@ -131,6 +131,40 @@ def sine(p: Array, u: Array) -> Array:
 
 def assess(p: Array, problems: Problems) -> State:
     """Return cost, gradient and normal matrix of shapes, D and Sv solved within their bounds."""
+    # In blocks that stay in the cache: three times as fast as all at once.
+    size = max(_BLOCK // problems.u.shape[1], 1)
+    if len(p) <= 1.5 * size:
+        return _assess(p, problems)
+    count = len(p)
+    whole = State(
+        p=p,
+        linear=np.empty((count, 2)),
+        cost=np.empty(count),
+        gradient=np.empty((count, 4)),
+        square=np.empty((count, 4, 4)),
+        cross=np.empty((count, 4, 2)),
+        gram=np.empty((count, 2, 2)),
+        held=np.empty((count, 2), dtype=np.bool_),
+    )
+    for first in range(0, count, size):
+        block = slice(first, first + size)
+        part = Problems(
+            u=problems.u[block],
+            y=problems.y[block],
+            sw=problems.sw[block],
+            low=problems.low,
+            high=problems.high,
+        )
+        found = _assess(p[block], part)
+        for name in _FIELDS[1:]:
+            getattr(whole, name)[block] = getattr(found, name)
+    return whole
+
+
+_BLOCK = 24_576  # points
+
+
+def _assess(p: Array, problems: Problems) -> State:
     u, y, sw = problems.u, problems.y, problems.sw
     B, C, q, h = p[:, 0:1], p[:, 1:2], p[:, 2:3], p[:, 3:4]
     B, eq = np.exp(B), np.exp(q)
@@ -139,8 +173,10 @@ def assess(p: Array, problems: Problems) -> State:
     bend = z - np.arctan(z)
     psi = z - E * bend
     phi = np.arctan(psi)
-    angle = C * phi
-    s, c = np.sin(angle), np.cos(angle)
+    # Sine and cosine from the tangent of the half angle: one quick function in place of two slow ones.
+    t = np.tan((0.5 * C) * phi)
+    share = 2.0 / (1.0 + t * t)
+    s, c = t * share, share - 1.0
     outer = (c * C) / (1.0 + psi * psi)
     zz = z * z
     inner = outer * (1.0 - E * (zz / (1.0 + zz)))

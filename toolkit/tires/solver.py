@@ -7,6 +7,7 @@ several starts end at the same lowest cost: an optimiser's own flag is true on m
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -27,9 +28,12 @@ _EXACT = 1e-20  # a cost below this share of sum(y^2) is rounding
 # early that they lose; then the steps of those that are left. A curve whose minimum is not confirmed is
 # searched again, with patience.
 _SWIFT = (32, ((4, 10), (8, 5)), 40)
-_PATIENT = (80, ((14, 20), (20, 5)), 60)
+_PATIENT = (48, ((10, 16), (15, 5)), 60)
 _ENOUGH = 2  # starts at one lowest cost end the search of a curve early
 _NEARLY = 3.0  # times the lowest cost: a start that ended beyond will not come within the noise of it
+_ENOUGH_TO_AGREE = 1e-5  # of the cost that a step may still gain: starts are then told apart to _SAME
+_GLANCE = 6  # steps on the rows that every rival takes
+_CLOSE = 1.05  # times the lowest cost on the rows: it may still be the lowest
 _NEAR = np.array([0.02, 0.02, 0.05, 0.02])
 
 
@@ -47,10 +51,14 @@ class Solution:
     excess: Array
 
 
-def solve(problems: Problems) -> Solution:
-    """Return the global minimum of every problem, as far as the starts can tell."""
-    curves = np.arange(len(problems.u))
-    coarse = compress(problems)
+def solve(groups: Sequence[Problems]) -> list[Solution]:
+    """Return the global minimum of every problem of every group, as far as the starts can tell.
+
+    All groups are searched in one batch, on bin means where they are long, and polished each by itself.
+    """
+    if not groups:
+        return []
+    coarse = _join([compress(one) for one in groups])
     floor = _EXACT * np.sum((coarse.sw * coarse.y) ** 2, axis=1)
     state, count = _search(coarse, floor, _SWIFT)
     agreeing = _agreeing(state.cost.reshape(-1, count), floor)
@@ -68,17 +76,50 @@ def solve(problems: Problems) -> Solution:
         merged.put((order >= count).ravel(), again.take(new.ravel()))
         state.put_at(_rows(open_, count), merged)
         agreeing = _agreeing(state.cost.reshape(-1, count), floor)
+    # The best goes to its end on the bins, where steps are cheap: on the rows few are left to do.
+    best = state.cost.reshape(-1, count).argmin(axis=1) + count * np.arange(len(coarse.u))
+    state.put_at(best, descend(state.p[best], coarse, steps=30, tolerance=_SETTLED))
+    cost, p = state.cost.reshape(-1, count), state.p.reshape(-1, count, 4)
+    cuts = np.cumsum([0, *(len(one.u) for one in groups)])
+    return [
+        _finish(one, p[low:high], cost[low:high], agreeing[low:high], floor[low:high])
+        for one, low, high in zip(groups, cuts[:-1], cuts[1:], strict=True)
+    ]
+
+
+def _join(parts: Sequence[Problems]) -> Problems:
+    # One batch, padded to one width.
+    width = max(one.u.shape[1] for one in parts)
+
+    def padded(columns: Sequence[Array]) -> Array:
+        return np.concatenate([np.pad(one, ((0, 0), (0, width - one.shape[1]))) for one in columns])
+
+    return Problems(
+        u=padded([one.u for one in parts]),
+        y=padded([one.y for one in parts]),
+        sw=padded([one.sw for one in parts]),
+        low=np.concatenate([one.low for one in parts]),
+        high=np.concatenate([one.high for one in parts]),
+    )
+
+
+def _finish(problems: Problems, p: Array, cost: Array, agreeing: NDArray[np.intp], floor: Array) -> Solution:
     # All that differ and come near the lowest are polished on the rows: bin means may rank two minima
     # otherwise than the rows do, and what another minimum leaves open is not determined.
-    cost = state.cost.reshape(len(curves), count)
+    count, curves = cost.shape[1], np.arange(len(cost))
     order = np.argsort(cost, axis=1)
     cost = np.take_along_axis(cost, order, axis=1)
-    p = np.take_along_axis(state.p.reshape(len(curves), count, 4), order[..., None], axis=1)
+    p = np.take_along_axis(p, order[..., None], axis=1)
     chosen = (cost <= _NEARLY * cost[:, :1] + floor[:, None]) & ~_twins(p)
     chosen[:, 0] = True
+    # Rivals take few steps on the rows, those that come close to the lowest go to the end with it.
     owner, place = np.nonzero(chosen)
-    state = descend(p[owner, place], problems.take(owner), steps=30, tolerance=1e-10)
+    state = descend(p[owner, place], problems.take(owner), steps=_GLANCE, tolerance=_SETTLED)
     cost = np.full((len(curves), count), np.inf)
+    cost[owner, place] = state.cost
+    close = np.flatnonzero(state.cost <= _CLOSE * cost.min(axis=1)[owner] + floor[owner])
+    polished = descend(state.p[close], problems.take(owner[close]), steps=30, tolerance=_SETTLED)
+    state.put_at(close, polished)
     cost[owner, place] = state.cost
     rivals = np.zeros((len(curves), count, 6))
     rivals[owner, place] = theta_of(state)
@@ -110,7 +151,7 @@ def _search(
     if (open_ := np.flatnonzero(agreeing < _ENOUGH)).size:
         index = _rows(open_, count)
         part = problems.take(np.repeat(open_, count))
-        state.put_at(index, descend(state.p[index], part, steps=last, tolerance=1e-7))
+        state.put_at(index, descend(state.p[index], part, steps=last, tolerance=_ENOUGH_TO_AGREE))
     return state, count
 
 
@@ -209,7 +250,7 @@ _REACH = np.array([1.5, 1.0, 1.5, 1.0])
 def compress(problems: Problems) -> Problems:
     """Return long curves as bin means with their weights; short ones as they are."""
     curves, points = problems.u.shape
-    if points <= 1.5 * _BINS:
+    if points <= _BINS:
         return problems
     w = problems.sw**2
     place = np.clip(((problems.u + 1.0) * (0.5 * _BINS)).astype(np.intp), 0, _BINS - 1)
