@@ -10,6 +10,7 @@ from calibration_factory import hub_data
 
 from toolkit.calibration.registry.candidate import calibrate
 from toolkit.calibration.registry.registry import Registry
+from toolkit.calibration.session.statements import statements_of
 from toolkit.errors import ToolkitError
 
 Make = Callable[..., Path]
@@ -130,3 +131,10 @@ def test_loads_that_only_vary_together_are_told_so(tmp_path: Path, make_session:
     values = hub_data(60, 1)
     values[:, 4:] = 0.0
     assert "MZ, MX are missing" in refused(tmp_path, make_session(values), "not-spanning").what
+
+
+def test_a_certificates_number_needs_no_quotes(tmp_path: Path, make_session: Make) -> None:
+    tail = "[reference]\nstandard = 7\ncertificate = 2025118\n"
+    made = calibrate(make_session(tail=tail), Registry(tmp_path / "cal"))
+    told = statements_of(made.record).reference
+    assert (told.standard, told.certificate) == ("7", "2025118")

@@ -117,7 +117,17 @@ def model_terms(
                 next_step="name one of the model's terms, or remove it from drop",
                 rule="term",
             )
-    return tuple(name for name in names if name not in drop)
+    left = tuple(name for name in names if name not in drop)
+    if set(left) <= {INTERCEPT}:
+        raise SessionError(
+            "no term of an indication is left in the model",
+            where="drop",
+            got=", ".join(drop),
+            expected="at least one term of an indication",
+            next_step="drop fewer terms; nothing was written",
+            rule="term",
+        )
+    return left
 
 
 def term_slopes(terms: Sequence[str], coefficients: Any, columns: Mapping[str, Any], zero: Any = 0.0) -> Any:

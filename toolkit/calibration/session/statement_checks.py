@@ -169,6 +169,11 @@ def stated(entry: object, text: str, place: str, where: object) -> float:
 def _check_reference(
     reference: Mapping[str, Any], table: Table, loads: tuple[str, ...], where: object
 ) -> None:
+    for key in ("standard", "certificate"):
+        # A certificate's number may be written without quotes.
+        told = reference.get(key, "-")
+        if isinstance(told, bool) or not isinstance(told, str | int) or not str(told).strip():
+            raise wrong(where, f"reference.{key}", told, f'a text: {key} = "..."')
     uncertainty = reference.get("uncertainty", {})
     if not isinstance(uncertainty, dict):
         raise wrong(where, "reference.uncertainty", uncertainty, "{ FY = { U, k, unit } }")

@@ -147,8 +147,8 @@ def parse_statements(
         else quantity(temperature, "temperature", f"{where}: temperature") - 273.15,
         phase=settings.get("phase"),
         reference=Reference(
-            standard=entry.get("standard"),
-            certificate=entry.get("certificate"),
+            standard=None if "standard" not in entry else str(entry["standard"]),
+            certificate=None if "certificate" not in entry else str(entry["certificate"]),
             due=None if due is None else dt.date.fromisoformat(str(due)),
             shared_group=entry.get("shared_group"),
             uncertainties=tuple(
