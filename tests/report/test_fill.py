@@ -4,6 +4,7 @@ from __future__ import annotations
 import dataclasses
 import datetime as dt
 import io
+import re
 import zipfile
 from pathlib import Path
 
@@ -12,7 +13,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from lxml import etree
-from report_factory import make_record, make_result
+from report_factory import SHA, make_record, make_result
 from template_factory import W, make, opened, p, run, sdt, tbl, texts
 
 from toolkit.errors import TemplateError
@@ -23,6 +24,7 @@ from toolkit.report.figures import Picture
 from toolkit.report.fill import Filled, fill
 from toolkit.report.package import read_template
 from toolkit.report.verify import verify_docx
+from toolkit.report.verify_text import text_checks
 from toolkit.report.xml import NS
 
 DAY = dt.date(2026, 11, 21)
@@ -328,3 +330,53 @@ def test_exact_heights_are_loosened(tmp_path: Path) -> None:
 def test_content_is_frozen() -> None:
     with pytest.raises(dataclasses.FrozenInstanceError):
         content().title = "x"  # type: ignore[misc]
+
+
+def test_a_picture_fits_merged_cells_and_the_page_of_its_header(tmp_path: Path) -> None:
+    grid = "".join(f'<w:gridCol w:w="{w}"/>' for w in (1000, 2000, 3000))
+    merged = f'<w:tc><w:tcPr><w:gridSpan w:val="2"/></w:tcPr>{p("{{tk:figure.prat}}")}</w:tc>'
+    body = f"<w:tbl><w:tblPr/><w:tblGrid>{grid}</w:tblGrid><w:tr><w:tc>{p('a')}</w:tc>{merged}</w:tr></w:tbl>"
+
+    def narrow(members: dict[str, bytes]) -> None:
+        name = "word/document.xml"
+        members[name] = re.sub(
+            rb'w:left="\d+"', b'w:left="9000"', members[name].replace(b'w:w="12240"', b'w:w="12000"')
+        )
+
+    assert extents(filled(tmp_path, body)) == [pytest.approx((5000 - 216) * 635 / 36000, abs=0.1)]
+    result = filled(tmp_path, p("x"), header=p("{{tk:figure.gough}}"), edit=narrow)
+    with zipfile.ZipFile(io.BytesIO(result.docx)) as archive:
+        header = next(name for name in archive.namelist() if name.startswith("word/header"))
+    # 12000 wide, 9000 to the left, python-docx's 1800 to the right: 1200 twips remain.
+    assert extents(result, header) == [pytest.approx(1200 * 635 / 36000, abs=0.1)]
+
+
+def test_a_vml_placeholder_gives_its_width_in_any_unit(tmp_path: Path) -> None:
+    for style, mm in (("width:2in", 50.8), ("left:1pt;width:30mm", 30.0), ("width: 96", 25.4)):
+        shape = f'<w:r><w:pict xmlns:v="{NS["v"]}"><v:shape style="{style};height:9pt"/></w:pict></w:r>'
+        assert extents(filled(tmp_path, p(sdt("tk:figure.gough", shape)))) == [mm]
+
+
+def test_a_note_goes_with_the_block_that_refers_to_it(tmp_path: Path) -> None:
+    mark = '<w:r><w:footnoteReference w:id="2"/></w:r>'
+    body = sdt("tk:if.simulated", p("x", mark))
+    made = content(operator=None)
+    gone = filled(tmp_path, body, made, footnote=p("{{tk:test.operator}}"))  # needs no value
+    assert not list(root(gone, "word/footnotes.xml"))
+    with pytest.raises(TemplateError, match=r"tk:test\.operator"):
+        filled(tmp_path, p("x", mark), made, footnote=p("{{tk:test.operator}}"))
+
+
+def test_five_hundred_pages_of_tables_are_filled_and_found_again(tmp_path: Path) -> None:
+    made = content()
+    old = made.tables["acquisition"]
+    rows = tuple((f"file {i}", i / 7, i / 9) for i in range(22_000))
+    made.tables["acquisition"] = Table(name=old.name, columns=old.columns, rows=rows)
+    result = filled(tmp_path, p("{{tk:table.acquisition}}") + tbl(["f", "F", "M"], ["a", "b", "c"]), made)
+    assert len(result.cells) == 22_000
+    pages = [" ".join(" ".join(row) for row in result.cells[i : i + 44]) for i in range(0, 22_000, 44)]
+    text = "\n\f".join([SHA, *pages])
+    assert all(one.ok for one in text_checks(text, result))
+    wrong = text.replace("file 15000 2142.86", "file 15000 2142.87")
+    assert wrong != text
+    assert not all(one.ok for one in text_checks(wrong, result))

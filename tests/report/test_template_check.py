@@ -217,3 +217,40 @@ def test_mutated_files_give_findings_or_a_clear_error(
         check_template(read_template(path), Style(), fonts=False)
     except ToolkitError as error:
         assert error.rule  # noqa: PT017
+
+
+def test_a_literal_of_another_tag_inside_a_control_is_found_and_its_own_prompt_is_not(tmp_path: Path) -> None:
+    assert rules(tmp_path, p(sdt("tk:tire.size", run("{{tk:tire.size}}")))) == []
+    assert rules(tmp_path, sdt("tk:tire.size", p("{{tk:ti", "re.size}}"))) == []
+    assert rules(tmp_path, p(sdt("tk:tire.size", run("{{tk:tire.company}}")))) == ["overlapping-tags"]
+    assert rules(tmp_path, sdt("tk:figure.gough", p("{{tk:tire.company}}"))) == ["overlapping-tags"]
+
+
+def test_a_tag_where_nothing_is_filled_is_found(tmp_path: Path) -> None:
+    math = "http://schemas.openxmlformats.org/officeDocument/2006/math"
+    formula = f'<m:oMath xmlns:m="{math}"><m:r><m:t>{{{{tk:tire.size}}}}</m:t></m:r></m:oMath>'
+    assert rules(tmp_path, p(formula)) == ["wrong-place"]
+
+
+def test_a_table_tag_reaches_its_table_through_a_control(tmp_path: Path) -> None:
+    table = tbl(["a", "b", "c"], ["1", "2", "3"])
+    assert rules(tmp_path, p("{{tk:table.files}}") + sdt("tk:if.files", table)) == []
+    assert rules(tmp_path, p("{{tk:table.files}}") + sdt("Company", table)) == []
+    assert rules(tmp_path, p("{{tk:table.files}}") + sdt("Company", p("x"))) == ["no-table"]
+
+
+CONTENTS = FIELD.format('TOC \\o "1-3" \\h')
+
+
+def test_contents_that_are_written_need_no_finding_and_others_do(tmp_path: Path) -> None:
+    assert rules(tmp_path, p(CONTENTS)) == []
+    assert rules(tmp_path, p(FIELD.format('TOC \\h \\z \\c "Figure"'))) == []
+    assert rules(tmp_path, p(FIELD.format("TOC \\f"))) == ["contents"]
+    assert rules(tmp_path, p(FIELD.format("INDEX"))) == ["contents"]
+    assert rules(tmp_path, p("x"), header=p(CONTENTS)) == ["contents"]
+
+
+def test_a_tag_may_ask_for_any_result_as_a_condition(tmp_path: Path) -> None:
+    for name in ("figure.gough", "table.pull", "caption.gough", "calibration.FY.E5", "report.opinions"):
+        expected = ["unknown-tag"] if name == "report.opinions" else []
+        assert rules(tmp_path, sdt(f"tk:if.{name}", p("x"))) == expected, name

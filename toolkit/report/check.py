@@ -17,9 +17,11 @@ from toolkit.report.fonts import missing_fonts
 from toolkit.report.lint import RULES, LintFinding
 from toolkit.report.package import Template, open_package
 from toolkit.report.scan import (
+    LITERAL,
     Site,
     broken_literals,
     control_tag,
+    filled_by,
     own_rows,
     place_of,
     row_in,
@@ -27,7 +29,7 @@ from toolkit.report.scan import (
     table_of,
 )
 from toolkit.report.style import Style
-from toolkit.report.tags import format_problem
+from toolkit.report.tags import format_problem, parse_tag
 from toolkit.report.vocabulary import REPORT, Vocabulary
 from toolkit.report.xml import (
     SDT_CONTENT,
@@ -38,6 +40,7 @@ from toolkit.report.xml import (
     Element,
     Story,
     ancestor,
+    own_texts,
     q,
     stories,
 )
@@ -177,6 +180,8 @@ def _one(site: Site, words: Vocabulary) -> Iterator[LintFinding]:
             yield _at(site, "wrong-place", f"{tag}: the control has no content")
         elif family not in ("if", "table") and content.find(W_TR) is not None:
             yield _at(site, "wrong-place", f"{tag}: a value or figure cannot stand around a table row")
+        if family in ("value", "figure", "row"):
+            yield from _swallowed(site)
         outer = next(
             (
                 s
@@ -189,6 +194,16 @@ def _one(site: Site, words: Vocabulary) -> Iterator[LintFinding]:
             yield _at(
                 site, "overlapping-tags", f"{tag} stands inside {control_tag(outer)}, which replaces it"
             )
+
+
+def _swallowed(site: Site) -> Iterator[LintFinding]:
+    """Find literals of other tags inside a control that will be filled as a whole; its own is its prompt."""
+    for paragraph in {id(p): p for p in [*site.element.iter(W_P), *site.element.iterancestors(W_P)]}.values():
+        inside = [t for t in own_texts(paragraph) if filled_by(t) is site.element]
+        for match in LITERAL.finditer("".join(t.text or "" for t in inside)):
+            other = parse_tag(match[1])
+            if other is not None and other.path != site.tag.path:
+                yield _at(site, "overlapping-tags", f"{other} stands inside {site.tag}, which replaces it")
 
 
 def _near(path: str, words: Vocabulary) -> str:

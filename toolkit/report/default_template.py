@@ -13,8 +13,9 @@ from collections.abc import Callable
 from typing import Any
 
 from toolkit.report.blocks import Pieces, elements, field, paragraph, placeholder_png, run
-from toolkit.report.template_body import chapters, title_page
+from toolkit.report.template_body import chapters
 from toolkit.report.template_styles import make_styles
+from toolkit.report.template_title import title_page
 from toolkit.report.xml import Element, q
 
 STYLE_FILE = """\

@@ -16,6 +16,7 @@ from toolkit.report.scan import own_rows
 from toolkit.report.xml import NS, W_P, W_R, W_T, W_TBL, W_TC, W_TR, Element, Story, ancestor, clean, q
 
 EMU_TWIP = 635
+_VML_EMU = {"pt": 12700, "in": 914400, "cm": 360000, "mm": 36000, "px": 9525}
 _CELL_MARGIN = 2 * 108
 _NEXT_SECTION: Any = etree.XPath("following::w:sectPr[1]", namespaces={"w": NS["w"]})
 _LETTER = (12240, 15840, 1440)
@@ -143,9 +144,9 @@ def _placeholder_width(at: Element) -> int | None:
     if extent is not None:
         return int(extent.get("cx") or 0) or None
     for shape in at.iter(q("v:shape")) if at.tag != W_P else ():
-        found = re.search(r"width:\s*([\d.]+)pt", shape.get("style") or "")
+        found = re.search(r"(?:^|[;\s])width:\s*(\d+(?:\.\d+)?)(pt|in|cm|mm|px)?", shape.get("style") or "")
         if found:
-            return round(float(found[1]) * 12700)
+            return round(float(found[1]) * _VML_EMU[found[2] or "px"])
     return None
 
 

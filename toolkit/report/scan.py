@@ -9,6 +9,7 @@ from typing import Literal
 
 from toolkit.report.tags import Tag, parse_tag
 from toolkit.report.xml import (
+    SDT_CONTENT,
     SDT_PR,
     W_P,
     W_SDT,
@@ -99,6 +100,10 @@ def table_of(site: Site) -> Element | None:
         q("w:proofErr"),
     ):
         following = following.getnext()
+    while following is not None and following.tag == W_SDT:
+        # A control of others, or a condition, around the table.
+        content = following.find(SDT_CONTENT)
+        following = None if content is None else next(iter(content), None)
     return following if following is not None and following.tag == W_TBL else None
 
 

@@ -263,7 +263,7 @@ def _value_paths() -> frozenset[str]:
 
 
 # A width or precision of three digits would be a denial of service, not a format.
-_NUMBER_SPEC = re.compile(r"(?:[^{}]?[<>=^])?[+\- ]?#?0?\d{0,2}[,_]?(?:\.\d{1,2})?[eEfFgG%d]?")
+_NUMBER_SPEC = re.compile(r"(?:[^{}]?[<>=^])?[+\- ]?z?#?0?\d{0,2}[,_]?(?:\.\d{1,2})?[eEfFgGn%d]?")
 _WIDTH = re.compile(r"width=(\d{1,4}(?:\.\d{1,3})?)(mm|cm|in|pt)")
 _EMU = {"mm": 36000, "cm": 360000, "in": 914400, "pt": 12700}
 
