@@ -43,6 +43,7 @@ def command(
     from toolkit.diagnosis.diagnose import diagnose
     from toolkit.diagnosis.serial import as_json, prediction_csv
     from toolkit.files import write_atomic
+    from toolkit.report.diagnosis.page import write_page
 
     started = time.perf_counter()
     read = read_case(case)
@@ -63,6 +64,7 @@ def command(
         out / "diagnosis.json",
         json_module.dumps({"schema": 1, **payload}, ensure_ascii=False, indent=2, allow_nan=False) + "\n",
     )
+    write_page(out / "diagnosis.html", result)
     answer({**payload, "out": str(out)}, _text(made, out), as_json=json, quiet=quiet)
     return 0 if made.verdict == "nothing" else 1
 

@@ -162,7 +162,7 @@ def _coloured(
 
 
 def _plain(space: _Space, layouts: dict[str, Layout], from_: _Solved) -> _Solved | None:
-    """Return ordinary least squares, every output weighed by what its rows are worth; None for white noise."""
+    """Return ordinary least squares, each output weighed by what its rows are worth; None for white noise."""
     if not len(from_.x) or not any(one.reflection for one in from_.noise.values()):
         return None
     weights = {

@@ -122,7 +122,9 @@ def search(problem: Problem, *, seed: int, budget: Budget) -> Search:
         for turn in range(MOST_EFFECTS + 1):
             budget.check(f"step {turn + 1}: screening {len(listed)} candidates")
             screen = Screen.of(problem, base)
-            scored = [one for each in listed for one in screen.score(each)]
+            taken = {_place(one) for one in base.active}
+            left = [each for each in listed if _place(each.active) not in taken]
+            scored = [one for each in left for one in screen.score(each)]
             ranked = best_of(scored)
             p_values = search_p_values(
                 screen, [one.directions for one in scored], [one.gain for one in scored], seed + turn

@@ -1,0 +1,1 @@
+"""A diagnosis for people: one self-contained page, its figures first."""

@@ -1,0 +1,209 @@
+"""Figures of a diagnosis: error before and after, where the mismatch is, one run in time, runs by output."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+    from numpy.typing import NDArray
+
+    from toolkit.diagnosis.answer import Diagnosis, Place
+    from toolkit.diagnosis.search import Search
+
+GREY, ORANGE, BLUE, GREEN = "#6b6b6b", "#d9822b", "#1565c0", "#2e7d32"
+_RC: Any = {
+    "font.family": "sans-serif",
+    "font.sans-serif": ["Carlito", "Calibri", "Liberation Sans", "DejaVu Sans"],
+    "font.size": 10.0,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "grid.color": "#e4e4e4",
+    "grid.linewidth": 0.6,
+    "svg.hashsalt": "toolkit",
+}
+_MOST = 4000  # points of a scatter
+_BINS = 24
+
+
+def error_bars(made: Diagnosis) -> bytes:
+    """Return the chart of the first ten seconds: held-out error over noise, three bars an output."""
+    names = [one.channel for one in made.held_out]
+
+    def draw(figure: Figure) -> None:
+        axes = figure.add_subplot()
+        steps = [("as declared", GREY), ("refitted", ORANGE), ("with the effect", BLUE)]
+        if not made.effects:
+            steps = steps[:2]
+        for i, (label, colour) in enumerate(steps):
+            values = [
+                (one.nominal_rmse, one.refitted_rmse, one.augmented_rmse)[i] / max(one.noise_floor, 1e-300)
+                for one in made.held_out
+            ]
+            at = np.arange(len(names)) + (i - (len(steps) - 1) / 2) * 0.26
+            bars = axes.barh(at, values, height=0.24, color=colour, label=label)
+            axes.bar_label(bars, labels=[f"{v:.3g}" for v in values], padding=4, fontsize=9, color="#333333")
+        axes.axvline(1.0, color=GREEN, linewidth=1.6)
+        top = axes.get_xaxis_transform()
+        axes.text(1.0, 1.02, "noise", color=GREEN, transform=top, ha="center")
+        axes.set_yticks(range(len(names)), names)
+        axes.invert_yaxis()
+        axes.set_xlabel("root mean square error on held-out rows, over the noise")
+        axes.margins(x=0.12)
+        axes.grid(visible=False, axis="y")
+        axes.legend(loc="lower right", frameon=False)
+
+    return _svg((8.6, 1.3 + 0.85 * max(len(names), 1)), draw)
+
+
+def mismatch_map(found: Search, channel: str, place: Place, *, after: bool) -> bytes | None:
+    """Return an output's residual over the variable that holds its mismatch, before and after."""
+    problem = found.problem
+    x = _variable(found, place.variable)
+    if x is None:
+        return None
+    kept = problem.kept[channel]
+    unit = next(one.unit for one in problem.model.outputs if one.name == channel)
+
+    def draw(figure: Figure) -> None:
+        axes = figure.add_subplot()
+        series = [("refitted", ORANGE, found.refitted.residual[channel])]
+        if after:
+            series.append(("with the effect", BLUE, found.augmented.residual[channel]))
+        for label, colour, residual in series:
+            some = np.flatnonzero(kept)
+            some = some[:: max(1, len(some) // _MOST)]
+            axes.plot(x[some], residual[some], ".", markersize=2.2, alpha=0.25, color=colour)
+            centre, mean = _binned(x[kept], residual[kept])
+            axes.plot(centre, mean, "-", linewidth=2.0, color=colour, label=f"{label} (mean)")
+        if isinstance(place.start, float) and isinstance(place.end, float):
+            axes.axvspan(place.start, place.end, color="#f6e7c8", alpha=0.5, zorder=0)
+        axes.axhline(0, color="#333333", linewidth=0.8)
+        axes.set_xlabel(f"{place.variable} [{place.unit}]" if place.unit else place.variable)
+        axes.set_ylabel(f"recorded − simulated {channel} [{unit}]")
+        axes.legend(frameon=False)
+
+    return _svg((8.6, 3.6), draw)
+
+
+def run_in_time(found: Search, channel: str, *, after: bool) -> bytes:
+    """Return the run with the largest mismatch of an output: recorded and simulated, residuals beneath."""
+    problem = found.problem
+    residual = np.where(problem.kept[channel], found.refitted.residual[channel], 0.0)
+    which = int(np.argmax([float(np.sum(residual[one] ** 2)) for one in problem.slices]))
+    rows, run = problem.slices[which], problem.runs[which]
+    unit = next(one.unit for one in problem.model.outputs if one.name == channel)
+
+    def draw(figure: Figure) -> None:
+        upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(1.5, 1))
+        upper.plot(run.t, problem.observed[channel][rows], ".", markersize=2, color=GREY, label="recorded")
+        upper.plot(
+            run.t, found.refitted.simulated[channel][rows], color=ORANGE, linewidth=1.2, label="refitted"
+        )
+        lower.plot(run.t, found.refitted.residual[channel][rows], color=ORANGE, linewidth=0.8)
+        if after:
+            upper.plot(
+                run.t,
+                found.augmented.simulated[channel][rows],
+                color=BLUE,
+                linewidth=1.2,
+                label="with the effect",
+            )
+            lower.plot(run.t, found.augmented.residual[channel][rows], color=BLUE, linewidth=0.8)
+        upper.set_ylabel(f"{channel} [{unit}]")
+        upper.legend(frameon=False, ncols=3, loc="upper right")
+        lower.axhline(0, color="#333333", linewidth=0.8)
+        lower.set_ylabel("residual")
+        lower.set_xlabel(f"time [s], {run.name}" if problem.case.has_time else f"row, {run.name}")
+
+    return _svg((8.6, 4.4), draw)
+
+
+def run_map(found: Search, *, after: bool) -> bytes:
+    """Return root mean square residuals over the noise, by run and output, before and after."""
+    problem = found.problem
+    names = problem.names
+    fits = [("refitted", found.refitted)] + ([("with the effect", found.augmented)] if after else [])
+
+    def table(fit: Any) -> NDArray[np.float64]:
+        made = np.zeros((len(names), len(problem.runs)))
+        for i, name in enumerate(names):
+            noise = found.augmented.noise[name].marginal_sd
+            for j, one in enumerate(problem.slices):
+                kept = problem.kept[name][one]
+                values = fit.residual[name][one][kept]
+                made[i, j] = np.sqrt(np.mean(values**2)) / noise if len(values) else np.nan
+        return made
+
+    def draw(figure: Figure) -> None:
+        made = [table(fit) for _, fit in fits]
+        most = max(2.0, float(np.nanmax(np.stack(made))))
+        panels = figure.subplots(len(fits), 1, sharex=True, squeeze=False)[:, 0]
+        for axes, (label, _), values in zip(panels, fits, made, strict=True):
+            axes.imshow(values, aspect="auto", cmap="YlOrBr", vmin=0, vmax=most)
+            axes.set_yticks(range(len(names)), names)
+            axes.set_title(label, loc="left", fontsize=10)
+            axes.grid(visible=False)
+            _write_cells(axes, values, most)
+        panels[-1].set_xticks(
+            range(len(problem.runs)), [_short(one.name) for one in problem.runs],
+            rotation=0 if len(problem.runs) < 9 else 90,
+        )  # fmt: skip
+
+    return _svg((8.6, 0.9 + len(fits) * (0.5 + 0.42 * len(names))), draw)
+
+
+def _write_cells(axes: Axes, values: NDArray[np.float64], most: float) -> None:
+    if values.shape[1] > 16:
+        return
+    for i in range(values.shape[0]):
+        for j in range(values.shape[1]):
+            if np.isfinite(values[i, j]):
+                colour = "white" if values[i, j] > 0.6 * most else "#333333"
+                axes.text(j, i, f"{values[i, j]:.2g}", ha="center", va="center", color=colour, fontsize=9)
+
+
+def _short(name: str) -> str:
+    return name.removesuffix(".csv").removesuffix(".xlsx")
+
+
+def _variable(found: Search, name: str) -> NDArray[np.float64] | None:
+    problem = found.problem
+    if name == "time":
+        return np.concatenate([run.t for run in problem.runs])
+    if all(name in run.columns for run in problem.runs):
+        return np.concatenate([run.columns[name] for run in problem.runs])
+    return None
+
+
+def _binned(
+    x: NDArray[np.float64], y: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    edges = np.unique(np.quantile(x, np.linspace(0, 1, _BINS + 1)))
+    if len(edges) < 3:
+        return np.array([float(np.mean(x))]), np.array([float(np.mean(y))])
+    at = np.clip(np.searchsorted(edges, x, side="right") - 1, 0, len(edges) - 2)
+    count = np.maximum(np.bincount(at, minlength=len(edges) - 1), 1)
+    centre = np.bincount(at, weights=x, minlength=len(edges) - 1) / count
+    mean = np.bincount(at, weights=y, minlength=len(edges) - 1) / count
+    return centre, mean
+
+
+def _svg(size: tuple[float, float], draw: Callable[[Figure], None]) -> bytes:
+    import matplotlib as mpl
+    from matplotlib.backends.backend_svg import FigureCanvasSVG
+    from matplotlib.figure import Figure as MadeFigure
+
+    with mpl.rc_context(_RC):
+        figure = MadeFigure(figsize=size, layout="constrained")
+        FigureCanvasSVG(figure)
+        draw(figure)
+        stream = io.BytesIO()
+        figure.savefig(stream, format="svg", metadata={"Date": None})
+    return stream.getvalue()

@@ -1,0 +1,224 @@
+"""A diagnosis as one HTML file that opens without a network; the chart of ten seconds comes first."""
+
+from __future__ import annotations
+
+import base64
+from html import escape
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from toolkit.files import write_atomic
+from toolkit.report.diagnosis import figures
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from toolkit.diagnosis.answer import Diagnosis, FoundEffect, Mismatch
+    from toolkit.diagnosis.diagnose import Result
+
+HEADLINES = {
+    "named": "The missing physics has a name.",
+    "equivalent": "A class of effects explains the mismatch; this recording cannot tell them apart.",
+    "unknown": "Something is missing that no known effect explains.",
+    "nothing": "Nothing is missing that this recording could show.",
+    "untestable": "This recording cannot tell.",
+}
+_COLOURS = {
+    "named": "#1565c0", "equivalent": "#6a4fb3", "unknown": "#c77700", "nothing": "#2e7d32",
+    "untestable": "#6b6b6b",
+}  # fmt: skip
+_STYLE = """
+body{font:15px/1.5 Carlito,Calibri,"Liberation Sans",sans-serif;color:#222;max-width:60rem;
+  margin:2rem auto;padding:0 1rem}
+h1{font-size:1.5rem;margin:0}h2{font-size:1.15rem;margin:2rem 0 .4rem;border-bottom:1px solid #ddd}
+.verdict{border-left:.5rem solid VAR;padding:.6rem 1rem;background:#f6f6f6;margin:1rem 0}
+.verdict b{font-size:1.2rem}table{border-collapse:collapse;margin:.5rem 0}
+th,td{padding:.2rem .7rem;text-align:left;border-bottom:1px solid #e4e4e4}
+td.n,th.n{text-align:right;font-variant-numeric:tabular-nums}img{max-width:100%}
+code{background:#f0f0f0;padding:.1rem .3rem}
+small{color:#666}details{margin:.5rem 0}
+"""
+
+
+def write_page(path: Path, result: Result) -> None:
+    """Write the page, whole or not at all.
+
+    Raises
+    ------
+    OutputError
+        the file cannot be written
+    """
+    write_atomic(path, page(result))
+
+
+def page(result: Result) -> str:
+    """Return the page's HTML."""
+    made = result.diagnosis
+    parts = [
+        '<!doctype html><html lang="en"><head><meta charset="utf-8">',
+        f"<title>Diagnosis: {escape(made.title)}</title>",
+        f"<style>{_STYLE.replace('VAR', _COLOURS[made.verdict])}</style></head><body>",
+        f"<h1>{escape(made.title)}</h1>",
+        f'<div class="verdict"><b>{escape(HEADLINES[made.verdict])}</b><br>{_sentence(made)}</div>',
+        _picture(figures.error_bars(made), "error on held-out rows before and after, over the noise"),
+        *_effects(made),
+        *_where(result),
+        *_held_out(made),
+        *_parameters(made),
+        *_remaining(made),
+        *_power(made),
+        *_next(made),
+        f"<p><small>Case {escape(made.case_sha256[:16])}; held out by {escape(made.held_out_by)}"
+        f"{'' if made.complete else '; incomplete: ' + escape(', '.join(made.skipped))}.</small></p>",
+        "</body></html>",
+    ]
+    return "\n".join(parts)
+
+
+def _sentence(made: Diagnosis) -> str:
+    if made.effects:
+        told = []
+        for one in made.effects:
+            where = f" on {one.channel}" if one.channel else ""
+            also = f" (or {', '.join(one.equivalent_to)})" if one.equivalent_to else ""
+            told.append(f"<b>{escape(one.name + where + also)}</b>: {escape(one.statement)}")
+        return "<br>".join(told)
+    if made.verdict == "unknown":
+        told = [f"{channel} over {' and '.join(names)}" for channel, names in made.depends_on[:3]]
+        return escape(f"The mismatch depends on: {'; '.join(told)}.")
+    if made.verdict == "untestable":
+        return "The outputs do not vary, or the parameters take up everything; see below."
+    return "What is left is noise; the list below says how large each effect would have had to be."
+
+
+def _effects(made: Diagnosis) -> list[str]:
+    parts = []
+    for one in made.effects:
+        parts.append(f"<h2>{escape(one.name)}{' on ' + escape(one.channel) if one.channel else ''}</h2>")
+        parts.append(f"<p>{escape(one.statement)} <small>Stage: {escape(one.stage)}.</small></p>")
+        parts.append(f"<p><code>{escape(one.equation)}</code> <small>{escape(one.reference)}</small></p>")
+        rows = [
+            (each.name, each.value if isinstance(each.value, str) else f"{each.value:.4g}", each.unit,
+             "" if each.ci95 is None else f"{each.ci95[0]:.4g} to {each.ci95[1]:.4g}",
+             "all runs" if each.runs is None else ", ".join(each.runs))
+            for each in one.parameters
+        ]  # fmt: skip
+        parts.append(_table(("parameter", "value", "unit", "95 % interval", "in"), rows, numbers=(1,)))
+        parts.append(f"<p>{_why(one)}</p>")
+    return parts
+
+
+def _why(one: FoundEffect) -> str:
+    text = (
+        f"On rows that no fit had seen the log score rose by {one.held_out_log_score_gain:.1f}; the chance "
+        f"that a search of this size finds as much in noise is {one.p_value:.2g}."
+    )
+    if one.equivalent_to:
+        text += f" {', '.join(one.equivalent_to)} would explain the same: they are one class here."
+    if one.rejected:
+        told = ", ".join(f"{name} (log-likelihood {-less:.1f} less)" for name, less in one.rejected[:5])
+        text += f" Rejected in its place: {told}."
+    return escape(text)
+
+
+def _where(result: Result) -> list[str]:
+    made, found = result.diagnosis, result.search
+    if not made.mismatch:
+        return []
+    after = bool(made.effects)
+    parts = ["<h2>Where</h2>"]
+    for one in made.mismatch:
+        parts.append(f"<p>{_place(one)}</p>")
+        for place in one.where[:2]:
+            drawn = figures.mismatch_map(found, one.channel, place, after=after)
+            if drawn is not None:
+                parts.append(_picture(drawn, f"residual of {one.channel} over {place.variable}"))
+        parts.append(
+            _picture(figures.run_in_time(found, one.channel, after=after), f"{one.channel} in one run")
+        )
+    if len(found.problem.runs) > 1:
+        parts.append("<p>Root mean square residual over the noise, by run:</p>")
+        parts.append(_picture(figures.run_map(found, after=after), "residual by run and output"))
+    return parts
+
+
+def _place(one: Mismatch) -> str:
+    text = (
+        f"{one.channel}: {100 * one.share_of_variance:.0f} % of the refitted residual's variance is structure"
+    )
+    for at in one.where[:1]:
+        ends = f"{at.start:.4g} to {at.end:.4g}" if isinstance(at.start, float) else str(at.start)
+        text += f", most of it where {at.variable} is {ends} {at.unit}"
+    return escape(f"{text} (p = {one.p_value:.2g}).")
+
+
+def _held_out(made: Diagnosis) -> list[str]:
+    rows = []
+    for one in made.held_out:
+        errors = (one.nominal_rmse, one.refitted_rmse, one.augmented_rmse, one.noise_floor)
+        rows.append((one.channel, one.unit, *(f"{value:.4g}" for value in errors)))
+    head = ("output", "unit", "as declared", "refitted", "with the effects", "noise")
+    return ["<h2>Error on held-out rows</h2>", _table(head, rows, numbers=(2, 3, 4, 5))]
+
+
+def _parameters(made: Diagnosis) -> list[str]:
+    rows = [
+        (one.name, one.unit, f"{one.before:.6g}", f"{one.after:.6g}",
+         "known exactly" if one.prior_sd is None else f"{one.prior_sd:.3g}",
+         "" if one.shift_in_sd is None else f"{one.shift_in_sd:+.2f}")
+        for one in made.nominal_parameters
+    ]  # fmt: skip
+    if not rows:
+        return []
+    head = ("parameter", "unit", "before", "after", "prior sd", "shift/sd")
+    return ["<h2>Parameters of the simulation</h2>", _table(head, rows, numbers=(2, 3, 4, 5))]
+
+
+def _remaining(made: Diagnosis) -> list[str]:
+    if not made.depends_on:
+        return ["<h2>What remains</h2>", "<p>Nothing that stands out of the noise.</p>"]
+    rows = [(channel, " and ".join(names)) for channel, names in made.depends_on[:8]]
+    return [
+        "<h2>What remains</h2>",
+        "<p>Structure that no named effect explains. It is a description, not physics:</p>",
+        _table(("output", "depends on"), rows),
+    ]
+
+
+def _power(made: Diagnosis) -> list[str]:
+    rows = [
+        (one.name, "" if one.minimum_detectable is None else f"{one.minimum_detectable:.3g}", one.unit,
+         "yes" if one.observable else "no", one.why)
+        for one in made.not_found
+    ]  # fmt: skip
+    head = ("effect", "smallest size seen with 80 % power", "unit", "observable", "")
+    return [
+        "<h2>What was not found</h2>",
+        "<p>“Nothing missing” means no more than this list: below these sizes an effect could be there.</p>",
+        "<details open><summary>effects</summary>",
+        _table(head, rows, numbers=(1,)),
+        "</details>",
+    ]
+
+
+def _next(made: Diagnosis) -> list[str]:
+    if not made.next_measurements:
+        return []
+    items = "".join(f"<li>{escape(one)}</li>" for one in made.next_measurements)
+    return ["<h2>What to measure next</h2>", f"<ul>{items}</ul>"]
+
+
+def _table(head: Sequence[str], rows: Sequence[Sequence[object]], *, numbers: Sequence[int] = ()) -> str:
+    def cell(tag: str, i: int, text: object) -> str:
+        return f"<{tag}{' class=n' if i in numbers else ''}>{escape(str(text))}</{tag}>"
+
+    top = "".join(cell("th", i, one) for i, one in enumerate(head))
+    body = "".join(
+        "<tr>" + "".join(cell("td", i, one) for i, one in enumerate(row)) + "</tr>" for row in rows
+    )
+    return f"<table><thead><tr>{top}</tr></thead><tbody>{body}</tbody></table>"
+
+
+def _picture(svg: bytes, alt: str) -> str:
+    data = base64.b64encode(svg).decode()
+    return f'<p><img alt="{escape(alt, quote=True)}" src="data:image/svg+xml;base64,{data}"></p>'
