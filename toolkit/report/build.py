@@ -16,7 +16,7 @@ from toolkit.report.content import Cell, ReportContent, Table, Value
 from toolkit.report.details import details_values
 from toolkit.report.plots import build_plots, load_groups
 from toolkit.report.style import Style
-from toolkit.report.tables import build_tables
+from toolkit.report.tables import build_tables, summary_load
 from toolkit.report.tags import FIGURES, catalogue, format_number
 from toolkit.report.words import say_plot, say_table, say_values
 
@@ -221,12 +221,10 @@ def _angles(steps: Sequence[float | None]) -> str | None:
 
 def _summary(result: TestResult) -> tuple[float | None, dict[str, Estimate | None]]:
     """Return the load of the summary [N] and its estimates: N, N·m, per degree."""
-    chars, info = result.characteristics, result.reduced.info
-    loads = sorted({one.load_N for one in chars.stiffness} | {one.load_N for one in chars.pull})
-    if not loads:
+    chars = result.characteristics
+    load = summary_load(result)
+    if load is None:
         return None, dict.fromkeys(_SUMMARY_NAMES)
-    rated = info.rated_load_N
-    load = min(loads, key=lambda one: abs(one - rated)) if rated else loads[len(loads) // 2]
     near = 0.04 * load
     stiff = next(
         (s for s in chars.stiffness if s.rotation == "forward" and abs(s.load_N - load) <= near), None

@@ -125,15 +125,21 @@ TABLES: dict[str, tuple[str, tuple[Column, ...]]] = {
         ),
     ),
     "budget": (
-        "what makes each characteristic uncertain, one row a source",
+        "standard uncertainties of each characteristic at the summary's load by their source, to two digits "
+        "of their sum; a dash below its last place",
         (
             _text("quantity", "name of the characteristic"),
             _text("rotation", "direction of rotation, or both"),
-            _number("load", "load", ".0f", quantity="force"),
-            _text("source", "source of uncertainty"),
-            _number("u", "standard uncertainty in the row's unit", ".3g"),
-            _number("share", "share of the variance", ".0f", unit="%"),
             _text("unit", "unit of the row"),
+            _text("calibration", "calibration record: fit and what its session stated"),
+            _text("zero", "zero of the cells: an open one, or the scatter of the tare"),
+            _text("SA_zero", "zero of the slip angle"),
+            _text("SA_scale", "scale of the slip angle"),
+            _text("load_cell", "load"),
+            _text("pressure", "inflation pressure"),
+            _text("repeatability", "scatter of the rows, of force and slip angle"),
+            _text("fit", "misfit of the curve beyond that scatter"),
+            _text("u", "standard uncertainty of all"),
         ),
     ),
     "characteristics": (

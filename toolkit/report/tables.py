@@ -151,27 +151,58 @@ def _at_angles(result: TestResult) -> list[Row]:
     return rows
 
 
+# Columns of the budget table and the sources that they hold.
+_SOURCES = {
+    "calibration": ("calibration",),
+    "zero": ("cell zero", "tare"),
+    "SA_zero": ("slip angle zero",),
+    "SA_scale": ("slip angle scale",),
+    "load_cell": ("load",),
+    "pressure": ("pressure",),
+    "repeatability": ("repeatability", "slip angle scatter"),
+    "fit": ("fit",),
+}
+
+
+def summary_load(result: TestResult) -> float | None:
+    """Return the load [N] of a report's summary: the one nearest the rated load, else the middle one."""
+    chars, rated = result.characteristics, result.reduced.info.rated_load_N
+    loads = sorted({one.load_N for one in chars.stiffness} | {one.load_N for one in chars.pull})
+    if not loads:
+        return None
+    return min(loads, key=lambda one: abs(one - rated)) if rated else loads[len(loads) // 2]
+
+
 def _budget(result: TestResult, style: Style) -> list[Row]:
     rows: list[Row] = []
+    load = summary_load(result)
     for one in result.characteristics.budgets:
+        if one.load_N != load:
+            continue
         way, _, kind = one.name.partition("_")
         text, unit = _LONG[f"{kind}_{way}" if way in ("secant", "slope") else one.name]
         shown, factor = style.unit(unit)
         factor *= _DEG if "/" in unit else 1.0
-        total = sum(u * u for _, u in one.sources)
-        rows += [
-            {
-                "quantity": text,
-                "rotation": one.rotation,
-                "load": one.load_N,
-                "source": source,
-                "u": u * factor,
-                "share": 100 * u * u / total,
-                "unit": str(shown).replace("*", "·"),
-            }
-            for source, u in one.sources
-        ]
+        sources = dict(one.sources)
+        row: Row = {"quantity": text, "rotation": one.rotation, "unit": str(shown).replace("*", "·")}
+        total = math.hypot(*sources.values()) * factor
+        for column, names in _SOURCES.items():
+            part = math.hypot(*(sources.get(name, 0.0) for name in names)) * factor
+            row[column] = _to_place(part, total, style)
+        row["u"] = _to_place(total, total, style)
+        rows.append(row)
     return rows
+
+
+def _to_place(value: float, total: float, style: Style) -> str:
+    """Return a part of a budget to the place of the second digit of its total; a dash below it."""
+    if not total > 0:
+        return "-"
+    digits = max(0, 1 - math.floor(math.log10(total)))
+    text = f"{value:.{digits}f}"
+    if not float(text):
+        return "-"
+    return text.replace(".", ",") if style.decimal_comma else text
 
 
 def _characteristics(result: TestResult, style: Style) -> list[Row]:

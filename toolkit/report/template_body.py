@@ -1,119 +1,11 @@
-"""The default template's title page and chapters."""
+"""The default template's chapters."""
 
 # ruff: noqa: E501  lines of a template's text read best whole
 from __future__ import annotations
 
 from toolkit.report.blocks import Pieces, literal, paragraph, run
+from toolkit.report.template_budget import budget_table
 from toolkit.report.template_pieces import contents
-
-
-def title_page(p: Pieces) -> list[str]:
-    """Return the title page: the source document's Figure 5.3, calibration, summary and report id."""
-    quarter = (31.0, 52.0, 31.0, 52.0)
-    return [
-        paragraph(p.inline("tk:laboratory.name", "laboratory"), style="Laboratory"),
-        paragraph(run("M-15 Tire Test"), style="Title"),
-        paragraph(run("Force and Moment"), style="Subtitle"),
-        p.block(
-            "tk:if.simulated",
-            paragraph(
-                run("SIMULATED DATA: made by simulation, not a measurement of a tire."), style="Notice"
-            ),
-        ),
-        p.block(
-            "tk:if.unverified",
-            paragraph(
-                run(
-                    "UNVERIFIED CALIBRATION: the record is a legacy import; its coefficients are not reproduced from "
-                    "reference data."
-                ),
-                style="Notice",
-            ),
-        ),
-        p.facts(
-            [
-                [("TIRE SIZE", "tire.size"), ("COMPANY", "tire.company")],
-                [("DOT", "tire.DOT"), ("SERIES", "tire.series")],
-                [("TEST PRESSURE", "test.pressure"), ("OPERATOR", "test.operator")],
-                [("REQUESTOR", "test.requestor"), ("TEST DATE", "test.date")],
-                [("SPECIAL?", "test.special")],
-            ],
-            quarter,
-        ),
-        paragraph("", style="Gap"),
-        paragraph(run("Calibration"), style="BoxTitle"),
-        p.facts(
-            [
-                [("RECORD", "calibration.id"), ("STATUS", "calibration.status")],
-                [("SHA-256", "calibration.hash")],
-            ],
-            quarter,
-        ),
-        paragraph("", style="Gap"),
-        p.block(
-            "tk:if.summary.load",
-            paragraph(
-                run("Results at ") + p.inline("tk:summary.load", "load") + literal(" {{tk:unit.force}}"),
-                style="BoxTitle",
-            )
-            + _summary(p, quarter),
-        ),
-        paragraph("", style="Gap"),
-        paragraph(run("Report"), style="BoxTitle"),
-        p.facts(
-            [
-                [("REPORT ID", "report.id"), ("ISSUED", "report.date")],
-                [("TEST", "test.name"), ("DATA", "simulated")],
-            ],
-            quarter,
-        ),
-        paragraph(
-            run(
-                "The results relate only to the item tested, as received. The report may be reproduced only as a whole. "
-                "Expanded uncertainties have a coverage probability of about 95 %."
-            ),
-            style="Small",
-        ),
-    ]
-
-
-def _summary(p: Pieces, widths: tuple[float, ...]) -> str:
-    def fact(label: str, name: str, unit: str) -> tuple[str, str]:
-        return label, f"{{{{tk:summary.{name}.with_U}}}} {{{{tk:unit.{unit}}}}}"
-
-    rows = [
-        p.block(
-            "tk:if.summary.cornering_stiffness",
-            _rows(
-                p,
-                [
-                    [
-                        fact("CORNERING", "cornering_stiffness", "force_per_angle"),
-                        fact("ALIGNING", "aligning_stiffness", "moment_per_angle"),
-                    ]
-                ],
-                widths,
-            ),
-        ),
-        p.block(
-            "tk:if.summary.conicity",
-            _rows(
-                p,
-                [
-                    [fact("CONICITY", "conicity", "force"), fact("PLYSTEER", "plysteer", "force")],
-                    [fact("CRAT", "CRAT", "moment"), fact("PRAT", "PRAT", "moment")],
-                ],
-                widths,
-            ),
-        ),
-    ]
-    outer = p.facts([], widths)
-    return outer.replace("</w:tblGrid>", "</w:tblGrid>" + "".join(rows))
-
-
-def _rows(p: Pieces, rows: list[list[tuple[str, str]]], widths: tuple[float, ...]) -> str:
-    made = p.facts([list(row) for row in rows], widths)
-    return made.partition("</w:tblGrid>")[2].removesuffix("</w:tbl>")
 
 
 def chapters(p: Pieces) -> list[str]:
@@ -258,6 +150,7 @@ def chapters(p: Pieces) -> list[str]:
                     f"load [{force}]",
                     f"CRAT, source [{moment}]",
                     f"PRAT, source [{moment}]",
+                    f"PRAT at FY = 0, source [{moment}]",
                     f"residual, forward [{moment}]",
                     f"residual, reverse [{moment}]",
                 ],
@@ -265,11 +158,12 @@ def chapters(p: Pieces) -> list[str]:
                     "load",
                     "thesis_CRAT ± U_thesis_CRAT",
                     "thesis_PRAT ± U_thesis_PRAT",
+                    "thesis_PRAT_at_FY_zero ± U_thesis_PRAT_at_FY_zero",
                     "residual_forward ± U_residual_forward",
                     "residual_reverse ± U_residual_reverse",
                 ],
-                [22, 36, 36, 36, 36],
-                "rrrrr",
+                [18, 29, 29, 32, 29, 29],
+                "rrrrrr",
                 together=True,
             ),
         ),
@@ -345,7 +239,7 @@ def chapters(p: Pieces) -> list[str]:
         heading("9  Measured conditions"),
         p.table(
             "results",
-            "Means of the load blocks as measured; U (k = 2) is the repeatability of the mean and, without a tare, the open zero of the cells.",
+            "Means of the load blocks as measured; U: expanded uncertainty (k = 2) from every source of the budget.",
             [
                 "direction",
                 "SA [deg]",
@@ -360,6 +254,7 @@ def chapters(p: Pieces) -> list[str]:
             [19, 17, 19, 20, 17, 20, 17, 37],
             "lrrrrrrl",
         ),
+        budget_table(p),
         heading("10  Provenance"),
         text(
             "Made by {{tk:software.name}} {{tk:software.version}} from the recordings below and calibration record "

@@ -224,7 +224,7 @@ def _body(p: Pieces) -> list[str]:
         heading("Messwerte"),
         p.table(
             "results",
-            "Mittelwerte der Lastblöcke, wie gemessen; U: Wiederholpräzision der Mittelwerte (k = 2).",
+            "Mittelwerte der Lastblöcke, wie gemessen; U: erweiterte Messunsicherheit aus allen Quellen (k = 2).",
             [
                 "Drehrichtung",
                 "SA [deg]",

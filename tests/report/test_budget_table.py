@@ -1,0 +1,73 @@
+"""The report's budget: at the summary's load, each row to the place that its own uncertainty reaches."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import pytest
+from report_factory import make_result
+
+from toolkit.characteristics.model import AtAngle, Budget
+from toolkit.estimate import Estimate
+from toolkit.pipeline import TestResult
+from toolkit.report.style import Style
+from toolkit.report.tables import build_tables, summary_load
+
+
+def with_budget(load: float, name: str, **sources: float) -> TestResult:
+    result = make_result()
+    named = tuple((key.replace("_", " "), u) for key, u in sources.items())
+    unit = "N/rad" if name.startswith("slope") else "N"
+    budget = Budget(load_N=load, rotation="both", name=name, unit=unit, sources=named)
+    chars = dataclasses.replace(result.characteristics, budgets=(budget,))
+    return dataclasses.replace(result, characteristics=chars)
+
+
+def rows(result: TestResult, style: Style | None = None) -> list[dict[str, object]]:
+    table = build_tables(result, None, (), style or Style())["budget"]
+    return [dict(zip([c.name for c in table.columns], row, strict=True)) for row in table.rows]
+
+
+def test_parts_end_where_their_sum_does() -> None:
+    load = summary_load(make_result())
+    assert load is not None
+    (row,) = rows(with_budget(load, "conicity", calibration=0.3, tare=0.4, fit=1.2, pressure=0.004))
+    # sqrt(0.09 + 0.16 + 1.44) = 1.3: one place after the point.
+    assert row["quantity"] == "conicity"
+    assert (row["calibration"], row["zero"], row["fit"], row["u"]) == ("0.3", "0.4", "1.2", "1.3")
+    assert (row["pressure"], row["SA_zero"]) == ("-", "-")
+
+
+def test_sources_of_one_column_add_in_quadrature() -> None:
+    load = summary_load(make_result())
+    assert load is not None
+    (row,) = rows(with_budget(load, "conicity", repeatability=3.0, slip_angle_scatter=4.0))
+    assert (row["repeatability"], row["u"]) == ("5.0", "5.0")
+
+
+def test_stiffness_is_per_degree_in_the_unit_of_choice() -> None:
+    load = summary_load(make_result())
+    assert load is not None
+    style = Style(force="lbf", moment="lbf*ft", decimal_comma=True)
+    (row,) = rows(with_budget(load, "slope_cornering", fit=1000.0), style)
+    assert row["unit"] == "lbf/deg"
+    assert float(str(row["u"]).replace(",", ".")) == pytest.approx(1000 * 0.0174533 / 4.44822, abs=0.05)
+    assert "," in str(row["u"])
+
+
+def test_other_loads_are_left_to_the_whole_test_file() -> None:
+    assert rows(with_budget(17.0, "conicity", fit=1.0)) == []
+
+
+def test_values_at_slip_angles_have_their_uncertainty() -> None:
+    result = make_result()
+    at = AtAngle(
+        load_N=4000.0, rotation="forward", SA_rad=-0.0349065850398866,
+        FY=Estimate(value=2000.0, u=10.0, unit="N"), MZ=None,
+    )  # fmt: skip
+    chars = dataclasses.replace(result.characteristics, at_angles=(at,))
+    made = build_tables(dataclasses.replace(result, characteristics=chars), None, (), Style())["at_angles"]
+    row = dict(zip([c.name for c in made.columns], made.rows[0], strict=True))
+    assert row["SA"] == pytest.approx(-2.0)
+    assert (row["FY"], row["MZ"]) == (2000.0, None)
+    assert row["U_FY"] == pytest.approx(19.6, abs=0.01)
