@@ -9,6 +9,7 @@ from types import SimpleNamespace
 
 import openpyxl
 import pytest
+import typer
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "report"))
 
@@ -222,3 +223,14 @@ def test_details_are_those_of_the_test_or_of_a_file(tmp_path: Path) -> None:
     other.write_text('[report]\ncustmer = "x"\n')
     with pytest.raises(ConfigError, match="custmer"):
         details_of(tmp_path, other)
+
+
+@pytest.mark.parametrize("like", ["summary", "pruefbericht", "certificate"])
+def test_a_new_template_can_be_like_any_of_the_toolkits(tmp_path: Path, like: str, capsys) -> None:
+    target = tmp_path / "ours.docx"
+    assert new(target, like=like, json=True) == 0
+    assert answer(capsys)["template"] == str(target)
+    assert check(target, json=True) == 0
+    assert answer(capsys)["findings"] == []
+    with pytest.raises(typer.BadParameter):
+        new(tmp_path / "other.docx", like="letter")

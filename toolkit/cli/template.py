@@ -78,17 +78,25 @@ def tags(
 @app.command("new")
 def new(
     file: Annotated[Path, typer.Argument(metavar="FILE", help="Where to write it: NAME.docx.")],
+    like: Annotated[
+        str, typer.Option("--like", help="Which to copy: org, summary, pruefbericht or certificate.")
+    ] = "org",
     force: Annotated[bool, typer.Option("--force", help="Overwrite an existing file.")] = False,
     json: Json = False,
     quiet: Quiet = False,
 ) -> int:
-    """Write a fresh copy of the default template and its style file, to be changed in Word.
+    """Write a fresh copy of one of the toolkit's templates and its style file, to be changed in Word.
 
-    Example: toolkit template new report_templates/ours.docx
+    Example: toolkit template new report_templates/ours.docx --like summary
     """
     from toolkit.errors import OutputError
     from toolkit.files import write_atomic
-    from toolkit.report.default_template import STYLE_FILE, build_default
+    from toolkit.report.default_template import STYLE_FILE
+    from toolkit.report.template_files import packaged_templates
+
+    known = packaged_templates()
+    if like not in known:
+        raise typer.BadParameter(", ".join(known), param_hint="--like")
 
     if file.suffix.lower() != ".docx":
         raise OutputError(
@@ -108,8 +116,8 @@ def new(
                 expected="a new name",
                 next_step="choose another name, or overwrite with --force",
             )
-    write_atomic(file, build_default())
-    write_atomic(style, STYLE_FILE)
+    write_atomic(file, known[like].build())
+    write_atomic(style, known[like].style or STYLE_FILE)
     answer({"template": file, "style": style}, f"{file}\n{style}", as_json=json, quiet=quiet)
     return 0
 
