@@ -79,7 +79,7 @@ def test_between_the_loads_forces_follow_the_parabola_through_zero(load):
 
 
 def test_a_slope_too_small_for_the_peak_is_kept_and_the_peak_moved():
-    given = {"dFy0": 8.0, "FyM": 1.0, "syM": 0.1, "FyS": 0.9, "syS": 1.0}  # 2 FM/sM = 20
+    given = {"dFy0": 8.0, "FyM": 1.0, "syM": 0.1, "FyD": 0.1, "syD": 0.75}  # 2 FM/sM = 20
     rows = make_rows(-np.arctan([1e-8, 0.1, 0.25, 0.4]), 1000.0, FNOMIN=1000.0)
     FY = MODEL.forces(MODEL.values(given), rows).FY / 1000
     assert FY[0] == pytest.approx(8e-8)

@@ -86,7 +86,7 @@ MODEL = GlobalModel(
             text="effective half contact length at FNOMIN", stage="MZ",
         ),
         GlobalParameter(
-            name="A_P", unit="1", default=0.5, low=0.05, high=2.0, size=0.05,
+            name="A_P", unit="1", default=0.5, low=0.05, high=2.0, size=0.1,
             text="its growth with load: a = A (FZ/FNOMIN)^A_P", stage="MZ", needs=("two_loads",),
         ),
         GlobalParameter(

@@ -126,7 +126,7 @@ MODEL = GlobalModel(
             text="its second change with load", needs=("three_loads",),
         ),
         GlobalParameter(
-            name="MU", unit="1", default=1.0, low=0.05, high=6.0, size=0.05,
+            name="MU", unit="1", default=1.0, low=0.05, high=6.0, size=0.1,
             text="static friction at FNOMIN",
         ),
         GlobalParameter(
@@ -134,11 +134,11 @@ MODEL = GlobalModel(
             text="its change with load: mu = MU exp(MU_Z dfz)", needs=("two_loads",),
         ),
         GlobalParameter(
-            name="R", unit="1", default=1.0, low=0.3, high=1.0, size=0.05,
+            name="R", unit="1", default=1.0, low=0.3, high=1.0, size=0.1,
             text="Coulomb over static friction",
         ),
         GlobalParameter(
-            name="VS", unit="m/s", default=5.0, low=0.5, high=100.0, size=1.0, text="Stribeck speed",
+            name="VS", unit="m/s", default=5.0, low=0.5, high=100.0, size=2.0, text="Stribeck speed",
         ),
         GlobalParameter(
             name="S2", unit="s/m", default=0.0, low=0.0, high=0.02, size=2e-3,
@@ -150,11 +150,11 @@ MODEL = GlobalModel(
             text="effective contact length at FNOMIN", stage="MZ",
         ),
         GlobalParameter(
-            name="L_P", unit="1", default=0.5, low=0.05, high=2.0, size=0.05,
+            name="L_P", unit="1", default=0.5, low=0.05, high=2.0, size=0.1,
             text="its growth with load: L (FZ/FNOMIN)^L_P", stage="MZ", needs=("two_loads",),
         ),
         GlobalParameter(
-            name="TOP", unit="1", default=0.5, low=0.0, high=1.0, size=0.1,
+            name="TOP", unit="1", default=0.5, low=0.0, high=1.0, size=0.15,
             text="flat part of the pressure trapezoid",
         ),
         GlobalParameter(

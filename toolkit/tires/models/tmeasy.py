@@ -18,6 +18,9 @@ their values at payload (FNOMIN) and twice payload: Y(FZ) = FZ/FNOMIN Y (1 + Y_Z
 Y_Z = Y(2 FNOMIN)/(2 Y) - 1, and s(FZ) = s (1 + s_Z dfz), with s_Z = s(2 FNOMIN)/s - 1. The trail n0 is (n/L)0
 times the patch length, and that grows as the root of load. Forces are given over FNOMIN.
 
+What follows the peak is given as its distance from it, which keeps the order of the points and says "no fall"
+by zero: FS = FM - FD, sS = sM + sD, sE = s0 + sED, each with its own change with load.
+
 Rill asks for dF0 >= 2 FM/sM; where a parameter set breaks it, sM is raised to 2 FM/dF0, since the slope at
 zero is what data know best. Camber acts as the lateral slip -K_IA sin(IA). SH, SV, SM as in the brush.
 """
@@ -42,11 +45,16 @@ def forces(values: Sequence[Any], rows: Rows) -> Responses:
     def law(name: str) -> Any:
         return p[name] * np.maximum(1 + p[name + "_Z"] * rows.dfz, _LEAST)
 
-    x = [law("dFx0"), law("FxM"), law("sxM"), law("FxS"), law("sxS")]
-    y = [law("dFy0"), law("FyM"), law("syM"), law("FyS"), law("syS")]
+    x, y = (
+        [law(f"dF{a}0"), law(f"F{a}M"), law(f"s{a}M"), law(f"F{a}M") - law(f"F{a}D"), law(f"s{a}D")]
+        for a in "xy"
+    )
     sx, sy = slips(rows, p["SH"])
     sy = sy - p["K_IA"] * np.sin(rows.IA)
-    x[2], y[2] = (np.maximum(one[2], 2 * one[1] / one[0]) for one in (x, y))
+    for one in (x, y):
+        one[2] = np.maximum(one[2], 2 * one[1] / one[0])
+        one[3] = np.maximum(one[3], _LEAST * one[1])
+        one[4] = one[2] + one[4]
     ratio = x[1] / x[0] / (x[1] / x[0] + y[1] / y[0])
     hx, hy = x[2] / (x[2] + y[2]) + ratio, y[2] / (x[2] + y[2]) + 1 - ratio
     slip, cos, sin = directed(sx / hx, sy / hy)
@@ -57,12 +65,12 @@ def forces(values: Sequence[Any], rows: Rows) -> Responses:
         dF0=np.hypot(x[0] * hx * cos, y[0] * hy * sin_),
         FM=np.hypot(x[1] * cos, y[1] * sin_),
         sM=np.hypot(x[2] / hx * cos, y[2] / hy * sin_),
-        FS=np.hypot(np.minimum(x[3], x[1]) * cos, np.minimum(y[3], y[1]) * sin_),
+        FS=np.hypot(x[3] * cos, y[3] * sin_),
         sS=np.hypot(x[4] / hx * cos, y[4] / hy * sin_),
     )
     FY = -F * sin
     s0 = law("sy0")
-    offset = law("n0") * np.sqrt(rows.FZ / rows.FNOMIN) * lever(sy, s0=s0, sE=np.maximum(law("syE"), s0))
+    offset = law("n0") * np.sqrt(rows.FZ / rows.FNOMIN) * lever(sy, s0=s0, sE=s0 + law("syED"))
     return Responses(FX=F * cos, FY=FY + rows.FZ * p["SV"], MZ=-offset * FY + rows.FZ * p["SM"])
 
 
@@ -105,13 +113,26 @@ def from_payload(
     >>> from_payload({"FyM": 4000.0}, {"FyM": 7200.0}, payload_N=4000.0, length_m=0.15)
     {'FyM': 1.0, 'FyM_Z': -0.1}
     """
+    one, two = (_distances(given, length_m) for given in (at_payload, at_double))
     made = {}
-    for name, one in at_payload.items():
-        two = at_double[name]
+    for name, first in one.items():
         force = name[0] in "dF"
-        key, scale = ("n0", length_m) if name == "nL0" else (name, 1 / payload_N if force else 1.0)
-        made[key] = one * scale
-        made[f"{key}_Z"] = round(two / (2 * one) - 1 if force else two / one - 1, 15)
+        made[name] = first / payload_N if force else first
+        change = two[name] / (2 * first if force else first) - 1 if first else 0.0
+        made[f"{name}_Z"] = round(change, 15)
+    return made
+
+
+def _distances(given: Mapping[str, float], length_m: float) -> dict[str, float]:
+    made = dict(given)
+    for sliding, peak, name, sign in (
+        ("FxS", "FxM", "FxD", -1), ("sxS", "sxM", "sxD", 1), ("FyS", "FyM", "FyD", -1),
+        ("syS", "syM", "syD", 1), ("syE", "sy0", "syED", 1),
+    ):  # fmt: skip
+        if sliding in made:
+            made[name] = sign * (made.pop(sliding) - made[peak])
+    if "nL0" in made:
+        made["n0"] = made.pop("nL0") * length_m
     return made
 
 
@@ -122,17 +143,17 @@ def starts(seeds: Seeds) -> tuple[Mapping[str, float], ...]:
     angle = seeds.at_nominal(np.tan(seeds.peak_angle))[0]
     start = {
         "dFy0": stiffness, "dFy0_Z": slope / stiffness, "FyM": peak, "FyM_Z": fade / peak,
-        "syM": max(angle, 2.2 * peak / stiffness), "FyS": 0.9 * peak, "FyS_Z": fade / peak,
+        "syM": max(angle, 2.2 * peak / stiffness), "FyD": 0.1 * peak,
     }  # fmt: skip
     trail = seeds.at_nominal(seeds.trail)[0]
     if np.isfinite(trail) and trail > 0:
         start["n0"] = trail
-    start |= {"syS": 3 * start["syM"], "sy0": 0.7 * start["syM"], "syE": 2 * start["syM"]}
+    start |= {"syD": 2 * start["syM"], "sy0": 0.7 * start["syM"], "syED": 1.3 * start["syM"]}
     wide = 1.6 * start["syM"]
     return (
         start,
-        {**start, "syM": wide, "syS": 2 * wide},
-        {**start, "FyS": 0.75 * peak, "syS": 1.5 * start["syM"], "syE": 1.1 * start["sy0"]},
+        {**start, "syM": wide, "syD": wide, "FyD": 0.02 * peak},
+        {**start, "FyD": 0.25 * peak, "syD": 0.5 * start["syM"], "syED": 0.1 * start["sy0"]},
     )
 
 
@@ -147,7 +168,7 @@ def _pair(
             stage=stage, needs=first,
         ),
         GlobalParameter(
-            name=f"{name}_Z", unit="1", default=0.0, low=-0.8, high=1.5, size=0.1,
+            name=f"{name}_Z", unit="1", default=0.0, low=-0.8, high=1.5, size=0.2,
             text=f"change of {name} with load", stage=stage, needs=(*first, "two_loads"),
         ),
     )  # fmt: skip
@@ -158,9 +179,9 @@ def _axis(letter: str, slope: float, stage: Channel) -> tuple[GlobalParameter, .
     return (
         *_pair(f"dF{letter}0", "1", slope, 1.0, 300.0, 1.0, f"{word} slope at zero slip over FNOMIN", stage),
         *_pair(f"F{letter}M", "1", 1.0, 0.05, 5.0, 0.05, f"largest {word} force over FNOMIN", stage),
-        *_pair(f"s{letter}M", "1", 0.15, 0.01, 2.0, 0.02, f"slip at the largest {word} force", stage),
-        *_pair(f"F{letter}S", "1", 0.8, 0.02, 5.0, 0.05, f"{word} sliding force over FNOMIN", stage),
-        *_pair(f"s{letter}S", "1", 0.8, 0.02, 5.0, 0.1, f"slip where all slides, {word}", stage),
+        *_pair(f"s{letter}M", "1", 0.15, 0.01, 2.0, 0.03, f"slip at the largest {word} force", stage),
+        *_pair(f"F{letter}D", "1", 0.0, 0.0, 3.0, 0.1, f"{word} force lost to sliding over FNOMIN", stage),
+        *_pair(f"s{letter}D", "1", 0.5, 0.02, 5.0, 0.1, f"slip from the {word} peak to sliding", stage),
     )
 
 
@@ -176,8 +197,8 @@ MODEL = GlobalModel(
         *_axis("x", 20.0, "FX"),
         *_axis("y", 15.0, "FY"),
         *_pair("n0", "m", 0.03, 1e-4, 0.2, 2e-3, "dynamic trail at zero slip, (n/L)0 L", "MZ"),
-        *_pair("sy0", "1", 0.15, 0.01, 2.0, 0.02, "lateral slip where the trail changes sign", "MZ"),
-        *_pair("syE", "1", 0.4, 0.01, 5.0, 0.05, "lateral slip from which there is no trail", "MZ"),
+        *_pair("sy0", "1", 0.15, 0.01, 2.0, 0.03, "lateral slip where the trail changes sign", "MZ"),
+        *_pair("syED", "1", 0.25, 0.0, 5.0, 0.1, "slip from there to where no trail is left", "MZ"),
         GlobalParameter(
             name="SH", unit="rad", default=0.0, low=-0.1, high=0.1, size=1e-3,
             text="equivalent slip angle of plysteer and steering zero", needs=("both_signs",),

@@ -136,15 +136,15 @@ MODEL = GlobalModel(
             text="half contact length at FNOMIN", stage="MZ",
         ),
         GlobalParameter(
-            name="A_P", unit="1", default=0.5, low=0.05, high=1.5, size=0.05,
+            name="A_P", unit="1", default=0.5, low=0.05, high=1.5, size=0.1,
             text="its growth with load: a = A (FZ/FNOMIN)^A_P", stage="MZ", needs=("two_loads",),
         ),
         GlobalParameter(
-            name="N", unit="1", default=2.0, low=1.0, high=12.0, size=0.5,
+            name="N", unit="1", default=2.0, low=1.0, high=12.0, size=1.0,
             text="exponent of the pressure: 2 a parabola, large an even one",
         ),
         GlobalParameter(
-            name="SKEW", unit="1", default=0.0, low=-0.9, high=0.9, size=0.1,
+            name="SKEW", unit="1", default=0.0, low=-0.9, high=0.9, size=0.15,
             text="pressure at the leading edge against the trailing one", stage="MZ",
         ),
         GlobalParameter(
@@ -152,19 +152,19 @@ MODEL = GlobalModel(
             text="friction at the mean pressure of FNOMIN without sliding",
         ),
         GlobalParameter(
-            name="MU_P", unit="1", default=0.0, low=0.0, high=0.9, size=0.05,
+            name="MU_P", unit="1", default=0.0, low=0.0, high=0.9, size=0.1,
             text="fall of friction with local pressure, exponent", needs=("two_loads",),
         ),
         GlobalParameter(
-            name="MU_V", unit="s/m", default=0.0, low=0.0, high=1.0, size=0.01,
+            name="MU_V", unit="s/m", default=0.0, low=0.0, high=1.0, size=0.03,
             text="fall of friction with sliding speed",
         ),
         GlobalParameter(
-            name="YAW", unit="1", default=0.0, low=0.0, high=1.2, size=0.05,
+            name="YAW", unit="1", default=0.0, low=0.0, high=1.2, size=0.1,
             text="yaw compliance of the carcass", stage="MZ",
         ),
         GlobalParameter(
-            name="BEND", unit="1", default=0.0, low=0.0, high=2.0, size=0.05,
+            name="BEND", unit="1", default=0.0, low=0.0, high=2.0, size=0.1,
             text="bending compliance of the carcass", stage="MZ",
         ),
         GlobalParameter(
