@@ -190,23 +190,37 @@ def _as_control(drawn: Drawn, control: str, rng: np.random.Generator) -> Drawn:
     return Drawn(scenario=s, measured=measured, predicted=drawn.predicted, answer=answer, effects={})
 
 
-def draw_case(seed: int, index: int, bucket: str, *, compare: bool = True) -> Drawn:
+def draw_case(
+    seed: int,
+    index: int,
+    bucket: str,
+    *,
+    compare: bool = True,
+    picked: tuple[str, tuple[str, ...]] | None = None,
+) -> Drawn:
     """Return the case; the same seed, index and kind give the same bytes.
 
-    `compare` False leaves out the list of effects alike, which costs most of the time.
+    `compare` False leaves out the list of effects alike, which costs most of the time; `picked` sets the
+    family (for a confounded case the class) and the effects, which a batch leaves to the seed.
     """
     for attempt in range(60):
         rng = np.random.default_rng([seed, index, attempt])
         try:
-            return _draw(rng, bucket, compare)
+            return _draw(rng, bucket, compare, picked)
         except RedrawError:
             continue
     raise RuntimeError(f"no draw of kind {bucket} met its conditions (case {index})")
 
 
-def _draw(rng: np.random.Generator, bucket: str, compare: bool) -> Drawn:
+def _draw(
+    rng: np.random.Generator, bucket: str, compare: bool, picked: tuple[str, tuple[str, ...]] | None
+) -> Drawn:
     control = str(rng.choice(list(controls.KINDS))) if bucket == "control" else ""
-    family, group, names = _pick(rng, bucket, control)
+    if picked:
+        group = CONFOUNDED.get(picked[0])
+        family, names = group.family if group else picked[0], picked[1]
+    else:
+        family, group, names = _pick(rng, bucket, control)
     needs = frozenset(names) | (group.needs if group else frozenset())
     s = (group or FAMILIES[family]).build(rng, needs)
     p = s.true_parameters()

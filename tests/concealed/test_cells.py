@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from tests.concealed import cell_cases, draw, files, tire_steady
+from tests.concealed import cell_cases, files, tire_steady
 from tests.concealed.draw import draw_case
 from tests.concealed.model import Scenario
 
@@ -81,11 +81,8 @@ def test_the_public_command_finds_the_cells_of_the_session(tmp_path: Path) -> No
         assert found == pytest.approx(list(row), abs=3e-4)
 
 
-def test_a_case_with_cells_names_its_record_and_has_no_loads(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(draw, "_pick", lambda *_: ("tire-cells", None, ()))
-    drawn = draw_case(9, 0, "null")
+def test_a_case_with_cells_names_its_record_and_has_no_loads(tmp_path: Path) -> None:
+    drawn = draw_case(9, 0, "null", picked=("tire-cells", ()))
     files.write_case(drawn.scenario, drawn.measured, tmp_path / "case")
     head = (tmp_path / "case" / "run01.csv").read_text().splitlines()[0].split(",")
     assert {"D51", "D52", "E5"} <= set(head)
