@@ -241,7 +241,7 @@ def _mismatches(found: Search, *, unknown: bool) -> tuple[Mismatch, ...]:
                 channel=name,
                 p_value=min(p_values),
                 share_of_variance=share,
-                where=places(problem, name, signal),
+                where=places(problem, name, signal, found.refitted.simulated[name]),
             )
         )
     return tuple(made)

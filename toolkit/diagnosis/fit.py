@@ -56,6 +56,7 @@ class _Solved:
     """One solution: the searched vector, its residual, the noise of that, and the log-posterior."""
 
     x: NDArray[np.float64]
+    simulated: Stacked
     residual: Stacked
     noise: dict[str, Noise]
     score: float
@@ -130,7 +131,7 @@ def fit(
         p=tuple(p),
         active=found,
         residual=chosen.residual,
-        simulated={name: problem.observed[name] - one for name, one in chosen.residual.items()},
+        simulated=chosen.simulated,
         noise=chosen.noise,
         log_posterior=chosen.score,
         covariance=covariance(space, chosen, layouts, plain=plain),
@@ -213,9 +214,9 @@ def _solve(
             xtol=1e-7,
             gtol=1e-9,
         ).x
-    residual = _run(space, x)[1]
+    simulated, residual = _run(space, x)
     noise = noise_of(problem, residual, layouts, used=len(x))
-    return _Solved(x, residual, noise, _score(problem, space, x, residual, layouts, noise))
+    return _Solved(x, simulated, residual, noise, _score(problem, space, x, residual, layouts, noise))
 
 
 def noise_of(
@@ -357,7 +358,7 @@ def covariance(
     x, noise, problem = solved.x, solved.noise, space.problem
     if not len(x):
         return np.zeros((0, 0))
-    J = _differences(space, x, {name: problem.observed[name] - one for name, one in solved.residual.items()})
+    J = _differences(space, x, solved.simulated)
     prior = np.zeros((len(problem.free), len(x)))
     for i, one in enumerate(problem.free):
         prior[i, i] = space.sizes[i] / (one.sd or 1.0)

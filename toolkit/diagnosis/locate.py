@@ -18,13 +18,16 @@ _HELD = 0.8  # of the mismatch's energy that a range must hold
 _NARROW = 0.7  # of the rows: a range that is wider says nothing
 
 
-def places(problem: Problem, name: str, signal: NDArray[np.float64]) -> tuple[Place, ...]:
+def places(
+    problem: Problem, name: str, signal: NDArray[np.float64], simulated: NDArray[np.float64]
+) -> tuple[Place, ...]:
     """Return the ranges that hold most of a mismatch, the narrowest first.
 
     Parameters
     ----------
     name : the output
     signal : the part of its residual that is no noise, over all rows
+    simulated : the output itself as simulated, a variable like the others
     """
     energy = np.where(problem.kept[name], np.nan_to_num(signal) ** 2, 0.0)
     whole = float(energy.sum())
@@ -32,7 +35,8 @@ def places(problem: Problem, name: str, signal: NDArray[np.float64]) -> tuple[Pl
         return ()
     rows = problem.kept[name]
     found: list[tuple[float, Place]] = []
-    for variable, unit, x in _variables(problem):
+    unit_of = {one.name: one.unit for one in problem.model.outputs}
+    for variable, unit, x in [*_variables(problem), (name, unit_of[name], simulated)]:
         made = _range(x, energy, rows)
         if made is not None:
             share, low, high = made

@@ -175,6 +175,8 @@ def _short(name: str) -> str:
 
 def _variable(found: Search, name: str) -> NDArray[np.float64] | None:
     problem = found.problem
+    if name in problem.names:
+        return found.refitted.simulated[name]
     if name == "time":
         return np.concatenate([run.t for run in problem.runs])
     if all(name in run.columns for run in problem.runs):

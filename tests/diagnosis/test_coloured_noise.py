@@ -1,0 +1,78 @@
+"""Coloured noise: the exact Gaussian likelihood, Burg's estimate, gaps, and what a residual is worth."""
+
+import numpy as np
+import pytest
+from scipy.linalg import toeplitz
+from scipy.stats import multivariate_normal
+
+from toolkit.diagnosis.noise import Noise, autocovariance, fit_noise, layout, log_likelihood, predictor, whiten
+
+
+def _one(n: int):
+    return layout([np.arange(n, dtype=float)], [np.ones(n, dtype=bool)])
+
+
+def _series(rng: np.random.Generator, phi: float, n: int) -> np.ndarray:
+    x = np.empty(n)
+    x[0] = rng.normal() / np.sqrt(1 - phi**2)
+    for i in range(1, n):
+        x[i] = phi * x[i - 1] + rng.normal()
+    return x
+
+
+@pytest.mark.parametrize("reflection", [(), (0.7,), (0.9, -0.4), (0.5, 0.3, -0.2)])
+def test_likelihood_is_that_of_the_dense_gaussian(reflection):
+    noise = Noise(reflection=reflection, sd=1.3)
+    n = 12
+    # Yule and Walker: the autocovariance that the predictor's own equations imply, solved densely.
+    a = predictor(reflection)[-1]
+    p = len(a)
+    equations = np.zeros((p + 1, p + 1))
+    for k in range(p + 1):
+        equations[k, k] += 1
+        for j in range(1, p + 1):
+            equations[k, abs(k - j)] -= a[j - 1]
+    gamma = np.zeros(n)
+    gamma[: p + 1] = np.linalg.solve(equations, np.r_[1.3**2, np.zeros(p)])
+    for k in range(p + 1, n):
+        gamma[k] = sum(a[j - 1] * gamma[k - j] for j in range(1, p + 1))
+    x = np.random.default_rng(1).normal(size=n)
+    expected = multivariate_normal(np.zeros(n), toeplitz(gamma)).logpdf(x)
+    assert log_likelihood(x, _one(n), noise) == pytest.approx(expected, rel=1e-10)
+    np.testing.assert_allclose(autocovariance(noise, n), gamma, rtol=1e-10, atol=1e-12)
+    assert noise.marginal_sd == pytest.approx(np.sqrt(gamma[0]), rel=1e-12)
+
+
+@pytest.mark.parametrize("phi", [0.0, 0.9, 0.99])
+def test_colour_is_found_within_its_own_standard_error(phi):
+    rng = np.random.default_rng(7)
+    n = 20_000
+    made = fit_noise(_series(rng, phi, n), _one(n), floor=1e-12)
+    first = made.reflection[0] if made.reflection else 0.0
+    assert first == pytest.approx(phi, abs=4 * np.sqrt((1 - phi**2) / n) + 1e-12)
+    assert made.sd == pytest.approx(1.0, abs=4 / np.sqrt(2 * n))
+
+
+def test_a_gap_begins_a_new_segment_and_a_masked_row_splits_nothing_else():
+    t = np.r_[np.arange(50.0), np.arange(100.0, 150.0)]
+    kept = np.ones(100, dtype=bool)
+    kept[10] = False
+    where = layout([t], [kept])
+    assert [one.stop - one.start for one in where.segments] == [49, 50]
+    assert where.n == 99
+
+
+def test_whitening_columns_is_whitening_each():
+    rng = np.random.default_rng(3)
+    noise = Noise(reflection=(0.8, 0.1), sd=2.0)
+    where = layout([np.arange(30.0), np.arange(25.0)], [np.ones(30, bool), np.ones(25, bool)])
+    x = rng.normal(size=(55, 3))
+    whole = whiten(x, where, noise)
+    for j in range(3):
+        np.testing.assert_allclose(whole[:, j], whiten(x[:, j], where, noise), rtol=1e-12)
+
+
+def test_rows_of_a_smooth_noise_are_worth_less():
+    # AR(1): the variance of a mean of n rows is (1 + phi) / (1 - phi) times that of white noise.
+    assert Noise(reflection=(0.9,), sd=1.0).correlation_rows == pytest.approx(1.9 / 0.1, rel=1e-9)
+    assert Noise(reflection=(), sd=1.0).correlation_rows == 1.0
