@@ -152,6 +152,16 @@ def test_camber_thrust_points_towards_the_lean(name):
     assert o.FY[0] < 0 < o.FY[1]
 
 
+@pytest.mark.parametrize("name", ["brush", "treadsim", "lugre"])
+def test_a_locked_wheel_is_dragged_against_its_velocity(name):
+    SA = np.radians([0.0, 20.0, -50.0, 80.0])
+    o = at(name, SA, KAPPA=-1.0, V=0.0)
+    size = np.hypot(o.FX, o.FY)
+    np.testing.assert_allclose(size, size[0], rtol=1e-3)  # friction does not ask where the wheel points
+    np.testing.assert_allclose(o.FX / size, -np.cos(SA), atol=1e-3)
+    np.testing.assert_allclose(o.FY / size, -np.sin(SA), atol=1e-3)
+
+
 @ALL
 def test_every_parameter_acts(name):
     model = find(name)

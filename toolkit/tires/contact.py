@@ -63,19 +63,3 @@ def bulged(u: ArrayLike, exponent: ArrayLike, skew: ArrayLike) -> Array:
     """
     u = np.asarray(u)
     return np.asarray((1.0 - np.power(np.abs(u), exponent)) * (1.0 + np.asarray(skew) * u))
-
-
-def trapezoid(u: ArrayLike, front: ArrayLike, rear: ArrayLike) -> Array:
-    """Return the pressure of a trapezoid of height 1.
-
-    It rises over the part ``front`` of the length behind the leading edge and falls over the part ``rear``
-    before the trailing one (0 to 1, together 1 at most); a part of 0 is a step.
-
-    >>> trapezoid([1.0, 0.5, 0.0, -1.0], 0.5, 0.0).tolist()
-    [0.0, 0.5, 1.0, 1.0]
-    """
-    u = np.asarray(u)
-    behind, ahead = 0.5 * (1.0 - u), 0.5 * (1.0 + u)
-    rise = np.where(np.asarray(front) > 0, behind / np.maximum(front, 1e-300), 1.0)
-    fall = np.where(np.asarray(rear) > 0, ahead / np.maximum(rear, 1e-300), 1.0)
-    return np.clip(np.minimum(rise, fall), 0.0, 1.0)
