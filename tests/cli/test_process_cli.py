@@ -168,3 +168,47 @@ def test_a_reduced_test_whose_record_was_withdrawn_says_so(
     assert {"withdrawn-record", "not-in-force"} <= {finding["rule"] for finding in answer["findings"]}
     _, then = toolkit(capsys, "process", tmp_path / "old.xlsx", "--known-at", "2019-06-30")
     assert "withdrawn-record" not in {finding["rule"] for finding in then["findings"]}
+
+
+def test_the_budget_and_the_values_at_slip_angles_are_answered_in_si(
+    virtual_test: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    _, answer = toolkit(capsys, "process", virtual_test)
+    chars = answer["characteristics"]
+    owners = {(p["load_N"], "both"): p for p in chars["pull"]}
+    owners |= {(s["load_N"], s["rotation"]): s for s in chars["stiffness"]}
+    for one in chars["budgets"]:
+        u = owners[one["load_N"], one["rotation"]][one["name"]]["standard_uncertainty"]
+        assert sum(part**2 for part in one["standard_uncertainty"].values()) == pytest.approx(u**2)
+        assert one["standard_uncertainty"]["pressure"] > 0
+    assert len({one["SA_rad"] for one in chars["at_angles"]}) == 13
+    assert all(one["u_FY_N"] >= one["u_FY_repeatability_N"] for one in answer["conditions"])
+    assert "SAE J1987 style" in answer["protocol"]
+
+
+def test_people_choose_their_units(virtual_test: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    shown = {}
+    for units in ("SI", "lbf"):
+        with pytest.raises(SystemExit):
+            run(["process", str(virtual_test), "--units", units, "--calibrations", str(CALIBRATIONS)])
+        lines = capsys.readouterr().out.splitlines()
+        head = next(i for i, line in enumerate(lines) if line.startswith("FZ [N]"))
+        assert ("lbf·ft" in lines[head]) is (units == "lbf")
+        shown[units] = float(lines[head + 3].split("±")[2].split()[1])  # conicity at the second load
+    assert shown["SI"] / shown["lbf"] == pytest.approx(4.448, rel=0.02)
+    code, answer = toolkit(capsys, "process", virtual_test, "--units", "kgf")
+    assert (code, answer["error"]["rule"]) == (2, "unknown-units")
+
+
+def test_an_unknown_pressure_is_a_note_and_no_part_of_the_budget(
+    tmp_path: Path, virtual_test: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    copy = tmp_path / "test"
+    shutil.copytree(virtual_test, copy)
+    toml = copy / "test.toml"
+    lines = [line for line in toml.read_text().splitlines() if not line.startswith("pressure")]
+    toml.write_text("\n".join(lines))
+    _, answer = toolkit(capsys, "process", copy)
+    (note,) = [one for one in answer["findings"] if one["rule"] == "no-pressure"]
+    assert note["level"] == "note"
+    assert all("pressure" not in one["standard_uncertainty"] for one in answer["characteristics"]["budgets"])

@@ -17,6 +17,7 @@ from toolkit.cli.console import (
     ProtocolFile,
     Quiet,
     Reader,
+    Units,
     answer,
     day,
     exit_code,
@@ -58,9 +59,7 @@ def command(
         bool,
         typer.Option("--reproducibility", help="Demand it: an error without another laboratory's tests."),
     ] = False,
-    units: Annotated[
-        str, typer.Option("--units", help="SI or lbf, for text and figures; JSON is SI.")
-    ] = "SI",
+    units: Units = "SI",
     figures: Annotated[
         Path | None,
         typer.Option("--figures", help="Folder for the figures (PNG), as the thesis's 6.6 to 6.29."),
@@ -90,7 +89,8 @@ def command(
 
     Example: toolkit compare tests/steel tests/sandpaper --figures figures
     """
-    from toolkit.cli.compare_answer import comparison_payload, comparison_text, unit_choice
+    from toolkit.cli.compare_answer import comparison_payload, comparison_text
+    from toolkit.cli.units import unit_choice
     from toolkit.comparison.compare import compare
 
     chosen = choose_reader(reader)

@@ -15,20 +15,6 @@ if TYPE_CHECKING:
     from toolkit.report.style import Style
 
 
-def unit_choice(units: str) -> Style:
-    """Return the units of text and figures: N and N·m, or lbf and lbf·ft."""
-    from toolkit.errors import ConfigError
-    from toolkit.report.style import Style
-
-    choices = {"SI": Style(), "lbf": Style(force="lbf", moment="lbf*ft")}
-    if units not in choices:
-        raise ConfigError(
-            f"unknown units {units!r}", where="--units", got=units, expected=", ".join(choices),
-            next_step="name one of those expected", rule="unknown-units",
-        )  # fmt: skip
-    return choices[units]
-
-
 def comparison_payload(found: Comparison) -> dict[str, Any]:
     """Return a comparison as the JSON answer, in SI (angles in rad, stiffness per rad) and SAE axes."""
     return {

@@ -43,6 +43,9 @@ ProtocolFile = Annotated[
         "--protocol", metavar="FILE", help="Protocol (.toml); default: the test's own, else the machine's."
     ),
 ]
+Units = Annotated[
+    str, typer.Option("--units", help="SI or lbf, for people; the JSON answer is always in SI.")
+]
 Reader = Annotated[
     str, typer.Option("--reader", help="calamine, or both: read again with openpyxl and compare.")
 ]

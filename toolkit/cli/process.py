@@ -18,6 +18,7 @@ from toolkit.cli.console import (
     ProtocolFile,
     Quiet,
     Reader,
+    Units,
     answer,
     day,
     exit_code,
@@ -30,6 +31,7 @@ from toolkit.cli.console import reader as choose_reader
 if TYPE_CHECKING:
     from toolkit.cli.resolve import Resolved
     from toolkit.estimate import Estimate
+    from toolkit.report.style import Style
 
 NAME = "process"
 
@@ -41,6 +43,7 @@ def command(
         Path | None, typer.Option("--out", help="Write the reduced test (.xlsx: the whole test in one file).")
     ] = None,
     known_at: KnownAt = None,
+    units: Units = "SI",
     protocol: ProtocolFile = None,
     reader: Reader = "calamine",
     calibrations: Calibrations = None,
@@ -55,10 +58,11 @@ def command(
     Example: toolkit process tests/2019-06-04 --out test.xlsx
     """
     from toolkit.cli.resolve import resolve_test
+    from toolkit.cli.units import unit_choice
     from toolkit.recording.marks import refuse_original
     from toolkit.testfile import write_test_file
 
-    chosen = choose_reader(reader)
+    chosen, style = choose_reader(reader), unit_choice(units)
     if out is not None:
         refuse_original(out, suffix=".xlsx")
     started = time.perf_counter()
@@ -80,7 +84,7 @@ def command(
         "content_sha256": digest,
         "timing": {"seconds": time.perf_counter() - started},
     }
-    answer(payload, _text(resolved, out), as_json=json, quiet=quiet)
+    answer(payload, _text(resolved, out, style), as_json=json, quiet=quiet)
     return exit_code(resolved.findings)
 
 
@@ -179,7 +183,7 @@ def _estimate(estimate: Estimate) -> dict[str, Any]:
     }
 
 
-def _text(resolved: Resolved, out: Path | None) -> str:
+def _text(resolved: Resolved, out: Path | None, style: Style) -> str:
     reduced = resolved.result.reduced
     mark = "  SIMULATED" if reduced.info.simulated else ""
     used = sum(c.used for c in reduced.conditions)
@@ -190,7 +194,7 @@ def _text(resolved: Resolved, out: Path | None) -> str:
         f"averaging: {reduced.averaging}",
         f"tare: {reduced.tare.source}",
         "",
-        _pull_table(resolved),
+        _pull_table(resolved, style),
     ]
     if resolved.findings:
         lines += ["", f"findings: {len(resolved.findings)} (toolkit explain RULE tells more)"]
@@ -202,11 +206,13 @@ def _text(resolved: Resolved, out: Path | None) -> str:
     return "\n".join(lines)
 
 
-def _pull_table(resolved: Resolved) -> str:
+def _pull_table(resolved: Resolved, style: Style) -> str:
     from toolkit.units import from_si
 
+    (force, per_N), (moment, per_Nm) = style.unit("N"), style.unit("N*m")
+    moment = str(moment).replace("*", "·")
     stiffness = {(s.load_N, s.rotation): s for s in resolved.result.characteristics.stiffness}
-    per_degree = 3.141592653589793 / 180
+    per_degree = math.pi / 180
     rows = []
     for pull in resolved.result.characteristics.pull:
         one = stiffness.get((pull.load_N, "forward")) or stiffness.get((pull.load_N, "reverse"))
@@ -214,23 +220,27 @@ def _pull_table(resolved: Resolved) -> str:
             [
                 f"{pull.load_N:.0f}",
                 f"{float(from_si(pull.load_N, 'lbf')):.0f}",
-                _shown(one.slope_cornering if one else None, per_degree, 1),
-                _shown(one.slope_aligning if one else None, per_degree, 2),
-                _shown(pull.conicity, 1, 1),
-                _shown(pull.plysteer, 1, 1),
-                _shown(pull.CRAT, 1, 2),
-                _shown(pull.PRAT, 1, 2),
+                _shown(one.slope_cornering if one else None, per_degree * per_N, 1),
+                _shown(one.slope_aligning if one else None, per_degree * per_Nm, 2),
+                _shown(pull.conicity, per_N, 1),
+                _shown(pull.plysteer, per_N, 1),
+                _shown(pull.CRAT, per_Nm, 2),
+                _shown(pull.PRAT, per_Nm, 2),
+                _shown(pull.PRAT_at_FY_zero, per_Nm, 2),
             ]
         )
     head = [
         "FZ [N]",
         "FZ [lbf]",
-        "slope C_FY [N/deg]",
-        "slope C_MZ [N·m/deg]",
-        "conicity [N]",
-        "plysteer [N]",
+        f"slope C_FY [{force}/deg]",
+        f"slope C_MZ [{moment}/deg]",
+        f"conicity [{force}]",
+        f"plysteer [{force}]",
+        f"CRAT [{moment}]",
+        f"PRAT [{moment}]",
+        f"PRAT at FY = 0 [{moment}]",
     ]
-    return table([*head, "CRAT [N·m]", "PRAT [N·m]"], rows, align=">" * 8)
+    return table(head, rows, align=">" * 9)
 
 
 def _shown(estimate: Estimate | None, factor: float, digits: int) -> str:

@@ -74,6 +74,7 @@ def reduce_test(
         *plan.check(placed, later, protocol, protocol.rotations or machine.rotations),
         *drift_findings(conditions, protocol),
         *remarks.machine_findings(info, machine),
+        *remarks.pressure_findings(info, machine),
         *remarks.speed_findings(files, machine),
         *remarks.tare_findings(files, record),
         *remarks.angle_findings(files),

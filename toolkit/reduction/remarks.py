@@ -30,6 +30,14 @@ def machine_findings(info: TestInfo, machine: Machine) -> list[Finding]:
     return _speed([info.speed_m_s], "test.toml", machine)
 
 
+def pressure_findings(info: TestInfo, machine: Machine) -> list[Finding]:
+    """Tell that the pressure is not known, where the machine states what an error of it does."""
+    if info.pressure_Pa is not None or not machine.stated_uncertainty("P").effect:
+        return []
+    message = "the test does not say its inflation pressure: the uncertainties hold no part for it"
+    return [Finding(rule="no-pressure", where="test.toml", message=message, level="note")]
+
+
 def speed_findings(files: Sequence[OpenedFile], machine: Machine) -> list[Finding]:
     """Return the files whose own speed channel, averaged over a block, leaves the tolerance."""
     found: dict[str, list[float]] = {}
