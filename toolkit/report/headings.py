@@ -74,8 +74,10 @@ def headings(body: Element, sheet: StyleSheet) -> Iterator[Heading]:
     outside = {FALLBACK, q("w:txbxContent")}
     for paragraph in body.iter(W_P):
         level = level_of(paragraph, sheet)
+        if level >= _BODY or any(one.tag in outside for one in paragraph.iterancestors()):
+            continue
         text = " ".join(paragraph_text(paragraph).split())
-        if level >= _BODY or not text or any(one.tag in outside for one in paragraph.iterancestors()):
+        if not text:
             continue
         own = paragraph.find(f"{_P_PR}/{q('w:numPr')}/{q('w:numId')}")
         none = own is not None and own.get(q("w:val")) == "0"

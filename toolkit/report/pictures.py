@@ -18,7 +18,6 @@ from toolkit.report.xml import NS, W_P, W_R, W_T, W_TBL, W_TC, W_TR, Element, St
 EMU_TWIP = 635
 _VML_EMU = {"pt": 12700, "in": 914400, "cm": 360000, "mm": 36000, "px": 9525}
 _CELL_MARGIN = 2 * 108
-_NEXT_SECTION: Any = etree.XPath("following::w:sectPr[1]", namespaces={"w": NS["w"]})
 _LETTER = (12240, 15840, 1440)
 
 
@@ -192,13 +191,17 @@ def _number_of(cell: Element, path: str) -> int:
 
 def _section(at: Element, story: Story) -> tuple[int, int]:
     """Return width of one column and height of the text area [twips] of the section around an element."""
-    section = _of_body(at) if story.body else _of_part(story)
+    section = _of_body(at, story) if story.body else _of_part(story)
     if section is None:
         return _LETTER[0] - 2 * _LETTER[2], _LETTER[1] - 2 * _LETTER[2]
     return section_room(section)
 
 
-def _of_body(at: Element) -> Element | None:
+def _of_body(at: Element, story: Story) -> Element | None:
+    if story.sections is None:
+        story.sections = list(story.root.iter(q("w:sectPr")))
+    if len(story.sections) < 2:
+        return next(iter(story.sections), None)
     # A section's properties stand in its last paragraph, or at the end of the body.
     for paragraph in at.iterancestors(W_P):
         own = paragraph.find(f"{q('w:pPr')}/{q('w:sectPr')}")
@@ -207,7 +210,14 @@ def _of_body(at: Element) -> Element | None:
     inside = next(at.iter(q("w:sectPr")), None)
     if inside is not None:
         return inside
-    return next(iter(_NEXT_SECTION(at)), None)
+    inner = at
+    while inner is not None:
+        for sibling in inner.itersiblings():
+            found = next(sibling.iter(q("w:sectPr")), None)
+            if found is not None:
+                return found
+        inner = inner.getparent()
+    return None
 
 
 def _of_part(story: Story) -> Element | None:

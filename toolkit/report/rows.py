@@ -9,7 +9,7 @@ from copy import deepcopy
 from toolkit.report.content import Cell, Table
 from toolkit.report.controls import fill_control, fill_literals, set_cell
 from toolkit.report.pictures import Ids, free_row
-from toolkit.report.scan import control_tag, own_rows, row_in
+from toolkit.report.scan import LITERAL, control_tag, own_rows, row_in, visible_texts
 from toolkit.report.style import Style
 from toolkit.report.tags import Tag, format_number, parse_tag
 from toolkit.report.xml import W_P, W_SDT, W_TC, W_TR, Element, ancestor, paragraph_text, q
@@ -44,6 +44,7 @@ def fill_table(
     free_row(prototype)
     pattern = deepcopy(prototype)
     _forget_identity(pattern)
+    literals, controls = _places(pattern)
     made: list[Element] = []
     last = prototype
     for values in table.rows:
@@ -60,7 +61,12 @@ def fill_table(
             return shown
 
         if tagged:
-            _fill_row(row, text)
+            # Literals first: what a control then receives is never read as a literal.
+            nodes = list(row.iter())
+            for place in literals:
+                fill_literals(nodes[place], text)
+            for place, tag in controls:
+                fill_control(nodes[place], text(tag))
         else:
             cells = [cell for cell in row.iter(W_TC) if ancestor(cell, W_TR) is row]
             for cell, column, value in zip(cells, table.columns, values, strict=True):
@@ -87,8 +93,6 @@ def _has_tags(row: Element) -> bool:
 
 
 def _tags(root: Element) -> Iterator[tuple[Element, Tag]]:
-    from toolkit.report.scan import LITERAL
-
     for element in root.iter(W_SDT, W_P):
         if element.tag == W_SDT:
             tag = control_tag(element)
@@ -101,16 +105,20 @@ def _tags(root: Element) -> Iterator[tuple[Element, Tag]]:
                 yield element, found
 
 
-def _fill_row(row: Element, text: Callable[[Tag], str]) -> None:
-    # Literals first: what a control then receives is never read as a literal. One pass over a list,
-    # because filling changes the tree below.
-    for element in list(row.iter(W_SDT, W_P)):
-        if element.tag == W_P:
-            fill_literals(element, text)
-    for element in list(row.iter(W_SDT)):
-        tag = control_tag(element)
-        if tag is not None and tag.family in ("row", "value"):
-            fill_control(element, text(tag))
+def _places(pattern: Element) -> tuple[list[int], list[tuple[int, Tag]]]:
+    """Return where a row has literals and controls, counted over its elements: the same in every clone."""
+    literals, controls = [], []
+    for place, element in enumerate(list(pattern.iter())):
+        if element.tag == W_P and any(
+            parse_tag(match[1]) is not None
+            for match in LITERAL.finditer("".join(t.text or "" for t in visible_texts(element)))
+        ):
+            literals.append(place)
+        elif element.tag == W_SDT:
+            tag = control_tag(element)
+            if tag is not None and tag.family in ("row", "value"):
+                controls.append((place, tag))
+    return literals, controls
 
 
 _BOOKMARKS = (q("w:bookmarkStart"), q("w:bookmarkEnd"), q("w:commentRangeStart"), q("w:commentRangeEnd"))

@@ -47,12 +47,16 @@ def parser() -> etree.XMLParser:
 
 @dataclass(slots=True, kw_only=True)
 class Story:
-    """A part that holds text: body, header, footer, footnotes or endnotes."""
+    """A part that holds text: body, header, footer, footnotes or endnotes.
+
+    ``sections`` are the body's section properties once someone asked for them.
+    """
 
     name: str
     root: Element
     part: Any
     blob: bool
+    sections: list[Element] | None = None
 
     @property
     def body(self) -> bool:
