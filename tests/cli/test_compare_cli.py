@@ -253,3 +253,10 @@ def test_a_protocol_for_a_test_that_is_reduced_already(
     code, answer = toolkit(capsys, "process", copy, "--protocol", protocol)
     assert answer["protocol"] == "other"
     assert {"slip-angle-tolerance", "unplanned-load"} <= {one["rule"] for one in answer["findings"]}
+
+
+def test_the_tags_of_a_comparison_are_listed(capsys: pytest.CaptureFixture[str]) -> None:
+    code, answer = toolkit(capsys, "template", "tags", "--kind", "comparison")
+    assert code == 0
+    listed = {one["tag"] for one in answer["tags"]}
+    assert {"tk:comparison.conclusion", "tk:table.differences", "tk:figure.compared_conicity"} <= listed

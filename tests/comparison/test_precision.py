@@ -9,7 +9,7 @@ import pytest
 from comparison_factory import conicity
 from scipy import stats
 
-from toolkit.comparison.precision import factor_spread, factors_of, repeats_of, spread
+from toolkit.comparison.precision import factor_spread, factors_of, grubbs_p, repeats_of, spread
 
 
 def test_gum_h5_zener_voltage_standard() -> None:
@@ -121,3 +121,39 @@ def test_reproducibility_needs_another_laboratory() -> None:
     two = repeats_of(five(laboratory=("A", "A", "B", "B")), level=0.05)  # type: ignore[arg-type]
     assert two.reproducibility == "laboratory"
     assert all(f.factor == "laboratory" for p in two.precisions for f in p.factors)
+
+
+# ISO 5725-2:1994, table 5: critical values of Grubbs's test for one outlying observation, 5 % and 1 %.
+@pytest.mark.parametrize(
+    ("n", "five", "one"), [(4, 1.481, 1.496), (5, 1.715, 1.764), (8, 2.126, 2.274), (10, 2.290, 2.482)]
+)
+def test_grubbs_against_the_published_critical_values(n: int, five: float, one: float) -> None:
+    for G, p in ((five, 0.05), (one, 0.01)):
+        # n - 1 values, half of them at a and half at -a about the rest, and one out at the wanted G.
+        low, high = 0.0, 1e6
+        for _ in range(200):
+            out = (low + high) / 2
+            values = np.array([*np.linspace(-1, 1, n - 1), out])
+            got = (values.max() - values.mean()) / values.std(ddof=1)
+            low, high = (out, high) if got < G else (low, out)
+        # The table is rounded to a thousandth, which is up to a tenth of p where the curve is steep.
+        assert grubbs_p(values) == pytest.approx(p, rel=0.12)
+
+
+def test_grubbs_needs_three_values_that_differ() -> None:
+    assert grubbs_p(np.array([1.0, 2.0])) is None
+    assert grubbs_p(np.array([1.0, 1.0, 1.0])) is None
+
+
+def test_a_repeat_that_stands_apart_is_named_and_kept() -> None:
+    rng = np.random.default_rng(2)
+    entries = [
+        conicity(f"t{i}", *(20 + rng.normal(0, 0.1, 3) + (50 if i == 3 else 0)), day="1") for i in range(8)
+    ]
+    from toolkit.comparison.compare import compare
+
+    found = compare(entries)
+    (note,) = [one for one in found.findings if one.rule == "repeat-outlier"]
+    assert (note.where, note.level) == ("t3", "note")
+    assert found.repeats is not None
+    assert all(one.n == 8 and one.outlier and one.farthest == "t3" for one in found.repeats.precisions)

@@ -111,6 +111,10 @@ def _repeats(found: Comparison) -> dict[str, Any]:
                 "repeatability_s_r": None if one.repeatability is None else _spread(one.repeatability),
                 "repeatability_limit_r": one.limit_r,
                 "intermediate": [_factor(factor) for factor in one.factors],
+                "farthest": one.farthest,
+                "grubbs_p": one.outlier_p,
+                "grubbs_p_holm": one.outlier_p_holm,
+                "outlier": one.outlier,
             }
             for one in repeats.precisions
         ],

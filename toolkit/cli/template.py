@@ -44,7 +44,8 @@ def tags(
     ] = None,
     calibration: Annotated[str | None, typer.Option("--calibration", help="Record id.")] = None,
     kind: Annotated[
-        str, typer.Option("--kind", help="report, or certificate: the tags of that document.")
+        str,
+        typer.Option("--kind", help="report, certificate, comparison or audit: the tags of that document."),
     ] = "report",
     calibrations: Calibrations = None,
     home: Home = None,
@@ -55,14 +56,17 @@ def tags(
 
     Example: toolkit template tags --test tests/2019-06-04
     """
+    from toolkit.report.audit_vocabulary import AUDIT
     from toolkit.report.build import build_content
     from toolkit.report.certificate.vocabulary import CERTIFICATE
+    from toolkit.report.comparison_vocabulary import COMPARISON
     from toolkit.report.listing import list_tags
     from toolkit.report.style import read_style, style_file
     from toolkit.report.vocabulary import REPORT
 
-    if kind not in ("report", "certificate") or (kind == "certificate" and test is not None):
-        raise typer.BadParameter("report, or certificate without --test", param_hint="--kind")
+    kinds = {one.name: one for one in (REPORT, CERTIFICATE, COMPARISON, AUDIT)}
+    if kind not in kinds or (kind != "report" and test is not None):
+        raise typer.BadParameter(f"{', '.join(kinds)}; only report with --test", param_hint="--kind")
     style = read_style(style_file(template)) if template else read_style(None)
     content = None
     if test is not None:
@@ -70,7 +74,7 @@ def tags(
 
         resolved = resolve_test(test, calibration=calibration, calibrations=calibrations, home=home)
         content = build_content(resolved.result, resolved.record, findings=resolved.findings, style=style)
-    listed = list_tags(content, style, CERTIFICATE if kind == "certificate" else REPORT)
+    listed = list_tags(content, style, kinds[kind])
     answer({"tags": listed}, _text(listed), as_json=json, quiet=quiet)
     return 0
 

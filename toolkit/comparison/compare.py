@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from toolkit.characteristics.characterise import characteristic_rows
 from toolkit.characteristics.shared import identity_of
 from toolkit.comparison.differences import differences
-from toolkit.comparison.model import MODES, Comparison, Entry, Mode
+from toolkit.comparison.model import MODES, Comparison, Entry, Mode, Repeats
 from toolkit.comparison.pattern import pattern_effect
 from toolkit.comparison.precision import repeats_of
 from toolkit.errors import ConfigError
@@ -127,7 +127,7 @@ def compare(
         repeats=repeats,
         pattern=pattern_effect(named),
         left_out=left_out,
-        findings=tuple(_findings(named, chosen, stated=mode is not None)),
+        findings=tuple(_findings(named, chosen, repeats, stated=mode is not None)),
     )
 
 
@@ -184,7 +184,9 @@ def _labelled(entries: Sequence[Entry]) -> tuple[Entry, ...]:
     return tuple(found)
 
 
-def _findings(entries: Sequence[Entry], mode: Mode, *, stated: bool) -> list[Finding]:
+def _findings(
+    entries: Sequence[Entry], mode: Mode, repeats: Repeats | None, *, stated: bool
+) -> list[Finding]:
     found = []
     tests = [one for one in entries if one.kind == "test"]
     for name in _WATCHED:
@@ -194,6 +196,13 @@ def _findings(entries: Sequence[Entry], mode: Mode, *, stated: bool) -> list[Fin
         told = ", ".join(f"{label}: {value or 'not stated'}" for label, value in values.items())
         message = f"the tests differ in {name} ({told}): a difference may come from it"
         found.append(Finding(rule="conditions-differ", where=name, message=message, level="note"))
+    outliers: dict[str, list[str]] = {}
+    for one in repeats.precisions if repeats else ():
+        if one.outlier:
+            outliers.setdefault(one.farthest, []).append(f"{one.name} at {one.load_N:.0f} N")
+    for label, where in outliers.items():
+        message = f"stands apart from the other repeats in {', '.join(where)} (Grubbs, Holm over the table)"
+        found.append(Finding(rule="repeat-outlier", where=label, message=message, level="note"))
     inferred = infer_mode(entries)
     if stated and mode != inferred and inferred != "repeats":
         message = f"compared as {mode}; by what the tests state it is a comparison of {inferred}"

@@ -109,6 +109,8 @@ class Precision:
 
     ``repeatability`` pools tests whose stated factors were all the same, None where no two are;
     ``limit_r`` is the repeatability limit, 1.96 sqrt(2) of it (ISO 5725-6). ``total`` is over all tests.
+    ``farthest`` is the test farthest from the mean, ``outlier_p`` its p by Grubbs's test (None for two
+    tests); it is an ``outlier`` where the p adjusted over the table is below the level.
     """
 
     name: str
@@ -120,6 +122,10 @@ class Precision:
     repeatability: Spread | None
     limit_r: float | None
     factors: tuple[FactorSpread, ...]
+    farthest: str
+    outlier_p: float | None
+    outlier_p_holm: float | None = None
+    outlier: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -37,6 +37,7 @@ def repeats_of(entries: Sequence[Entry], *, level: float) -> Repeats:
         () for _ in entries
     ]
     found = []
+    labels = [one.label for one in entries]
     everywhere = [series_of(one.rows) for one in entries]
     for series, rows in everywhere[0].items():
         if series[2] is not None or any(series not in other for other in everywhere):
@@ -48,7 +49,7 @@ def repeats_of(entries: Sequence[Entry], *, level: float) -> Repeats:
             ]
             values = [one.value for one in numbers if one is not None]
             if len(values) == len(entries):
-                found.append(_precision(series, row.load_N, np.array(values), cells, varied))
+                found.append(_precision(series, row.load_N, np.array(values), cells, varied, labels))
     labs = next(one for one in factors if one.name == "laboratory")
     reproducible = labs.varied and None not in labs.levels
     return Repeats(
@@ -96,11 +97,15 @@ def _precision(
     values: NDArray[np.float64],
     cells: Sequence[Hashable],
     varied: Sequence[Factor],
+    labels: Sequence[str],
 ) -> Precision:
     name, rotation, _ = series
     variance, dof = _within(values, cells)
     repeatability = spread(math.sqrt(variance), dof) if dof else None
+    farthest = int(np.argmax(np.abs(values - values.mean())))
     return Precision(
+        farthest=labels[farthest],
+        outlier_p=grubbs_p(values),
         name=name,
         rotation=rotation,
         load_N=load_N,
@@ -150,6 +155,27 @@ def factor_spread(values: NDArray[np.float64], levels: Sequence[Hashable], *, fa
     )
 
 
+def grubbs_p(values: NDArray[np.float64]) -> float | None:
+    """Return the two-sided p of the value farthest from the mean (Grubbs, Technometrics 11, 1969, 1-21).
+
+    None for fewer than three values, or values that are all the same.
+
+    >>> round(grubbs_p(np.array([0.0, 0.1, -0.1, 0.05, 5.0])), 4) < 0.01
+    True
+    """
+    from scipy.special import stdtr
+
+    n, s = len(values), float(values.std(ddof=1)) if len(values) > 1 else 0.0
+    if n < 3 or s <= 0:
+        return None
+    G = float(np.max(np.abs(values - values.mean()))) / s
+    rest = (n - 1) ** 2 - n * G * G
+    if rest <= 0:
+        return 0.0
+    t = math.sqrt(n * (n - 2) * G * G / rest)
+    return min(1.0, 2 * n * float(stdtr(n - 2, -t)))
+
+
 def spread(s: float, dof: int) -> Spread:
     """Return a standard deviation with its 95 % interval from the chi-squared distribution.
 
@@ -164,16 +190,19 @@ def spread(s: float, dof: int) -> Spread:
 
 
 def _decided(found: Sequence[Precision], level: float) -> tuple[Precision, ...]:
-    """Adjust each factor's F tests over its table."""
+    """Adjust each factor's F tests, and the tests for outliers, over their tables."""
     names = dict.fromkeys(one.factor for row in found for one in row.factors)
     adjusted: dict[tuple[int, str], float | None] = {}
     for name in names:
         tests = [(i, one) for i, row in enumerate(found) for one in row.factors if one.factor == name]
         for (i, _), p in zip(tests, holm([one.p for _, one in tests]), strict=True):
             adjusted[i, name] = p
+    apart = holm([row.outlier_p for row in found])
     return tuple(
         replace(
             row,
+            outlier_p_holm=apart[i],
+            outlier=(p_apart := apart[i]) is not None and p_apart < level,
             factors=tuple(
                 replace(one, p_holm=p, significant=p is not None and p < level)
                 for one in row.factors

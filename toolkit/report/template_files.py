@@ -19,6 +19,7 @@ class PackagedTemplate:
 def packaged_templates() -> dict[str, PackagedTemplate]:
     """Return the templates by the name of their file."""
     from toolkit.report.certificate.template import build_certificate
+    from toolkit.report.comparison_template import build_comparison
     from toolkit.report.default_template import STYLE_FILE, build_default
     from toolkit.report.template_german import STYLE_FILE as GERMAN
     from toolkit.report.template_german import build_german
@@ -35,6 +36,9 @@ def packaged_templates() -> dict[str, PackagedTemplate]:
         ),
         PackagedTemplate(
             name="certificate", title="a calibration certificate", build=build_certificate, style=None
+        ),
+        PackagedTemplate(
+            name="comparison", title="a comparison of tests", build=build_comparison, style=None
         ),
     )
     return {one.name: one for one in listed}
