@@ -9,6 +9,7 @@ import time
 import pytest
 
 from toolkit.audit.workers import Lost, run_isolated
+from toolkit.errors import ConfigError
 
 
 def make():
@@ -62,3 +63,13 @@ def test_a_file_whose_worker_was_killed_by_somebody_else_is_read_by_the_next(tmp
 
 def test_nothing_to_do_starts_nothing():
     assert list(run_isolated(make, [], workers=2)) == []
+
+
+def stillborn():
+    os._exit(3)
+
+
+def test_workers_that_never_start_end_the_run_with_an_error():
+    with pytest.raises(ConfigError) as caught:
+        list(run_isolated(stillborn, ["a", "b"], workers=2))
+    assert caught.value.rule == "workers"

@@ -13,7 +13,7 @@ import tempfile
 from collections.abc import Callable
 from pathlib import Path
 
-from tests.benchmarks import fit_rows, help_time, monte_carlo, process_time, report_time, verify_records
+from tests.benchmarks import audit_rate, fit_rows, help_time, monte_carlo, process_time, report_time, verify_records
 
 BENCHES: dict[str, Callable[[Path, int], list[dict[str, object]]]] = {
     "help": help_time.run,
@@ -22,6 +22,7 @@ BENCHES: dict[str, Callable[[Path, int], list[dict[str, object]]]] = {
     "fit": fit_rows.run,
     "verify": verify_records.run,
     "monte-carlo": monte_carlo.run,
+    "audit": audit_rate.run,
 }
 
 

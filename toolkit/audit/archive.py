@@ -14,8 +14,8 @@ from toolkit.audit.across import Across
 from toolkit.audit.inventory import inventory
 from toolkit.audit.lines import Lines
 from toolkit.audit.model import GRADES, TELLS, Grade
-from toolkit.audit.one_file import Auditor, OwnOutput, unreadable
-from toolkit.audit.resume import Files, Results
+from toolkit.audit.one_file import Auditor, unreadable
+from toolkit.audit.resume import Done, Files, Results, done
 from toolkit.audit.workers import Lost, run_isolated
 from toolkit.calibration.registry.registry import Refused, Registry
 from toolkit.errors import ConfigError, RegistryError
@@ -87,7 +87,7 @@ def audit_archive(
         )  # fmt: skip
     day = known_at or today()
     todo = inventory(archive) if names is None else names
-    make = partial(Auditor, archive, registry, day)
+    make = partial(_Worker, archive, registry, day)
     with Results(out, archive=archive, registry_hash=_hash(registry, day)) as kept:
         reused: set[str] = set()
         for name in kept.known(todo):
@@ -95,14 +95,18 @@ def audit_archive(
             step(name)
         new = tuple(name for name in todo if name not in reused)
         for name, result in run_isolated(make, new, workers=workers):
-            if isinstance(result, Lost):
-                kept.put(name, None, unreadable(name, result.reason))
-            elif isinstance(result, OwnOutput):
-                kept.put(name, result.sha256, None)
-            else:
-                kept.put(name, result.sha256, result)
+            kept.put(name, done(unreadable(name, result.reason)) if isinstance(result, Lost) else result)
             step(name)
         return _summed(archive, registry, day, kept.files(todo), reused=len(reused))
+
+
+class _Worker:
+    # What crosses the border of the process is the text that is kept.
+    def __init__(self, archive: Path, registry: Registry, day: dt.date) -> None:
+        self.audit = Auditor(archive, registry, day)
+
+    def __call__(self, name: str) -> Done:
+        return done(self.audit(name))
 
 
 def _summed(archive: Path, registry: Registry, day: dt.date, files: Files, *, reused: int) -> ArchiveAudit:

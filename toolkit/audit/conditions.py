@@ -6,12 +6,13 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from toolkit.reduction.protocol import nearest_load, nearest_step
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    import numpy as np
     from numpy.typing import NDArray
 
     from toolkit.audit.columns import Columns
@@ -64,7 +65,9 @@ def changes(
     if recording.has("SA"):
         rows["SA"] = recording["SA"].si
         step = nearest_step(turn * float(rows["SA"].mean()), protocol)
-    means = {name: [float(values[b.rows].mean()) for b in blocks] for name, values in rows.items()}
+    stacked = np.stack(list(rows.values()))
+    table = np.array([stacked[:, block.rows].mean(axis=1) for block in blocks])
+    means = dict(zip(rows, table.T.tolist(), strict=True))
     nothing = [None] * len(blocks)
     return tuple(
         Change(

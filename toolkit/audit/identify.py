@@ -140,6 +140,9 @@ class _Judge:
 
     def segments(self) -> tuple[tuple[Segment, ...], tuple[_Answer | None, ...]]:
         """Return the file's segments and the answer of each: the whole file first, parts only if it must."""
+        usual = self._usual()
+        if usual is not None:
+            return usual
         self._let_in(self.screen.whole(self.columns))
         for slack in (False, True):
             hits = whole_file(self._fits(slack=slack))
@@ -157,6 +160,25 @@ class _Judge:
         ]
         slack, runs = min(parts, key=lambda part: (_unknown_rows(part[1]), len(part[1]), part[0]))
         return self._told(runs, [self._answers(run.hits, slack=slack) for run in runs])
+
+    def _usual(self) -> tuple[tuple[Segment, ...], tuple[_Answer | None, ...]] | None:
+        # Most files are what they should be: by the record in force, as it is, and by nothing else.
+        if self.in_force is None:
+            return None
+        ids = [record.id for record in self.screen.records]
+        if self.in_force.id not in ids or not self.columns.loads:
+            return None
+        plain = tuple(range(len(self.in_force.indications)))
+        self._let_in([(ids.index(self.in_force.id), False, plain)])
+        for load, family in self.groups[0].families.items():
+            if not bool(np.all(np.abs(family.predicted[0] - self.columns.y[load]) <= family.bound)):
+                return None
+        hit = Hit(group=0, signs=tuple((load, 0) for load in self.groups[0].families))
+        self._let_in(self.screen.close_to(self.groups[0], self.columns, dict(hit.signs)))
+        told = self._answers(distinct_rivals(self.groups, hit, slack=False), slack=False)
+        if len(told) > 1:
+            return None
+        return self._told([Run(start=0, stop=self.columns.rows, hits=(hit,))], [told])
 
     def _let_in(self, keys: Sequence[Key]) -> None:
         new = [key for key in keys if key not in self._keys]

@@ -13,12 +13,13 @@ import tempfile
 import weakref
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
 from typing import IO, Any, overload
 
 from toolkit import __version__
-from toolkit.audit.one_file import FileAudit
+from toolkit.audit.one_file import FileAudit, OwnOutput
 from toolkit.audit.serial import SHAPE, from_plain, to_plain
 from toolkit.errors import OutputError
 from toolkit.files import sha256_bytes, sha256_file
@@ -29,6 +30,21 @@ RESULTS = "results.jsonl"
 _HEADER = (json.dumps({"generator": GENERATOR, "marks": OWN_OUTPUT}) + "\n").encode()
 _REST = b', "result": '
 _HASHING = 4  # threads; reading and hashing leave the interpreter free
+
+
+@dataclass(frozen=True, slots=True)
+class Done:
+    """A result as it is kept: the hash of the file, and the plain answer as JSON (null: an own output)."""
+
+    sha256: str | None
+    body: bytes
+
+
+def done(result: FileAudit | OwnOutput) -> Done:
+    """Return a result as it is kept."""
+    if isinstance(result, OwnOutput):
+        return Done(result.sha256, b"null")
+    return Done(result.sha256, json.dumps(to_plain(result)).encode())
 
 
 class Files(Sequence[FileAudit]):
@@ -123,15 +139,13 @@ class Results:
                 if content is not None and self._places[name][0] == self._key(name, content):
                     yield name
 
-    def put(self, name: str, sha256: str | None, result: FileAudit | None) -> None:
-        """Append a result, None for a file that the toolkit wrote; one without a hash is not used again."""
-        key = b"" if sha256 is None else self._key(name, sha256)
-        plain = None if result is None else to_plain(result)
+    def put(self, name: str, done: Done) -> None:
+        """Append a result; one without a hash is not used again."""
+        key = b"" if done.sha256 is None else self._key(name, done.sha256)
         # ASCII: a name that is no UTF-8 survives as well.
         head = json.dumps({"key": key.hex(), "path": name})
-        body = json.dumps(plain)
         self._places[name] = (key, self._end)
-        self._write(head[:-1].encode() + _REST + body.encode() + b"}\n")
+        self._write(head[:-1].encode() + _REST + done.body + b"}\n")
 
     def files(self, names: Sequence[str]) -> Files:
         """Return the results of the names, without those of files that the toolkit wrote."""

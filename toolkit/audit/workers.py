@@ -19,11 +19,14 @@ from multiprocessing.connection import Connection, wait
 from multiprocessing.context import SpawnProcess
 from typing import Generic, TypeVar
 
+from toolkit.errors import ConfigError
+
 Result = TypeVar("Result")
 
 TIMEOUT_S = 120.0
 MEMORY_BYTES = 4 << 30
 _THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
+_TRIES = 3
 _AHEAD = 16  # files in a worker's pipe: it never waits for the next one
 
 
@@ -40,6 +43,7 @@ class _Worker(Generic[Result]):
     pipe: Connection
     waiting: deque[str]
     since: float
+    ready: bool = False
 
 
 def run_isolated(
@@ -58,12 +62,18 @@ def run_isolated(
     workers : processes
     timeout_s : of one name; its worker is killed beyond
 
+    Raises
+    ------
+    ConfigError
+        ``workers``: three processes in a row ended before they were ready
+
     A name whose worker died is given to a fresh worker, alone, once more: where several were in its pipe,
     the dead one is the first, but a machine that ran short of memory may have killed the wrong one.
     """
     context = mp.get_context("spawn")
     todo = deque(names)
     doubtful: set[str] = set()
+    stillborn = 0  # workers that ended before they were ready, one after the other
     pool: list[_Worker[Result]] = []
 
     def start() -> _Worker[Result]:
@@ -75,7 +85,7 @@ def run_isolated(
         return _Worker(process=process, pipe=ours, waiting=deque(), since=time.monotonic())
 
     def feed(worker: _Worker[Result]) -> None:
-        while todo and len(worker.waiting) < _AHEAD:
+        while worker.ready and todo and len(worker.waiting) < _AHEAD:
             if todo[0] in doubtful and worker.waiting:
                 return  # a suspect runs alone
             name = todo.popleft()
@@ -111,21 +121,30 @@ def run_isolated(
                 pool.append(start())
             for worker in pool:
                 feed(worker)
-            busy = [worker for worker in pool if worker.waiting]
+            busy = [worker for worker in pool if worker.waiting or not worker.ready]
             ready = set(wait([worker.pipe for worker in busy], timeout=1.0))
             for worker in busy:
                 if worker.pipe in ready:
                     try:
                         result = worker.pipe.recv()
                     except (EOFError, OSError):
+                        if not worker.ready:
+                            bury(worker, "")
+                            stillborn += 1
+                            if stillborn == _TRIES:
+                                raise _no_workers() from None
+                            continue
                         name = worker.waiting[0]
                         lost = bury(worker, "worker-died: the reader's process ended without an answer")
                         if lost is not None:
                             yield name, lost
                         continue
                     worker.since = time.monotonic()
+                    if not worker.ready:
+                        worker.ready, stillborn = True, 0
+                        continue
                     yield worker.waiting.popleft(), result
-                elif time.monotonic() - worker.since > timeout_s:
+                elif worker.waiting and time.monotonic() - worker.since > timeout_s:
                     name = worker.waiting[0]
                     lost = bury(worker, f"timeout: no answer within {timeout_s:g} s")
                     if lost is not None:
@@ -152,6 +171,17 @@ def _one_thread() -> Iterator[None]:
                 os.environ[name] = value
 
 
+def _no_workers() -> ConfigError:
+    return ConfigError(
+        "the workers cannot start",
+        where="--workers",
+        got=f"{_TRIES} processes, one after the other, that ended before their first file",
+        expected="processes that start; their own messages stand above",
+        next_step="free memory, and guard a script that calls this with 'if __name__ == \"__main__\"'",
+        rule="workers",
+    )
+
+
 def _serve(make: Callable[[], Callable[[str], Result]], pipe: Connection) -> None:
     import resource
     import signal
@@ -159,6 +189,7 @@ def _serve(make: Callable[[], Callable[[str], Result]], pipe: Connection) -> Non
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent is interrupted, and ends its workers
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY_BYTES, MEMORY_BYTES))
     work = make()
+    pipe.send(None)  # ready
     while True:
         try:
             name = pipe.recv()

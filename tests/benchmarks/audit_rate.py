@@ -1,0 +1,144 @@
+"""`toolkit audit` on an archive of 5 000 recordings whose grades were decided when they were made.
+
+Peers: a plain script (pandas on openpyxl, least squares, comparison with every calibration) on one core, on
+a sample; and the gate with python-calamine alone, in the same workers, on all of it.
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import time
+import warnings
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tests.benchmarks.archive_factory import (
+    CELLS,
+    EDITIONS,
+    HEADERS,
+    KNOWN_AT,
+    Archive,
+    compare,
+    make_archive,
+)
+from tests.benchmarks.timing import row
+
+FILES, FEW, WORKERS = 5000, 500, 2
+_SAMPLE = 150
+_PAIRS = 3
+
+
+def run(folder: Path, count: int) -> list[dict[str, object]]:
+    """Time the audit against its peers, then a second run, memory, and hold every grade against the truth."""
+    from toolkit.audit.archive import audit_archive
+    from toolkit.audit.inventory import inventory
+    from toolkit.calibration.registry.registry import Registry
+
+    big = make_archive(folder / "big", files=FILES)
+    names = inventory(big.folder)
+    registry = Registry(big.calibrations)
+    made: list[Any] = []
+
+    def audit(workers: int = WORKERS, out: Path | None = None) -> None:
+        made[:] = [audit_archive(big.folder, registry, known_at=KNOWN_AT, workers=workers, out=out)]
+
+    ours, reader = _in_turn(audit, partial(_read_all, big.folder, names), min(count, _PAIRS))
+    sample = names[:: max(1, len(names) // _SAMPLE)]
+    plain = [_seconds(partial(_plain_script, big.folder, sample)) * len(names) / len(sample) for _ in ours]
+    wrong = compare(big.truth, {"files": list(made[0].files.plain())})
+    exact = sum(one["grade"] == "exact" for one in made[0].files.plain())
+    first = _seconds(partial(audit, out=folder / "out"))
+    again = [_seconds(partial(audit, out=folder / "out")) for _ in range(3)]
+    single = _seconds(partial(audit, 1))
+    small = make_archive(folder / "small", files=FEW)
+    peak = {one.folder: _peak_MB(one) for one in (small, big)}
+    head = f"audit of {FILES} files"
+    return [
+        row(f"{head}, {WORKERS} workers", ours, "pandas on openpyxl, one core (sampled)", plain, "0.083"),
+        row(f"{head}, {WORKERS} workers", ours, "gate and calamine, same workers", reader, "1.43"),
+        row(f"{head}, second run", again, "the first run", [first] * len(again), "0.05"),
+        row(f"{head}, 1 worker", [single], f"{WORKERS} workers", [min(ours)], ""),
+        row(f"wrong grades of {len(big.truth)} ({exact} exact)", [float(len(wrong))], "", None, "0"),
+        row(f"peak memory at {FILES} files [MB]", [peak[big.folder]], f"at {FEW} [MB]",
+            [peak[small.folder]], "1.1"),
+    ]  # fmt: skip
+
+
+def _seconds(work: Callable[[], object]) -> float:
+    started = time.perf_counter()
+    work()
+    return time.perf_counter() - started
+
+
+def _in_turn(
+    ours: Callable[[], object], peer: Callable[[], object], count: int
+) -> tuple[list[float], list[float]]:
+    pairs = [(_seconds(ours), _seconds(peer)) for _ in range(count)]
+    return [a for a, _ in pairs], [b for _, b in pairs]
+
+
+class _Reader:
+    # The gate and python-calamine, nothing else.
+    def __init__(self, folder: Path) -> None:
+        from toolkit.machine import load_machine
+
+        self.folder, self.machine = folder, load_machine("m15")
+
+    def __call__(self, name: str) -> int:
+        from toolkit.errors import ToolkitError
+        from toolkit.recording.gate import gate
+        from toolkit.recording.xlsx import read_sheet
+
+        try:
+            return len(read_sheet(gate(self.folder / name), self.machine)[1].rows)
+        except ToolkitError:
+            return 0
+
+
+def _read_all(folder: Path, names: tuple[str, ...]) -> None:
+    from toolkit.audit.workers import run_isolated
+
+    for _ in run_isolated(partial(_Reader, folder), names, workers=WORKERS):
+        pass
+
+
+def _plain_script(folder: Path, names: tuple[str, ...]) -> list[str]:
+    # What an engineer writes in an afternoon: fit each file, name the calibration that is nearest.
+    import pandas as pd
+
+    told = []
+    for name in names:
+        try:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")
+                table = pd.read_excel(folder / name, engine="openpyxl")
+        except Exception:  # noqa: BLE001  a plain script
+            told.append("unreadable")
+            continue
+        x = table[[f"{cell} (Filtered)" for cell in CELLS]].to_numpy()
+        design = np.column_stack([x, np.ones(len(x))])
+        found = [np.linalg.lstsq(design, table[y].to_numpy(), rcond=None)[0] for y in HEADERS[-2:]]
+        off = [
+            max(
+                float(np.abs(design @ (f - np.array(e))).max())
+                for f, e in zip(found, edition[1:], strict=True)
+            )
+            for edition in EDITIONS
+        ]
+        told.append(f"m15-r{int(np.argmin(off)) + 1}")
+    return told
+
+
+def _peak_MB(archive: Archive) -> float:
+    words = [str(Path(sys.executable).with_name("toolkit")), "audit", str(archive.folder), "--calibrations",
+             str(archive.calibrations), "--workers", str(WORKERS), "--json"]  # fmt: skip
+    child = subprocess.Popen(words, stdout=subprocess.DEVNULL)
+    _, _, used = os.wait4(child.pid, 0)
+    child.returncode = 0
+    return used.ru_maxrss / 1024
