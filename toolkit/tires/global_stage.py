@@ -2,8 +2,8 @@
 
 The search starts from the model's own starts and deterministic variations of them. Few steps show which
 starts lose; the rest go on to the end. A parameter that the data do not determine is set to its neutral
-default where the cost allows it (four times the noise of one row: what a 95 % interval allows), else held
-where the search ended; what is left is then determined by itself.
+default where the fit is as good with it (within a 95 % interval and a thousandth of the cost, for a model's
+own misfit is no noise), else held where the search ended; what is left is then determined by itself.
 """
 
 from __future__ import annotations
@@ -128,24 +128,24 @@ def run(task: Task, coarse: Measured, count: Array, width: float) -> Found:
     floor = _EXACT * float(np.sum((search.y * search.weight) ** 2))
     agreeing = descent.agreeing(_SAME, floor)
     x = descend(search, descent.x[:1].copy(), search.box(), steps=30, tolerance=1e-10).x
-    on_rows = len(coarse) == len(task.data)
     cheap = len(task.data) * task.model.grid * (len(task.free) + 1) <= _POLISH
-    if task.robust:
-        x, robust_weight = _reweight(rows if cheap else search, x)
-        (rows if cheap else search).weight = robust_weight
-        on_rows = on_rows or cheap
-    elif cheap and not on_rows:
-        x = descend(rows, x, rows.box(), steps=8).x
-        on_rows = True
-    misfit = rows if cheap else search
     # Bin medians where outliers are many rows: their residuals are the noise then.
-    noisy = search if task.robust and not cheap else rows
-    time, variance, dof = _noise(noisy, x)
+    judged = search if task.robust and not cheap else rows
+    work = search
+    if task.robust:
+        work = judged
+        x, work.weight = _reweight(work, x)
+    time, variance, dof = _noise(judged, x)
     fixed: list[tuple[int, str]] = []
     held: list[int] = []
-    misfit, x = _prune(misfit, x, variance, dof, fixed, held)
-    if fixed or held:
-        time, variance, dof = _noise(_same_free(noisy, misfit), x)
+    x = _prune(work, x, variance, dof, fixed, held)
+    for one in (judged, rows):
+        one.base, one.free = work.base.copy(), list(work.free)
+    misfit = rows if cheap else search
+    if cheap:
+        x = descend(rows, x, rows.box(), steps=10, tolerance=1e-10).x
+    time, variance, dof = _noise(judged, x)
+    on_rows = cheap or len(coarse) == len(task.data)
     covariance, errors = _covariance(misfit, x, variance)
     box = misfit.box()
     factor = coverage_factor(dof)
@@ -246,12 +246,6 @@ def _noise(rows: Misfit, x: Array) -> tuple[float, float, float]:
     return time, max(float(r @ r) / left, 1e-26) * time, max(used / time - len(rows.free), 1.0)
 
 
-def _same_free(rows: Misfit, misfit: Misfit) -> Misfit:
-    if rows is not misfit:
-        rows.base, rows.free = misfit.base.copy(), list(misfit.free)
-    return rows
-
-
 def _covariance(misfit: Misfit, x: Array, variance: float) -> tuple[Array, Array]:
     # By sizes for the inverse; what the bounds alone say keeps it finite.
     box = misfit.box()
@@ -273,7 +267,7 @@ def _at_bound(x: Array, box: Box) -> Sequence[bool]:
 
 def _prune(
     misfit: Misfit, x: Array, variance: float, dof: float, fixed: list[tuple[int, str]], held: list[int]
-) -> tuple[Misfit, Array]:
+) -> Array:
     # One at a time, the worst first: parameters that are not determined move together.
     factor = coverage_factor(dof)
     kept: set[int] = set()
@@ -295,7 +289,7 @@ def _prune(
         others = np.delete(x, worst, axis=1)
         misfit.hold(place, spec.default)
         trial = descend(misfit, others.copy(), misfit.box(), steps=12, tolerance=1e-7)
-        if trial.cost[0] <= cost + _ALLOWED * variance:
+        if trial.cost[0] <= cost + min(_ALLOWED * variance, _SAME * cost):
             x, cost = trial.x, max(cost, float(trial.cost[0]))
             fixed.append((place, f"not determined by these data, fixed at its default {spec.default:g}"))
         elif bound[worst]:
@@ -310,7 +304,7 @@ def _prune(
             cost = float(r @ r)
             held.append(place)
             fixed.append((place, f"not determined by these data, held at {value:.4g} where the search ended"))
-    return misfit, x
+    return x
 
 
 def refit(task: Task, coarse: Measured, count: Array) -> Array:
