@@ -148,3 +148,31 @@ def test_no_text_and_no_file(tmp_path: Path) -> None:
         with pytest.raises(ToolkitError) as caught:
             maker_characteristics(one, identity="f")
         assert caught.value.rule == rule
+
+
+def test_a_real_table_of_a_hundred_hertz_compares_with_a_thinned_copy_of_itself(tmp_path: Path) -> None:
+    """Calspan's cornering run at 100 Hz: rows that the two share none of tell the same stiffness."""
+    from conftest import SHARED_DATA
+
+    source = SHARED_DATA / "ttc_cornering" / "cornering_IA0_P83kPa.csv"
+    if not source.is_file():
+        pytest.skip(f"{source} is not at hand")
+    head, *lines = source.read_text().splitlines()
+    names = head.split(",")
+    wanted = {"SA_deg": "SA [deg]", "FZ_N": "FZ [N]", "FY_N": "FY [N]", "MZ_Nm": "MZ [N*m]"}
+    places = [names.index(name) for name in wanted]
+    cells = [[line.split(",")[i] for i in places] for line in lines]
+    slopes = []
+    for name, rows in (("all", cells[::2]), ("thin", cells[1::6])):
+        path = tmp_path / f"{name}.csv"
+        path.write_text("\n".join([",".join(wanted.values()), *(",".join(row) for row in rows)]))
+        read, findings = maker_rows(path, axes="SAE", angles_rad=DEFAULT_ANGLES, identity=name)
+        assert [f.rule for f in findings] == []
+        slopes.append([r.number.estimate() for r in read if r.name == "slope_cornering"])
+    assert len(slopes[0]) == len(slopes[1]) == 5
+    for one, other in zip(*slopes, strict=True):
+        U, _ = one.expanded()
+        V, _ = other.expanded()
+        assert abs(one.value - other.value) < math.hypot(U, V)
+    values = [one.value for one in slopes[0]]
+    assert values == sorted(values)  # the cornering stiffness grows with the load up to the rated one

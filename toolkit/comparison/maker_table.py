@@ -7,6 +7,7 @@ plysteer. Its uncertainty is that of the fit alone: it states nothing else.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -75,7 +76,11 @@ def maker_rows(
         reader = Reader(_direction(load, channels, path), shared=_nothing_shared(identity))
         rows += _rows(reader, load, angles_rad)
     sae = TireTable(path=path, axes="SAE", columns=())
-    findings += [*fit_findings(list(fits)), *axes_findings(sae, fits)]
+    # Which parameters a curve leaves open is of no interest here: values and slopes are read off it.
+    told = [one for one in fit_findings(list(fits)) if one.level != "note"]
+    findings += [
+        replace(one, where=f"{path.name}, {one.where}") for one in (*told, *axes_findings(sae, fits))
+    ]
     return tuple(rows), tuple(findings)
 
 
