@@ -10,7 +10,7 @@ import pytest
 from archive_made import FY, dated, recording, write
 
 from toolkit.audit.archive import audit_archive
-from toolkit.audit.linked import link, read_reports
+from toolkit.audit.linked import PastReport, link, read_reports
 from toolkit.calibration.registry.registry import Registry
 from toolkit.errors import ConfigError
 from toolkit.files import sha256_file
@@ -119,3 +119,19 @@ def test_links_are_not_followed(made, tmp_path):
 def test_there_is_no_such_list(tmp_path):
     with pytest.raises(ConfigError):
         read_reports(tmp_path / "none.csv")
+
+
+@pytest.mark.parametrize(
+    ("identity", "calibrations", "not_clean", "amend"),
+    [
+        ("T", ("m15-r2",), 3, False),  # computed from the cells by the record in force: it stands
+        ("T", ("m15-r1",), 0, True),
+        (None, (), 3, True),  # nothing is known but the files' own columns
+        (None, (), 0, False),
+    ],
+)
+def test_what_is_to_be_amended(identity, calibrations, not_clean, amend):
+    one = PastReport(
+        report="R", id=identity, calibrations=calibrations, not_clean=not_clean, in_force={"m15-r2"}
+    )
+    assert one.to_amend is amend

@@ -13,7 +13,15 @@ import tempfile
 from collections.abc import Callable
 from pathlib import Path
 
-from tests.benchmarks import audit_rate, fit_rows, help_time, monte_carlo, process_time, report_time, verify_records
+from tests.benchmarks import (
+    audit_rate,
+    fit_rows,
+    help_time,
+    monte_carlo,
+    process_time,
+    report_time,
+    verify_records,
+)
 
 BENCHES: dict[str, Callable[[Path, int], list[dict[str, object]]]] = {
     "help": help_time.run,

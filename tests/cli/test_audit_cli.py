@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import shutil
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -11,6 +13,8 @@ from typer.testing import CliRunner
 
 from toolkit.cli.main import _register, app
 from toolkit.examples.fig4_4 import write_fig4_4
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "audit"))
 
 HOME = Path(__file__).resolve().parents[2]
 CALIBRATIONS = ("--calibrations", str(HOME / "calibrations"))
@@ -117,3 +121,36 @@ def test_a_name_that_is_no_utf_8_is_an_answer_like_any_other(archive, tmp_path):
 def test_progress_stays_off_what_is_no_terminal(archive):
     result = run(archive)
     assert result.stderr == ""
+
+
+def test_a_report_by_a_withdrawn_record_is_amended_and_names_what_it_replaces(tmp_path):
+    from test_across import WRONG, whole_test
+
+    whole_test(tmp_path / "archive" / "tire 7", FY=WRONG, date="2015-06-01")
+    told = {
+        "generator": "toolkit", "schema": 1, "report": "TR-1", "calibrations": [{"id": "m15-r1"}],
+        "inputs": [{"name": "run 0", "sha256": _sha(tmp_path / "archive" / "tire 7" / "run 0")}],
+    }  # fmt: skip
+    for name, record in (("old", "m15-r1"), ("good", "m15-r2")):
+        (tmp_path / "reports" / name).mkdir(parents=True)
+        manifest = told | {"report": f"TR-{name}", "calibrations": [{"id": record}]}
+        (tmp_path / "reports" / name / "manifest.json").write_text(json.dumps(manifest))
+    result = run(
+        tmp_path / "archive", "--reports", tmp_path / "reports", "--repair", tmp_path / "fixed", "--json"
+    )
+    answer = json.loads(result.stdout)
+    # The report that was computed by the record in force stands, whatever the files' own columns say.
+    assert {one["report"]: one["to_amend"] for one in answer["reports"]} == {"old": True, "good": False}
+    (one,) = answer["amended"]
+    assert one["replaces"] == "TR-old"
+    text = subprocess.run(
+        ["pdftotext", "-layout", one["pdf"], "-"], capture_output=True, text=True, check=True
+    )
+    assert "TR-old" in text.stdout
+    assert "rests on m15-r1" in " ".join(text.stdout.split())
+
+
+def _sha(path):
+    from toolkit.files import sha256_file
+
+    return sha256_file(path)

@@ -36,7 +36,8 @@ _CLEAN = ("exact", "rounding")
 class PastReport:
     """A report and what it says of its origin; ``words`` are those in which a test's name may stand.
 
-    ``id`` is that of its manifest; ``tests``, ``files`` and ``not_clean`` are filled when it is linked.
+    ``id`` is that of its manifest; ``tests``, ``files``, ``not_clean`` and ``in_force``, the records in force
+    on the days of its tests, are filled when it is linked.
     """
 
     report: str
@@ -49,6 +50,7 @@ class PastReport:
     tests: set[str] = field(default_factory=set)
     files: int = 0
     not_clean: int = 0
+    in_force: set[str] = field(default_factory=set)
 
     def as_dict(self) -> dict[str, Any]:
         """Return the report under the keys of the answer."""
@@ -60,8 +62,20 @@ class PastReport:
             "tests": sorted(self.tests),
             "files": self.files,
             "not_clean": self.not_clean,
-            "to_amend": self.not_clean > 0,
+            "in_force": sorted(self.in_force),
+            "to_amend": self.to_amend,
         }
+
+    @property
+    def to_amend(self) -> bool:
+        """Whether it rests on values that are not those of the records in force.
+
+        A report with a manifest was computed from the load cells, by the calibrations that it names, whatever
+        Fy and Mz stand in the files; any other is taken to rest on these.
+        """
+        if self.id is not None:
+            return bool(self.in_force) and set(self.calibrations) != self.in_force
+        return self.not_clean > 0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -96,12 +110,14 @@ def link(made: ArchiveAudit, reports: tuple[PastReport, ...]) -> Linked:
         for sha256 in one.hashes:
             by_hash.setdefault(sha256, []).append(one)
     tests: dict[str, tuple[int, int]] = {}
+    in_force: dict[str, set[str]] = {}
     for plain in made.files.plain():
         test = plain["test"]
         dirty = plain["grade"] not in _CLEAN
         if test is not None:
             n, bad = tests.get(test, (0, 0))
             tests[test] = (n + 1, bad + dirty)
+            in_force.setdefault(test, set()).update({plain["in_force"]} - {None})
         for one in by_hash.get(plain["sha256"] or "", ()):
             one.linked_by.add("sha256" if one.id is None else "manifest")
             if test is not None:
@@ -119,6 +135,7 @@ def link(made: ArchiveAudit, reports: tuple[PastReport, ...]) -> Linked:
         for test in one.tests:
             one.files += tests[test][0]
             one.not_clean += tests[test][1]
+            one.in_force |= in_force[test]
     taken = {test for one in reports for test in one.tests}
     return Linked(reports=reports, unknown=tuple(sorted(set(tests) - taken)))
 

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import time
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from toolkit.cli.console import Calibrations, Home, Json, KnownAt, Quiet, day, progress, stream
 from toolkit.cli.home import calibrations_folder
+
+if TYPE_CHECKING:
+    from toolkit.cli.audit_amend import Amended
 
 NAME = "audit"
 
@@ -89,12 +92,28 @@ def command(
         )
     with progress(None, "corrected copies", show=show and repair is not None) as step:
         copies = None if repair is None else write_copies(made, registry, repair, step=step)
+    linked = None if past is None else link(made, past)
+    amended: tuple[Amended, ...] = ()
+    if repair is not None and linked is not None:
+        from toolkit.cli.audit_amend import amend
+
+        with progress(None, "amended reports", show=show) as step:
+            amended = amend(
+                linked,
+                archive,
+                repair,
+                calibrations=calibrations,
+                home=home,
+                known_at=day(known_at),
+                step=step,
+            )
     told = Answer(
         made=made,
-        linked=None if past is None else link(made, past),
+        linked=linked,
         drift=drift,
         drifted=drifted,
         copies=copies,
+        amended=amended,
     )
     written = () if out is None else write_folder(out, told, registry, opened)
     if json:

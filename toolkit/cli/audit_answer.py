@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from toolkit.audit.linked import Linked
     from toolkit.audit.since_good import Drift, DriftedFile
     from toolkit.calibration.registry.registry import Registry
+    from toolkit.cli.audit_amend import Amended
     from toolkit.report.package import Template
 
 PAGE, LINES = "audit.html", "audit.jsonl"
@@ -32,6 +33,7 @@ class Answer:
     drift: Drift | None
     drifted: tuple[DriftedFile, ...]
     copies: tuple[Copy, ...] | None
+    amended: tuple[Amended, ...] = ()
 
 
 def payload_of(told: Answer) -> dict[str, Any]:
@@ -55,6 +57,7 @@ def payload_of(told: Answer) -> dict[str, Any]:
         found["since_good"] = {**told.drift.as_dict(), "files": files}
     if told.copies is not None:
         found["repaired"] = [one.as_dict() for one in told.copies]
+        found["amended"] = [one.as_dict() for one in told.amended]
     return found
 
 
@@ -137,7 +140,8 @@ def _asked(told: Answer) -> Iterator[str]:
     if told.linked is not None:
         yield ""
         for one in told.linked.reports:
-            why = f"{one.not_clean} of {one.files} files are not right" if one.not_clean else "stands"
+            why = f"to be amended, {one.not_clean} of {one.files} files are not right"
+            why = why if one.to_amend else "stands"
             tests = ", ".join(sorted(one.tests))
             yield f"report {one.report} ({tests}): {why}" if one.files else f"report unknown: {one.report}"
         if told.linked.unknown:
@@ -159,6 +163,9 @@ def _asked(told: Answer) -> Iterator[str]:
         made = [one for one in told.copies if one.sha256 is not None]
         yield f"{len(made)} corrected copies"
         yield from (f"no copy of {one.path}: {one.reason}" for one in told.copies if one.sha256 is None)
+        for done in told.amended:
+            made_of = done.as_dict()
+            yield f"{made_of['pdf'] or 'NO REPORT: ' + str(done.outcome)} replaces {done.replaces}"
 
 
 def _rows(made: ArchiveAudit) -> Iterator[list[str]]:

@@ -92,9 +92,10 @@ def _texts(view: AuditView, totals: Mapping[str, Any]) -> dict[str, str | None]:
         conclusion += f" {made.grades['unreadable']} files could not be read and are set aside."
     reports = None
     if view.linked is not None:
-        amend = sum(one.not_clean > 0 for one in view.linked.reports)
+        amend = sum(one.to_amend for one in view.linked.reports)
         reports = (
-            f"{len(view.linked.reports)} reports were looked at; {amend} rest on files that are not right. "
+            f"{len(view.linked.reports)} reports were looked at; {amend} of them rest on "
+            "other values than those of the record in force. "
             f"For {len(view.linked.unknown)} tests the report is unknown."
         )
     since = None
@@ -141,7 +142,7 @@ def _tables(view: AuditView) -> dict[str, Table]:
             f"{one.not_clean} of {one.files}",
         )
         for one in (view.linked.reports if view.linked is not None else ())
-        if one.not_clean
+        if one.to_amend
     ]
     rows: dict[str, list[tuple[Cell, ...]]] = {
         "audit_grades": grades,
