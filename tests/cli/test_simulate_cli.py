@@ -56,12 +56,15 @@ def test_seed_and_effect(run, short, tmp_path):
         "--effect",
         "drum_runout=60",
         "--effect",
-        "crosstalk=0.02",
+        "crosstalk.FZ.FY=0.02",
     )
     truth = json.loads((tmp_path / "b" / "truth.json").read_text(encoding="utf-8"))
     assert truth["seed"] == 3
-    assert truth["effects"] == [{"name": "drum_runout", "value": 60.0}, {"name": "crosstalk", "value": 0.02}]
-    assert truth["stages"]["road"]["runout_1_N"] == 60.0
+    runout, leak = truth["effects"]
+    assert (runout["name"], runout["channel"]) == ("drum_runout", "FZ")
+    assert runout["parameters"][0] == {"name": "amplitude_1", "value": 60.0, "unit": "N"}
+    assert (leak["name"], leak["channel"], leak["from"]) == ("crosstalk", "FY", "FZ")
+    assert leak["parameters"] == [{"name": "coefficient", "value": 0.02, "unit": "N/N"}]
     assert (tmp_path / "a" / "FM_run_1.xlsx").read_bytes() != (tmp_path / "b" / "FM_run_1.xlsx").read_bytes()
 
 

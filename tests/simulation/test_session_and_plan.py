@@ -14,8 +14,7 @@ from toolkit.machine import load_machine
 from toolkit.recording.folder import read_test_folder
 from toolkit.recording.marks import SIMULATED, is_own_output
 from toolkit.recording.read import read_recording
-from toolkit.simulation.effects import EFFECTS, with_effects
-from toolkit.simulation.plan import Plan, read_plan
+from toolkit.simulation.plan import Plan, read_plan, with_effects
 from toolkit.simulation.run import simulate
 from toolkit.simulation.session import schedule, simulate_session
 from toolkit.simulation.write import write_session, write_test
@@ -88,38 +87,6 @@ class TestPlan:
             0.02,
             0,
         )
-
-
-class TestEffects:
-    def test_each_effect_sets_its_field_and_is_recorded(self):
-        plan = read_plan(TEST_PLAN)
-        for effect in EFFECTS:
-            changed = with_effects(plan, [f"{effect.name}=0.5"])
-            assert getattr(changed, effect.stage) != getattr(plan, effect.stage), effect.name
-            assert changed.effects == ((effect.name, 0.5),)
-
-    def test_each_effect_shows_in_the_recording_or_the_truth(self):
-        plan = replace(read_plan(TEST_PLAN), slip_angles_rad=(0.0,), loads_N=(1112.0, 3705.0))
-        base = simulate(plan).files[0]
-        for effect in EFFECTS:
-            other = simulate(with_effects(plan, [f"{effect.name}=0.3"])).files[0]
-            assert not np.array_equal(base.columns["D51"], other.columns["D51"]), effect.name
-
-    def test_one_cell(self):
-        plan = with_effects(read_plan(TEST_PLAN), ["zero_offset.E5=0.01"])
-        assert (plan.cells.E5.zero_offset_V_V, plan.cells.D51.zero_offset_V_V) == (1e-5, 0.0)
-        assert plan.effects == (("zero_offset.E5", 0.01),)
-
-    def test_a_moved_zero_is_not_in_the_tare(self):
-        plan = replace(read_plan(TEST_PLAN), slip_angles_rad=(0.0,), loads_N=(1112.0,))
-        assert simulate(with_effects(plan, ["zero_offset=0.01"])).tare == simulate(plan).tare
-
-    @pytest.mark.parametrize("text", ["drum_runaut=1", "drum_runout", "drum_runout=x", "drum_runout=nan",
-                                      "drum_runout.D51=1", "zero_offset.D53=1"])  # fmt: skip
-    def test_bad_effects(self, text):
-        with pytest.raises(ConfigError) as caught:
-            with_effects(read_plan(TEST_PLAN), [text])
-        assert text in str(caught.value)
 
 
 class TestSession:

@@ -10,8 +10,11 @@ import typer
 from toolkit.cli.console import Calibrations, Home, Json, Quiet, answer
 
 if TYPE_CHECKING:
+    from toolkit.calibration.registry.registry import Registry
+    from toolkit.errors import ToolkitError
     from toolkit.simulation.acquisition import OwnProgram
     from toolkit.simulation.plan import Plan
+    from toolkit.simulation.switched import Switched
 
 NAME = "simulate"
 
@@ -23,43 +26,88 @@ def command(
     effect: Annotated[
         list[str] | None,
         typer.Option(
-            "--effect", metavar="NAME=VALUE", help="Set an effect, e.g. drum_runout=40; repeatable."
+            "--effect",
+            metavar="NAME[.CHANNEL][@KEY:VALUE][=VALUE]",
+            help="Switch an effect of the catalogue on, beside the plan's own; repeatable.",
         ),
+    ] = None,
+    csv: Annotated[
+        Path | None, typer.Option("--csv", help="Folder for the recordings as CSV, every column.")
+    ] = None,
+    case: Annotated[
+        Path | None,
+        typer.Option("--case", help="Folder for a case that `toolkit diagnose` reads; it names no effect."),
     ] = None,
     calibrations: Calibrations = None,
     home: Home = None,
     json: Json = False,
     quiet: Quiet = False,
 ) -> int:
-    """Run a test or a session on the virtual machine.
+    """Run a test or a session on the virtual machine, or print a maker's flat-surface table.
 
     The files are in the machine's own format, everything is marked simulated, and the truth is stored
     beside it. Where the registry has a record of the virtual machine, its acquisition program computes
-    Fy and Mz by the record's issued coefficients.
+    Fy and Mz by the record's issued coefficients. [acquisition] record = "continuous" in the plan keeps
+    every row, moves too, with time, commands, angles, temperatures and pressure.
+
+    Effects are those of the catalogue that `toolkit diagnose` looks for. A number without a unit is in the
+    parameter's own; an effect on cells without a cell's name is on every cell:
+
+    \b
+      --effect relaxation=0.5m
+      --effect creep.D51=fraction:0.01,time_constant:20s
+      --effect zero_offset.D51=0.002mV/V
+      --effect crosstalk.FZ.FY=0.01            (from FZ to FY)
+      --effect channel_sign.E5
+      --effect channel_swap.D51.D52
+      --effect wrong_calibration=m15-virtual-r1
+      --effect load_lag@order:1+2=1.5s         (in runs with that condition)
 
     Example: toolkit simulate toolkit/examples/virtual/test_plan.toml --out virtual-test
     """
-    from toolkit.simulation.effects import with_effects
-    from toolkit.simulation.plan import read_plan
+    from toolkit.simulation.plan import read_plan, with_effects
 
     told = with_effects(read_plan(plan, seed=seed), effect or [])
+    if told.kind != "test" and (csv is not None or case is not None):
+        raise _no_runs(told)
     if told.kind == "session":
         payload, text = _session(told, out)
+    elif told.kind == "table":
+        payload, text = _table(told, out)
     else:
-        payload, text = _test(told, out, _program(told, calibrations, home))
+        payload, text = _test(told, out, _registry(calibrations, home), csv, case)
     answer(payload, text, as_json=json, quiet=quiet)
     return 0
 
 
-def _test(plan: Plan, out: Path, program: OwnProgram | None) -> tuple[dict[str, Any], str]:
-    from toolkit.simulation.run import simulate
-    from toolkit.simulation.write import TEST, TRUTH, write_test
+def _no_runs(plan: Plan) -> ToolkitError:
+    from toolkit.errors import ConfigError
 
-    test = simulate(plan, program)
+    return ConfigError(
+        f"a {plan.kind} has no recordings", where="--csv, --case", got=f'kind = "{plan.kind}"',
+        expected='a plan with kind = "test"', next_step="leave the option out", rule="wrong-value",
+    )  # fmt: skip
+
+
+def _test(
+    plan: Plan, out: Path, registry: Registry | None, csv: Path | None, case: Path | None
+) -> tuple[dict[str, Any], str]:
+    from toolkit.simulation.case import CASE, RUNS, TIRE, check_case, write_case, write_runs
+    from toolkit.simulation.program import other_programs
+    from toolkit.simulation.run import simulate
+    from toolkit.simulation.write import TEST, TRUTH, check_folder, write_test
+
+    program = _program(plan, registry)
+    record = None if program is None else program.record
+    others = other_programs(plan, registry)
+    if case is not None:
+        check_case(plan, record)
+        check_folder(case, {CASE, RUNS, TIRE})
+    test = simulate(plan, program, others)
     files = write_test(test, out)
-    record = test.program.record
     payload = _common(plan, out, files) | {
         "kind": "test",
+        "record": plan.record,
         "recordings": [file.name for file in test.files],
         "truth": TRUTH,
         "acquisition_program": {"record": record, "negated": plan.acquisition.negated},
@@ -70,6 +118,23 @@ def _test(plan: Plan, out: Path, program: OwnProgram | None) -> tuple[dict[str, 
         f"  conditions   {TEST}\n  truth        {TRUTH}\n"
         f"  own Fy, Mz   by {record or 'the true map of the cells (no record applies)'}{wrong}"
     )
+    if csv is not None:
+        payload["csv"] = [str(path) for path in write_runs(test, csv)]
+        text += f"\n  as CSV       {csv}"
+    if case is not None:
+        payload["case"] = str(write_case(test, case, record=record)[0])
+        text += f"\n  case         {case / CASE}   (toolkit diagnose {case / CASE} --out DIR)"
+    return payload, text + _effects(plan)
+
+
+def _table(plan: Plan, out: Path) -> tuple[dict[str, Any], str]:
+    from toolkit.simulation.maker import TABLE, write_table
+    from toolkit.simulation.write import check_folder
+
+    check_folder(out, {TABLE})
+    path = write_table(plan, out)
+    payload = _common(plan, out, (path,)) | {"kind": "table", "table": path.name, "axes": "SAE"}
+    text = f"flat-surface table of the plan's tire in {path}, SAE axes  SIMULATED"
     return payload, text + _effects(plan)
 
 
@@ -101,30 +166,47 @@ def _common(plan: Plan, out: Path, files: tuple[Path, ...]) -> dict[str, Any]:
         "machine": plan.machine.name,
         "date": plan.date,
         "seed": plan.seed,
-        "effects": [{"name": name, "value": value} for name, value in plan.effects],
+        "effects": [one.as_dict() for one in plan.effects],
         "files": [path.name for path in files],
         "findings": [],
     }
 
 
 def _effects(plan: Plan) -> str:
-    return "".join(f"\n  effect       {name} = {value:g}" for name, value in plan.effects)
+    return "".join(f"\n  effect       {_effect(one)}" for one in plan.effects)
 
 
-def _program(plan: Plan, calibrations: Path | None, home: Path | None) -> OwnProgram | None:
-    # A virtual machine needs no registry; but a registry that is named, or is damaged, is never passed over.
-    from datetime import date
+def _effect(one: Switched) -> str:
+    place = "" if one.channel is None else f" on {one.channel}"
+    place += "" if one.source is None else f" with {one.source}"
+    units = dict(one.units)
+    said = [f"{name} = {value:g} {units[name]}" for name, value in one.values]
+    said += [] if one.record is None else [f"record {one.record}"]
+    said += [] if one.only is None else [f"where {one.only[0]} is {' or '.join(one.only[1])}"]
+    return f"{one.effect.name}{place}{': ' if said else ''}{', '.join(said)}"
 
+
+def _registry(calibrations: Path | None, home: Path | None) -> Registry | None:
+    # A virtual machine needs no registry; but one that is named, or is damaged, is never passed over.
     from toolkit.calibration.registry.registry import Registry
     from toolkit.cli.home import calibrations_folder
-    from toolkit.errors import ConfigError, RegistryError
-    from toolkit.simulation.program import program_from
+    from toolkit.errors import ConfigError
 
     try:
-        registry = Registry(calibrations_folder(calibrations, home))
+        return Registry(calibrations_folder(calibrations, home))
     except ConfigError:
         if calibrations is not None or home is not None:
             raise
+        return None
+
+
+def _program(plan: Plan, registry: Registry | None) -> OwnProgram | None:
+    from datetime import date
+
+    from toolkit.errors import RegistryError
+    from toolkit.simulation.program import program_from
+
+    if registry is None:
         return None
     try:
         record = registry.in_force(plan.machine.name, on=date.fromisoformat(plan.date))

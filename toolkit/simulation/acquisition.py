@@ -17,6 +17,8 @@ from toolkit.simulation.cells import CELLS, CellsTruth
 from toolkit.units import from_si
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from numpy.typing import NDArray
 
     from toolkit.machine import Machine
@@ -91,26 +93,48 @@ def low_pass(signal: NDArray[np.float64], *, time_constant: float, dt: float) ->
     return np.asarray(made, dtype=np.float64)
 
 
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Noise:
+    """Noise of every sample before the filter: cells [V/V] (rows, 3), SA [rad] and FZ [N] (rows,)."""
+
+    cells: NDArray[np.float64]
+    SA: NDArray[np.float64]
+    FZ: NDArray[np.float64]
+
+
+def draw_noise(truth: AcquisitionTruth, cells: CellsTruth, rows: int, rng: np.random.Generator) -> Noise:
+    """Draw the noise of so many rows."""
+    sd = np.asarray([cell.noise_V_V for cell in cells.all])
+    return Noise(
+        cells=rng.standard_normal((rows, len(CELLS))) * sd,
+        SA=rng.standard_normal(rows) * truth.SA_noise_rad,
+        FZ=rng.standard_normal(rows) * truth.FZ_noise_N,
+    )
+
+
+def joined(parts: Sequence[Noise]) -> Noise:
+    """Return the noise of parts one after another."""
+    return Noise(
+        cells=np.concatenate([one.cells for one in parts]),
+        SA=np.concatenate([one.SA for one in parts]),
+        FZ=np.concatenate([one.FZ for one in parts]),
+    )
+
+
 def digitise(
     truth: AcquisitionTruth,
     *,
     cells: NDArray[np.float64],
     FZ: NDArray[np.float64],
     SA: NDArray[np.float64],
-    noise_V_V: tuple[float, ...],
+    noise: Noise,
     dt: float,
-    rng: np.random.Generator,
 ) -> dict[str, NDArray[np.float64]]:
-    """Return the recorded channels in SI, symbol to (rows,): noise, then the filter."""
-    noisy = cells + rng.standard_normal(cells.shape) * np.asarray(noise_V_V)
-    smooth = low_pass(noisy, time_constant=truth.filter_time_constant_s, dt=dt)
-    angle = low_pass(
-        SA + rng.standard_normal(SA.shape) * truth.SA_noise_rad,
-        time_constant=truth.filter_time_constant_s,
-        dt=dt,
-    )
+    """Return the recorded channels in SI, symbol to (rows,): noise, then the filter of cells and angle."""
+    smooth = low_pass(cells + noise.cells, time_constant=truth.filter_time_constant_s, dt=dt)
+    angle = low_pass(SA + noise.SA, time_constant=truth.filter_time_constant_s, dt=dt)
     channels = {name: smooth[:, index] for index, name in enumerate(CELLS)}
-    return {"FZ": FZ + rng.standard_normal(FZ.shape) * truth.FZ_noise_N, "SA": angle, **channels}
+    return {"FZ": FZ + noise.FZ, "SA": angle, **channels}
 
 
 def own_columns(

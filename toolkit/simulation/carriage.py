@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
@@ -17,6 +17,8 @@ from toolkit.units import to_si
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
+
+Angle = TypeVar("Angle", float, "NDArray[np.float64]")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -46,8 +48,8 @@ class HubLoads:
     FZ: NDArray[np.float64]
 
 
-def wheel_angle(carriage: CarriageTruth, *, step_rad: float) -> float:
-    """Return the wheel's slip angle [rad] at a step of the rack."""
+def wheel_angle(carriage: CarriageTruth, *, step_rad: Angle) -> Angle:
+    """Return the wheel's slip angle [rad] at an angle of the rack."""
     return step_rad + carriage.steering_zero_rad - carriage.steer_offset_rad
 
 

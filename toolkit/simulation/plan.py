@@ -1,18 +1,17 @@
 """Plan: what the virtual machine is told to do, and what it really is.
 
-A plan is a TOML file with ``kind = "test"`` or ``"session"``. Every number that is not given has its
-default; the packaged plans in ``toolkit/examples/virtual`` show them. A number is written with its unit,
-``plysteer = { value = 0.12, unit = "deg" }``.
+A plan is a TOML file with ``kind = "test"``, ``"session"`` or ``"table"`` (a maker's flat-surface table).
+Every number that is not given has its default; the packaged plans in ``toolkit/examples/virtual`` show them.
+A number is written with its unit, ``plysteer = { value = 0.12, unit = "deg" }``.
 """
 
 from __future__ import annotations
 
 import dataclasses
 import datetime as dt
-import math
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Literal, TypeVar, cast
+from typing import Any, Literal, cast
 
 from toolkit.channels import ROTATIONS, Rotation
 from toolkit.errors import ConfigError
@@ -20,42 +19,39 @@ from toolkit.files import check_keys, read_toml
 from toolkit.machine.definition import Machine, load_machine, quantity
 from toolkit.simulation.acquisition import AcquisitionTruth
 from toolkit.simulation.carriage import CarriageTruth
-from toolkit.simulation.cells import CELLS, CellsTruth, CellTruth
+from toolkit.simulation.case_plan import CasePlan, read_case_plan
+from toolkit.simulation.cells import CellsTruth
+from toolkit.simulation.effect_text import parse_effect
+from toolkit.simulation.file_tire import FileTire, read_file_tire
+from toolkit.simulation.plan_sections import (
+    CARRIAGE,
+    ROAD,
+    TIRE,
+    SessionTruth,
+    acquisition_of,
+    cells_of,
+    choice,
+    section_of,
+    session_of,
+    whole,
+)
 from toolkit.simulation.road import RoadTruth
+from toolkit.simulation.steps import Motion, RunSteps, protocol_runs, read_motion, read_runs
+from toolkit.simulation.switched import Switched
 from toolkit.simulation.tire import TireTruth
-from toolkit.units import unit
+from toolkit.tires.tir_units import si_number
 
-Kind = Literal["test", "session"]
-Output = Literal["mV/V", "mV", "count"]
-T = TypeVar("T")
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class SessionTruth:
-    """The reference-load session: largest loads, runs, and how well the reference loads are known.
-
-    ``output`` is what the files hold: the bridge's ratio, volts at ``excitation_V``, or counts of
-    ``count_V_V`` [V/V] each. ``readings`` writes zeros before and after, which drift by ``zero_drift_V_V``
-    in each cell, and shunt steps.
-    """
-
-    FY_N: float = 6200.0
-    MZ_Nm: float = 200.0
-    MX_Nm: float = 1900.0
-    runs: int = 3
-    reference_FY_N: float = 0.4
-    reference_MZ_Nm: float = 0.015
-    reference_MX_Nm: float = 0.15
-    output: Output = "mV/V"
-    excitation_V: float = 10.0
-    count_V_V: float = 4e-10
-    readings: bool = False
-    zero_drift_V_V: float = 2e-8
+Kind = Literal["test", "session", "table"]
+Record = Literal["dwell", "continuous"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Plan:
-    """A test or session of the virtual machine: the steps, and the truth of every stage, in SI."""
+    """A test, session or table of the virtual machine: the steps, and the truth of every stage, in SI.
+
+    ``record`` says whether a file holds settled blocks alone or every row; ``tire_file`` replaces the
+    published tire; ``runs`` replaces the protocol's order.
+    """
 
     kind: Kind
     title: str
@@ -74,56 +70,22 @@ class Plan:
     cells: CellsTruth = field(default_factory=CellsTruth)
     acquisition: AcquisitionTruth = field(default_factory=AcquisitionTruth)
     session: SessionTruth = field(default_factory=SessionTruth)
-    effects: tuple[tuple[str, float], ...] = ()
+    effects: tuple[Switched, ...] = ()
+    record: Record = "dwell"
+    motion: Motion = field(default_factory=Motion)
+    runs: tuple[RunSteps, ...] = ()
+    tire_file: FileTire | None = None
+    case: CasePlan = field(default_factory=CasePlan)
+
+    @property
+    def recordings(self) -> tuple[RunSteps, ...]:
+        """The runs, one recording each: as given, else one for each direction and slip angle."""
+        return self.runs or protocol_runs(self.rotations, self.slip_angles_rad, self.loads_N)
 
 
-# Key of a section -> (field, dimension as `units.Unit.dimension` names it). "" is a plain number.
-_TIRE = {
-    "plysteer": ("plysteer_rad", "angle"),
-    "aligning_shift": ("aligning_shift_rad", "angle"),
-    "conicity": ("conicity_N", "force"),
-    "nominal_load": ("nominal_load_N", "force"),
-    "free_radius": ("free_radius_m", "length"),
-    "rolling_ratio": ("rolling_ratio", "ratio"),
-    "vertical_stiffness": ("vertical_stiffness_N_m", "N/m"),
-}
-_ROAD = {
-    "drum_runout_1": ("runout_1_N", "force"),
-    "drum_runout_1_phase": ("runout_1_phase_rad", "angle"),
-    "drum_runout_2": ("runout_2_N", "force"),
-    "drum_runout_2_phase": ("runout_2_phase_rad", "angle"),
-}
-_CARRIAGE = {
-    "steering_zero": ("steering_zero_rad", "angle"),
-    "steer_offset": ("steer_offset_rad", "angle"),
-    "camber_offset": ("camber_offset_rad", "angle"),
-    "load_spread": ("load_spread", "ratio"),
-    "overturning": ("overturning_Nm", "moment"),
-}
-_CELL = {
-    "zero": ("zero_V_V", "bridge_ratio"),
-    "noise": ("noise_V_V", "bridge_ratio"),
-    "zero_offset": ("zero_offset_V_V", "bridge_ratio"),
-    "gain_error": ("gain_error", "ratio"),
-}
-_ACQUISITION = {
-    "filter_time_constant": ("filter_time_constant_s", "time"),
-    "FZ_noise": ("FZ_noise_N", "force"),
-    "SA_noise": ("SA_noise_rad", "angle"),
-}
-_SESSION = {
-    "FY": ("FY_N", "force"),
-    "MZ": ("MZ_Nm", "moment"),
-    "MX": ("MX_Nm", "moment"),
-    "reference_FY": ("reference_FY_N", "force"),
-    "reference_MZ": ("reference_MZ_Nm", "moment"),
-    "reference_MX": ("reference_MX_Nm", "moment"),
-    "scale": ("count_V_V", "bridge_ratio"),
-    "zero_drift": ("zero_drift_V_V", "bridge_ratio"),
-}
 _TOP = (
     "schema kind title date machine seed rotations slip_angles loads pressure file_name label "
-    "tire road carriage cells acquisition session"
+    "tire road carriage cells acquisition session motion run effects case"
 ).split()
 _LABEL = ("size", "company", "DOT", "series", "construction", "rim")
 
@@ -134,11 +96,12 @@ def read_plan(path: Path, *, seed: int | None = None) -> Plan:
     Raises
     ------
     ConfigError
-        no TOML, an unknown key, a number without a unit, a unit of another dimension, an unknown machine
+        no TOML, an unknown key, a number without a unit, a unit of another dimension, an unknown machine or
+        effect, a tire file that cannot be used
     """
     table = read_toml(path)
     check_keys(table, _TOP, where=path)
-    kind = _choice(table.get("kind", "test"), ("test", "session"), f"{path}: kind")
+    kind = choice(table.get("kind", "test"), ("test", "session", "table"), f"{path}: kind")
     machine = load_machine(str(table.get("machine", "m15-virtual")))
     if not machine.simulated:
         raise ConfigError(
@@ -156,124 +119,126 @@ def read_plan(path: Path, *, seed: int | None = None) -> Plan:
             expected=", ".join(ROTATIONS), next_step="name one or both in a list", rule="wrong-value",
         )  # fmt: skip
     for one in rotations:
-        _choice(one, ROTATIONS, f"{path}: rotations")
+        choice(one, ROTATIONS, f"{path}: rotations")
     label = table.get("label", {})
     check_keys(label, _LABEL, where=f"{path}: label")
-    return Plan(
+    angles = _list(table, "slip_angles", "angle", protocol.slip_angles_rad, path)
+    loads = _list(table, "loads", "force", protocol.loads_N, path)
+    recording = dict(table.get("acquisition", {}))
+    record = choice(recording.pop("record", "dwell"), ("dwell", "continuous"), f"{path}: acquisition.record")
+    tire, file = _tire(table.get("tire", {}), path)
+    plan = Plan(
         kind=cast("Kind", kind),
         title=str(table.get("title", path.stem)),
         date=_date(table.get("date"), path),
         machine=machine,
-        seed=_whole(table.get("seed", 0) if seed is None else seed, f"{path}: seed", least=0),
+        seed=whole(table.get("seed", 0) if seed is None else seed, f"{path}: seed", least=0),
         label=tuple((key, str(value)) for key, value in label.items()),
         rotations=tuple(cast("Rotation", one) for one in rotations),
-        slip_angles_rad=_list(table, "slip_angles", "angle", protocol.slip_angles_rad, path),
-        loads_N=_list(table, "loads", "force", protocol.loads_N, path),
-        pressure_Pa=quantity(table.get("pressure", {"value": 34, "unit": "psi"}), "pressure", path),
+        slip_angles_rad=angles,
+        loads_N=loads,
+        pressure_Pa=quantity(table["pressure"], "pressure", path)
+        if "pressure" in table
+        else _stated_pressure(file),
         file_name=_file_name(table.get("file_name", "FM_run_{number}.xlsx"), path),
-        tire=_section(TireTruth(), table.get("tire", {}), _TIRE, f"{path}: tire"),
-        road=_section(RoadTruth(), table.get("road", {}), _ROAD, f"{path}: road"),
-        carriage=_section(CarriageTruth(), table.get("carriage", {}), _CARRIAGE, f"{path}: carriage"),
-        cells=_cells(table.get("cells", {}), f"{path}: cells"),
-        acquisition=_acquisition(table.get("acquisition", {}), f"{path}: acquisition"),
-        session=_session(table.get("session", {}), f"{path}: session"),
+        tire=tire,
+        road=section_of(RoadTruth(), table.get("road", {}), ROAD, f"{path}: road"),
+        carriage=section_of(CarriageTruth(), table.get("carriage", {}), CARRIAGE, f"{path}: carriage"),
+        cells=cells_of(table.get("cells", {}), f"{path}: cells"),
+        acquisition=acquisition_of(recording, f"{path}: acquisition"),
+        session=session_of(table.get("session", {}), f"{path}: session"),
+        record=cast("Record", record),
+        motion=read_motion(table.get("motion", {}), where=f"{path}: motion"),
+        runs=read_runs(table["run"], slip_angles_rad=angles, loads_N=loads, where=f"{path}: run")
+        if "run" in table
+        else (),
+        tire_file=file,
+        case=read_case_plan(table.get("case", {}), where=f"{path}: case"),
     )
+    return with_effects(plan, _texts(table.get("effects", []), f"{path}: effects"))
 
 
-# Sizes of the tire that no tire can have at zero or below.
-_SIZES = ("nominal_load_N", "free_radius_m", "rolling_ratio", "vertical_stiffness_N_m")
+def with_effects(plan: Plan, given: list[str]) -> Plan:
+    """Return a plan with further effects switched on, each as `effect_text` has it.
+
+    Raises
+    ------
+    ConfigError
+        an effect that cannot be read, that the plan's tire does not know, or that acts in none of its runs
+    """
+    added: list[Switched] = []
+    for text in given:
+        for one in parse_effect(text, plan.machine):
+            _check_tire(plan, one, text)
+            _check_runs(plan, one, text)
+            added.append(one)
+    return dataclasses.replace(plan, effects=(*plan.effects, *added))
 
 
-def _section(default: T, table: dict[str, Any], known: dict[str, tuple[str, str]], where: str) -> T:
-    check_keys(table, known, where=where)
-    values = {
-        known[key][0]: quantity(entry, _dimension(known[key][1]), f"{where}.{key}")
-        for key, entry in table.items()
+def _check_tire(plan: Plan, one: Switched, text: str) -> None:
+    file, name = plan.tire_file, one.effect.name
+    knows = {
+        "pressure_change": file is not None and file.has_pressure,
+        "camber_offset": file is None or file.has_camber,
     }
-    for key, entry in table.items():
-        value = values[known[key][0]]
-        if not math.isfinite(value) or (known[key][0] in _SIZES and value <= 0):
-            raise ConfigError(
-                "a number of the plan cannot be", where=f"{where}.{key}", got=entry,
-                expected="a number above zero" if known[key][0] in _SIZES else "a finite number",
-                next_step="correct the line", rule="wrong-value",
-            )  # fmt: skip
-    return cast("T", dataclasses.replace(cast("Any", default), **values))
-
-
-def _dimension(name: str) -> str:
-    return unit(name).dimension if "/" in name else name
-
-
-def _cells(table: dict[str, Any], where: str) -> CellsTruth:
-    check_keys(table, (*CELLS, "crosstalk"), where=where)
-    made = CellsTruth()
-    for name in CELLS:
-        if name in table:
-            changed: dict[str, Any] = {name: _cell(getattr(made, name), table[name], where, name)}
-            made = dataclasses.replace(made, **changed)
-    if "crosstalk" in table:
-        factor = quantity(table["crosstalk"], "ratio", f"{where}.crosstalk")
-        made = dataclasses.replace(made, crosstalk_FZ_FY=factor)
-    return made
-
-
-def _cell(default: CellTruth, table: dict[str, Any], where: str, name: str) -> CellTruth:
-    place = f"{where}.{name}"
-    check_keys(table, (*_CELL, "rated_output", "capacity"), where=place)
-    rest = {key: entry for key, entry in table.items() if key in _CELL}
-    made = _section(default, rest, _CELL, place)
-    if ("rated_output" in table) != ("capacity" in table):
+    if not knows.get(name, True):
+        what = "pressure" if name == "pressure_change" else "camber"
         raise ConfigError(
-            "a cell's sensitivity needs rated output and capacity",
-            where=place,
-            got=", ".join(table),
-            expected="rated_output (mV/V) and capacity (force) together",
-            next_step="give both or neither",
-        )
-    if "capacity" in table:
-        output = quantity(table["rated_output"], "bridge_ratio", place)
-        capacity = _positive(quantity(table["capacity"], "force", place), f"{place}.capacity")
-        made = dataclasses.replace(made, sensitivity_per_N=_positive(output, place) / capacity)
-    return made
+            f"the plan's tire does not depend on its {what}", where=f"--effect {text}", got=name,
+            expected=f"a tire file with {what} coefficients",
+            next_step=f"give the plan a .tir of MF 6.x with {what} terms, or leave the effect out",
+            rule="effect-value",
+        )  # fmt: skip
 
 
-def _acquisition(table: dict[str, Any], where: str) -> AcquisitionTruth:
-    check_keys(table, (*_ACQUISITION, "rows_per_revolution", "negated"), where=where)
-    numbers = {key: entry for key, entry in table.items() if key in _ACQUISITION}
-    made = _section(AcquisitionTruth(), numbers, _ACQUISITION, where)
-    if "rows_per_revolution" in table:
-        rows = _whole(table["rows_per_revolution"], f"{where}.rows_per_revolution", least=1)
-        made = dataclasses.replace(made, rows_per_revolution=rows)
-    if "negated" in table:
-        names = table["negated"]
-        for one in names if isinstance(names, list) else [names]:
-            _choice(one, CELLS, f"{where}.negated")
-        made = dataclasses.replace(made, negated=tuple(names))
-    return made
+def _check_runs(plan: Plan, one: Switched, text: str) -> None:
+    if one.only is None or any(one.acts_in(run.conditions) for run in plan.recordings):
+        return
+    known = sorted({f"{k}:{v}" for run in plan.recordings for k, v in run.conditions.items()})
+    raise ConfigError(
+        "no run has the condition of an effect", where=f"--effect {text}",
+        got=f"{one.only[0]}:{'+'.join(one.only[1])}", expected=", ".join(known),
+        next_step="name a condition of the plan's runs", rule="effect-value",
+    )  # fmt: skip
 
 
-def _session(table: dict[str, Any], where: str) -> SessionTruth:
-    check_keys(table, (*_SESSION, "runs", "output", "excitation", "readings"), where=where)
-    numbers = {key: entry for key, entry in table.items() if key in _SESSION}
-    made = _section(SessionTruth(), numbers, _SESSION, where)
-    _positive(made.count_V_V, f"{where}.scale")
-    changed: dict[str, Any] = {}
-    if "runs" in table:
-        changed["runs"] = _whole(table["runs"], f"{where}.runs", least=1)
-    if "output" in table:
-        changed["output"] = _choice(table["output"], ("mV/V", "mV", "count"), f"{where}.output")
-    if "excitation" in table:
-        volts = quantity(table["excitation"], unit("V").dimension, f"{where}.excitation")
-        changed["excitation_V"] = _positive(volts, f"{where}.excitation")
-    if "readings" in table:
-        if not isinstance(table["readings"], bool):
-            raise ConfigError(
-                "readings is neither true nor false", where=f"{where}.readings", got=table["readings"],
-                expected="true or false", next_step="correct it", rule="wrong-value",
-            )  # fmt: skip
-        changed["readings"] = table["readings"]
-    return dataclasses.replace(made, **changed)
+def _tire(table: dict[str, Any], path: Path) -> tuple[TireTruth, FileTire | None]:
+    where = f"{path}: tire"
+    if not isinstance(table, dict) or "file" not in table:
+        return section_of(TireTruth(), table, TIRE, where), None
+    name = table["file"]
+    if not isinstance(name, str) or not name:
+        raise ConfigError(
+            "the tire's file has no name", where=f"{where}.file", got=name, expected='file = "tire.tir"',
+            next_step="write the path, relative to the plan", rule="wrong-value",
+        )  # fmt: skip
+    file = read_file_tire(path.parent / name)
+    default = TireTruth(
+        plysteer_rad=0.0,
+        aligning_shift_rad=0.0,
+        conicity_N=0.0,
+        nominal_load_N=file.FNOMIN,
+        free_radius_m=file.UNLOADED_RADIUS,
+        vertical_stiffness_N_m=si_number(file.tir, "VERTICAL_STIFFNESS", TireTruth().vertical_stiffness_N_m),
+    )
+    rest = {key: entry for key, entry in table.items() if key != "file"}
+    own = {key: entry for key, entry in TIRE.items() if key not in ("plysteer", "aligning_shift", "conicity")}
+    return section_of(default, rest, own, where), file
+
+
+def _stated_pressure(file: FileTire | None) -> float:
+    if file is not None and file.INFLPRES > 0:
+        return file.INFLPRES
+    return quantity({"value": 34, "unit": "psi"}, "pressure", "pressure")
+
+
+def _texts(value: object, where: str) -> list[str]:
+    if not isinstance(value, list) or not all(isinstance(one, str) for one in value):
+        raise ConfigError(
+            "effects are a list of texts", where=where, got=value, expected='["relaxation=0.5m"]',
+            next_step="write each effect in quotes", rule="wrong-value",
+        )  # fmt: skip
+    return list(value)
 
 
 def _list(
@@ -312,30 +277,3 @@ def _file_name(value: object, path: Path) -> str:
             next_step='write it like "FM_run_{number}.xlsx"',
         )  # fmt: skip
     return name
-
-
-def _choice(value: object, allowed: tuple[str, ...], where: str) -> str:
-    if value not in allowed:
-        raise ConfigError(
-            "a setting has a value that is not known", where=where, got=value,
-            expected=", ".join(allowed), next_step="use one of those expected",
-        )  # fmt: skip
-    return str(value)
-
-
-def _whole(value: object, where: str, *, least: int) -> int:
-    if isinstance(value, bool) or not isinstance(value, int) or value < least:
-        raise ConfigError(
-            "a count is no whole number", where=where, got=value, expected=f"a whole number from {least}",
-            next_step="correct it",
-        )  # fmt: skip
-    return value
-
-
-def _positive(value: float, where: str) -> float:
-    if not value > 0:
-        raise ConfigError(
-            "a size is not positive", where=where, got=value, expected="a number above zero",
-            next_step="correct it",
-        )  # fmt: skip
-    return value

@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING
 
-from toolkit.errors import RecordError
+from toolkit.calibration.records.record import from_bytes
+from toolkit.errors import ConfigError, RecordError
+from toolkit.files import read_bytes
 from toolkit.simulation.acquisition import OwnProgram
 from toolkit.simulation.cells import CELLS
-from toolkit.units import si_scale
+from toolkit.units import si_scale, unit
 
 if TYPE_CHECKING:
     from toolkit.calibration.records.record import CalibrationRecord, LoadFit
+    from toolkit.calibration.registry.registry import Registry
+    from toolkit.simulation.plan import Plan
 
 
 def program_from(record: CalibrationRecord) -> OwnProgram:
@@ -31,6 +36,39 @@ def program_from(record: CalibrationRecord) -> OwnProgram:
         FY_constant=terms["FY"][-1],
         MZ_constant=terms["MZ"][-1],
     )
+
+
+def other_programs(plan: Plan, registry: Registry | None) -> dict[str, OwnProgram]:
+    """Return the programs of the wrong calibrations that a plan names: paths of records, or registry ids.
+
+    Raises
+    ------
+    ConfigError
+        a registry id without a registry; RegistryError: an unknown or damaged record; RecordError: a record
+        that is not of these cells or not in their unit
+    """
+    made = {}
+    for one in plan.effects:
+        if one.record is None or one.record in made:
+            continue
+        path = Path(one.record)
+        if path.suffix == ".json" and path.is_file():
+            record = from_bytes(read_bytes(path), where=path)
+        elif registry is None:
+            raise ConfigError(
+                "a wrong calibration is named and there is no registry",
+                where=f"--effect wrong_calibration={one.record}", got=one.record,
+                expected="a home with calibrations/, or the path of a record (.json)",
+                next_step="give --calibrations DIR", rule="effect-value",
+            )  # fmt: skip
+        else:
+            record = registry.load(one.record)
+        written = unit(plan.machine.column(CELLS[0]).unit)
+        for text in record.indication_units:
+            if unit(text).dimension != written.dimension:
+                raise _unfit(record, f"indications in {text}", f"indications in {written.text}")
+        made[one.record] = program_from(record)
+    return made
 
 
 def _linear(record: CalibrationRecord, fit: LoadFit) -> tuple[float, ...]:

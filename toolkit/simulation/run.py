@@ -1,27 +1,39 @@
-"""The forward chain: tire, road, carriage, load cells, data acquisition, walked once for each file.
+"""A whole test on the virtual machine: each recording walked from its commands to the columns of its file.
 
 Nothing here reads a file or knows a file format; `write` does. Each file has a random generator of its
-own, derived from the plan's seed and the file's number, so that one file repeats without the others.
+own, derived from the plan's seed and the file's number, so that the noise of one file repeats without the
+others. What a tire remembers from file to file (slip work, warmth) and the clock do go on.
 """
 
 from __future__ import annotations
 
 import dataclasses
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from toolkit.channels import Rotation
-from toolkit.simulation import acquisition, carriage, cells, road, tire
+from toolkit.effects.signals import Setting
+from toolkit.errors import ConfigError
+from toolkit.simulation import acquisition, carriage, cells, timeline, tire
 from toolkit.simulation.acquisition import OwnProgram, true_program
 from toolkit.simulation.cells import CELLS
+from toolkit.simulation.chain import Before, Walked, walk
+from toolkit.simulation.disturb import through
 from toolkit.simulation.plan import Plan
+from toolkit.simulation.steps import RunSteps
+from toolkit.simulation.switched import Switched, here
+from toolkit.simulation.timeline import Block, Timeline
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from toolkit.simulation.disturb import Signals
+
 _TARE_FILE = 1_000_000  # the tare's place among the seeds, beyond any file's number
+_BETWEEN = 1  # the stream of the rows that a dwell recording leaves out
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -43,26 +55,40 @@ class BlockTruth:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class VirtualFile:
-    """One recording: its name, its columns in the units of the machine's files, and the truth."""
+    """One recording: its name, its columns in the units of the machine's files, and the truth.
+
+    ``signals`` has every recorded signal in SI, unrounded: ``t`` since the test began, commands, measured
+    channels, angles, temperatures; ``FY`` and ``MZ`` are what the true map of the cells makes of the tared
+    cells, as a laboratory without error would.
+    """
 
     name: str
     rotation: Rotation
     columns: dict[str, NDArray[np.float64]]
     truth: tuple[BlockTruth, ...]
+    run: RunSteps
+    signals: dict[str, NDArray[np.float64]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class VirtualTest:
-    """A whole test: the files in the order of recording, and the tare in the cells' unit."""
+    """A whole test: the files in the order of recording, and the tare in the cells' unit.
+
+    ``tare_rows`` are the tare's samples [V/V], (rows, 3), ``tare_dt`` apart [s].
+    """
 
     plan: Plan
     files: tuple[VirtualFile, ...]
     tare: tuple[tuple[str, float], ...]
     tare_unit: str
     program: OwnProgram
+    tare_rows: dict[str, NDArray[np.float64]]
+    tare_dt: float
 
 
-def simulate(plan: Plan, program: OwnProgram | None = None) -> VirtualTest:
+def simulate(
+    plan: Plan, program: OwnProgram | None = None, others: Mapping[str, OwnProgram] | None = None
+) -> VirtualTest:
     """Run a plan's test on the virtual machine.
 
     Parameters
@@ -70,111 +96,177 @@ def simulate(plan: Plan, program: OwnProgram | None = None) -> VirtualTest:
     plan : with ``kind = "test"``
     program : what the acquisition program was given, before the plan's signs are turned; None for the
         true map of the cells
+    others : record id to program, for the effect ``wrong_calibration``
+
+    Raises
+    ------
+    ConfigError
+        a wrong calibration that ``others`` does not have
     """
-    program = (true_program(plan.cells) if program is None else program).with_negated(
-        plan.acquisition.negated
-    )
+    given = (true_program(plan.cells) if program is None else program).with_negated(plan.acquisition.negated)
+    known = dict(others or {})
+    for one in plan.effects:
+        if one.record is not None and one.record not in known:
+            raise ConfigError(
+                "the record of a wrong calibration is not known", where="--effect wrong_calibration",
+                got=one.record, expected=", ".join(known) or "a registry with that record",
+                next_step="give --calibrations DIR or --home DIR", rule="effect-value",
+            )  # fmt: skip
+    tare_rows, tare_dt = _tare(plan)
+    tare, unit = _tare_values(plan, tare_rows)
     files: list[VirtualFile] = []
-    for rotation in plan.rotations:
-        for step in plan.slip_angles_rad:
-            files.append(_file(plan, program, rotation, step, len(files) + 1))
-    tare, unit = _tare(plan)
-    return VirtualTest(plan=plan, files=tuple(files), tare=tare, tare_unit=unit, program=program)
-
-
-def _file(plan: Plan, program: OwnProgram, rotation: Rotation, step: float, number: int) -> VirtualFile:
-    rng = np.random.default_rng([plan.seed, number])
-    name = plan.file_name.format(number=number)
-    clock = float(rng.uniform(0.0, 60.0))  # the drum turns on between files
-    parts: list[dict[str, NDArray[np.float64]]] = []
-    truth: list[BlockTruth] = []
-    first = 1
-    for load in plan.loads_N:
-        channels, block, clock = _block(plan, rotation=rotation, step=step, load=load, clock=clock, rng=rng)
-        rows = len(channels["FZ"])
-        parts.append(channels)
-        truth.append(dataclasses.replace(block, file=name, first_row=first, last_row=first + rows - 1))
-        first += rows
-    channels = {symbol: np.concatenate([part[symbol] for part in parts]) for symbol in parts[0]}
-    channels |= acquisition.own_columns(program, channels)
-    columns = acquisition.printed(plan.machine, channels)
-    return VirtualFile(name=name, rotation=rotation, columns=columns, truth=tuple(truth))
-
-
-def _block(
-    plan: Plan, *, rotation: Rotation, step: float, load: float, clock: float, rng: np.random.Generator
-) -> tuple[dict[str, NDArray[np.float64]], BlockTruth, float]:
-    machine, protocol = plan.machine, plan.machine.protocol
-    per_turn = plan.acquisition.rows_per_revolution
-    dt = tire.revolution_time_s(plan.tire, machine.drum.speed_m_s) / per_turn
-    settle = round(protocol.settle_revolutions * per_turn)
-    keep = round(protocol.average_revolutions * per_turn)
-    time = clock + dt * np.arange(settle + keep, dtype=np.float64)
-
-    # road: the load between tire and drum
-    set_load = carriage.set_load(plan.carriage, step_N=load, rng=rng)
-    angle = road.drum_angle(
-        time=time,
-        speed_m_s=machine.drum.speed_m_s,
-        radius_m=machine.drum.radius_m,
-        start_rad=0.0,
-        reverse=rotation == "reverse",
+    before = Before()
+    for number, run in enumerate(plan.recordings, start=1):
+        made, before = _file(plan, given, known, run, number, before, tare_rows)
+        files.append(made)
+    return VirtualTest(
+        plan=plan,
+        files=tuple(files),
+        tare=tare,
+        tare_unit=unit,
+        program=given,
+        tare_rows=tare_rows,
+        tare_dt=tare_dt,
     )
-    FZ = road.load_on_drum(plan.road, load=np.full(time.shape, set_load), angle=angle)
 
-    # carriage holds the wheel at an angle; the tire answers; carriage carries it to the hub
-    SA = np.full(time.shape, carriage.wheel_angle(plan.carriage, step_rad=step))
-    answer = tire.forces(plan.tire, SA=SA, FZ=FZ, rotation=rotation, camber=plan.carriage.camber_offset_rad)
-    hub = carriage.hub_loads(plan.carriage, tire=answer, FZ=FZ)
 
-    # load cells, then the acquisition
+def _file(
+    plan: Plan,
+    program: OwnProgram,
+    others: Mapping[str, OwnProgram],
+    run: RunSteps,
+    number: int,
+    before: Before,
+    tare: Signals,
+) -> tuple[VirtualFile, Before]:
+    rng = np.random.default_rng([plan.seed, number])
+    if plan.record == "dwell":
+        line = timeline.dwell(plan, run, rng, np.random.default_rng([plan.seed, number, _BETWEEN]))
+    else:
+        line = timeline.continuous(plan, run, rng)
+    walked = walk(plan, run, line, before)
+    effects = here(plan.effects, run.conditions)
+    measured = _measured(plan, line, walked, effects)
+    tared = {name: measured[name] - float(tare[name].mean()) for name in CELLS}
+    own = _computed(plan, program, others, measured, effects, walked.setting)
+    right = _computed(plan, true_program(plan.cells), others, measured | tared, effects, walked.setting)
+    kept = line.recorded
+    commands = {"SA_CMD": line.SA_CMD, "FZ_CMD": line.FZ_CMD}
+    signals = {"t": walked.setting.elapsed_s, **walked.setting.channels, **commands, **measured, **right}
+    name = plan.file_name.format(number=number)
+    return VirtualFile(
+        name=name,
+        rotation=run.rotation,
+        columns=acquisition.printed(plan.machine, {k: v[kept] for k, v in (measured | own).items()}),
+        truth=_truth(name, run, line, walked),
+        run=run,
+        signals={symbol: values[kept] for symbol, values in signals.items()},
+    ), walked.after
+
+
+def _measured(plan: Plan, line: Timeline, walked: Walked, effects: Any) -> Signals:
+    """Return the recorded cells [V/V], FZ [N] and SA [rad]: load cells, then the acquisition."""
+    hub, machine = walked.hub, plan.machine
+    loads = {"FY": hub.FY, "MZ": hub.MZ, "MX": hub.MX, "FZ": hub.FZ}
+    at_cells = [one for one in effects if one.effect.stage == "load_cells"]
+    sensed = through(loads, [one for one in at_cells if one.channel in loads], walked.setting, machine)
+    bridge = cells.sense(
+        plan.cells,
+        hub=carriage.HubLoads(FY=sensed["FY"], MZ=sensed["MZ"], MX=sensed["MX"], FZ=hub.FZ),
+    )
+    shown = {name: bridge[:, i] for i, name in enumerate(CELLS)}
+    shown = through(
+        {**sensed, **shown}, [one for one in at_cells if one.channel in CELLS], walked.setting, machine
+    )
     channels = acquisition.digitise(
         plan.acquisition,
-        cells=cells.sense(plan.cells, hub=hub),
-        FZ=FZ,
-        SA=carriage.sensed_angle(plan.carriage, SA=SA),
-        noise_V_V=tuple(cell.noise_V_V for cell in plan.cells.all),
-        dt=dt,
-        rng=rng,
+        cells=np.column_stack([shown[name] for name in CELLS]),
+        FZ=sensed["FZ"],
+        SA=walked.sensed,
+        noise=line.noise,
+        dt=line.dt,
     )
-    recorded = slice(settle, settle + keep)
-    block = BlockTruth(
-        file="",
-        rotation=rotation,
-        step_SA_rad=step,
-        step_FZ_N=load,
-        first_row=0,
-        last_row=0,
-        SA_rad=float(SA[recorded].mean()),
-        FZ_N=float(FZ[recorded].mean()),
-        FY_N=float(hub.FY[recorded].mean()),
-        MZ_Nm=float(hub.MZ[recorded].mean()),
-        MX_Nm=float(hub.MX[recorded].mean()),
-    )
-    pause = float(rng.uniform(1.0, 4.0))  # the actuator moves to the next load
-    return {k: v[recorded] for k, v in channels.items()}, block, float(time[-1]) + pause
+    return through(channels, _acquired(effects), walked.setting, machine)
 
 
-def _tare(plan: Plan) -> tuple[tuple[tuple[str, float], ...], str]:
-    # Wheel mounted and lifted off the drum: the zeros and its weight, before any zero has moved.
+def _computed(
+    plan: Plan,
+    program: OwnProgram,
+    others: Mapping[str, OwnProgram],
+    channels: Signals,
+    effects: Any,
+    setting: Setting,
+) -> Signals:
+    """Return FY [N] and MZ [N·m] as a program makes them of recorded cells, with effects on them."""
+    made = acquisition.own_columns(program, channels)
+    for one in _acquired(effects):
+        if one.record is not None and one.effect.channel is not None:
+            other = acquisition.own_columns(others[one.record], channels)
+            for name in made:
+                seen = dataclasses.replace(setting, channels={**setting.channels, "from": other[name]})
+                made[name] = one.effect.channel(made[name], one.parameters, seen)
+        else:
+            made = through(made, [one], setting, plan.machine)
+    return made
+
+
+def _acquired(effects: Any) -> list[Switched]:
+    return [one for one in effects if one.effect.stage == "acquisition"]
+
+
+def _truth(name: str, run: RunSteps, line: Timeline, walked: Walked) -> tuple[BlockTruth, ...]:
+    place = np.cumsum(line.recorded)
+
+    def block(one: Block) -> BlockTruth:
+        rows = slice(one.start, one.stop)
+        return BlockTruth(
+            file=name,
+            rotation=run.rotation,
+            step_SA_rad=one.step_SA_rad,
+            step_FZ_N=one.step_FZ_N,
+            first_row=int(place[one.start]),
+            last_row=int(place[one.stop - 1]),
+            SA_rad=float(walked.SA[rows].mean()),
+            FZ_N=float(walked.hub.FZ[rows].mean()),
+            FY_N=float(walked.hub.FY[rows].mean()),
+            MZ_Nm=float(walked.hub.MZ[rows].mean()),
+            MX_Nm=float(walked.hub.MX[rows].mean()),
+        )
+
+    return tuple(block(one) for one in line.blocks)
+
+
+def _tare(plan: Plan) -> tuple[Signals, float]:
+    """Return the samples of the lifted wheel: the zeros and its weight, before any zero has moved."""
     rng = np.random.default_rng([plan.seed, _TARE_FILE])
     rows = plan.acquisition.rows_per_revolution
     none = np.zeros(rows)
+    dt = tire.revolution_time_s(plan.tire, plan.machine.drum.speed_m_s) / rows
     hub = carriage.HubLoads(FY=none, MZ=none, MX=np.full(rows, plan.carriage.overturning_Nm), FZ=none)
     unmoved: dict[str, Any] = {
         name: dataclasses.replace(getattr(plan.cells, name), zero_offset_V_V=0.0) for name in CELLS
     }
-    at_rest = dataclasses.replace(plan.cells, **unmoved)
-    channels = acquisition.digitise(
-        plan.acquisition,
-        cells=cells.sense(at_rest, hub=hub),
-        FZ=none,
-        SA=none,
-        noise_V_V=tuple(cell.noise_V_V for cell in plan.cells.all),
-        dt=tire.revolution_time_s(plan.tire, plan.machine.drum.speed_m_s) / rows,
-        rng=rng,
+    at_rest = dataclasses.replace(plan, cells=dataclasses.replace(plan.cells, **unmoved))
+    ambient = none + plan.motion.ambient_K
+    setting = Setting(
+        t=dt * np.arange(rows, dtype=np.float64),
+        elapsed_s=none,
+        channels={"T_AMBIENT": ambient, "T_TREAD": ambient},
+        first={"T_AMBIENT": plan.motion.ambient_K, "T_TREAD": plan.motion.ambient_K},
+        nominal_load_N=plan.tire.nominal_load_N,
     )
+    line = Timeline(
+        t=setting.t, clock=setting.t, dt=dt, SA_CMD=none, FZ_CMD=none, FZ_SET=none,
+        noise=acquisition.draw_noise(plan.acquisition, plan.cells, rows, rng),
+        recorded=np.ones(rows, dtype=bool), blocks=(),
+    )  # fmt: skip
+    still = Walked(hub=hub, SA=none, sensed=none, setting=setting, power_W=none, after=Before())
+    effects = [one for one in here(plan.effects, {}) if one.effect.name != "zero_offset"]
+    return _measured(at_rest, line, still, effects), dt
+
+
+def _tare_values(plan: Plan, rows: Signals) -> tuple[tuple[tuple[str, float], ...], str]:
     unit = plan.machine.column(CELLS[0]).unit
-    means = {name: np.array([channels[name].mean()]) for name in CELLS}
+    means = {name: np.array([rows[name].mean()]) for name in CELLS}
     shown = acquisition.printed(plan.machine, means)
     return tuple((name, float(shown[name][0])) for name in CELLS), unit

@@ -59,7 +59,13 @@ class TireForces:
 
 
 def forces(
-    tire: TireTruth, *, SA: ArrayLike, FZ: ArrayLike, rotation: Rotation, camber: float = 0.0
+    tire: TireTruth,
+    *,
+    SA: ArrayLike,
+    FZ: ArrayLike,
+    rotation: Rotation,
+    camber: ArrayLike = 0.0,
+    facing: float = 1.0,
 ) -> TireForces:
     """Return what the tire does to the wheel.
 
@@ -69,9 +75,10 @@ def forces(
     FZ : load [N], positive; broadcasts with SA
     rotation : of the drum
     camber : error of the wheel's camber [rad], as it acts with the drum forward
+    facing : -1 for a tire that was turned round on the hub: its conicity pulls the other way
     """
     travel = 1.0 if rotation == "forward" else -1.0
-    gamma = travel * (pseudo_camber(tire) + camber)
+    gamma = travel * (facing * pseudo_camber(tire) + np.asarray(camber, dtype=np.float64))
     slip = -(np.asarray(SA, dtype=np.float64) + tire.plysteer_rad)  # SAE to adapted SAE
     load = np.asarray(FZ, dtype=np.float64)
     return TireForces(

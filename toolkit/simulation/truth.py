@@ -9,12 +9,18 @@ from __future__ import annotations
 import dataclasses
 import math
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from toolkit.channels import Rotation
 from toolkit.simulation.cells import CELLS, LOADS, true_coefficients
+from toolkit.simulation.plan import Plan
 from toolkit.simulation.run import VirtualTest
+from toolkit.simulation.steady import settled
+from toolkit.simulation.steps import Motion
 from toolkit.simulation.tire import TireTruth, forces, pseudo_camber
+
+if TYPE_CHECKING:
+    from toolkit.simulation.steady import Answer
 
 _SMALL = math.radians(1e-3)
 
@@ -44,11 +50,12 @@ class TruePull:
     PRAT_at_FY_zero: float
 
 
-def true_stiffness(tire: TireTruth, *, load_N: float, rotation: Rotation) -> TrueStiffness:
-    """Return the stiffness of the virtual tire at a load [N]."""
+def true_stiffness(tire: TireTruth | Answer, *, load_N: float, rotation: Rotation) -> TrueStiffness:
+    """Return the stiffness of a tire at a load [N]: the published one's, or that of an answer."""
     one = math.radians(1.0)
-    slope_FY, slope_MZ = _difference(tire, load_N, rotation, _SMALL)
-    secant_FY, secant_MZ = _difference(tire, load_N, rotation, one)
+    answer = _answer(tire)
+    slope_FY, slope_MZ = _difference(answer, load_N, rotation, _SMALL)
+    secant_FY, secant_MZ = _difference(answer, load_N, rotation, one)
     return TrueStiffness(
         rotation=rotation,
         slope_cornering=-slope_FY,
@@ -58,23 +65,20 @@ def true_stiffness(tire: TireTruth, *, load_N: float, rotation: Rotation) -> Tru
     )
 
 
-def true_pull(tire: TireTruth, *, load_N: float) -> TruePull:
+def true_pull(tire: TireTruth | Answer, *, load_N: float) -> TruePull:
     """Return the pull characteristics of the virtual tire at a load [N].
 
     From the machine's axes at SA = 0, F forward and R reversed: conicity (F + R)/2 and plysteer (F - R)/2
     of FY; CRAT (F - R)/2 and PRAT (F + R)/2 of MZ.
     """
-    forward = forces(tire, SA=0.0, FZ=load_N, rotation="forward")
-    reverse = forces(tire, SA=0.0, FZ=load_N, rotation="reverse")
-    free = [
-        float(forces(tire, SA=_angle_of_no_force(tire, load_N, one), FZ=load_N, rotation=one).MZ)
-        for one in ("forward", "reverse")
-    ]
+    answer = _answer(tire)
+    forward, reverse = answer(0.0, load_N, "forward"), answer(0.0, load_N, "reverse")
+    free = [answer(_angle_of_no_force(answer, load_N, one), load_N, one)[1] for one in ("forward", "reverse")]
     return TruePull(
-        conicity=float(forward.FY + reverse.FY) / 2,
-        plysteer=float(forward.FY - reverse.FY) / 2,
-        CRAT=float(forward.MZ - reverse.MZ) / 2,
-        PRAT=float(forward.MZ + reverse.MZ) / 2,
+        conicity=(forward[0] + reverse[0]) / 2,
+        plysteer=(forward[0] - reverse[0]) / 2,
+        CRAT=(forward[1] - reverse[1]) / 2,
+        PRAT=(forward[1] + reverse[1]) / 2,
         PRAT_at_FY_zero=sum(free) / 2,
     )
 
@@ -83,12 +87,13 @@ def truth_document(test: VirtualTest) -> dict[str, Any]:
     """Return the whole truth of a virtual test as JSON values, marked as the toolkit's own output.
 
     ``per_load`` stands at the median of the true loads of all files at each step, where a reduced test
-    compares them, and at the nominal step too.
+    compares them, and at the nominal step too; effects on road and tire are in it, those on carriage, cells
+    and acquisition, and those of single runs, are not.
     """
     plan = test.plan
     blocks = [block for file in test.files for block in file.truth]
     per_load = []
-    for step in plan.loads_N:
+    for step in dict.fromkeys(load for run in plan.recordings for load in run.loads_N):
         loads = sorted(block.FZ_N for block in blocks if block.step_FZ_N == step)
         middle = len(loads) // 2
         median = loads[middle] if len(loads) % 2 else (loads[middle - 1] + loads[middle]) / 2
@@ -102,7 +107,7 @@ def truth_document(test: VirtualTest) -> dict[str, Any]:
         "machine": plan.machine.name,
         "date": plan.date,
         "seed": plan.seed,
-        "effects": [{"name": name, "value": value} for name, value in plan.effects],
+        "effects": [one.as_dict() for one in plan.effects],
         "axes": {"conditions": "machine", "per_load": "SAE"},
         "stages": {
             "tire": {**dataclasses.asdict(plan.tire), "pseudo_camber_rad": pseudo_camber(plan.tire)},
@@ -110,7 +115,8 @@ def truth_document(test: VirtualTest) -> dict[str, Any]:
             "carriage": dataclasses.asdict(plan.carriage),
             "cells": dataclasses.asdict(plan.cells),
             "acquisition": dataclasses.asdict(plan.acquisition),
-        },
+        }
+        | _further(plan),
         "true_coefficients": {
             "units": {"indications": "V/V", "FY": "N", "MZ": "N*m", "MX": "N*m"},
             **{load: dict(zip(CELLS, true_coefficients(plan.cells)[load], strict=True)) for load in LOADS},
@@ -127,31 +133,60 @@ def truth_document(test: VirtualTest) -> dict[str, Any]:
     }
 
 
+def _further(plan: Plan) -> dict[str, Any]:
+    # Named only where they are not the default, so that a plain test's truth is what it always was.
+    made: dict[str, Any] = {}
+    if plan.record != "dwell":
+        made["record"] = plan.record
+    if plan.motion != Motion():
+        made["motion"] = dataclasses.asdict(plan.motion)
+    if plan.tire_file is not None:
+        made["tire_file"] = plan.tire_file.path.name
+    return made
+
+
 def _at(test: VirtualTest, load_N: float) -> dict[str, Any]:
-    tire = test.plan.tire
+    plan = test.plan
+    # The road's and the tire's effects belong to the truth; a tire that no effect touches is its own.
+    touched = plan.tire_file is not None or any(
+        one.effect.stage in ("road", "tire") and one.only is None for one in plan.effects
+    )
+    general = dataclasses.replace(plan, effects=tuple(one for one in plan.effects if one.only is None))
+    tire = settled(general, {}) if touched else plan.tire
     return {
         "load_N": load_N,
         "stiffness": [
-            dataclasses.asdict(true_stiffness(tire, load_N=load_N, rotation=one))
-            for one in test.plan.rotations
+            dataclasses.asdict(true_stiffness(tire, load_N=load_N, rotation=one)) for one in plan.rotations
         ],
         "pull": dataclasses.asdict(true_pull(tire, load_N=load_N)),
     }
 
 
-def _sae(tire: TireTruth, SA: float, load: float, rotation: Rotation) -> tuple[float, float]:
-    answer = forces(tire, SA=SA, FZ=load, rotation=rotation)
-    return (1.0 if rotation == "forward" else -1.0) * float(answer.FY), float(answer.MZ)
+def _answer(tire: TireTruth | Answer) -> Answer:
+    if not isinstance(tire, TireTruth):
+        return tire
+    truth = tire
+
+    def answer(SA: float, FZ: float, rotation: Rotation) -> tuple[float, float]:
+        made = forces(truth, SA=SA, FZ=FZ, rotation=rotation)
+        return float(made.FY), float(made.MZ)
+
+    return answer
 
 
-def _difference(tire: TireTruth, load: float, rotation: Rotation, step: float) -> tuple[float, float]:
-    up, down = _sae(tire, step, load, rotation), _sae(tire, -step, load, rotation)
+def _sae(answer: Answer, SA: float, load: float, rotation: Rotation) -> tuple[float, float]:
+    FY, MZ = answer(SA, load, rotation)
+    return (1.0 if rotation == "forward" else -1.0) * FY, MZ
+
+
+def _difference(answer: Answer, load: float, rotation: Rotation, step: float) -> tuple[float, float]:
+    up, down = _sae(answer, step, load, rotation), _sae(answer, -step, load, rotation)
     return (up[0] - down[0]) / (2 * step), (up[1] - down[1]) / (2 * step)
 
 
-def _angle_of_no_force(tire: TireTruth, load: float, rotation: Rotation) -> float:
+def _angle_of_no_force(answer: Answer, load: float, rotation: Rotation) -> float:
     low, high = math.radians(-3.0), math.radians(3.0)  # FY falls with SA in SAE axes
     for _ in range(80):
         middle = 0.5 * (low + high)
-        low, high = (middle, high) if _sae(tire, middle, load, rotation)[0] > 0 else (low, middle)
+        low, high = (middle, high) if _sae(answer, middle, load, rotation)[0] > 0 else (low, middle)
     return 0.5 * (low + high)

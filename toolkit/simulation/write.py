@@ -14,6 +14,7 @@ from toolkit.errors import OutputError
 from toolkit.files import write_atomic
 from toolkit.recording.labview import write_labview
 from toolkit.simulation.cells import CELLS, LOADS, true_coefficients
+from toolkit.simulation.columns import further
 from toolkit.simulation.run import VirtualTest
 from toolkit.simulation.session import (
     DECIMALS,
@@ -46,9 +47,10 @@ def write_test(test: VirtualTest, folder: Path) -> tuple[Path, ...]:
         the folder holds other files, or cannot be written to
     """
     names = [file.name for file in test.files]
-    _prepare(folder, {*names, TEST, TRUTH})
+    check_folder(folder, {*names, TEST, TRUTH})
     for file in test.files:
-        write_labview(folder / file.name, test.plan.machine, file.columns, simulated=True)
+        columns = file.columns if test.plan.record == "dwell" else file.columns | further(file.signals)
+        write_labview(folder / file.name, test.plan.machine, columns, simulated=True)
     write_atomic(folder / TEST, test_toml(test))
     write_atomic(folder / TRUTH, _json(truth_document(test)))
     return tuple(folder / name for name in (*names, TEST, TRUTH))
@@ -56,7 +58,7 @@ def write_test(test: VirtualTest, folder: Path) -> tuple[Path, ...]:
 
 def write_session(session: VirtualSession, folder: Path) -> tuple[Path, ...]:
     """Write a virtual reference-load session into a folder; return the files, SESSION.toml first."""
-    _prepare(folder, {SESSION, LOADS_CSV, CHECK_CSV, TRUTH})
+    check_folder(folder, {SESSION, LOADS_CSV, CHECK_CSV, TRUTH})
     write_atomic(folder / LOADS_CSV, loads_csv(session))
     write_atomic(folder / CHECK_CSV, check_csv(session))
     write_atomic(folder / SESSION, session_toml(session))
@@ -67,6 +69,7 @@ def write_session(session: VirtualSession, folder: Path) -> tuple[Path, ...]:
 def test_toml(test: VirtualTest) -> str:
     """Return test.toml: what an operator would have written down, and the tare."""
     plan = test.plan
+    first = plan.recordings[0].rotation
     label = {"size": "205/55R16", "company": "simulated", "DOT": "SIMULATED", **dict(plan.label)}
     speed = float(from_si(plan.machine.drum.speed_m_s, "km/h"))
     lines = [
@@ -78,7 +81,7 @@ def test_toml(test: VirtualTest) -> str:
         'requestor = "simulated test"',
         f"surface = {_text(plan.machine.drum.surface + ' drum (simulated)')}",
         f"special = {_text('simulated: ' + plan.title)}",
-        f"rotation = {_text(plan.rotations[0])}",
+        f"rotation = {_text(first)}",
         f'speed = {{ value = {round(speed, 6)!r}, unit = "km/h" }}',
         f'pressure = {{ value = {round(float(from_si(plan.pressure_Pa, "psi")), 6)!r}, unit = "psi" }}',
         f'rated_load = {{ value = {plan.tire.nominal_load_N!r}, unit = "N" }}',
@@ -86,7 +89,7 @@ def test_toml(test: VirtualTest) -> str:
         "[tire]",
         *(f"{key} = {_text(value)}" for key, value in label.items()),
     ]
-    turned = [file for file in test.files if file.rotation != plan.rotations[0]]
+    turned = [file for file in test.files if file.rotation != first]
     if turned:
         lines += ["", "[rotations]", *(f"{_text(file.name)} = {_text(file.rotation)}" for file in turned)]
     values = ", ".join(f"{name} = {value!r}" for name, value in test.tare)
@@ -174,7 +177,14 @@ def session_truth(session: VirtualSession) -> dict[str, Any]:
     }
 
 
-def _prepare(folder: Path, names: set[str]) -> None:
+def check_folder(folder: Path, names: set[str]) -> None:
+    """Refuse a folder that holds anything but an earlier output of these names.
+
+    Raises
+    ------
+    OutputError
+        the folder holds other files, or is none
+    """
     if not folder.exists():
         return
     strangers = (

@@ -1,0 +1,217 @@
+"""A diagnosis case made of a virtual test: CASE.toml, its runs as CSV, the tire; no word of any effect.
+
+The case's simulation is the plan without its effects: of kind ``machine`` where the plan's tire is a file,
+else of kind ``columns`` with what the plan's tire does at the measured slip angles and loads.
+"""
+
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from toolkit.effects.signals import Drive, drive
+from toolkit.errors import ConfigError
+from toolkit.files import write_atomic
+from toolkit.simulation.case_plan import COLUMNS, Free
+from toolkit.simulation.cells import CELLS
+from toolkit.simulation.columns import shown, unit_of
+from toolkit.simulation.plan import Plan
+from toolkit.simulation.run import VirtualFile, VirtualTest
+from toolkit.simulation.steady import steady_of
+from toolkit.units import from_si
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+CASE, TIRE, RUNS = "CASE.toml", "tire.tir", "runs"
+_TARE = "tare.csv"
+_TARE_BEFORE_S = 60.0  # how long before the first run the tare ended
+
+
+def write_runs(test: VirtualTest, folder: Path) -> tuple[Path, ...]:
+    """Write every recording as plain CSV, all columns, names in the header; return the files."""
+    names = ("t", "SA", "FZ", *CELLS, "FY", "MZ", *(one for one in COLUMNS if one not in ("SA", "FZ")))
+    return tuple(
+        _csv(folder / _run_name(i, test), _columns(file, names, [])) for i, file in enumerate(test.files)
+    )
+
+
+def write_case(test: VirtualTest, folder: Path, *, record: str | None = None) -> tuple[Path, ...]:
+    """Write a case of a test into a folder; return the files, CASE.toml first.
+
+    Parameters
+    ----------
+    record : registry id of the calibration, needed where the case's outputs are cells
+
+    Raises
+    ------
+    ConfigError
+        no case can be made of the plan: see `check_case`
+    """
+    plan = test.plan
+    kind = check_case(plan, record)
+    inputs = _inputs(test)
+    cells = plan.case.outputs == "cells"
+    outputs = list(CELLS) if cells else ["FY", "MZ"]
+    names = ("t", *inputs, *(["FZ"] if plan.case.judge_load else []), *outputs)
+    simulated = [] if kind == "machine" else ["FY", "MZ"]
+    made = []
+    for i, file in enumerate(test.files):
+        nominal = _nominal(test, file) if simulated else []
+        made.append(_csv(folder / RUNS / _run_name(i, test), _columns(file, names, nominal)))
+    if cells:
+        made.append(_csv(folder / RUNS / _TARE, _tare(test, names)))
+    if plan.tire_file is not None:
+        folder.mkdir(parents=True, exist_ok=True)
+        shutil.copyfile(plan.tire_file.path, folder / TIRE)
+        made.append(folder / TIRE)
+    write_atomic(folder / CASE, case_toml(test, kind=kind, record=record, inputs=inputs, outputs=outputs))
+    return (folder / CASE, *made)
+
+
+def case_toml(
+    test: VirtualTest, *, kind: str, record: str | None, inputs: Sequence[str], outputs: Sequence[str]
+) -> str:
+    """Return the text of CASE.toml."""
+    plan = test.plan
+    lines = [
+        "# simulated: made by the virtual machine of the toolkit, no real tire was tested",
+        "schema = 1",
+        f"title = {_text(plan.title)}",
+        "",
+        "[simulation]",
+        f"kind = {_text(kind)}",
+    ]
+    if kind == "machine":
+        lines += [f"machine = {_text(plan.machine.name)}", f"tire = {_text(TIRE)}"]
+        if plan.case.outputs == "cells":
+            lines.append(f"calibration = {_text(str(record))}")
+    else:
+        lines.append('simulated = { FY = "FY_sim", MZ = "MZ_sim" }')
+    for one in plan.case.parameters:
+        lines += ["", f"[simulation.parameters.{one.name}]", *_parameter(one)]
+    lines += ["", "[recording]", 'time = "t"', 'axes = "machine"', "", "[recording.channels]"]
+    lines.append('t = { unit = "s", role = "time" }')
+    lines += [f'{name} = {{ unit = {_text(unit_of(name))}, role = "{_role(name)}" }}' for name in inputs]
+    judged = [*(["FZ"] if plan.case.judge_load else []), *outputs]
+    lines += [f'{name} = {{ unit = {_text(unit_of(name))}, role = "output" }}' for name in judged]
+    turned = any(file.run.mounting == "turned" for file in test.files)
+    if plan.case.outputs == "cells":
+        lines += ["", "[[recording.run]]", f"file = {_text(f'{RUNS}/{_TARE}')}", 'phase = "tare"']
+    for i, file in enumerate(test.files):
+        lines += ["", "[[recording.run]]", f"file = {_text(f'{RUNS}/{_run_name(i, test)}')}"]
+        for key, value in file.run.conditions.items():
+            if key != "mounting" or turned:
+                lines.append(f"{_text(key) if not key.isidentifier() else key} = {_text(value)}")
+    return "\n".join(lines) + "\n"
+
+
+def check_case(plan: Plan, record: str | None) -> str:
+    """Return the kind of the case that can be made of a plan: ``machine`` or ``columns``.
+
+    Raises
+    ------
+    ConfigError
+        none can
+    """
+    kind = "columns" if plan.tire_file is None else "machine"
+    wrong: tuple[str, str] | None = None
+    if kind == "columns" and (plan.case.outputs == "cells" or plan.case.judge_load):
+        wrong = "a tire that is no file", '[tire] file = "tire.tir" in the plan'
+    elif plan.case.outputs == "cells" and record is None:
+        wrong = "no calibration of the virtual machine", "--calibrations DIR with a record in force"
+    elif kind == "columns" and plan.case.parameters:
+        wrong = "parameters of a tire that is no file", '[tire] file = "tire.tir" in the plan'
+    if wrong is not None:
+        raise ConfigError(
+            "the case cannot be made of this plan", where="[case]", got=wrong[0], expected=wrong[1],
+            next_step="change the plan's [case] or [tire]; nothing was written", rule="wrong-value",
+        )  # fmt: skip
+    return kind
+
+
+def _inputs(test: VirtualTest) -> list[str]:
+    """Return the driving columns: slip angle and load, and those that the plan names or that vary."""
+    judged = {"FZ"} if test.plan.case.judge_load else set()
+    wanted = test.plan.case.columns
+    if wanted is None:
+        wanted = tuple(
+            name
+            for name in COLUMNS
+            if not name.endswith("_CMD")
+            and len({float(v) for file in test.files for v in shown(file.signals, name)[[0, -1]]}) > 1
+        )
+    chosen = dict.fromkeys(("SA", "FZ", *(("FZ_CMD",) if judged else ()), *wanted))
+    return [name for name in chosen if name not in judged]
+
+
+def _role(name: str) -> str:
+    return "input" if name in ("SA", "FZ", "V", "SA_CMD", "FZ_CMD") else "covariate"
+
+
+def _parameter(one: Free) -> list[str]:
+    lines = [f"value = {one.value!r}", f"unit = {_text(one.unit)}"]
+    if one.sd is not None:
+        lines.append(f"sd = {one.sd!r}")
+    if one.bounds is not None:
+        lines.append(f"bounds = [{one.bounds[0]!r}, {one.bounds[1]!r}]")
+    return lines
+
+
+def _columns(
+    file: VirtualFile, names: Sequence[str], nominal: list[tuple[str, NDArray[np.float64]]]
+) -> list[tuple[str, NDArray[np.float64]]]:
+    return [*((name, shown(file.signals, name)) for name in names), *nominal]
+
+
+def _nominal(test: VirtualTest, file: VirtualFile) -> list[tuple[str, NDArray[np.float64]]]:
+    plan, signals = test.plan, file.signals
+    facing = -1.0 if file.run.mounting == "turned" else 1.0
+    pressure = plan.pressure_Pa if file.run.pressure_Pa is None else file.run.pressure_Pa
+    steady = steady_of(plan, rotation=file.rotation, facing=facing, pressure_Pa=pressure)
+    start: Drive = drive(signals["t"], signals["SA"], signals["FZ"], V=signals["V"])
+    made = steady(start.SA, start)
+    return [
+        ("FY_sim", np.round(made.FY, 5) + 0.0),
+        ("MZ_sim", np.round(made.MZ, 6) + 0.0),
+    ]
+
+
+def _tare(test: VirtualTest, names: Sequence[str]) -> list[tuple[str, NDArray[np.float64]]]:
+    rows = len(test.tare_rows[CELLS[0]])
+    first = {name: values[:1] for name, values in test.files[0].signals.items()}
+    made: list[tuple[str, NDArray[np.float64]]] = []
+    for name in names:
+        if name == "t":
+            times = -_TARE_BEFORE_S + test.tare_dt * np.arange(rows)
+            made.append((name, np.round(times, 6)))
+        elif name in CELLS:
+            made.append((name, np.round(from_si(test.tare_rows[name], unit_of(name)), 8) + 0.0))
+        elif name in ("SA", "FZ", "SA_CMD", "FZ_CMD"):
+            made.append((name, np.zeros(rows)))
+        else:
+            made.append((name, np.full(rows, shown(first, name)[0])))
+    return made
+
+
+def _run_name(index: int, test: VirtualTest) -> str:
+    width = max(2, len(str(len(test.files))))
+    return f"run{index + 1:0{width}d}.csv"
+
+
+def _csv(path: Path, columns: list[tuple[str, Any]]) -> Path:
+    # repr of a rounded double is the shortest text that reads back as the same number.
+    rows = zip(*(values.tolist() for _, values in columns), strict=True)
+    lines = [",".join(name for name, _ in columns), *(",".join(map(repr, row)) for row in rows)]
+    write_atomic(path, "\n".join(lines) + "\n")
+    return path
+
+
+def _text(value: str) -> str:
+    return json.dumps(value, ensure_ascii=False)

@@ -1,0 +1,236 @@
+"""Effects as they are written: ``NAME[.CHANNEL][@CONDITION:VALUE][=VALUE]``.
+
+    relaxation=0.5m                             one parameter; its unit, or another of the same dimension
+    relaxation.relaxation_length=0.5m           the same
+    creep.D51=fraction:0.01,time_constant:20s   several parameters, on one cell
+    zero_offset.D51=0.002mV/V                   on one signal; without a name on every cell
+    crosstalk.FZ.FY=0.01                        from FZ to FY
+    channel_swap.D51.D52   channel_sign.E5      there or not: no value
+    wrong_calibration=m15-r1                    the record that was used instead
+    load_lag@order:1+2=1.5s                     only in runs with the condition order = 1 or 2
+
+A number without a unit is in the parameter's own. A parameter that is not given is off, or has its usual
+value where it cannot be off.
+"""
+
+from __future__ import annotations
+
+import difflib
+import math
+import re
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from toolkit.effects.catalogue import effect as find_effect
+from toolkit.effects.effect import Effect, EffectParameter
+from toolkit.effects.unit_error import FACTORS
+from toolkit.errors import ConfigError, UnitError
+from toolkit.simulation.places import (
+    can_join,
+    channels_of,
+    default_channels,
+    is_paired,
+    sources_of,
+    unit_of,
+)
+from toolkit.simulation.switched import Switched
+from toolkit.units import unit
+
+if TYPE_CHECKING:
+    from toolkit.machine import Machine
+
+_QUANTITY = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*", re.ASCII | re.DOTALL)
+
+
+def parse_effect(text: str, machine: Machine) -> tuple[Switched, ...]:
+    """Return the effect that a text switches on, once for each signal that it acts on.
+
+    Raises
+    ------
+    ConfigError
+        an unknown effect, signal or parameter, a value that is no number, a unit of another dimension, a
+        value outside the effect's bounds, a value where there is none to give, or none where one is needed
+    """
+    where = f"--effect {text}"
+    head, equals, given = text.partition("=")
+    head, _, condition = head.partition("@")
+    name, *parts = [part.strip() for part in head.split(".")]
+    effect = find_effect(name, where=where)
+    if effect.stage == "dynamics":
+        raise _wrong(
+            f"{name} is a term of an equation of motion, not of the tire test machine", where, name,
+            "an effect of road, carriage, tire, load_cells or acquisition",
+            "write it into the simulator of a case of kind ode or python",
+        )  # fmt: skip
+    parameter = None
+    if parts and parts[-1] in effect.names:
+        parameter = parts.pop()
+    source, channels = _signals(effect, parts, where)
+    only = _condition(condition, where) if condition or "@" in text.partition("=")[0] else None
+    if effect.name == "wrong_calibration":
+        if not given.strip():
+            raise _wrong(
+                "the record that was used is not named", where, "nothing", "a registry id, such as m15-r1",
+                "write --effect wrong_calibration=ID",
+            )  # fmt: skip
+        return (Switched(effect=effect, record=given.strip(), only=only),)
+    made = []
+    for channel in channels or (None,):
+        units = {one.name: _unit(one, machine, channel, source) for one in effect.parameters}
+        values = _values(effect, parameter, given if equals else None, units, where)
+        made.append(
+            Switched(
+                effect=effect,
+                channel=channel,
+                source=source,
+                values=tuple(values.items()),
+                units=tuple(units.items()),
+                only=only,
+            )
+        )
+    return tuple(made)
+
+
+def _signals(
+    effect: Effect, parts: Sequence[str], where: str
+) -> tuple[str | None, tuple[str, ...]]:  # source, channels
+    known = channels_of(effect)
+    if is_paired(effect):
+        if len(parts) != 2 or parts[0] == parts[1]:
+            raise _wrong(
+                f"effect {effect.name!r} is between two signals", where, ".".join(parts) or "none",
+                f"two of {', '.join(dict.fromkeys((*sources_of(effect), *known)))}",
+                f"write {effect.name}.{'FZ.FY=0.01' if effect.name == 'crosstalk' else 'D51.D52'}",
+            )  # fmt: skip
+        # A swap names two signals, crosstalk says from which to which.
+        source = _one_of(parts[0], sources_of(effect), effect, where)
+        channel = _one_of(parts[1], known, effect, where)
+        if not can_join(effect, source, channel):
+            raise _wrong(
+                f"effect {effect.name!r} cannot join {source} and {channel}", where, ".".join(parts),
+                "two cells, or two loads", "name two signals of one kind",
+            )  # fmt: skip
+        return source, (channel,)
+    if not known and parts:
+        expected = f"the effect's name alone{', or .' + ', .'.join(effect.names) if effect.names else ''}"
+        raise _wrong(
+            f"effect {effect.name!r} acts on the whole machine", where, parts[0], expected,
+            "correct the part after the dot",
+        )  # fmt: skip
+    if len(parts) > 1:
+        raise _wrong(
+            f"effect {effect.name!r} acts on one signal", where, ".".join(parts), ", ".join(known),
+            "name one; give the option again for another",
+        )  # fmt: skip
+    return None, (_one_of(parts[0], known, effect, where),) if parts else default_channels(effect)
+
+
+def _one_of(part: str, known: Sequence[str], effect: Effect, where: str) -> str:
+    if part in known:
+        return part
+    names = [*known, *effect.names]
+    near = difflib.get_close_matches(part, names, n=1, cutoff=0.5)
+    raise _wrong(
+        f"effect {effect.name!r} knows no part {part!r}", where, part, ", ".join(names),
+        f"did you mean {near[0]!r}?" if near else "correct the part after the dot",
+    )  # fmt: skip
+
+
+def _condition(text: str, where: str) -> tuple[str, tuple[str, ...]]:
+    key, colon, values = text.partition(":")
+    chosen = tuple(one.strip() for one in values.split("+"))
+    if not key.strip() or not colon or not all(chosen):
+        raise _wrong(
+            "a condition is not whole", where, f"@{text}", "@KEY:VALUE or @KEY:VALUE+VALUE",
+            "write for example @order:1+2",
+        )  # fmt: skip
+    return key.strip(), chosen
+
+
+def _unit(one: EffectParameter, machine: Machine, channel: str | None, source: str | None) -> str:
+    if "{" not in one.unit:
+        return one.unit
+    names = {"channel": channel, "from": source}
+    shown = {key: "1" if name is None else unit_of(machine, name) for key, name in names.items()}
+    if one.unit != "{channel}":  # "1/N*m" would be read from left to right
+        shown = {key: f"({text})" if set("/*") & set(text) else text for key, text in shown.items()}
+    return re.sub(r"\((\w+)\)", r"\1", one.unit.format_map(shown))  # no brackets around one name
+
+
+def _values(
+    effect: Effect, parameter: str | None, given: str | None, units: dict[str, str], where: str
+) -> dict[str, float]:
+    if not effect.parameters:
+        if given is not None:
+            raise _wrong(
+                f"effect {effect.name!r} is there or not", where, given or "nothing", "no value",
+                "leave out the = and what follows",
+            )  # fmt: skip
+        return {}
+    known = {one.name: one for one in effect.parameters}
+    made: dict[str, float] = {}
+    for item in (given or "").split(","):
+        name, colon, text = item.rpartition(":")
+        name = name.strip() if colon else (parameter or effect.parameters[0].name)
+        if name not in known:
+            near = difflib.get_close_matches(name, list(known), n=1, cutoff=0.5)
+            raise _wrong(
+                f"effect {effect.name!r} has no parameter {name!r}", where, name, ", ".join(known),
+                f"did you mean {near[0]!r}?" if near else "use one of those expected",
+            )  # fmt: skip
+        if name in made:
+            raise _wrong(
+                f"the parameter {name!r} is given twice", where, given, f"{name} once", "remove one",
+            )  # fmt: skip
+        made[name] = _number(effect, known[name], text, units[name], where)
+    return {one.name: made.get(one.name, _usual(one)) for one in effect.parameters}
+
+
+def _number(effect: Effect, one: EffectParameter, text: str, stated: str, where: str) -> float:
+    if effect.name == "unit_error" and text.strip() in FACTORS:
+        return FACTORS[text.strip()]
+    match = _QUANTITY.fullmatch(text)
+    value = float(match[1]) if match else math.nan
+    if not match or not math.isfinite(value):
+        raise _wrong(
+            f"effect {effect.name!r} has no number", where, text.strip() or "nothing",
+            f"a number in {stated} ({one.name}: {one.text})", f"write --effect {effect.name}=VALUE",
+        )  # fmt: skip
+    if match[2]:
+        value *= _factor(match[2], stated, one, where)
+    if not one.bounds[0] <= value <= one.bounds[1]:
+        raise _wrong(
+            f"the parameter {one.name!r} of {effect.name!r} cannot be that", where, text.strip(),
+            f"from {one.bounds[0]:g} to {one.bounds[1]:g} {stated}", "give another value",
+        )  # fmt: skip
+    return value
+
+
+def _factor(text: str, stated: str, one: EffectParameter, where: str) -> float:
+    try:
+        given, own = unit(text, where=where), unit(stated)
+    except UnitError as error:
+        raise _wrong(
+            f"the unit of {one.name!r} is not known", where, text, stated, f"write it in {stated}", error,
+        ) from error  # fmt: skip
+    if given.dimension != own.dimension or given.offset != own.offset:
+        raise _wrong(
+            f"the parameter {one.name!r} is in a unit of another dimension", where,
+            f"{text} ({given.dimension})", f"{stated} ({own.dimension})", f"write it in {stated}",
+        )  # fmt: skip
+    return given.factor / own.factor
+
+
+def _usual(one: EffectParameter) -> float:
+    if one.off is not None:
+        return one.off
+    return one.starts[0] if one.starts else 0.5 * (one.typical[0] + one.typical[1])
+
+
+def _wrong(
+    what: str, where: str, got: object, expected: str, next_step: str, cause: UnitError | None = None
+) -> ConfigError:
+    return ConfigError(
+        what, where=where, got=got, expected=expected, next_step=next_step,
+        rule=(cause.rule if cause else None) or "effect-value",
+    )  # fmt: skip

@@ -1,0 +1,80 @@
+"""The steady tire of a plan, whatever it is: forces in the machine's axes for what drives it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from toolkit.channels import Rotation
+from toolkit.effects.signals import Drive, Setting, TireForces, drive
+from toolkit.effects.similarity import Steady, similar
+from toolkit.simulation import tire as bakker
+from toolkit.simulation.file_tire import file_forces
+from toolkit.simulation.plan import Plan
+from toolkit.simulation.switched import here
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+    from numpy.typing import NDArray
+
+    # slip angle [rad], load [N], direction -> FY [N], MZ [N·m] in the machine's axes
+    Answer = Callable[[float, float, Rotation], tuple[float, float]]
+
+
+def steady_of(plan: Plan, *, rotation: Rotation, facing: float, pressure_Pa: float) -> Steady:
+    """Return the plan's tire: (slip angle [rad], drive) to forces in the machine's axes."""
+    file = plan.tire_file
+    if file is None:
+
+        def published(SA: NDArray[np.float64], one: Drive) -> TireForces:
+            made = bakker.forces(plan.tire, SA=SA, FZ=one.FZ, rotation=rotation, camber=one.IA, facing=facing)
+            return TireForces(FY=made.FY, MZ=made.MZ)
+
+        return published
+
+    def from_file(SA: NDArray[np.float64], one: Drive) -> TireForces:
+        pressure = pressure_Pa + one.pressure_error
+        return file_forces(
+            file, SA=SA, FZ=one.FZ, IA=one.IA, V=one.V, pressure_Pa=pressure, rotation=rotation
+        )
+
+    return from_file
+
+
+def settled(plan: Plan, conditions: Mapping[str, str]) -> Answer:
+    """Return the tire on its road at rest in every motion, with the effects of road and tire in it.
+
+    It is what a perfect test would find: errors of carriage, cells and acquisition are not in it, and what
+    needs time has settled.
+    """
+
+    def answer(SA: float, FZ: float, rotation: Rotation) -> tuple[float, float]:
+        facing = -1.0 if conditions.get("mounting") == "turned" else 1.0
+        steady = steady_of(plan, rotation=rotation, facing=facing, pressure_Pa=plan.pressure_Pa)
+        speed = plan.machine.drum.speed_m_s
+        now = np.zeros(1)
+        made = drive(now, np.array([SA]), np.array([FZ]), V=speed)
+        setting = Setting(
+            t=now, elapsed_s=now, nominal_load_N=plan.tire.nominal_load_N, nominal_speed_m_s=speed,
+            facing=facing, conditions=conditions,
+            channels={"T_TREAD": now + plan.motion.ambient_K}, first={"T_TREAD": plan.motion.ambient_K},
+        )  # fmt: skip
+
+        def tire(one: Drive) -> TireForces:
+            return similar(steady, one)
+
+        for one in here(plan.effects, {**conditions, "rotation": rotation}):
+            if one.effect.drive is not None and one.effect.stage in ("road", "tire"):
+                made = one.effect.drive(made, one.parameters, setting, tire)
+        forces = tire(made)
+        return float(forces.FY[0]), float(forces.MZ[0])
+
+    return answer
+
+
+def loaded_radius(plan: Plan, FZ: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the distance of the hub from the drum [m], (n,)."""
+    truth = plan.tire
+    return truth.free_radius_m - np.maximum(FZ, 0.0) / truth.vertical_stiffness_N_m
