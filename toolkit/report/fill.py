@@ -268,6 +268,7 @@ class _Filler:
 
     def _literals(self, sites: list[Site]) -> None:
         seen: set[int] = set()
+        naming = {id(site.element) for site in sites if site.tag.family == "table"}
         for site in sites:
             if id(site.element) in seen:
                 continue
@@ -289,7 +290,7 @@ class _Filler:
             fill_literals(site.element, resolve)
             for tag in figures:
                 insert_at_mark(site.element, _MARK, self._picture(tag, site))
-            if any(one.tag.family == "table" and one.element is site.element for one in sites):
+            if id(site.element) in naming:
                 _drop_if_empty(site.element)
 
     def _figure_control(self, site: Site) -> None:
