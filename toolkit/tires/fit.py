@@ -251,7 +251,7 @@ def _result(
     values = found.theta[i] * factor
     values[4] -= middle
     covariance = found.covariance[i] * np.outer(factor, factor)
-    errors = np.sqrt(np.diag(covariance))
+    errors = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     names = [spec.name for spec in MODEL.parameters]
     determined, bound = found.determined[i], found.at_bound[i]
     unit = CHANNEL_UNIT[curve.channel]

@@ -3,7 +3,8 @@
 The search starts from the model's own starts and deterministic variations of them. Few steps show which
 starts lose; the rest go on to the end. A parameter that the data do not determine is set to its neutral
 default where the fit is as good with it (within a 95 % interval and a thousandth of the cost, for a model's
-own misfit is no noise), else held where the search ended; what is left is then determined by itself.
+own misfit is no noise); else it stays where the search ended, named, and free in the covariance, so that
+the errors of what moves with it stay true.
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ _EXACT = 1e-18  # a cost below this share of the data's square is rounding
 _PLAN = (12, 6, 5, 60)  # starts, first steps, how many go on, steps to the end
 _PATIENT = (36, 8, 10, 90)
 _AGAIN = (25, 12, 8, 90)
-_WIDE = (0.5, 5.0)  # an interval's half width beyond half of the value and five sizes says nothing
+_WIDE = (0.3, 2.5)  # an interval of more than 30 % of the value and 2.5 sizes to either side says little
 _ALLOWED = 4.0  # of the variance of a row: the rise of the cost by which a default is as good as the fit
 _BIWEIGHT = 4.685  # 95 % efficiency on normal noise
 _POLISH = 4_000_000  # rows x inner points x copies that a polish on the rows may cost a step
@@ -137,8 +138,7 @@ def run(task: Task, coarse: Measured, count: Array, width: float) -> Found:
         x, work.weight = _reweight(work, x)
     time, variance, dof = _noise(judged, x)
     fixed: list[tuple[int, str]] = []
-    held: list[int] = []
-    x = _prune(work, x, variance, dof, fixed, held)
+    x = _prune(work, x, variance, dof, fixed)
     for one in (judged, rows):
         one.base, one.free = work.base.copy(), list(work.free)
     misfit = rows if cheap else search
@@ -160,7 +160,7 @@ def run(task: Task, coarse: Measured, count: Array, width: float) -> Found:
         covariance=covariance,
         fixed=tuple(fixed),
         bound=tuple(p for p, at in zip(misfit.free, bound, strict=True) if at),
-        undetermined=tuple(sorted({*undetermined, *held})),
+        undetermined=tuple(undetermined),
         starts=starts,
         agreeing=agreeing,
         time=time,
@@ -265,9 +265,7 @@ def _at_bound(x: Array, box: Box) -> Sequence[bool]:
     return [bool(one) for one in (x <= box.low + margin) | (x >= box.high - margin)]
 
 
-def _prune(
-    misfit: Misfit, x: Array, variance: float, dof: float, fixed: list[tuple[int, str]], held: list[int]
-) -> Array:
+def _prune(misfit: Misfit, x: Array, variance: float, dof: float, fixed: list[tuple[int, str]]) -> Array:
     # One at a time, the worst first: parameters that are not determined move together.
     factor = coverage_factor(dof)
     kept: set[int] = set()
@@ -292,18 +290,12 @@ def _prune(
         if trial.cost[0] <= cost + min(_ALLOWED * variance, _SAME * cost):
             x, cost = trial.x, max(cost, float(trial.cost[0]))
             fixed.append((place, f"not determined by these data, fixed at its default {spec.default:g}"))
-        elif bound[worst]:
-            # It means something, and the bound stops it: it stays in the fit, and its bound is told.
+        else:
+            # It matters, though its value is not known: it stays free, so that the errors of what moves
+            # with it stay true, and is named.
             misfit.base[place] = value
             misfit.free.insert(worst, place)
             kept.add(place)
-        else:
-            misfit.base[place] = value
-            x = descend(misfit, others.copy(), misfit.box(), steps=6, tolerance=1e-8).x
-            r = misfit(x)[0]
-            cost = float(r @ r)
-            held.append(place)
-            fixed.append((place, f"not determined by these data, held at {value:.4g} where the search ended"))
     return x
 
 
