@@ -19,6 +19,7 @@ from tests.benchmarks import (
     help_time,
     monte_carlo,
     process_time,
+    report_batch,
     report_time,
     verify_records,
 )
@@ -27,6 +28,7 @@ BENCHES: dict[str, Callable[[Path, int], list[dict[str, object]]]] = {
     "help": help_time.run,
     "process": process_time.run,
     "report": report_time.run,
+    "reports": report_batch.run,
     "fit": fit_rows.run,
     "verify": verify_records.run,
     "monte-carlo": monte_carlo.run,
