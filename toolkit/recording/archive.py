@@ -124,13 +124,15 @@ def _inflate(data: bytes, member: zipfile.ZipInfo, left: int, where: object) -> 
     if member.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
         _refuse("zip-method", "a member of the archive is packed in a way that workbooks never are", where,
                 got=f"{name}: method {member.compress_type}", expected="stored or deflated")  # fmt: skip
+    if member.file_size > MAX_TOTAL_BYTES:
+        _too_large(name, where)  # what it claims is enough
     raw = _raw(data, member, where)
     if member.compress_type == zipfile.ZIP_STORED:
         content = raw
         if len(content) > left:
             _too_large(name, where)
     else:
-        # The sizes in the directory are claims; only what comes out is counted.
+        # The sizes in the directory are claims: what comes out is counted, whatever they say.
         bound = min(left, max(RATIO_FREE_BYTES, MAX_RATIO * len(raw)))
         engine = zlib.decompressobj(-zlib.MAX_WBITS)
         try:
@@ -141,6 +143,8 @@ def _inflate(data: bytes, member: zipfile.ZipInfo, left: int, where: object) -> 
             _too_large(name, where)
         if not engine.eof:
             _damaged(name, "the packed data ends early", where)
+    if len(content) != member.file_size:
+        _damaged(name, f"{len(content)} bytes where the directory says {member.file_size}", where)
     if zlib.crc32(content) != member.CRC:
         _damaged(name, "the check sum differs", where)
     return content
