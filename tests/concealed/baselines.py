@@ -44,7 +44,7 @@ def library(df: pd.DataFrame, run: Run, nominal: dict[str, Array], output: str) 
             "nonlinearity:y2": y**2,
         "nonlinearity:y3": y**3, "channel_delay:dy": rate, "hysteresis:sign": np.sign(rate),
     }  # fmt: skip
-    tire = "SA" in df
+    tire = {"SA", "V"} <= set(df)
     for name in ("T", "T_AMBIENT"):
         if (x := _column(df, name)) is not None:
             out[f"thermal_drift:{name}"] = x

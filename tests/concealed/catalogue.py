@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tests.concealed import cell_cases, dynamic_cases, slow_cases, tire_cases
+from tests.concealed import cell_cases, dynamic_cases, labview_cases, slow_cases, tire_cases
 from tests.concealed.model import Scenario
 
 Builder = Callable[[np.random.Generator, frozenset[str]], Scenario]
@@ -48,6 +48,10 @@ FAMILIES: dict[str, Family] = {
         inside=("relaxation", "steer_compliance", "backlash", "thermal_friction", "wear", "nonuniformity",
                 "drum_runout", "turn_slip", *cell_cases.CELL_EFFECTS),
         outside=("hidden_ambient", "hidden_line", "hidden_pulse"),
+    ),
+    "labview": Family(
+        build=labview_cases.build, weight=1, inside=("channel_sign", "channel_swap", "unit_error"),
+        outside=(),
     ),
     "tire-python": Family(
         build=lambda rng, needs: tire_cases.build(rng, kind="python", needs=needs),

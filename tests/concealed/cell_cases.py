@@ -89,7 +89,7 @@ def _specs(rng: np.random.Generator, full: float) -> dict[str, EffectSpec]:
 
 
 def session_files(rng: np.random.Generator, matrix: Array) -> dict[str, str]:
-    """Return SESSION.toml with its loads and check loads: combined loads on the true cells, tared."""
+    """Return SESSION.toml with its loads and check loads: combined loads on the true cells."""
     back = np.linalg.inv(matrix)
 
     def rows(n: int) -> pd.DataFrame:
@@ -112,7 +112,7 @@ indications = ["D51", "D52", "E5"]
 loads = ["FY", "MZ"]
 data = "loads.csv"
 check = "check.csv"
-zero = "tared"
+zero = "included"
 
 [reference]
 standard = "reference loads of the bench"

@@ -127,10 +127,11 @@ def _scenario(
     `cutoff_Hz`: the inputs pass the same anti-alias filter as the outputs; None: they are set, not measured.
     """
     p = {q.name: q.true for q in parameters}
-    spread = dict.fromkeys(outputs, 0.0)
+    spread, peak = dict.fromkeys(outputs, 0.0), dict.fromkeys(outputs, 0.0)
     for run in runs:
         for k, y in truth(run, p, {}).items():
             spread[k] = max(spread[k], float(np.ptp(y)) / 2)
+            peak[k] = max(peak[k], float(np.abs(y).max()))
     ar = COLOURS[int(rng.integers(len(COLOURS)))]
     level = float(rng.uniform(*share))
     rate = 0.003 if rng.random() < 0.3 else 0.0
@@ -158,7 +159,7 @@ def _scenario(
         family=family, kind=kind, title=title, simulation={"kind": kind, "path": "sim.py", **simulation},
         files={"sim.py": source(sim)}, parameters=parameters, channels=channels, outputs=tuple(outputs),
         runs=tuple(runs[:-2]), predict=tuple(runs[-2:]), noise=noise, inputs=recorded, nominal=nominal,
-        truth=truth, effects=effects(spread),
+        truth=truth, effects=effects(peak),
     )  # fmt: skip
 
 

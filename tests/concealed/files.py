@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from tests.concealed.labview_cases import write_xlsx
 from tests.concealed.model import Array, Run, Scenario
 
 
@@ -43,7 +44,8 @@ def case_text(s: Scenario, *, order: dict[str, int]) -> str:
         lines += ["", f"[simulation.parameters.{p.name}]", f"value = {p.declared!r}", f'unit = "{p.unit}"']
         if p.sd is not None:
             lines.append(f"sd = {p.sd:.6g}")
-    lines += ["", "[recording]", 'time = "t"']
+    lines += ["", "[recording]"]
+    lines += [] if s.timeless else ['time = "t"']
     if s.axes:
         lines.append(f"axes = {toml_value(s.axes)}")
     lines += ["", "[recording.channels]"]
@@ -64,6 +66,7 @@ def case_text(s: Scenario, *, order: dict[str, int]) -> str:
 def table(s: Scenario, run: Run, measured: dict[str, Array] | None) -> pd.DataFrame:
     """Return the rows of a run's file; without measured outputs, those of a file to predict."""
     df = s.inputs(run).round(7)
+    df = df.drop(columns="t") if s.timeless else df
     if s.simulated:
         for output, y in s.nominal(df, run, s.declared_parameters()).items():
             df[s.simulated[output]] = y
@@ -75,7 +78,10 @@ def table(s: Scenario, run: Run, measured: dict[str, Array] | None) -> pd.DataFr
 
 
 def write_csv(df: pd.DataFrame, path: Path) -> None:
-    """Write a run: ten significant digits, an empty cell for a missing sample."""
+    """Write a run: ten significant digits, an empty cell for a missing sample; or the machine's columns."""
+    if path.suffix == ".xlsx":
+        write_xlsx(df, path)
+        return
     df.to_csv(path, index=False, float_format="%.10g", lineterminator="\n")
 
 

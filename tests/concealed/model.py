@@ -113,6 +113,8 @@ class Scenario:
     """For kind `columns`: output -> column of the other program."""
     written: Callable[[dict[str, Array]], dict[str, Array]] | None = None
     """The measured outputs as the file has them, where it has others (load cells)."""
+    timeless: bool = False
+    """Steady files without a time channel, printed to so many digits and with no other noise."""
     session: Mapping[str, str] | None = None
     """Files of a reference-load session whose record the case names as record.json."""
 

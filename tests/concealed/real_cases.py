@@ -195,8 +195,11 @@ def ball(sheet: str, *, free_gravity: bool) -> Callable[[Path, Path], None]:
         for k in (1, 2):
             part = book[book["drop"] == k]
             write_csv(part[["t", "H"]], out / f"drop{k}.csv")
-            parameters[f"h{k}"] = {"value": float(part["H"].iloc[0]), "unit": "m", "sd": 0.3}
-            parameters[f"v{k}"] = {"value": 0.0, "unit": "m/s", "sd": 1.0}
+            # height and velocity at the start, from a parabola through the first two thirds of a second
+            first = part[part["t"] < 0.7]
+            _, v, h = np.polyfit(first["t"], first["H"], 2)
+            parameters[f"h{k}"] = {"value": round(float(h), 3), "unit": "m", "sd": 0.1}
+            parameters[f"v{k}"] = {"value": round(float(v), 3), "unit": "m/s", "sd": 0.3}
         (out / "sim.py").write_text(source(fall), encoding="utf-8")
         _toml(
             out, title="A ball dropped from a bridge",
