@@ -18,10 +18,14 @@ def lag(
     Parameters
     ----------
     t : time [s], rising, shape (n,)
-    time_constant : [s], one number or shape (n,), not negative; an interval uses the value at its end
+    time_constant : [s], one number or shape (n,), not negative; an interval uses the value at its end, and
+        without lag anywhere y is x itself
     start : y at the first row; x there by default
     """
-    tau = np.maximum(np.broadcast_to(np.asarray(time_constant, dtype=np.float64), t.shape), 1e-12)[1:]
+    given = np.broadcast_to(np.asarray(time_constant, dtype=np.float64), t.shape)[1:]
+    if start is None and not (given > 0).any():
+        return x.copy()
+    tau = np.maximum(given, 1e-12)
     ratio = np.diff(t) / tau
     decay = np.exp(-ratio)
     # Response to a ramp: y1 = decay*y0 + (1 - decay)*x0 + (1 - (1 - decay)/ratio)*(x1 - x0)

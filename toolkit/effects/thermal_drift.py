@@ -13,13 +13,15 @@ if TYPE_CHECKING:
     from toolkit.effects.signals import Setting
 
 
+_TEMPERATURES = ("T_CELL", "T_AMBIENT", "T", "T_TREAD")  # the nearest to the cell first
+
+
 def _warming(y: NDArray[np.float64], values: Values, setting: Setting) -> NDArray[np.float64]:
-    temperature = setting.channel("T_CELL", "T_AMBIENT", "T", "T_TREAD")
-    if temperature is None:
+    name = next((one for one in _TEMPERATURES if one in setting.channels), None)
+    if name is None or not len(y):
         return y
-    return y + values["coefficient"] * (
-        temperature - setting.first.get("T_CELL", setting.first.get("T_AMBIENT", float(temperature[0])))
-    )
+    temperature = setting.channels[name]
+    return y + values["coefficient"] * (temperature - setting.first.get(name, float(temperature[0])))
 
 
 EFFECT = Effect(
@@ -40,5 +42,5 @@ EFFECT = Effect(
         ),
     ),
     channel=_warming,
-    any_of=("T_CELL", "T_AMBIENT", "T", "T_TREAD"),
+    any_of=_TEMPERATURES,
 )

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from toolkit.effects.signals import Drive, Setting, Tire
 
 
+_TEMPERATURES = ("T_TREAD", "T_TIRE", "T")  # the nearest to the road first
 HEATING_K_PER_KJ = 0.5  # of the tread, where no temperature was recorded (about 2 kJ/K of rubber)
 
 
@@ -29,9 +30,10 @@ def _heated(drive: Drive, values: Values, setting: Setting, tire: Tire) -> Drive
 
 
 def _rise(drive: Drive, values: Values, setting: Setting, tire: Tire) -> NDArray[np.float64]:
-    recorded = setting.channel("T_TREAD", "T_TIRE", "T")
-    if recorded is not None:
-        return recorded - setting.first.get("T_TREAD", setting.first.get("T", float(recorded[0])))
+    name = next((one for one in _TEMPERATURES if one in setting.channels), None)
+    if name is not None and len(drive.t):
+        recorded = setting.channels[name]
+        return recorded - setting.first.get(name, float(recorded[0]))
     power_kW = np.abs(tire(drive).FY * drive.V * np.sin(drive.SA)) * 1e-3
     tau = max(values["time_constant"], 1e-3)
     return HEATING_K_PER_KJ * tau * lag(drive.t, power_kW, tau, start=0.0)

@@ -16,7 +16,8 @@ if TYPE_CHECKING:
 def _twisted(drive: Drive, values: Values, setting: Setting, tire: Tire) -> Drive:
     rate = np.gradient(drive.SA, drive.t) if len(drive.t) > 1 else np.zeros_like(drive.SA)
     phi = -rate / np.maximum(np.abs(drive.V), 1e-6)
-    return dataclasses.replace(drive, FY=drive.FY + values["force"] * phi)
+    # Half a turn about z reverses the travel and FY, and keeps the rate of turn.
+    return dataclasses.replace(drive, FY=drive.FY + setting.travel * values["force"] * phi)
 
 
 EFFECT = Effect(

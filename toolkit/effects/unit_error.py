@@ -27,10 +27,10 @@ FACTORS = {
     "rad read as deg": 1 / 57.29577951308232,
     "kilo": 1000.0,
     "milli": 0.001,
-    "m/s read as km/h": 3.6,
-    "km/h read as m/s": 1 / 3.6,
-    "inch read as mm": 25.4,
-    "mm read as inch": 1 / 25.4,
+    "km/h read as m/s": 3.6,
+    "m/s read as km/h": 1 / 3.6,
+    "mm read as inch": 25.4,
+    "inch read as mm": 1 / 25.4,
 }
 
 

@@ -1,0 +1,64 @@
+"""Force-like terms of an equation of motion: direction, symmetry, energy."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from toolkit.effects.catalogue import effect
+
+PLACES = [(x, v) for x in (-0.7, 0.0, 0.4) for v in (-2.0, -0.1, 0.0, 0.1, 2.0)]
+
+
+def force(name, x, v, **values):
+    return effect(name).force(x, v, values)
+
+
+@pytest.mark.parametrize(
+    ("name", "values"),
+    [
+        ("coulomb_friction", {"coulomb": 3.0}),
+        ("viscous_damping", {"viscous": 2.0}),
+        ("quadratic_drag", {"drag": 0.5}),
+    ],
+)
+def test_friction_is_odd_in_the_velocity_and_never_gives_energy(name, values):
+    for x, v in PLACES:
+        assert force(name, x, v, **values) == pytest.approx(-force(name, x, -v, **values), abs=1e-12)
+        # taken from m a: the power that it takes, force times velocity, is not negative
+        assert force(name, x, v, **values) * v >= 0
+
+
+def test_sizes_by_their_equations():
+    assert force("coulomb_friction", 0.0, 2.0, coulomb=3.0) == pytest.approx(3.0)
+    assert force("coulomb_friction", 0.0, 20.0, coulomb=3.0) == pytest.approx(3.0)
+    assert force("viscous_damping", 0.0, -2.0, viscous=1.5) == pytest.approx(-3.0)
+    assert force("quadratic_drag", 0.0, -2.0, drag=1.5) == pytest.approx(-6.0)
+    assert force("cubic_stiffness", -0.5, 1.0, k3=8.0) == pytest.approx(-1.0)
+    assert abs(force("constant_force", 0.1, 0.2, force=4.0)) == pytest.approx(4.0)
+
+
+def test_ripple_repeats_with_the_position_and_does_no_net_work():
+    values = {"amplitude": 2.0, "period": 0.3, "phase": 25.0}
+    for x, v in PLACES:
+        assert force("periodic_ripple", x + 0.3, v, **values) == pytest.approx(
+            force("periodic_ripple", x, -v, **values), abs=1e-9
+        )
+    work = sum(force("periodic_ripple", 0.3 * i / 360, 1.0, **values) for i in range(360))
+    assert work == pytest.approx(0, abs=1e-9)
+    largest = max(abs(force("periodic_ripple", 0.3 * i / 3600, 1.0, **values)) for i in range(3600))
+    assert largest == pytest.approx(2.0, rel=1e-5)
+
+
+def test_stiffness_conserves_energy():
+    # k3 x^3 is the slope of k3 x^4 / 4, whatever the velocity
+    step = 1e-5
+    for x, v in PLACES:
+        slope = 8.0 / 4 * ((x + step) ** 4 - (x - step) ** 4) / (2 * step)
+        assert force("cubic_stiffness", x, v, k3=8.0) == pytest.approx(slope, abs=1e-7)
+
+
+def test_overflow_is_no_force():
+    assert all(force("overflow", x, v, level=0.1) == 0 for x, v in PLACES)
+    assert math.isinf(effect("overflow").parameters[0].off)
