@@ -14,8 +14,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolkit.diagnosis.noise import whiten
-
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
@@ -25,25 +23,24 @@ _DRAWS = 4_000
 
 
 def search_p_values(
-    screen: Screen, directions: Sequence[dict[str, NDArray[np.float64]]], gains: Sequence[float], seed: int
+    screen: Screen, blocks: Sequence[NDArray[np.float64]], gains: Sequence[float], seed: int
 ) -> list[float]:
     """Return for every statistic the chance that a search without an effect finds one as improbable.
 
     Parameters
     ----------
-    directions : responses of every candidate and start, over all rows of each output, (rows, k)
+    blocks : orthonormal whitened responses of every candidate and start, (values, k)
     gains : their gains of twice the log-likelihood
     """
-    if not directions:
+    if not blocks:
         return []
-    blocks = [_orthonormal(screen, one) for one in directions]
     widths = [one.shape[1] for one in blocks]
     stacked = np.hstack(blocks)
     gram = stacked.T @ stacked
     values, vectors = np.linalg.eigh(gram)
     keep = values > 1e-9 * max(float(values.max()), 1e-300)
     root = vectors[:, keep] * np.sqrt(values[keep])
-    n = sum(where.n for where in screen.layouts.values())
+    n = screen.n
     left = max(n - screen.sizes.size - int(keep.sum()), 1)
     rng = np.random.default_rng(seed)
     normal = rng.standard_normal((_DRAWS, root.shape[1]))
@@ -79,20 +76,3 @@ def _log_p(statistic: NDArray[np.float64], dof: int) -> NDArray[np.float64]:
     tail = gammaincc(0.5 * dof, half)
     far = (0.5 * dof - 1) * np.log(np.maximum(half, 1e-300)) - half - gammaln(0.5 * dof)
     return np.where(tail > 1e-290, np.log(np.maximum(tail, 1e-300)), far)
-
-
-def _orthonormal(screen: Screen, directions: dict[str, NDArray[np.float64]]) -> NDArray[np.float64]:
-    """Return the whitened responses off the nominal parameters, orthonormal, (values, k)."""
-    parts, nominal = [], []
-    for name, where in screen.layouts.items():
-        noise = screen.base.noise[name]
-        parts.append(whiten(directions[name][where.index], where, noise))
-        nominal.append(whiten(screen.columns[name][where.index], where, noise))
-    D, J = np.vstack(parts), np.vstack(nominal)
-    size = np.sqrt((D**2).sum(axis=0))
-    D = D / np.where(size > 0, size, 1.0)
-    if J.shape[1]:
-        q, _ = np.linalg.qr(J / np.maximum(np.sqrt((J**2).sum(axis=0)), 1e-300))
-        D = D - q @ (q.T @ D)
-    u, s, _ = np.linalg.svd(D, full_matrices=False)
-    return np.asarray(u[:, s > 1e-6])

@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from toolkit.diagnosis.answer import NotFound
-from toolkit.diagnosis.noise import whiten
 from toolkit.effects.catalogue import effects
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
 
     from toolkit.diagnosis.screen import Scored, Screen
 
@@ -72,38 +70,18 @@ def not_found(
 
 def _distance(screen: Screen, one: Scored) -> tuple[float, float, float]:
     """Return the whitened response off the nominal parameters, its share of the whole, and the amplitude."""
-    parts, nominal = [], []
-    for name, where in screen.layouts.items():
-        noise = screen.base.noise[name]
-        parts.append(whiten(one.directions[name][where.index][:, 0], where, noise))
-        nominal.append(whiten(screen.columns[name][where.index], where, noise))
-    d, J = np.concatenate(parts), np.vstack(nominal)
-    whole = float(np.linalg.norm(d))
-    left = d - _projected(J, d)
+    raw = screen.rows(one.directions)[:, 0]
+    whole = float(np.linalg.norm(raw))
+    left = raw - screen.coloured.span @ (screen.coloured.span.T @ raw)
     names = one.candidate.active.searched
     amplitude = 0.0
     if names:
         # The size of the first direction: what was switched on, off its own neutral value.
         first = next((each for each in names if each.off is not None), None)
         if first is not None:
-            start = next(
-                (s for s in one.candidate.starts if _same(s.values, one.active.values, first.name)),
-                one.candidate.starts[0],
-            )
             off = first.off if first.off is not None and math.isfinite(first.off) else 0.0
-            amplitude = start.directions[0][first.name] - off
+            amplitude = one.start.directions[0][first.name] - off
     return float(np.linalg.norm(left)), float(np.linalg.norm(left)) / max(whole, 1e-300), amplitude
-
-
-def _same(start: dict[str, float], values: Mapping[str, float], amplitude: str) -> bool:
-    return all(values.get(name) == value for name, value in start.items() if name != amplitude)
-
-
-def _projected(J: NDArray[np.float64], d: NDArray[np.float64]) -> NDArray[np.float64]:
-    if not J.shape[1]:
-        return np.zeros_like(d)
-    q, _ = np.linalg.qr(J / np.maximum(np.sqrt((J**2).sum(axis=0)), 1e-300))
-    return np.asarray(q @ (q.T @ d))
 
 
 def _noncentrality(alpha: float, dof: int) -> float:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolkit.diagnosis.candidates import Candidate
+from toolkit.diagnosis.candidates import Candidate, Start
 from toolkit.diagnosis.fit import Fit, jacobian, log_prior
 from toolkit.diagnosis.model import Active
 from toolkit.diagnosis.noise import Layout, Noise, fit_noise, log_likelihood, whiten
@@ -35,14 +35,17 @@ _COLLINEAR = 1e-11  # of the largest eigenvalue: what lies below adds nothing th
 class Scored:
     """One candidate from one start: the gain of twice the log-likelihood and where a fit should begin.
 
-    ``directions`` are its responses over all rows of each output, one column for each amplitude.
+    ``directions`` are its responses over all rows of each output, one column for each amplitude; ``block``
+    the same whitened, off the nominal parameters, orthonormal. A gain is first a quick one, at the noise of
+    the fit or at white noise, whichever is larger; `Screen.sharpened` makes the best ones exact.
     """
 
     candidate: Candidate
+    start: Start
     active: Active
     gain: float
     directions: Stacked
-    coefficients: tuple[float, ...]
+    block: NDArray[np.float64]
 
     @property
     def dof(self) -> int:
@@ -51,8 +54,22 @@ class Scored:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class Weighed:
+    """Rows of all outputs under one noise, with the priors beneath; what the nominal parameters span."""
+
+    noise: dict[str, Noise]
+    span: NDArray[np.float64]
+    left: NDArray[np.float64]
+
+    @property
+    def rest(self) -> float:
+        """Sum of squares that the nominal parameters leave."""
+        return float(self.left @ self.left)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Screen:
-    """What every candidate is held against: a fit, its Jacobian and its noise."""
+    """What every candidate is held against: a fit, its Jacobian, and its residual under two noises."""
 
     problem: Problem
     base: Fit
@@ -60,16 +77,27 @@ class Screen:
     sizes: NDArray[np.float64]
     layouts: dict[str, Layout]
     log_likelihood: float
+    coloured: Weighed
+    white: Weighed
 
     @staticmethod
     def of(problem: Problem, base: Fit) -> Screen:
         """Return the screen about a fit."""
         columns, sizes = jacobian(problem, base)
         layouts = {name: problem.layout(name) for name in problem.names}
-        return Screen(problem, base, columns, sizes, layouts, base.log_posterior)
+        plain = {name: Noise(reflection=(), sd=one.marginal_sd) for name, one in base.noise.items()}
+        coloured, white = (
+            _weighed(problem, base, columns, sizes, layouts, noise) for noise in (base.noise, plain)
+        )
+        return Screen(problem, base, columns, sizes, layouts, base.log_posterior, coloured, white)
+
+    @property
+    def n(self) -> int:
+        """Number of values that count."""
+        return sum(where.n for where in self.layouts.values())
 
     def score(self, candidate: Candidate) -> list[Scored]:
-        """Return the gains of a candidate, one for each start that the simulation can run."""
+        """Return a candidate with its quick gains, one for each start that the simulation can run."""
         made = []
         for start in candidate.starts:
             responses = []
@@ -86,19 +114,67 @@ class Screen:
             if not any(np.isfinite(one).all() and np.abs(one).max() > 0 for one in directions.values()):
                 continue
             directions = {name: np.nan_to_num(one) for name, one in directions.items()}
-            gain, coefficients = self.gain(directions, fixed=candidate.discrete)
-            values = dict(start.values)
-            for name, c in zip(start.amplitudes, coefficients, strict=False):
-                off = next(one.off for one in candidate.active.effect.parameters if one.name == name) or 0.0
-                if math.isfinite(off) and not candidate.discrete:
-                    values[name] = off + c * (start.values[name] - off)
+            gain, block = self.quick(directions, fixed=candidate.discrete)
+            active = replace(candidate.active, values=start.values)
             made.append(
                 Scored(
-                    candidate=candidate, active=replace(candidate.active, values=values), gain=gain,
-                    directions=directions, coefficients=coefficients,
+                    candidate=candidate,
+                    start=start,
+                    active=active,
+                    gain=gain,
+                    directions=directions,
+                    block=block,
                 )
-            )  # fmt: skip
+            )
         return made
+
+    def quick(self, directions: Stacked, *, fixed: bool = False) -> tuple[float, NDArray[np.float64]]:
+        """Return twice the gain at a fixed noise, the better of two, and the responses' orthonormal block."""
+        gains, blocks = [], []
+        for under in (self.coloured, self.white):
+            raw = self._rows(directions, under.noise)
+            raw = raw - under.span @ (under.span.T @ raw)
+            block = _orthonormal(raw)
+            if fixed:
+                left = float(np.sum((under.left - raw.sum(axis=1)) ** 2))
+            else:
+                left = under.rest - float(np.sum((block.T @ under.left) ** 2))
+            gains.append(self.n * math.log(under.rest / max(left, 1e-12 * under.rest)))
+            blocks.append(block)
+        # White noise overrates what is smooth; as a first look that is what is wanted.
+        return (max(gains) if self._is_coloured else gains[0]), blocks[0]
+
+    @property
+    def _is_coloured(self) -> bool:
+        return any(one.reflection for one in self.base.noise.values())
+
+    def rows(self, directions: Stacked) -> NDArray[np.float64]:
+        """Return responses whitened by the fit's noise, (values and priors, columns)."""
+        return self._rows(directions, self.coloured.noise)
+
+    def _rows(self, directions: Stacked, noise: dict[str, Noise]) -> NDArray[np.float64]:
+        parts = [
+            whiten(directions[name][where.index], where, noise[name]) for name, where in self.layouts.items()
+        ]
+        none = np.zeros((len(self.problem.free), parts[0].shape[1]))
+        return np.vstack([*parts, none])
+
+    def sharpened(self, scored: Sequence[Scored], most: int) -> list[Scored]:
+        """Return all of them, the ``most`` best with their exact gain and the values at which it is reached."""
+        ranked = sorted(scored, key=lambda one: -one.gain)
+        made = [self._exact(one) for one in ranked[:most]]
+        least = min((one.gain for one in made), default=0.0)
+        # What was not sharpened keeps its quick gain, but never ranks before what was.
+        return [*made, *(replace(one, gain=min(one.gain, least)) for one in ranked[most:])]
+
+    def _exact(self, one: Scored) -> Scored:
+        gain, coefficients = self.gain(one.directions, fixed=one.candidate.discrete)
+        values = dict(one.start.values)
+        for name, c in zip(one.start.amplitudes, coefficients, strict=False):
+            off = next(each.off for each in one.active.effect.parameters if each.name == name) or 0.0
+            if math.isfinite(off) and not one.candidate.discrete:
+                values[name] = off + c * (one.start.values[name] - off)
+        return replace(one, gain=gain, active=replace(one.active, values=values))
 
     def gain(self, directions: Stacked, *, fixed: bool = False) -> tuple[float, tuple[float, ...]]:
         """Return twice the gain of the log-likelihood, and the responses' coefficients.
@@ -107,7 +183,7 @@ class Screen:
         """
         width = next(iter(directions.values())).shape[1]
         best, chosen = -math.inf, tuple([1.0] * width)
-        for first in (self.base.noise, None):
+        for first in (self.base.noise, None) if self._is_coloured else (self.base.noise,):
             known = first
             for _ in range(_TURNS):
                 made = self._once(directions, known, fixed=fixed)
@@ -164,6 +240,41 @@ class Screen:
             tuple([1.0] * next(iter(directions.values())).shape[1]) if fixed else tuple(found[n_p:].tolist())
         )
         return total, coefficients, made
+
+
+def _weighed(
+    problem: Problem,
+    base: Fit,
+    columns: Stacked,
+    sizes: NDArray[np.float64],
+    layouts: dict[str, Layout],
+    noise: dict[str, Noise],
+) -> Weighed:
+    blocks, targets = [], []
+    for name, where in layouts.items():
+        blocks.append(whiten(columns[name][where.index], where, noise[name]))
+        targets.append(whiten(base.residual[name][where.index], where, noise[name]))
+    prior = np.zeros((len(problem.free), len(sizes)))
+    for i, one in enumerate(problem.free):
+        prior[i, i] = sizes[i] / (one.sd or 1.0)
+    at_prior = [-(v - one.value) / (one.sd or 1.0) for v, one in zip(base.p, problem.free, strict=True)]
+    span = _orthonormal(np.vstack([*blocks, prior]))
+    target = np.concatenate([*targets, np.array(at_prior)])
+    return Weighed(noise, span, target - span @ (span.T @ target))
+
+
+def _orthonormal(columns: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return an orthonormal basis of columns, (rows, rank), by their Gram matrix."""
+    if not columns.shape[1]:
+        return columns
+    size = np.sqrt((columns**2).sum(axis=0))
+    scaled = columns / np.where(size > 0, size, 1.0)
+    values, vectors = np.linalg.eigh(scaled.T @ scaled)
+    keep = values > 1e-10 * max(float(values.max()), 1e-300)
+    made = (scaled @ vectors[:, keep]) / np.sqrt(values[keep])
+    # Once more, against what rounding left.
+    q, _ = np.linalg.qr(made)
+    return np.asarray(q)
 
 
 def best_of(scored: Sequence[Scored]) -> list[Scored]:

@@ -20,6 +20,8 @@ from toolkit.diagnosis.structure import Group, groups
 ALPHA = 0.01  # of the whole search, a step
 ALPHA_STRUCTURE = 0.002
 MOST_EFFECTS = 4
+_SHARPENED = 30  # starts whose gain is computed with the noise estimated anew
+_FAR_BEHIND = 0.25  # of the best gain: a candidate below cannot win a joint fit
 _REFINED = 8  # candidates that are fitted jointly, of those that screening ranks first
 _CLOSE = 3.0  # log-likelihood within which two effects cannot be told apart
 _LEAST_GAIN = 1.5  # of the held-out log score
@@ -124,10 +126,10 @@ def search(problem: Problem, *, seed: int, budget: Budget) -> Search:
             screen = Screen.of(problem, base)
             taken = {_place(one) for one in base.active}
             left = [each for each in listed if _place(each.active) not in taken]
-            scored = [one for each in left for one in screen.score(each)]
+            scored = screen.sharpened([one for each in left for one in screen.score(each)], _SHARPENED)
             ranked = best_of(scored)
             p_values = search_p_values(
-                screen, [one.directions for one in scored], [one.gain for one in scored], seed + turn
+                screen, [one.block for one in scored], [one.gain for one in scored], seed + turn
             )
             p_of = {id(one): p for one, p in zip(scored, p_values, strict=True)}
             budget.check(f"step {turn + 1}: structure of the residual")
@@ -136,7 +138,11 @@ def search(problem: Problem, *, seed: int, budget: Budget) -> Search:
                 before = structure
             if turn == MOST_EFFECTS:
                 break
-            promising = [one for one in ranked if p_of[id(one)] < ALPHA][:_REFINED]
+            promising = [
+                one
+                for one in ranked
+                if p_of[id(one)] < ALPHA and one.gain > min(_FAR_BEHIND * ranked[0].gain, ranked[0].gain - 40)
+            ][:_REFINED]
             if not promising:
                 break
             told = ", ".join(dict.fromkeys(one.candidate.name for one in promising))
@@ -245,8 +251,16 @@ def _place(one: Active) -> tuple[object, ...]:
 def _structure(problem: Problem, screen: Screen, base: Fit, seed: int) -> tuple[StructureFound, ...]:
     listed: list[Group] = groups(problem, base)
     directions = [one.directions(problem) for one in listed]
-    gains = [screen.gain(one)[0] for one in directions]
-    p_values = search_p_values(screen, directions, gains, seed)
+    quick = [screen.quick(one) for one in directions]
+    order = sorted(range(len(listed)), key=lambda i: -quick[i][0])
+    gains = [gain for gain, _ in quick]
+    for place, i in enumerate(order):
+        if place < _SHARPENED // 2:
+            gains[i] = screen.gain(directions[i])[0]
+    least = min((gains[i] for i in order[: _SHARPENED // 2]), default=0.0)
+    for i in order[_SHARPENED // 2 :]:
+        gains[i] = min(gains[i], least)
+    p_values = search_p_values(screen, [block for _, block in quick], gains, seed)
     found = [
         StructureFound(output=one.output, variables=one.variables, gain=gain, p_value=p)
         for one, gain, p in zip(listed, gains, p_values, strict=True)
