@@ -21,6 +21,7 @@ from tests.benchmarks import (
     process_time,
     report_batch,
     report_time,
+    tire_fits,
     verify_records,
 )
 
@@ -33,6 +34,7 @@ BENCHES: dict[str, Callable[[Path, int], list[dict[str, object]]]] = {
     "verify": verify_records.run,
     "monte-carlo": monte_carlo.run,
     "audit": audit_rate.run,
+    "tires": tire_fits.run,
 }
 
 
