@@ -161,3 +161,13 @@ class TestSummary:
         done = deliver(template, build_audit_content(view), tmp_path, name="audit")
         assert done.pdf.read_bytes().startswith(b"%PDF")
         assert not [one for one in done.checks if not one.ok and not one.warning]
+
+    def test_a_template_is_known_by_its_tags_and_asks_for_no_reports_tags(self):
+        from toolkit.report.audit_vocabulary import AUDIT
+        from toolkit.report.certificate.vocabulary import CERTIFICATE
+        from toolkit.report.vocabulary import REPORT
+
+        asked = ("tk:test.name", "tk:certificate.id", "tk:audit.id")
+        assert AUDIT.demanded(asked) == ("tk:audit.heads", "tk:audit.id")
+        assert "tk:audit.id" not in REPORT.demanded(asked)
+        assert "tk:audit.id" not in CERTIFICATE.demanded(asked)
