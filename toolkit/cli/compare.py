@@ -85,6 +85,9 @@ def command(
     load cell) cancels. Which are significant is decided over the whole table. Repeats of one tire give
     repeatability and intermediate precision by day, operator, mounting.
 
+    A maker's table holds forces (SA [deg],FZ [N],FY [N],MZ [N*m]) or characteristics (FZ [N],conicity [N],
+    U_conicity [N],plysteer [N],secant_cornering [N/deg],...). The document's units are its style file's.
+
     Ends with 0 whether or not there are differences: they are results. 1: the data has findings.
 
     Example: toolkit compare tests/steel tests/sandpaper --figures figures
