@@ -12,6 +12,7 @@ from typing import Any
 
 from tests.concealed import page
 from tests.concealed.batch import draw_batch, seed_of
+from tests.concealed.real import run_real
 from tests.concealed.running import run_batch
 from tests.concealed.score import score_batch
 from tests.concealed.seal import SealError, verify
@@ -56,55 +57,86 @@ def _score(given: argparse.Namespace) -> None:
         print(f"{state}  {bar.title}: {bar.observed} ({bar.asked})")  # noqa: T201
 
 
+def _draw(given: argparse.Namespace) -> None:
+    found = draw_batch(
+        given.out,
+        seed=seed_of(given.seed),
+        cases=given.cases,
+        workers=given.workers,
+        progress=lambda n: _say(f"{n} drawn"),
+    )
+    print(f"answers {found['answers_sha256']}\ndata    {found['data_sha256']}")  # noqa: T201
+
+
+def _run(given: argparse.Namespace) -> None:
+    run_batch(given.out, tool=[given.tool], workers=given.workers, budget=given.budget, progress=_say)
+
+
+def _real(given: argparse.Namespace) -> None:
+    run_real(given.data, given.out / "real", tool=[given.tool], budget=given.budget, progress=_say)
+
+
+def _verify(given: argparse.Namespace) -> None:
+    found = verify(given.out)
+    print(f"answers {found['answers_sha256']}\ndata    {found['data_sha256']}")  # noqa: T201
+
+
+def _all(given: argparse.Namespace) -> None:
+    """Do what of a proof is not yet done; a batch that was drawn is never drawn again."""
+    if not (given.out / "batch.json").exists():
+        _draw(given)
+    _run(given)
+    _real(given)
+    _score(given)
+
+
+STEPS = {"draw": _draw, "run": _run, "real": _real, "score": _score, "verify": _verify, "all": _all}
+_HELP = {
+    "draw": "draw a batch and seal its answers",
+    "run": "run the tool once on every case; resumable",
+    "real": "make and run the cases of public recordings",
+    "score": "open, score and write PROOF.md and proof.html",
+    "verify": "compare a batch with its seal",
+    "all": "whatever of these is not done yet",
+}
+
+
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="python -m tests.concealed", description=__doc__)
     steps = parser.add_subparsers(dest="step", required=True)
-    draw = steps.add_parser("draw", help="draw a batch and seal its answers")
-    draw.add_argument("--seed", default="os", help='a number, or "os": nobody chose it (default)')
-    draw.add_argument("--cases", type=int, default=400, help="without the negative controls, 6 %% more")
-    run = steps.add_parser("run", help="run the tool once on every case; resumable")
-    score = steps.add_parser("score", help="open, score and write PROOF.md and proof.html")
-    score.add_argument("--proof", type=Path, help="folder of PROOF.md and proof.html (default: the batch's)")
-    score.add_argument("--log", type=Path, help="file of batches to append to (one JSON object a line)")
-    score.add_argument("--changed", default="", help="what changed since the batch before, for the log")
-    real = steps.add_parser("real", help="make and run the cases of public recordings")
-    real.add_argument("--data", type=Path, required=True, help="folder of the recordings")
-    check = steps.add_parser("verify", help="compare a batch with its seal")
-    for step in (run, real):
-        step.add_argument("--tool", default=str(TOOL), help="the command (default: the one of this Python)")
-        step.add_argument("--budget", type=float, default=600.0, help="seconds for one case")
-    for step in (draw, run, score, real, check):
+    for name, text in _HELP.items():
+        step = steps.add_parser(name, help=text)
         step.add_argument("--out", type=Path, required=True, help="the batch's folder")
         step.add_argument("--workers", type=int, default=2)
+        if name in ("draw", "all"):
+            step.add_argument("--seed", default="os", help='a number, or "os": nobody chose it (default)')
+            step.add_argument("--cases", type=int, default=400, help="controls, 6 %% more, not counted")
+        if name in ("run", "real", "all"):
+            step.add_argument(
+                "--tool", default=str(TOOL), help="the command (default: the one of this Python)"
+            )
+            step.add_argument("--budget", type=float, default=600.0, help="seconds for one case")
+        if name in ("real", "all"):
+            step.add_argument(
+                "--data", type=Path, default=Path("../shared/data"), help="the public recordings"
+            )
+        if name in ("score", "all"):
+            step.add_argument("--proof", type=Path, help="folder of PROOF.md and proof.html (default: --out)")
+            step.add_argument("--log", type=Path, help="file of batches to append to, one JSON object a line")
+            step.add_argument(
+                "--changed", default="", help="what changed since the batch before, for the log"
+            )
     return parser
 
 
 def main(argv: list[str] | None = None) -> int:
-    """Run one step; exit 1 where a seal is broken."""
+    """Do one step; exit 1 where a seal is broken."""
     given = _parser().parse_args(argv)
     try:
-        if given.step == "draw":
-            show = lambda n: _say(f"{n} drawn")  # noqa: E731
-            found = draw_batch(
-                given.out, seed=seed_of(given.seed), cases=given.cases, workers=given.workers, progress=show
-            )
-        elif given.step == "run":
-            run_batch(given.out, tool=[given.tool], workers=given.workers, budget=given.budget, progress=_say)
-            return 0
-        elif given.step == "score":
-            _score(given)
-            return 0
-        elif given.step == "real":
-            from tests.concealed.real import run_real
-
-            run_real(given.data, given.out / "real", tool=[given.tool], budget=given.budget, progress=_say)
-            return 0
-        else:
-            found = verify(given.out)
+        STEPS[given.step](given)
     except SealError as error:
         print(f"seal broken: {error}", file=sys.stderr)  # noqa: T201
         return 1
-    print(f"answers {found['answers_sha256']}\ndata    {found['data_sha256']}")  # noqa: T201
     return 0
 
 

@@ -19,7 +19,7 @@ from tests.concealed.draw import draw_case
 from tests.concealed.intervals import Rate, rate
 from tests.concealed.judge import Judgment, judge
 from tests.concealed.running import answer_of
-from tests.concealed.seal import opened
+from tests.concealed.seal import SealError, opened
 
 NAMED = ("single", "two", "confounded")
 SIZES = (0.1, 0.5, 1.0, 2.0, 4.0, 8.0, np.inf)
@@ -53,6 +53,8 @@ def _gaps(job: tuple[Path, str, int, dict[str, Any], list[dict[str, Any]]]) -> d
         done: dict[str, Any] = json.loads(store.read_text(encoding="utf-8"))
         return done
     drawn = draw_case(seed, sealed["index"], sealed["bucket"], compare=False)
+    if drawn.answer["parameters"] != sealed["parameters"] or drawn.answer["size"] != sealed["size"]:
+        raise SealError(f"{case} was drawn by another state of the generator; score it with that one")
     s = drawn.scenario
     params = oracle.refit(s, drawn.measured)
     verdicts = baselines.all_methods(s, drawn.measured, params)

@@ -10,7 +10,7 @@ import pytest
 
 HERE = Path(__file__).parent
 ALLOWED = {"numpy", "scipy", "pandas", "openpyxl", "tests"}
-MODULES = sorted(p for p in HERE.rglob("*.py") if not p.name.startswith("test_"))
+MODULES = sorted(p for p in HERE.rglob("*.py") if not p.name.startswith(("test_", "conftest")))
 
 
 def imports(path: Path) -> set[str]:

@@ -11,9 +11,11 @@ import pytest
 from tests.concealed.batch import draw_batch, seed_of
 from tests.concealed.seal import SealError, opened, verify
 
+pytestmark = pytest.mark.usefixtures("light_families")
+
 
 @pytest.fixture(scope="module")
-def batch(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def batch(light_families: None, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Three small cases, sealed."""
     folder = tmp_path_factory.mktemp("sealed") / "batch"
     draw_batch(folder, seed=41, cases=3, workers=1)

@@ -25,6 +25,9 @@ answer = {"schema": 1, "verdict": "nothing", "effects": [], "mismatch": [], "not
 """
 
 
+pytestmark = pytest.mark.usefixtures("light_families")
+
+
 @pytest.fixture(scope="module")
 def tool(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A program that answers "nothing" to every case, and counts."""
@@ -36,7 +39,7 @@ def tool(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def batch(tool: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def batch(tool: Path, light_families: None, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A batch of four that was drawn and run."""
     out = tmp_path_factory.mktemp("batch") / "b"
     common = ["--out", str(out), "--workers", "1"]
@@ -93,6 +96,31 @@ def test_a_broken_seal_ends_with_one(batch: Path, tmp_path: Path, capsys: pytest
     (broken / "cases" / "case0001" / "CASE.toml").write_text("schema = 1\n")
     assert main(["verify", "--out", str(broken)]) == 1
     assert "seal broken" in capsys.readouterr().err
+
+
+def test_a_batch_of_another_state_of_the_generator_is_not_scored(batch: Path, tmp_path: Path) -> None:
+    import hashlib
+    import shutil
+
+    other = Path(shutil.copytree(batch, tmp_path / "b", ignore=shutil.ignore_patterns("score")))
+    path = other / "sealed" / "answers.json"
+    answers = json.loads(path.read_text())
+    answers["seed"] = hex(107)
+    path.write_text(json.dumps(answers))
+    sealed = json.loads((other / "batch.json").read_text())
+    sealed["answers_sha256"] = hashlib.sha256(path.read_bytes()).hexdigest()
+    (other / "batch.json").write_text(json.dumps(sealed))
+    assert main(["score", "--out", str(other), "--workers", "1"]) == 1
+
+
+def test_all_steps_in_one_command(tool: Path, tmp_path: Path) -> None:
+    out = tmp_path / "b"
+    given = ["all", "--out", str(out), "--seed", "106", "--cases", "1", "--workers", "1", "--tool", str(tool)]
+    assert main([*given, "--data", str(tmp_path / "nowhere")]) == 0
+    first = (out / "batch.json").read_bytes()
+    assert main([*given, "--data", str(tmp_path / "nowhere")]) == 0
+    assert (out / "batch.json").read_bytes() == first
+    assert "Real recordings" in (out / "PROOF.md").read_text()
 
 
 def _case(name: str) -> real_cases.RealCase:
