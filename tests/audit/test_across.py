@@ -176,3 +176,28 @@ class TestEffects:
         whole_test(tmp_path / "right")
         (test,) = audit(tmp_path).tests
         assert (test["not_clean"], test["effects"]) == (0, [])
+
+
+def test_the_new_stiffness_is_that_of_the_reduced_test_before_its_common_load(virtual_test):
+    # Two ways to the same means: the audit's, and the whole reduction; a tare cancels in the difference.
+    from toolkit.pipeline import process, read_test
+    from toolkit.recording.folder import read_test_folder
+
+    folder = read_test_folder(virtual_test)
+    record = Registry(CALIBRATIONS).load("m15-virtual-r1")
+    reduced = process(folder, read_test(folder), record).reduced
+    sides = {
+        (c.rotation, c.step_FZ, round(math.degrees(c.step_SA))): c
+        for c in reduced.conditions
+        if c.used and c.step_SA is not None
+    }
+    (test,) = audit(virtual_test.parent).tests
+    got = [e for e in test["effects"] if e["name"] in ("cornering_stiffness", "aligning_stiffness")]
+    assert len(got) == 20  # two directions, five loads
+    for one in got:
+        a, b = (sides[one["rotation"], one["load_N"], angle] for angle in (-1, 1))
+        if one["name"] == "cornering_stiffness":
+            expected = -(b.FY - a.FY) / (b.SA - a.SA)
+        else:
+            expected = (b.MZ - a.MZ) / (b.SA - a.SA)
+        assert one["new"] == pytest.approx(expected, rel=1e-9)

@@ -2,7 +2,8 @@
 
 Both are read off the means of the load blocks in one way, so that nothing but the calibration differs: the
 stiffness is the secant through the +-1 deg steps (thesis, SAE), pull the line through the steps next to
-0 deg of a forward and a reversed run. `toolkit process` fits curves; this compares without them.
+0 deg of a forward and a reversed run, each at the load as it was. `toolkit process` subtracts a tare, carries
+to a common load and fits curves; this compares without them.
 """
 
 from __future__ import annotations
