@@ -87,13 +87,13 @@ def aligning(
 
 def forces(p: Mapping[str, float], q: State, *, UNLOADED_RADIUS: float) -> Forces:
     """Return FX, FY, MZ of combined slip (4.E50, 4.E58, 4.E71); without kappa it is pure side slip."""
-    pure, leaned, upright = longitudinal(p, q), side(p, q), side(p, q.upright())
+    pure, leaned = longitudinal(p, q), side(p, q)
     FX = weight_x(p, q) * pure.FX
-    FY = weight_y(p, q) * leaned.FY + kappa_force(p, q, leaned.friction)
-    MZ = _moment(
-        p, q, leaned,
-        FY=weight_y(p, q.upright()) * upright.FY, ratio=pure.K / leaned.K, UNLOADED_RADIUS=UNLOADED_RADIUS,
-    )  # fmt: skip
+    reduced = weight_y(p, q) * leaned.FY
+    FY = reduced + kappa_force(p, q, leaned.friction)
+    # Without camber the upright tire is the tire itself: half of the work.
+    upright = weight_y(p, q.upright()) * side(p, q.upright()).FY if np.any(q.g) else reduced
+    MZ = _moment(p, q, leaned, FY=upright, ratio=pure.K / leaned.K, UNLOADED_RADIUS=UNLOADED_RADIUS)
     MZ = MZ + arm(p, q, FY=FY, UNLOADED_RADIUS=UNLOADED_RADIUS) * FX
     return Forces(FX=FX, FY=FY, MZ=MZ)
 
