@@ -113,9 +113,10 @@ def _signals(
         return source, (channel,)
     if not known and parts:
         expected = f"the effect's name alone{', or .' + ', .'.join(effect.names) if effect.names else ''}"
+        near = difflib.get_close_matches(parts[0], effect.names, n=1, cutoff=0.5)
         raise _wrong(
             f"effect {effect.name!r} acts on the whole machine", where, parts[0], expected,
-            "correct the part after the dot",
+            f"did you mean {near[0]!r}?" if near else "correct the part after the dot",
         )  # fmt: skip
     if len(parts) > 1:
         raise _wrong(
