@@ -139,7 +139,13 @@ def _dynamic_scale(problem: Problem, active: Active, one: EffectParameter) -> fl
         "k3": force / place**3,
         "period": place,
         "level": place,
+        "presliding": speed * _row_time(problem),
     }[one.name]
+
+
+def _row_time(problem: Problem) -> float:
+    steps = np.concatenate([np.diff(run.t) for run in problem.runs if run.rows > 1] or [np.ones(1)])
+    return float(np.median(steps))
 
 
 def _motion_scales(problem: Problem, active: Active) -> tuple[float, float, float]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 import hashlib
 import math
 from pathlib import Path
@@ -12,12 +13,12 @@ import numpy as np
 from toolkit.channels import AXES, Axes
 from toolkit.diagnosis.case import KINDS, ROLES, Case, CaseChannel, CaseParameter, Role, Run, Simulation
 from toolkit.diagnosis.recordings import read_run
-from toolkit.errors import ConfigError
-from toolkit.files import check_keys, parse_toml, read_bytes
+from toolkit.errors import ConfigError, UnitError
+from toolkit.files import check_keys, parse_toml, read_bytes, read_regular
 from toolkit.units import unit
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
 _TOP = ("schema", "title", "simulation", "recording")
 _KEYS = {
@@ -56,10 +57,11 @@ def read_case(path: Path) -> Case:
     check_keys(recording, _RECORDING, where=f"{path}: recording")
     axes = recording.get("axes", "machine")
     if axes not in AXES:
-        raise _wrong("unknown axis system", f"{path}: recording.axes", axes, ", ".join(AXES))
+        raise _one_of("unknown axis system", f"{path}: recording.axes", axes, AXES)
     channels = _channels(recording.get("channels"), f"{path}: recording.channels")
     time = _time(recording, channels, path)
     digest = hashlib.sha256(data)
+    _different_files(_list(recording, "run", path), path)
     runs = [
         _run(
             entry,
@@ -90,9 +92,9 @@ def read_case(path: Path) -> Case:
         )
         for i, entry in enumerate(_list(recording, "predict", path), start=1)
     ]
-    for one in (simulation.path, simulation.tire):
+    for one in (simulation.path, simulation.tire, _record_beside(simulation, path)):
         if one is not None:
-            digest.update(read_bytes(one))
+            digest.update(_content(one))
     if not any(one.role == "output" for one in channels):
         raise _wrong(
             "a case has nothing to be judged on",
@@ -119,7 +121,7 @@ def _simulation(entry: object, path: Path) -> tuple[Simulation, tuple[CaseParame
     table = _table(entry, where)
     kind = table.get("kind")
     if kind not in KINDS:
-        raise _wrong("unknown kind of simulation", f"{where}.kind", kind, ", ".join(KINDS))
+        raise _one_of("unknown kind of simulation", f"{where}.kind", kind, KINDS)
     check_keys(table, _KEYS[kind], where=where)
     parameters = tuple(
         _parameter(name, one, f"{where}.parameters.{name}")
@@ -144,6 +146,7 @@ def _parameter(name: str, entry: object, where: str) -> CaseParameter:
     text = table.get("unit")
     if not isinstance(text, str):
         raise _wrong("a parameter has no unit", f"{where}.unit", text, 'unit = "kg" (or "1" for a number)')
+    _known_unit(text, f"{where}.unit")
     value = _number(table.get("value"), f"{where}.value")
     sd = None if "sd" not in table else _number(table["sd"], f"{where}.sd")
     if sd is not None and sd <= 0:
@@ -171,10 +174,10 @@ def _channels(entry: object, where: str) -> tuple[CaseChannel, ...]:
         text = table.get("unit")
         if not isinstance(text, str):
             raise _wrong("a channel has no unit", f"{where}.{name}.unit", text, 'unit = "N"')
-        unit(text)
+        _known_unit(text, f"{where}.{name}.unit")
         role = table.get("role")
         if role not in ROLES:
-            raise _wrong("a channel has no known role", f"{where}.{name}.role", role, ", ".join(ROLES))
+            raise _one_of("a channel has no known role", f"{where}.{name}.role", role, ROLES)
         sd = None if "sd" not in table else _number(table["sd"], f"{where}.{name}.sd")
         if sd is not None and sd <= 0:
             raise _wrong("a channel's noise is not positive", f"{where}.{name}.sd", sd, "a number above zero")
@@ -228,11 +231,13 @@ def _run(
         raise _wrong("a run has no file", f"{where}.file", file, 'file = "run01.csv"')
     for key, value in table.items():
         if key in _CONDITIONS and value not in _CONDITIONS[key]:
-            raise _wrong("unknown condition", f"{where}.{key}", value, ", ".join(_CONDITIONS[key]))
+            raise _one_of("unknown condition", f"{where}.{key}", value, _CONDITIONS[key])
     path = folder / file
-    digest.update(read_bytes(path))
+    data = _content(path)
+    digest.update(data)
     return read_run(
         path,
+        data,
         name=file,
         channels=channels,
         time=time,
@@ -251,7 +256,10 @@ def _pairs(table: Mapping[str, Any], where: str) -> tuple[tuple[str, str], ...]:
 
 
 def _units(entry: object, where: str) -> tuple[tuple[str, str], ...]:
-    return tuple((name, _text(one, f"{where}.{name}")) for name, one in _table(entry, where).items())
+    made = tuple((name, _text(one, f"{where}.{name}")) for name, one in _table(entry, where).items())
+    for name, text in made:
+        _known_unit(text, f"{where}.{name}")
+    return made
 
 
 def _names(entry: object, where: str) -> tuple[str, ...]:
@@ -292,6 +300,63 @@ def _number(entry: object, where: str) -> float:
     if isinstance(entry, bool) or not isinstance(entry, int | float) or not math.isfinite(entry):
         raise _wrong("an entry is no number", where, entry, "a finite number")
     return float(np.float64(entry))
+
+
+def _known_unit(text: str, where: str) -> None:
+    """Refuse a unit that nobody knows, and name its place in the case."""
+    try:
+        unit(text)
+    except UnitError as error:
+        raise _wrong("a unit is unknown", where, text, str(error.expected)) from error
+
+
+def _content(path: Path) -> bytes:
+    """Return a file that the case names, whole."""
+    try:
+        return read_regular(path)
+    except (OSError, ValueError) as error:
+        raise ConfigError(
+            "a file that the case names cannot be read",
+            where=path,
+            got=getattr(error, "strerror", None) or error,
+            expected="a readable regular file; paths are relative to the case file",
+            next_step="correct the path in the case",
+            rule="no-file",
+        ) from error
+
+
+def _record_beside(simulation: Simulation, path: Path) -> Path | None:
+    """Return the calibration's file where the case names one, None for a registry's id."""
+    named = path.parent / simulation.calibration
+    return named if simulation.calibration and named.is_file() else None
+
+
+def _different_files(entries: list[Any], path: Path) -> None:
+    """Refuse a recording that stands twice: held out as one run, it would be seen as the other."""
+    seen: set[Path] = set()
+    for i, entry in enumerate(entries, start=1):
+        file = entry.get("file") if isinstance(entry, dict) else None
+        if not isinstance(file, str):
+            continue
+        real = (path.parent / file).resolve()
+        if real in seen:
+            raise _wrong(
+                "a recording stands twice",
+                f"{path}: recording.run[{i}].file",
+                file,
+                "another file: a run that is held out must not have been seen",
+            )
+        seen.add(real)
+
+
+def _one_of(what: str, where: str, got: object, known: Sequence[str]) -> ConfigError:
+    """Return the error of a word that is none of those known, with the nearest one."""
+    lowered = {one.lower(): one for one in known}
+    near = difflib.get_close_matches(str(got).lower(), list(lowered), n=1, cutoff=0.5)
+    made = _wrong(what, where, got, ", ".join(known))
+    if near:
+        made.next_step = f"did you mean {lowered[near[0]]!r}?"
+    return made
 
 
 def _wrong(what: str, where: str, got: object, expected: str) -> ConfigError:

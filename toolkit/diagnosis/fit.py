@@ -219,6 +219,17 @@ def _solve(
     return _Solved(x, simulated, residual, noise, _score(problem, space, x, residual, layouts, noise))
 
 
+def replace_effects(problem: Problem, made: Fit, active: tuple[Active, ...]) -> Fit:
+    """Return a fit with other effects in it that nothing is fitted of: its covariance has them as known."""
+    simulated = problem.simulate(made.p, active)
+    width = len(problem.free) + sum(len(one.searched) for one in active)
+    covariance = np.zeros((width, width))
+    n = len(made.covariance)
+    covariance[:n, :n] = made.covariance
+    residual = {name: problem.observed[name] - one for name, one in simulated.items()}
+    return replace(made, active=active, simulated=simulated, residual=residual, covariance=covariance)
+
+
 def noise_of(
     problem: Problem, residual: Stacked, layouts: dict[str, Layout], *, used: int = 0
 ) -> dict[str, Noise]:

@@ -23,14 +23,14 @@ def model_of(case: Case, calibrations: Path | None) -> Model:
     """
     kind = case.simulation.kind
     if kind == "python":
-        from toolkit.diagnosis.kinds.python import PythonModel, load_function
+        from toolkit.diagnosis.kinds.python import PythonModel, load_functions
 
-        return PythonModel(case, load_function(case.file(), case.simulation.function))
+        return PythonModel(case, *load_functions(case.file(), case.simulation.function))
     if kind == "ode":
         from toolkit.diagnosis.kinds.ode import OdeModel
-        from toolkit.diagnosis.kinds.python import load_function
+        from toolkit.diagnosis.kinds.python import load_functions
 
-        return OdeModel(case, *(load_function(case.file(), name) for name in ("rhs", "outputs", "initial")))
+        return OdeModel(case, *load_functions(case.file(), "rhs", "outputs", "initial"))
     if kind == "columns":
         from toolkit.diagnosis.kinds.columns import ColumnsModel
 

@@ -12,7 +12,6 @@ from toolkit.diagnosis.answer import NotFound
 from toolkit.effects.catalogue import effects
 
 if TYPE_CHECKING:
-
     from toolkit.diagnosis.screen import Scored, Screen
 
 _POWER = 0.8

@@ -89,7 +89,11 @@ class Screen:
         coloured, white = (
             _weighed(problem, base, columns, sizes, layouts, noise) for noise in (base.noise, plain)
         )
-        return Screen(problem, base, columns, sizes, layouts, base.log_posterior, coloured, white)
+        bare = Screen(problem, base, columns, sizes, layouts, 0.0, coloured, white)
+        # What the nominal parameters reach by the same steps without a response: gains count from there.
+        none = {name: np.zeros((problem.rows, 0)) for name in problem.names}
+        reached = max(0.5 * bare.gain(none)[0], base.log_posterior)
+        return replace(bare, log_likelihood=reached)
 
     @property
     def n(self) -> int:
@@ -160,7 +164,7 @@ class Screen:
         return np.vstack([*parts, none])
 
     def sharpened(self, scored: Sequence[Scored], most: int) -> list[Scored]:
-        """Return all of them, the ``most`` best with their exact gain and the values at which it is reached."""
+        """Return all of them, the ``most`` best with their exact gain and the values that reach it."""
         ranked = sorted(scored, key=lambda one: -one.gain)
         made = [self._exact(one) for one in ranked[:most]]
         least = min((one.gain for one in made), default=0.0)

@@ -5,17 +5,22 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from toolkit.diagnosis.candidates import Candidate, candidates
-from toolkit.diagnosis.fit import Fit, fit
+from toolkit.diagnosis.fit import Fit, fit, replace_effects
 from toolkit.diagnosis.folds import Folds, HeldOut, folds_of, hold_out
+from toolkit.diagnosis.lattice import lattice_of
 from toolkit.diagnosis.model import Active
 from toolkit.diagnosis.null import search_p_values
 from toolkit.diagnosis.problem import Problem, without_outliers
 from toolkit.diagnosis.screen import Scored, Screen, best_of
 from toolkit.diagnosis.structure import Group, groups
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
 
 ALPHA = 0.01  # of the whole search, a step
 ALPHA_STRUCTURE = 0.002
@@ -125,7 +130,9 @@ def search(problem: Problem, *, seed: int, budget: Budget) -> Search:
             budget.check(f"step {turn + 1}: screening {len(listed)} candidates")
             screen = Screen.of(problem, base)
             taken = {_place(one) for one in base.active}
-            left = [each for each in listed if _place(each.active) not in taken]
+            left = [
+                each for each in listed if _place(each.active) not in taken and each.name != "quantisation"
+            ]
             scored = screen.sharpened([one for each in left for one in screen.score(each)], _SHARPENED)
             ranked = best_of(scored)
             p_values = search_p_values(
@@ -152,6 +159,7 @@ def search(problem: Problem, *, seed: int, budget: Budget) -> Search:
                 break
             base, held_base, step = found
             steps.append(step)
+        base, held_base, steps = _stepped(problem, folds, base, held_base, steps)
         if len(steps) > 1:
             budget.check("swaps")
             base, held_base, steps = _pruned(problem, folds, base, held_base, steps)
@@ -211,6 +219,41 @@ def _best_step(
         )
         return made, held, step
     return None
+
+
+def _stepped(
+    problem: Problem, folds: Folds, base: Fit, held_base: HeldOut, steps: list[Step]
+) -> tuple[Fit, HeldOut, list[Step]]:
+    """Add the outputs whose recorded values stand on a coarse lattice."""
+    for candidate in candidates(problem):
+        name = str(candidate.active.channel)
+        if candidate.name != "quantisation" or name not in problem.observed:
+            continue
+        kept = problem.kept[name]
+        sd = float(np.std(base.residual[name][kept]))
+        found = lattice_of(problem.observed[name][np.isfinite(problem.observed[name])], sd)
+        if found is None:
+            continue
+        active = replace(candidate.active, values={"step": found.step})
+        gain = found.log_score_gain
+        made = Step(
+            active=active, p_value=math.exp(-min(gain, 700.0)), held_out_gain=gain, gain=gain, rivals=()
+        )
+        steps = [*steps, made]
+        with_steps = replace_effects(problem, base, (*base.active, active))
+        held = HeldOut(
+            scores=held_base.scores,
+            simulated={**held_base.simulated, name: _rounded(held_base.simulated[name], found.step)},
+            fits=held_base.fits,
+        )
+        if _matters(problem, held_base, held):
+            held_base = held
+        base = with_steps
+    return base, held_base, steps
+
+
+def _rounded(values: NDArray[np.float64], step: float) -> NDArray[np.float64]:
+    return np.asarray(step * np.round(values / step))
 
 
 def _matters(problem: Problem, before: HeldOut, after: HeldOut) -> bool:

@@ -43,7 +43,9 @@ def _motion(case: Case, model: Model, active: Active) -> tuple[str, str, str]:
     if motion is None:
         return own, "1", "1"
     if motion.kind == "force":
-        return own, _channel(case, model, motion.velocity), _channel(case, model, motion.position)
+        speed = _channel(case, model, motion.velocity)
+        place = f"{speed}*s" if motion.position is None else _channel(case, model, motion.position)
+        return own, speed, place
     length = own if motion.kind == "position" else f"{own}*s"
     return f"{length}/s^2", f"{length}/s", length
 

@@ -1,8 +1,8 @@
-"""The machine's own .xlsx as a run of a case: columns under the channels' symbols and in the case's units."""
+"""The machine's own file as a run of a case: columns under the channels' symbols and in the case's units."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,8 +14,17 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 
-def read_workbook(path: Path, machine: str, units: Mapping[str, str]) -> dict[str, NDArray[np.float64]]:
-    """Return a workbook's columns by symbol, each in the unit that the case states for it.
+def is_of_machine(header: Collection[str], machine: str) -> bool:
+    """Tell whether a header row is that of a machine's acquisition program."""
+    from toolkit.machine import load_machine
+
+    return any(one.header in header for one in load_machine(machine).columns)
+
+
+def read_workbook(
+    path: Path, data: bytes, machine: str, units: Mapping[str, str]
+) -> dict[str, NDArray[np.float64]]:
+    """Return a file's columns by symbol, each in the unit that the case states for it.
 
     Raises
     ------
@@ -26,7 +35,7 @@ def read_workbook(path: Path, machine: str, units: Mapping[str, str]) -> dict[st
     from toolkit.recording.read import read_recording
 
     made = {}
-    for one in read_recording(path, load_machine(machine)).series:
+    for one in read_recording(path, load_machine(machine), data=data).series:
         if one.symbol not in units:
             continue
         stated = unit(units[one.symbol])

@@ -29,6 +29,8 @@ DriveHook = Callable[["Drive", Values, "Setting", "Tire"], "Drive"]
 ChannelHook = Callable[["NDArray[np.float64]", Values, "Setting"], "NDArray[np.float64]"]
 # (position, velocity, parameters) -> force-like term, of the arrays' shape or scalars
 ForceHook = Callable[[float, float, Values], float]
+# (time, velocity, parameters) -> the same term along a recorded motion, of a force that has a memory
+RecordedHook = Callable[["NDArray[np.float64]", "NDArray[np.float64]", Values], "NDArray[np.float64]"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -70,6 +72,7 @@ class Effect:
     drive: DriveHook | None = None
     channel: ChannelHook | None = None
     force: ForceHook | None = None
+    recorded: RecordedHook | None = None
     needs: tuple[str, ...] = ()
     any_of: tuple[str, ...] = ()
     confined_by: tuple[str, ...] = ()

@@ -6,6 +6,7 @@ output at other slip angles and loads: a smooth surface through the simulated co
 
 from __future__ import annotations
 
+import difflib
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
@@ -44,6 +45,17 @@ class ColumnsModel:
                 next_step="name it, or drop the output",
                 rule="case",
             )
+        extra = [name for name in named if name not in {one.name for one in case.outputs}]
+        if extra:
+            near = difflib.get_close_matches(extra[0], [one.name for one in case.outputs], n=1, cutoff=0.5)
+            raise ConfigError(
+                "a simulated column stands for no output",
+                where=f"{case.path}: simulation.simulated",
+                got=", ".join(extra),
+                expected=", ".join(one.name for one in case.outputs),
+                next_step=f"did you mean {near[0]!r}?" if near else "declare the channel with role = output",
+                rule="case",
+            )
         allowed = {f"{name}_{what}" for name in named for what in ("gain", "offset")}
         unknown = [one.name for one in case.parameters if one.name not in allowed]
         if unknown:
@@ -58,15 +70,19 @@ class ColumnsModel:
         self.parameters = case.parameters
         self.outputs = tuple(Output(name=one.name, unit=one.unit, sd=one.sd) for one in case.outputs)
         self._load = nominal_load(case)
-        self._settings: dict[str, Setting] = {}
+        self._settings: dict[Run, Setting] = {}
         drivers = {one.name for one in case.drivers}
         is_tire = bool(drivers & {"SA", "SA_CMD"}) and bool({"FY", "MZ"} & set(named))
         self._surface = Surface(case) if is_tire else None
         self.motion: Motion | None = None if is_tire else motion_of(case)
 
     def observed(self, run: Run) -> dict[str, NDArray[np.float64]]:
-        """Return what was recorded of every output."""
-        return {one.name: run.columns[one.name] for one in self.outputs if one.name in run.columns}
+        """Return what was recorded of every output, where the other program has a value too."""
+        return {
+            one.name: np.where(np.isfinite(run.simulated[one.name]), run.columns[one.name], np.nan)
+            for one in self.outputs
+            if one.name in run.columns
+        }
 
     def simulate(
         self, run: Run, p: Mapping[str, float], active: Sequence[Active]
@@ -74,7 +90,7 @@ class ColumnsModel:
         """Return every output of a run with effects in it."""
         here = self.setting(run)
         made = {
-            one.name: run.simulated[one.name] * p.get(f"{one.name}_gain", 1.0)
+            one.name: _whole(run, one.name) * p.get(f"{one.name}_gain", 1.0)
             + p.get(f"{one.name}_offset", 0.0)
             for one in self.outputs
         }
@@ -105,11 +121,9 @@ class ColumnsModel:
 
     def setting(self, run: Run) -> Setting:
         """Return a run's setting."""
-        if run.name not in self._settings:
-            self._settings[run.name] = setting(
-                self.case, run, nominal_load_N=self._load, speed_m_s=NOMINAL_SPEED
-            )
-        return self._settings[run.name]
+        if run not in self._settings:
+            self._settings[run] = setting(self.case, run, nominal_load_N=self._load, speed_m_s=NOMINAL_SPEED)
+        return self._settings[run]
 
     def _tire(
         self, run: Run, made: dict[str, NDArray[np.float64]], active: Sequence[Active], here: Setting
@@ -137,3 +151,12 @@ class ColumnsModel:
         for name, factor in units.items():
             result[name] = getattr(forces, name) * back[name] / factor
         return result
+
+
+def _whole(run: Run, name: str) -> NDArray[np.float64]:
+    """Return a simulated column; rows that the other program left out, which none judges, are bridged."""
+    values = run.simulated[name]
+    good = np.isfinite(values)
+    if good.all():
+        return values
+    return np.interp(run.t, run.t[good], values[good]) if good.any() else np.zeros(run.rows)

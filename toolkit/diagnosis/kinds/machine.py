@@ -53,7 +53,7 @@ class MachineModel:
                     rule="case",
                 )
         self.outputs = self._outputs()
-        self._settings: dict[str, Any] = {}
+        self._settings: dict[Run, Any] = {}
 
     def _outputs(self) -> tuple[Output, ...]:
         made = []
@@ -149,15 +149,15 @@ class MachineModel:
         return found
 
     def _setting(self, run: Run) -> Any:
-        if run.name not in self._settings:
-            self._settings[run.name] = setting(
+        if run not in self._settings:
+            self._settings[run] = setting(
                 self.case,
                 run,
                 nominal_load_N=self._load,
                 speed_m_s=self._speed,
                 work_kJ=self._work_before(run),
             )
-        return self._settings[run.name]
+        return self._settings[run]
 
     def _work_before(self, run: Run) -> float:
         total = 0.0

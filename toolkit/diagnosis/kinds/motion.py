@@ -72,7 +72,7 @@ class Motion:
             zero = np.zeros(run.rows)
             x = zero if self.position is None else run.columns[self.position]
             v = zero if self.velocity is None else run.columns[self.velocity]
-            result[self.output] = made[self.output] + _resisting(forces, x, v, on_output=True)
+            result[self.output] = made[self.output] + _resisting(forces, run.t, x, v)
             return result
         return self._moved(result, forces, run)
 
@@ -130,15 +130,18 @@ def _step(
 
 
 def _resisting(
-    forces: Sequence[Active], x: NDArray[np.float64], v: NDArray[np.float64], *, on_output: bool
+    forces: Sequence[Active], t: NDArray[np.float64], x: NDArray[np.float64], v: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     total = np.zeros(len(x))
     for one in forces:
+        if one.effect.recorded is not None:
+            total += one.effect.recorded(t, v, one.values)
+            continue
         force = one.effect.force
         if force is None:
             continue
         # A constant is reported as the term that stands in the output's own equation.
-        sign = -1.0 if on_output and one.effect.name in ("constant_force", "periodic_ripple") else 1.0
+        sign = -1.0 if one.effect.name in ("constant_force", "periodic_ripple") else 1.0
         values = one.values
         total += sign * np.fromiter(
             (force(a, b, values) for a, b in zip(x.tolist(), v.tolist(), strict=True)), np.float64, len(x)

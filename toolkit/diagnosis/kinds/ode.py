@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -35,7 +36,7 @@ class OdeModel:
         self.parameters = case.parameters
         self.outputs = tuple(Output(name=one.name, unit=one.unit, sd=one.sd) for one in case.outputs)
         self._drivers = tuple(one.name for one in case.drivers)
-        self._settings: dict[str, Setting] = {}
+        self._settings: dict[Run, Setting] = {}
         self._kept: dict[Any, dict[str, NDArray[np.float64]]] = {}
         p = {one.name: one.value for one in case.parameters}
         start = self._start(case.runs[0], p)
@@ -75,7 +76,7 @@ class OdeModel:
             many = len(inspect.signature(self._initial).parameters) > 1
             given = self._initial(dict(p), _as_dict(run)) if many else self._initial(dict(p))
             return np.atleast_1d(np.asarray(given, dtype=np.float64)).astype(np.float64)
-        except Exception as error:
+        except (Exception, SystemExit) as error:
             raise _failed(self.case, run, f"initial: {type(error).__name__}: {error}") from error
 
     def _kinematics(self, p: Mapping[str, float]) -> dict[int, int]:
@@ -91,7 +92,7 @@ class OdeModel:
             x = start + size * rng.normal(size=len(start))
             try:
                 rates.append(np.asarray(self._rhs(float(run.t[0]), x.copy(), u, dict(p)), dtype=np.float64))
-            except Exception as error:
+            except (Exception, SystemExit) as error:
                 raise _failed(self.case, run, f"rhs: {type(error).__name__}: {error}") from error
             points.append(x)
         for i in range(len(start)):
@@ -103,7 +104,7 @@ class OdeModel:
         return found
 
     def _sizes(self, p: Mapping[str, float]) -> dict[str, tuple[float, float]]:
-        """Return for every state that a term may enter: spread of its rate, and of itself."""
+        """Return for every state that a term may enter: size of its rate, and spread of itself."""
         run = self.case.runs[0]
         x = self._integrate(run, p, ())
         rates = np.gradient(x, run.t, axis=1) if run.rows > 2 else np.zeros_like(x)
@@ -111,7 +112,8 @@ class OdeModel:
         self.largest = {name: float(x[i].max()) for i, name in enumerate(self.states)}
         for i, name in enumerate(self.states):
             made[name] = (
-                float(np.std(rates[i])) or 1.0,
+                # Its largest rate, not its spread: a body in free fall has a force that never varies.
+                float(np.abs(rates[i]).max()) or 1.0,
                 float(np.std(x[i])) or float(np.abs(x[i]).max()) or 1.0,
             )
         return made
@@ -131,7 +133,7 @@ class OdeModel:
         """Return every output of a free simulation over the whole run."""
         forces = [one for one in active if one.effect.stage == "dynamics" and one.acts_in(run)]
         key = (
-            run.name,
+            run,
             tuple(p.values()),
             tuple((one.effect.name, one.channel, tuple(one.values.values())) for one in forces),
         )
@@ -152,7 +154,7 @@ class OdeModel:
                 return integrate(rate, run.t, start, self._tolerance(start))
         except IntegrationError as error:
             raise _failed(self.case, run, f"the integration ended early: {error}") from error
-        except Exception as error:
+        except (Exception, SystemExit) as error:
             raise _failed(self.case, run, f"rhs: {type(error).__name__}: {error}") from error
 
     def _tolerance(self, start: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -192,14 +194,16 @@ class OdeModel:
             for k in range(run.rows):
                 try:
                     made = self._outputs(x[:, k].copy(), inputs.row(k), values)
-                except Exception as error:
+                except (Exception, SystemExit) as error:
                     raise _failed(self.case, run, f"outputs: {type(error).__name__}: {error}") from error
+                if not isinstance(made, Mapping):
+                    raise _failed(self.case, run, f"outputs gives a {type(made).__name__}, not a dict")
                 for name, column in rows.items():
                     if name not in made:
                         raise _failed(
-                            self.case, run, f"outputs gives no {name!r}; it gives {', '.join(made)}"
+                            self.case, run, f"outputs gives no {name!r}; it gives {', '.join(map(str, made))}"
                         )
-                    column.append(float(made[name]))
+                    column.append(_number(made[name]))
         result = {name: np.array(column) for name, column in rows.items()}
         for name, values_of in result.items():
             if not np.isfinite(values_of).all():
@@ -224,9 +228,9 @@ class OdeModel:
 
     def setting(self, run: Run) -> Setting:
         """Return a run's setting."""
-        if run.name not in self._settings:
-            self._settings[run.name] = setting(self.case, run, nominal_load_N=nominal_load(self.case))
-        return self._settings[run.name]
+        if run not in self._settings:
+            self._settings[run] = setting(self.case, run, nominal_load_N=nominal_load(self.case))
+        return self._settings[run]
 
 
 class _Inputs:
@@ -257,6 +261,13 @@ class _Inputs:
     def row(self, k: int) -> dict[str, float]:
         """Return the inputs of a row."""
         return {name: column[k] for name, column in self._columns}
+
+
+def _number(value: Any) -> float:
+    try:
+        return float(value)
+    except (TypeError, ValueError):
+        return math.nan
 
 
 def _as_dict(run: Run) -> dict[str, Any]:

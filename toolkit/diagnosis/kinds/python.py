@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import difflib
 import io
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -19,6 +20,7 @@ from toolkit.diagnosis.model import Active, Output
 from toolkit.effects.effect import Effect
 from toolkit.effects.signals import Drive, Setting, TireForces
 from toolkit.errors import ConfigError, FitError
+from toolkit.files import read_regular
 from toolkit.units import unit
 
 if TYPE_CHECKING:
@@ -26,6 +28,7 @@ if TYPE_CHECKING:
 
     from toolkit.diagnosis.case import Case, Run
 
+_KEPT = 300  # simulations that are remembered
 # Drive's field -> the channel that a simulator takes it from.
 _FIELDS = (("SA", ("SA", "SA_CMD")), ("FZ", ("FZ", "FZ_CMD")), ("IA", ("IA",)), ("V", ("V",)))
 
@@ -39,7 +42,8 @@ class PythonModel:
         self.outputs = tuple(Output(name=one.name, unit=one.unit, sd=one.sd) for one in case.outputs)
         self._names = {one.name for one in case.channels}
         self._load = nominal_load(case)
-        self._settings: dict[str, Setting] = {}
+        self._settings: dict[Run, Setting] = {}
+        self._kept: dict[tuple[Run, tuple[float, ...]], dict[str, NDArray[np.float64]]] = {}
         drivers = {one.name for one in case.drivers}
         self._is_tire = bool(drivers & {"SA", "SA_CMD"}) and bool(
             {"FY", "MZ"} & {one.name for one in self.outputs}
@@ -67,7 +71,22 @@ class PythonModel:
     def call(
         self, run: Run, p: Mapping[str, float], changed: Mapping[str, NDArray[np.float64]]
     ) -> dict[str, NDArray[np.float64]]:
-        """Return the simulator's own outputs with some of its inputs changed, checked."""
+        """Return the simulator's own outputs with some of its inputs changed, checked.
+
+        The same inputs and parameters give the same outputs: a slow simulator is not asked twice.
+        """
+        key = (run, tuple(p.values()))
+        if changed:
+            return self._called(run, p, changed)
+        if key not in self._kept:
+            if len(self._kept) >= _KEPT:
+                self._kept.pop(next(iter(self._kept)))
+            self._kept[key] = self._called(run, p, changed)
+        return self._kept[key]
+
+    def _called(
+        self, run: Run, p: Mapping[str, float], changed: Mapping[str, NDArray[np.float64]]
+    ) -> dict[str, NDArray[np.float64]]:
         import pandas as pd
 
         columns: dict[str, NDArray[np.float64]] = {}
@@ -78,7 +97,7 @@ class PythonModel:
         try:
             with silenced():
                 made = self._function(inputs, dict(p))
-        except Exception as error:
+        except (Exception, SystemExit) as error:
             raise _failed(self.case, run, f"{type(error).__name__}: {error}") from error
         if not isinstance(made, pd.DataFrame):
             raise _failed(self.case, run, f"a {type(made).__name__}, not a pandas.DataFrame")
@@ -90,7 +109,10 @@ class PythonModel:
                 raise _failed(
                     self.case, run, f"no column {one.name!r}; it has {', '.join(map(str, made.columns))}"
                 )
-            values = np.asarray(made[one.name], dtype=np.float64)
+            values = _numbers(made, one.name)
+            if values is None or values.ndim != 1:
+                got = "no numbers" if values is None else "several columns of one name"
+                raise _failed(self.case, run, f"{got} in column {one.name!r}")
             if not np.isfinite(values).all():
                 raise _failed(self.case, run, f"no number in column {one.name!r}, row {_first_bad(values)}")
             result[one.name] = values
@@ -112,11 +134,9 @@ class PythonModel:
 
     def setting(self, run: Run) -> Setting:
         """Return a run's setting."""
-        if run.name not in self._settings:
-            self._settings[run.name] = setting(
-                self.case, run, nominal_load_N=self._load, speed_m_s=NOMINAL_SPEED
-            )
-        return self._settings[run.name]
+        if run not in self._settings:
+            self._settings[run] = setting(self.case, run, nominal_load_N=self._load, speed_m_s=NOMINAL_SPEED)
+        return self._settings[run]
 
     def _tire(
         self, run: Run, p: Mapping[str, float], active: Sequence[Active], here: Setting
@@ -155,33 +175,47 @@ class PythonModel:
         return made
 
 
-def load_function(path: Path, name: str) -> Callable[..., Any]:
-    """Return a function of a Python file.
+def load_functions(path: Path, *names: str) -> tuple[Callable[..., Any], ...]:
+    """Return functions of one Python file, which is run once and may import its neighbours.
 
     Raises
     ------
     ConfigError
-        the file raises, or has no such function
+        the file raises or ends the process, or has no such function
     """
-    import runpy
+    import sys
+    import types
 
+    space = types.ModuleType(f"simulator_{abs(hash(path.resolve()))}")
+    space.__file__ = str(path)
+    # Dataclasses and pickles look their module up by name.
+    sys.modules[space.__name__] = space
+    folder = str(path.resolve().parent)
+    if folder not in sys.path:
+        sys.path.append(folder)
     try:
         with silenced():
-            space = runpy.run_path(str(path))
-    except Exception as error:
+            exec(compile(read_regular(path), str(path), "exec"), space.__dict__)  # noqa: S102
+    except (Exception, SystemExit) as error:
         raise ConfigError(
             "the simulator cannot be loaded", where=path, got=f"{type(error).__name__}: {error}",
-            expected=f"a Python file with {name}(..)", next_step="run the file by itself and mend it",
+            expected=f"a Python file with {names[0]}(..)", next_step="run the file by itself and mend it",
             rule="simulator",
         ) from error  # fmt: skip
-    function = space.get(name)
-    if not callable(function):
-        raise ConfigError(
-            f"the simulator has no function {name!r}", where=path,
-            got=", ".join(key for key, one in space.items() if callable(one) and not key.startswith("_")),
-            expected=f"def {name}(..)", next_step="name the function in the case", rule="simulator",
-        )  # fmt: skip
-    return cast("Callable[..., Any]", function)
+    made = []
+    for name in names:
+        function = getattr(space, name, None)
+        if not callable(function):
+            own = [key for key, one in vars(space).items() if callable(one) and not key.startswith("_")]
+            near = difflib.get_close_matches(name, own, n=1, cutoff=0.5)
+            raise ConfigError(
+                f"the simulator has no function {name!r}", where=path, got=", ".join(own) or "no functions",
+                expected=f"def {name}(..)",
+                next_step=f"did you mean {near[0]!r}?" if near else "name the function in the case",
+                rule="simulator",
+            )  # fmt: skip
+        made.append(cast("Callable[..., Any]", function))
+    return tuple(made)
 
 
 @contextlib.contextmanager
@@ -198,6 +232,13 @@ def _failed(case: Case, run: Run, got: str) -> FitError:
         expected="a pandas.DataFrame with every output, a finite number in each row, in the inputs' order",
         next_step="run the simulator on that file by itself and mend it", rule="simulator",
     )  # fmt: skip
+
+
+def _numbers(made: Any, name: str) -> NDArray[np.float64] | None:
+    try:
+        return np.asarray(made[name], dtype=np.float64)
+    except (TypeError, ValueError):
+        return None
 
 
 def _first_bad(values: NDArray[np.float64]) -> int:

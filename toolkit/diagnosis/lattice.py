@@ -1,0 +1,66 @@
+"""Coarse steps show in the recorded numbers themselves: every value stands on a lattice.
+
+No search is needed, and none would do: where the noise is as large as the step, the simulation stepped alike
+predicts nothing better. What tells is that all values are multiples of one step which is coarse against
+the noise and coarse against the digits that the file prints.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+_FEWEST = 20
+_COARSE = 0.1  # of the residual's variance that rounding to the step must make
+_EXACT = 1e-3  # of a step, by which values may miss the lattice
+_FINER = 10.0  # digits of the file: a step below ten of its last place is only how it was printed
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Lattice:
+    """The step of a channel's values, and how much more probable they are on it than between its points."""
+
+    step: float
+    log_score_gain: float
+
+
+def lattice_of(values: NDArray[np.float64], residual_sd: float) -> Lattice | None:
+    """Return the lattice of recorded values, None where there is none or it does not matter.
+
+    Parameters
+    ----------
+    values : as recorded, (n,), without missing ones
+    residual_sd : of what a simulation leaves of them
+    """
+    if len(values) < _FEWEST:
+        return None
+    steps = np.diff(np.unique(values))
+    size = float(np.abs(values).max())
+    steps = steps[steps > 1e-9 * max(size, 1e-300)]
+    if len(steps) < 3:
+        return None
+    least = float(steps.min())
+    counts = np.round(steps / least)
+    if np.abs(steps / least - counts).max() > _EXACT * max(float(counts.max()), 1.0):
+        return None
+    step = float(np.sum(steps) / np.sum(counts))
+    printed = _last_place(values)
+    if step < _FINER * printed or step**2 / 12 < _COARSE * residual_sd**2:
+        return None
+    return Lattice(step=step, log_score_gain=len(values) * math.log(step / printed))
+
+
+def _last_place(values: NDArray[np.float64]) -> float:
+    """Return the finest decimal place at which the values are printed."""
+    places = 0
+    for value in values[:200].tolist():
+        _, _, decimals = f"{value:.12g}".partition(".")
+        mantissa, _, exponent = decimals.partition("e")
+        places = max(places, len(mantissa) - (int(exponent) if exponent else 0))
+    return 10.0**-places

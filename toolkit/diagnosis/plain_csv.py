@@ -1,0 +1,138 @@
+"""Plain CSV: a header row of column names, then numbers; columns that nobody names may hold anything."""
+
+from __future__ import annotations
+
+import csv
+import difflib
+import io
+import math
+from collections.abc import Collection, Iterable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from toolkit.errors import CellError, ColumnError, UnreadableError
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+_MISSING = frozenset(("", "nan", "na", "n/a", "null", "none"))
+_LARGEST = 1e100  # in no unit does an instrument reach it; its square must stay a number
+
+
+def read_csv(data: bytes, wanted: Collection[str], *, where: Path) -> dict[str, NDArray[np.float64]]:
+    """Return the wanted columns that the file has, each (n,), NaN where a sample is missing.
+
+    Raises
+    ------
+    UnreadableError
+        it is no text, no CSV, or has no rows; ColumnError: a wanted column stands twice; CellError: a cell
+        of a wanted column is no finite number, or a row has another number of cells than the header
+    """
+    try:
+        text = data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise _unreadable(where, f"byte {error.start} is not UTF-8", "CSV in UTF-8") from error
+    try:
+        rows = csv.reader(io.StringIO(text, newline=""))
+        header = [cell.strip() for cell in next(rows, [])]
+        doubled = sorted({one for one in header if one in wanted and header.count(one) > 1})
+        if doubled:
+            raise ColumnError(
+                "a column stands twice", where=where, got=", ".join(doubled), expected="different names",
+                next_step="rename or remove one", rule="case-run",
+            )  # fmt: skip
+        made = _quick(text, header)
+        if made is None:
+            made = _careful(rows, header, wanted, where)
+    except csv.Error as error:
+        raise _unreadable(where, str(error), "CSV: a header row and rows of numbers") from error
+    if not len(made):
+        raise _unreadable(where, "no rows of numbers", "a header and rows")
+    return {name: made[:, i] for i, name in enumerate(header) if name in wanted}
+
+
+def missing_column(where: Path, name: str, names: Iterable[str]) -> ColumnError:
+    """Return the error of a column that a file has not, with the nearest one that it has."""
+    listed = list(names)
+    near = difflib.get_close_matches(name, listed, n=1, cutoff=0.5)
+    step = f"did you mean {near[0]!r}?" if near else "correct the case or the file"
+    if len(listed) == 1 and any(mark in listed[0] for mark in ";\t|"):
+        step = "separate the columns by commas, and write decimals with a point"
+    return ColumnError(
+        f"the recording has no column {name!r}", where=where, got=", ".join(listed) or "no columns",
+        expected=f"a column {name!r} in the header row", next_step=step, rule="case-column",
+    )  # fmt: skip
+
+
+def header_of(data: bytes) -> list[str]:
+    """Return the names in a file's header row; none where it cannot be read."""
+    try:
+        text = data.decode("utf-8-sig")
+        return [cell.strip() for cell in next(csv.reader(io.StringIO(text, newline="")), []) if cell.strip()]
+    except (UnicodeDecodeError, csv.Error):
+        return []
+
+
+def _quick(text: str, header: list[str]) -> NDArray[np.float64] | None:
+    """Return a file of finite numbers alone, None for anything that must be looked at cell by cell."""
+    start = text.find("\n")
+    if start < 0 or '"' in text or "\r" in text[:start].rstrip("\r") or not text[start + 1 :].strip():
+        return None
+    try:
+        made = np.loadtxt(
+            io.StringIO(text[start + 1 :]), delimiter=",", dtype=np.float64, ndmin=2, comments=None
+        )
+    except ValueError:
+        return None
+    fits = made.shape[1] == len(header) and bool((np.abs(made) < _LARGEST).all())
+    return made if fits else None
+
+
+def _careful(
+    rows: Iterable[list[str]], header: list[str], wanted: Collection[str], where: Path
+) -> NDArray[np.float64]:
+    made: list[list[float]] = []
+    used = [name in wanted for name in header]
+    for number, row in enumerate(rows, start=2):
+        if not any(cell.strip() for cell in row):
+            continue
+        if len(row) != len(header):
+            raise CellError(
+                "a row has another number of cells than the header", where=f"{where}, line {number}",
+                got=f"{len(row)} cells", expected=f"{len(header)}", next_step="correct the row",
+                rule="case-run",
+            )  # fmt: skip
+        made.append(
+            [
+                _number(cell, f"{where}, line {number}, column {name}") if use else math.nan
+                for cell, name, use in zip(row, header, used, strict=True)
+            ]
+        )
+    return np.array(made, dtype=np.float64).reshape(len(made), len(header))
+
+
+def _number(cell: str, where: str) -> float:
+    text = cell.strip()
+    if text.lower() in _MISSING:
+        return math.nan
+    try:
+        # Python alone reads 1_000 and digits of other scripts as numbers; no instrument writes them.
+        value = float(text) if text.isascii() and "_" not in text else math.inf
+    except ValueError:
+        value = math.inf
+    if not abs(value) < _LARGEST:
+        raise CellError(
+            "a cell is no number", where=where, got=repr(text[:60]),
+            expected="a finite number with a decimal point, or nothing where a sample is missing",
+            next_step="correct the cell, or leave it empty", rule="case-run",
+        )  # fmt: skip
+    return value
+
+
+def _unreadable(where: Path, got: str, expected: str) -> UnreadableError:
+    return UnreadableError(
+        "a run cannot be read as CSV", where=where, got=got, expected=expected,
+        next_step="check the file; save it as plain CSV in UTF-8", rule="case-run",
+    )  # fmt: skip

@@ -1,0 +1,98 @@
+"""Predictions: the outputs of further inputs as declared, refitted and augmented, as CSV."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import PurePosixPath
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from toolkit.units import unit
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from numpy.typing import NDArray
+
+    from toolkit.diagnosis.case import Run
+    from toolkit.diagnosis.fit import Fit
+    from toolkit.diagnosis.model import Active
+    from toolkit.diagnosis.problem import Problem
+
+VARIANTS = ("nominal", "refitted", "augmented")
+
+
+def prediction_names(runs: Sequence[Run]) -> tuple[str, ...]:
+    """Return the file name of every prediction below ``predictions/``: that of the input, a workbook's as CSV.
+
+    The path of the case is kept without what would lead out of the folder; where two would then be one, a
+    number tells them apart.
+    """
+    made: list[str] = []
+    for run in runs:
+        parts = [one for one in run.name.replace("\\", "/").split("/") if one not in ("", ".", "..")]
+        path = PurePosixPath(*parts) if parts else PurePosixPath("prediction.csv")
+        if path.suffix.lower() in (".xlsx", ".xlsm"):
+            path = path.with_suffix(".csv")
+        at, name = 2, str(path)
+        while name in made:
+            name, at = str(path.with_stem(f"{path.stem}-{at}")), at + 1
+        made.append(name)
+    return tuple(made)
+
+
+def prediction_csv(problem: Problem, run: Run, fits: Sequence[Fit | None]) -> str:
+    """Return a run's outputs under the recording's own time.
+
+    Parameters
+    ----------
+    fits : the simulation as declared, refitted, and augmented; None for the declared parameters
+    """
+    case = problem.case
+    columns: dict[str, NDArray[np.float64]] = {}
+    for one in case.channels:
+        if one.role == "time":
+            columns[one.name] = run.t / unit(one.unit).factor
+    made = [_simulated(problem, run, one) for one in fits]
+    for output in problem.model.outputs:
+        for variant, values in zip(VARIANTS, made, strict=True):
+            columns[f"{output.name}_{variant}"] = values[output.name]
+    lines = [",".join(_cell(name) for name in columns)]
+    lines += [",".join(_number(v) for v in row) for row in np.stack(list(columns.values()), axis=1)]
+    return "\n".join(lines) + "\n"
+
+
+def _simulated(problem: Problem, run: Run, made: Fit | None) -> Mapping[str, NDArray[np.float64]]:
+    values = dict(problem.known)
+    if made is None:
+        return problem.model.simulate(run, values, ())
+    values.update(zip((one.name for one in problem.free), made.p, strict=True))
+    return problem.model.simulate(run, values, tuple(_spread_to(problem, run, one) for one in made.active))
+
+
+def _spread_to(problem: Problem, run: Run, one: Active) -> Active:
+    """Return an effect that is confined to some runs with the new run in it, where a condition says so.
+
+    The condition is the one whose values part the effect's runs from all the others.
+    """
+    if one.runs is None:
+        return one
+    keys = dict.fromkeys(key for key in one.effect.confined_by if key in run.conditions)
+    for key in keys:
+        inside = {each.conditions.get(key) for each in problem.runs if each.name in one.runs}
+        outside = {each.conditions.get(key) for each in problem.runs if each.name not in one.runs}
+        if not inside & outside and run.conditions[key] in inside:
+            return replace(one, runs=one.runs | {run.name})
+    return replace(one, runs=one.runs - {run.name})
+
+
+def _cell(name: str) -> str:
+    return '"' + name.replace('"', '""') + '"' if any(mark in name for mark in ',"\r\n') else name
+
+
+def _number(value: Any) -> str:
+    number = float(value)
+    return repr(number) if math.isfinite(number) else ""
