@@ -159,7 +159,7 @@ def search(problem: Problem, *, seed: int, budget: Budget) -> Search:
                 break
             base, held_base, step = found
             steps.append(step)
-        base, held_base, steps = _stepped(problem, folds, base, held_base, steps)
+        base, held_base, steps = _stepped(problem, base, held_base, steps)
         if len(steps) > 1:
             budget.check("swaps")
             base, held_base, steps = _pruned(problem, folds, base, held_base, steps)
@@ -222,7 +222,7 @@ def _best_step(
 
 
 def _stepped(
-    problem: Problem, folds: Folds, base: Fit, held_base: HeldOut, steps: list[Step]
+    problem: Problem, base: Fit, held_base: HeldOut, steps: list[Step]
 ) -> tuple[Fit, HeldOut, list[Step]]:
     """Add the outputs whose recorded values stand on a coarse lattice."""
     for candidate in candidates(problem):
