@@ -220,10 +220,17 @@ def test_rows_that_a_candidate_meets_by_chance_do_not_part_an_unknown_file():
         Run(start=210, stop=500, hits=()),
     )
     assert [(r.start, r.stop, r.hits) for r in without_chance(chance)] == [(0, 500, ())]
-    # The same candidate twice, a long run, or a file that is mostly explained: no chance.
-    twice = (*chance[:2], Run(start=210, stop=300, hits=()), Run(start=300, stop=301, hits=hit(7)),
-             Run(start=301, stop=500, hits=()))  # fmt: skip
-    assert without_chance(twice) == twice
+    # A candidate with a fiftieth of the rows, a long run, or a file that is mostly explained: no chance.
+    often = tuple(
+        one
+        for start in range(0, 500, 50)
+        for one in (
+            Run(start=start, stop=start + 49, hits=()),
+            Run(start=start + 49, stop=start + 50, hits=hit(7)),
+        )
+    )
+    assert without_chance(often) == often
+    assert [r.hits for r in without_chance((*often[:8], Run(start=200, stop=500, hits=())))] == [()]
     long = (
         Run(start=0, stop=400, hits=()),
         Run(start=400, stop=404, hits=hit(7)),

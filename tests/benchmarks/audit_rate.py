@@ -6,7 +6,6 @@ a sample; and the gate with python-calamine alone, in the same workers, on all o
 
 from __future__ import annotations
 
-import os
 import subprocess
 import sys
 import time
@@ -139,6 +138,24 @@ def _peak_MB(archive: Archive) -> float:
     words = [str(Path(sys.executable).with_name("toolkit")), "audit", str(archive.folder), "--calibrations",
              str(archive.calibrations), "--workers", str(WORKERS), "--json"]  # fmt: skip
     child = subprocess.Popen(words, stdout=subprocess.DEVNULL)
-    _, _, used = os.wait4(child.pid, 0)
-    child.returncode = 0
-    return used.ru_maxrss / 1024
+    peak = 0.0
+    while child.poll() is None:
+        peak = max(peak, *(_high_water_MB(pid) for pid in (child.pid, *_children(child.pid))))
+        time.sleep(0.02)
+    return peak
+
+
+def _children(pid: int) -> list[int]:
+    try:
+        return [int(one) for one in Path(f"/proc/{pid}/task/{pid}/children").read_text().split()]
+    except OSError:
+        return []
+
+
+def _high_water_MB(pid: int) -> float:
+    # Of this program alone: what wait4 tells includes the process that started it.
+    try:
+        lines = Path(f"/proc/{pid}/status").read_text().splitlines()
+    except OSError:
+        return 0.0
+    return next((int(line.split()[1]) / 1024 for line in lines if line.startswith("VmHWM")), 0.0)

@@ -78,16 +78,19 @@ def partition(fits: Sequence[dict[str, NDArray[np.bool_]]], rows: int) -> tuple[
 def without_chance(runs: Sequence[Run]) -> tuple[Run, ...]:
     """Return the runs without those that a file of unknown origin has by chance.
 
-    Thousands of candidates meet a few rows of any file. Where no candidate explains over half of the rows,
-    a run of one to three rows counts only if one of its candidates explains other rows too.
+    Thousands of candidates meet a few rows of any file. Where over half of the rows have no candidate, a run
+    of one to three rows counts only if one of its candidates explains three rows and a fiftieth of the file.
     """
     unknown = sum(run.stop - run.start for run in runs if not run.hits)
     if 2 * unknown <= runs[-1].stop:
         return tuple(runs)
-    times = Counter(hit for run in runs for hit in run.hits)
+    explained: Counter[Hit] = Counter()
+    for run in runs:
+        explained.update(dict.fromkeys(run.hits, run.stop - run.start))
+    enough = max(_LUCKY, runs[-1].stop / 50)
     kept: list[Run] = []
     for run in runs:
-        lucky = run.stop - run.start <= _LUCKY and all(times[hit] == 1 for hit in run.hits)
+        lucky = run.stop - run.start <= _LUCKY and all(explained[hit] < enough for hit in run.hits)
         if run.hits and not lucky:
             kept.append(run)
         elif kept and not kept[-1].hits:
