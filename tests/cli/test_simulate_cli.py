@@ -97,3 +97,60 @@ def test_a_named_registry_without_the_machine_is_a_stand_alone_run(run, short, t
     assert json.loads(found.stdout)["acquisition_program"]["record"] is None
     missing = run(short, "--out", tmp_path / "u", "--calibrations", tmp_path / "none")
     assert isinstance(missing.exception, ConfigError)
+
+
+def test_a_case_and_csv_beside_a_test(run, tmp_path):
+    from toolkit.diagnosis.case_read import read_case
+
+    plan = (EXAMPLES / "continuous_plan.toml").read_text().partition("[[run]]")[0]
+    plan = plan.replace("[2, -2, 5, -5, 9, -9, 0]", "[3]").replace("[2000, 4000, 6000]", "[4000]")
+    (tmp_path / "plan.toml").write_text(plan)
+    (tmp_path / "tire.tir").write_text((EXAMPLES / "tire.tir").read_text())
+    found = run(
+        tmp_path / "plan.toml", "--out", tmp_path / "t", "--case", tmp_path / "c", "--csv", tmp_path / "csv",
+        "--effect", "relaxation=0.5m", "--json",
+    )  # fmt: skip
+    answer = json.loads(found.stdout)
+    assert answer["record"] == "continuous"
+    assert Path(answer["case"]) == tmp_path / "c" / "CASE.toml"
+    assert [Path(one).name for one in answer["csv"]] == ["run01.csv", "run02.csv"]
+    assert answer["effects"][0]["name"] == "relaxation"
+    assert len(read_case(Path(answer["case"])).runs) == 2
+    again = run(tmp_path / "plan.toml", "--out", tmp_path / "t", "--case", tmp_path / "c", "--quiet")
+    assert again.return_value == 0
+
+
+def test_a_case_that_cannot_be_or_a_foreign_folder_writes_nothing(run, short, tmp_path):
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine" / "keep.txt").write_text("keep")
+    found = run(short, "--out", tmp_path / "t", "--case", tmp_path / "mine")
+    assert isinstance(found.exception, OutputError)
+    short.write_text(SHORT + "[case]\noutputs = 'cells'\n")
+    found = run(short, "--out", tmp_path / "t", "--case", tmp_path / "c")
+    assert isinstance(found.exception, ConfigError)
+    assert not (tmp_path / "t").exists()
+    session = run(EXAMPLES / "session_plan.toml", "--out", tmp_path / "t", "--case", tmp_path / "c")
+    assert isinstance(session.exception, ConfigError)
+    assert not (tmp_path / "t").exists()
+
+
+def test_a_makers_table(run, tmp_path):
+    (tmp_path / "plan.toml").write_text(SHORT + "kind = 'table'\n")
+    found = run(tmp_path / "plan.toml", "--out", tmp_path / "t", "--json")
+    answer = json.loads(found.stdout)
+    assert (answer["kind"], answer["table"], answer["axes"]) == ("table", "table_simulated.csv", "SAE")
+    assert (tmp_path / "t" / "table_simulated.csv").read_text().startswith("SA [deg],FZ [N],FY [N],MZ [N*m]")
+
+
+def test_wrong_calibration_by_id_and_by_path(run, short, tmp_path):
+    home = EXAMPLES.parents[2]
+    record = home / "calibrations" / "m15-virtual" / "m15-virtual-r1.json"
+    for name, options in (("m15-virtual-r1", ["--home", home]), (str(record), [])):
+        found = run(
+            short, "--out", tmp_path / "t", "--effect", f"wrong_calibration={name}", "--quiet", *options
+        )
+        assert found.return_value == 0, found.exception
+    foreign = run(short, "--out", tmp_path / "t", "--effect", "wrong_calibration=m15-r1", "--home", home)
+    assert "cannot be given" in str(foreign.exception)  # pounds-force, where these cells give mV/V
+    none = run(short, "--out", tmp_path / "t", "--effect", "wrong_calibration=m15-r1")
+    assert isinstance(none.exception, ConfigError)
