@@ -48,7 +48,7 @@ def test_a_file_without_a_record_has_its_own_equation_and_the_true_one_lies_insi
     assert unknown
     for one in unknown:
         on = max(i for i, (since, _, _) in enumerate(factory.EDITIONS) if since <= one.date)
-        true = {"FY": list(factory.unknown_FY(factory.EDITIONS[on][1])), "MZ": list(factory.EDITIONS[on][2])}
+        true = dict(zip(("FY", "MZ"), factory.unknown(*factory.EDITIONS[on][1:]), strict=True))
         for equation in one.estimate.equations:
             assert equation.linear
             expected = dict(zip((*factory.CELLS, "constant"), true[equation.load], strict=True))

@@ -174,7 +174,7 @@ def _write(path: Path, kind: str, day: dt.date, rows: int, rng: np.random.Genera
         told = f"{CELLS[a]}<->{CELLS[b]}"
         truth = Made(grade="column_swap", record=_id(now), variant=told, segments=((*whole, _id(now)),))
     elif kind == "unknown":
-        FY = unknown_FY(FY)
+        FY, MZ = unknown(FY, MZ)
         truth = Made(grade="unknown", segments=((*whole, None),))
     elif kind == "rounding":
         FY = tuple(v + s * 0.4 * _unit5(v) for v, s in zip(FY, (1, -1, 1, 1), strict=True))
@@ -203,9 +203,12 @@ def _write(path: Path, kind: str, day: dt.date, rows: int, rng: np.random.Genera
     return truth
 
 
-def unknown_FY(FY: tuple[float, ...]) -> tuple[float, ...]:
-    """Return an equation that no edition comes near: 5 % more, and 2 lbf that a small load shows too."""
-    return (*(v * 1.05 for v in FY[:3]), FY[3] * 1.05 + 2.0)
+def unknown(FY: tuple[float, ...], MZ: tuple[float, ...]) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """Return equations that no edition comes near, for both loads: where one is small the other is not."""
+    return (*(v * 1.05 for v in FY[:3]), FY[3] * 1.05 + 2.0), (
+        *(v * 1.07 for v in MZ[:3]),
+        MZ[3] * 1.07 + 0.5,
+    )
 
 
 def _cells(rows: int, rng: np.random.Generator) -> tuple[NDArray[np.float64], ...]:
