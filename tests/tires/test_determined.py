@@ -228,3 +228,14 @@ def test_the_virtual_test_determines_all_but_the_shape_of_FY_at_the_lightest_loa
         assert C["MZ"].value == pytest.approx(2.4, abs=0.01)
         if C["FY"].standard_error is not None:
             assert C["FY"].value == pytest.approx(1.3, abs=0.01)
+
+
+def test_rows_of_one_sign_determine_nothing_that_an_interval_could_tell():
+    channel, truth = TRUTHS[0]
+    SA = np.radians(np.linspace(0.3, 12.0, 200))
+    noise = np.random.default_rng(8).normal(0.0, 0.001 * abs(truth[2]), len(SA))
+    fit = fit_curves([Curve(SA=SA, y=formula(truth, SA) + noise, channel=channel, load_N=2000.0)])[0]
+    assert set(fit.not_determined) == {"B", "C", "D", "E", "Sh", "Sv"}
+    assert fit.slope_at_zero is None
+    assert fit.value_at_zero is None
+    assert "one sign" in fit.message

@@ -45,6 +45,7 @@ if TYPE_CHECKING:
     from toolkit.tires.solver import Solution
 
 _PARABOLA = (0.5, 3.0)  # of the expected rise of the cost: below, an interval would be too narrow to be true
+_INSIDE = 0.98  # normalised: SA = 0 must lie between the rows
 _REFITS = 2  # steps by which all else is fitted again where one parameter is held
 _WIDE = 0.5  # half width of an interval, of what is natural: beyond, the data say next to nothing
 _SAME = 1e-6  # normalised parameters that differ by less are one
@@ -100,10 +101,13 @@ def spread(solution: Solution, problems: Problems, *, zero: Array, variance: Arr
     outside = np.abs(solution.rivals - theta[:, None, :]) > half[:, None, :] + _SAME
     determined = ~at_bound & inside & (half <= _WIDE * natural) & ~(rival & outside).any(axis=1)
     determined &= _straight(theta, covariance, half, compress(problems), allowed[:, 0], low, high)
+    # Rows of one sign leave the shifts to the model, and all else moves with them: of the few intervals that
+    # would pass three quarters cover.
+    determined &= (np.abs(zero) <= _INSIDE)[:, None]
     # Beyond the data a curve is an extrapolation of the model, whatever its covariance says.
     # Slope and value need rows on both sides: at their end the linear interval covers 85 % and not 95 %.
     slope_ok = (np.abs(zero) <= 0.95) & (factor * slope_se <= _WIDE * np.abs(at_zero))
-    value_ok = (np.abs(zero) <= 0.98) & (factor * value_se <= _WIDE)
+    value_ok = (np.abs(zero) <= _INSIDE) & (factor * value_se <= _WIDE)
     return Spread(
         theta=theta,
         covariance=covariance,
