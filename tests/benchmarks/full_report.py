@@ -50,9 +50,9 @@ def content(test: Path, home: Path) -> Any:
 
 def template(made: Any) -> bytes:
     """Return a template that asks for all of them, each with a numbered caption."""
-    from toolkit.report.blocks import paragraph, run
-    from toolkit.report.default_template import build_document
-    from toolkit.report.template_pieces import contents
+    from toolkit.report.design.blocks import paragraph, run
+    from toolkit.report.design.default import build_document
+    from toolkit.report.design.pieces import contents
 
     def body(p: Any) -> list[str]:
         story = [contents("Contents"), paragraph(run("{{tk:calibration.hash}}"))]
@@ -80,8 +80,8 @@ def main() -> None:
     """Make the report: TEST HOME OUT."""
     from toolkit.report.deliver import deliver
     from toolkit.report.drawer import Drawer
-    from toolkit.report.package import read_template
     from toolkit.report.pdf import Office
+    from toolkit.report.template.package import read_template
 
     test, home, out = map(Path, sys.argv[1:4])
     with Office() as office, Drawer() as drawer:

@@ -11,7 +11,7 @@ import toolkit
 from toolkit.audit.model import Grade
 from toolkit.cli.explain import rules_catalogue
 from toolkit.cli.main import run
-from toolkit.report.check import RULES
+from toolkit.report.template.check import RULES
 
 SOURCES = sorted(Path(toolkit.__file__).parent.rglob("*.py"))
 REFUSERS = {"_refuse", "refuse_cell", "problem"}

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import docx
 
-from toolkit.report.blocks import elements
-from toolkit.report.package import Template, read_template
+from toolkit.report.design.blocks import elements
+from toolkit.report.template.package import Template, read_template
 
 HASH = "{{tk:calibration.hash}}"
 FOOTNOTES = (

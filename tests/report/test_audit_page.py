@@ -20,10 +20,10 @@ from toolkit.audit.traces import traces, worst_files
 from toolkit.calibration.registry.registry import Registry
 from toolkit.cli.explain import rules_catalogue
 from toolkit.recording.marks import own_output
-from toolkit.report.audit_content import build_audit_content
-from toolkit.report.audit_page import AuditView, page, write_page
-from toolkit.report.audit_svg import COLOURS, rows_of
-from toolkit.report.audit_template import build_audit
+from toolkit.report.audit.content import build_audit_content
+from toolkit.report.audit.page import AuditView, page, write_page
+from toolkit.report.audit.svg import COLOURS, rows_of
+from toolkit.report.audit.template import build_audit
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "audit"))
 from archive_made import factory
@@ -155,7 +155,7 @@ class TestSummary:
 
     def test_it_is_filled_converted_and_verified(self, view, tmp_path):
         from toolkit.report.deliver import deliver
-        from toolkit.report.package import read_template
+        from toolkit.report.template.package import read_template
 
         template = read_template(CHECKOUT / "report_templates" / "audit.docx")
         done = deliver(template, build_audit_content(view), tmp_path, name="audit")
@@ -163,7 +163,7 @@ class TestSummary:
         assert not [one for one in done.checks if not one.ok and not one.warning]
 
     def test_a_template_is_known_by_its_tags_and_asks_for_no_reports_tags(self):
-        from toolkit.report.audit_vocabulary import AUDIT
+        from toolkit.report.audit.vocabulary import AUDIT
         from toolkit.report.certificate.vocabulary import CERTIFICATE
         from toolkit.report.vocabulary import REPORT
 

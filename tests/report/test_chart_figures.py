@@ -6,7 +6,7 @@ import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from toolkit.report.chart_figures import whole_ticks
+from toolkit.report.calibration.chart_figures import whole_ticks
 
 
 @pytest.mark.parametrize("size", [6e-5, 0.0125, 3.0, 4.2e6])

@@ -15,14 +15,14 @@ from toolkit.comparison.compare import compare
 from toolkit.comparison.model import Comparison, Entry
 from toolkit.estimate import Estimate
 from toolkit.findings import Finding
-from toolkit.report.check import check_template
-from toolkit.report.comparison_cells import conclusion, named, p_text, shown_rows, with_U
-from toolkit.report.comparison_content import build_comparison_content
-from toolkit.report.comparison_plots import comparison_plots
-from toolkit.report.comparison_template import build_comparison
-from toolkit.report.comparison_vocabulary import COMPARISON, TABLES
-from toolkit.report.package import read_template
+from toolkit.report.comparison.cells import conclusion, named, p_text, shown_rows, with_U
+from toolkit.report.comparison.content import build_comparison_content
+from toolkit.report.comparison.plots import comparison_plots
+from toolkit.report.comparison.template import build_comparison
+from toolkit.report.comparison.vocabulary import COMPARISON, TABLES
 from toolkit.report.style import Style
+from toolkit.report.template.check import check_template
+from toolkit.report.template.package import read_template
 
 CHECKOUT = Path(__file__).resolve().parents[2]
 LOADS = (2000.0, 4000.0)

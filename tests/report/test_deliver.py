@@ -14,14 +14,14 @@ from template_factory import opened, p, run, sdt, tbl
 
 from toolkit.errors import OutputError, RenderError, TemplateError
 from toolkit.recording.marks import is_own_output
-from toolkit.report import verify, verify_text
 from toolkit.report.build import build_content
 from toolkit.report.deliver import deliver
 from toolkit.report.drawer import Drawer
-from toolkit.report.fill import Entry, Filled
-from toolkit.report.package import read_template
 from toolkit.report.pdf import Office
 from toolkit.report.style import read_style
+from toolkit.report.template import verify, verify_text
+from toolkit.report.template.fill import Entry, Filled
+from toolkit.report.template.package import read_template
 
 CHECKOUT = Path(__file__).resolve().parents[2]
 DAY = dt.date(2026, 11, 21)

@@ -17,15 +17,15 @@ from report_factory import SHA, make_record, make_result
 from template_factory import W, make, opened, p, run, sdt, tbl, texts
 
 from toolkit.errors import TemplateError
-from toolkit.report.blocks import placeholder_png
 from toolkit.report.build import build_content
 from toolkit.report.content import Table, Value
+from toolkit.report.design.blocks import placeholder_png
 from toolkit.report.figures import Picture
-from toolkit.report.fill import Filled, fill
-from toolkit.report.package import read_template
-from toolkit.report.verify import verify_docx
-from toolkit.report.verify_text import text_checks
-from toolkit.report.xml import NS
+from toolkit.report.template.fill import Filled, fill
+from toolkit.report.template.package import read_template
+from toolkit.report.template.verify import verify_docx
+from toolkit.report.template.verify_text import text_checks
+from toolkit.report.template.xml import NS
 
 DAY = dt.date(2026, 11, 21)
 PICTURE = Picture(png=placeholder_png(63, 37), width_px=63, height_px=37)

@@ -10,10 +10,10 @@ from hypothesis import strategies as st
 from template_factory import make, opened, p, run, sdt, tbl
 
 from toolkit.errors import TemplateError, ToolkitError
-from toolkit.report.check import RULES, check_template
-from toolkit.report.default_template import build_default
-from toolkit.report.package import read_template
+from toolkit.report.design.default import build_default
 from toolkit.report.style import Style, read_style
+from toolkit.report.template.check import RULES, check_template
+from toolkit.report.template.package import read_template
 
 CHECKOUT = Path(__file__).resolve().parents[2]
 

@@ -14,13 +14,13 @@ from report_factory import make_record, make_result
 from toolkit.errors import ConfigError
 from toolkit.recording.details import read_details
 from toolkit.report.build import build_content, report_id
-from toolkit.report.check import check_template
-from toolkit.report.contents_pages import pdf_outline
 from toolkit.report.deliver import Delivered, deliver
-from toolkit.report.package import read_template
+from toolkit.report.design.files import packaged_templates
 from toolkit.report.style import Style, read_style, style_file
-from toolkit.report.template_files import packaged_templates
-from toolkit.report.verify import pdf_text
+from toolkit.report.template.check import check_template
+from toolkit.report.template.contents_pages import pdf_outline
+from toolkit.report.template.package import read_template
+from toolkit.report.template.verify import pdf_text
 from toolkit.report.words import say
 
 FOLDER = Path(__file__).resolve().parents[2] / "report_templates"

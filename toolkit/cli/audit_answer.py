@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from toolkit.audit.since_good import Drift, DriftedFile
     from toolkit.calibration.registry.registry import Registry
     from toolkit.cli.audit_amend import Amended
-    from toolkit.report.package import Template
+    from toolkit.report.template.package import Template
 
 PAGE, LINES = "audit.html", "audit.jsonl"
 _SHOWN, _WORST = 40, 6
@@ -90,7 +90,7 @@ def write_folder(out: Path, told: Answer, registry: Registry, template: Template
     from toolkit.cli.explain import rules_catalogue
     from toolkit.files import atomic_path
     from toolkit.recording.marks import GENERATOR, OWN_OUTPUT
-    from toolkit.report.audit_page import AuditView, write_page
+    from toolkit.report.audit.page import AuditView, write_page
 
     with atomic_path(out / LINES) as temporary, temporary.open("w", encoding="ascii") as lines:
         head = {"generator": GENERATOR, "marks": OWN_OUTPUT, "schema": 1, "kind": "audit"}
@@ -108,7 +108,7 @@ def write_folder(out: Path, told: Answer, registry: Registry, template: Template
     write_page(out / PAGE, view)
     if template is None:
         return out / PAGE, out / LINES
-    from toolkit.report.audit_content import build_audit_content
+    from toolkit.report.audit.content import build_audit_content
     from toolkit.report.deliver import deliver
     from toolkit.report.style import read_style, style_file
 

@@ -59,7 +59,7 @@ def command(
     findings = chart_findings(chart, newest.session_record)
     if out is not None:
         from toolkit.files import write_atomic
-        from toolkit.report.chart_figures import draw_chart
+        from toolkit.report.calibration.chart_figures import draw_chart
 
         write_atomic(out, draw_chart(chart, kind or "png"))
     text = [table(

@@ -31,8 +31,8 @@ if TYPE_CHECKING:
     from toolkit.comparison.model import Comparison, Entry, Mode
     from toolkit.findings import Finding
     from toolkit.report.deliver import Delivered
-    from toolkit.report.package import Template
     from toolkit.report.style import Style
+    from toolkit.report.template.package import Template
 
 NAME = "compare"
 
@@ -127,7 +127,7 @@ def _template(template: Path | None, out: Path | None, home: Path | None) -> Tem
     """Return the template of a comparison's document, judged before anything is read; None without one."""
     from toolkit.cli.delivery import home_template
     from toolkit.errors import ConfigError
-    from toolkit.report.package import read_template
+    from toolkit.report.template.package import read_template
 
     if out is None:
         if template is not None:
@@ -144,7 +144,7 @@ def _document(
 ) -> Delivered:
     from datetime import date
 
-    from toolkit.report.comparison_content import build_comparison_content
+    from toolkit.report.comparison.content import build_comparison_content
     from toolkit.report.deliver import deliver
     from toolkit.report.style import read_style, style_file
 
@@ -228,7 +228,7 @@ def _table(path: Path, *, axes: str, angles: Sequence[float]) -> tuple[Entry, li
 
 def _draw(found: Comparison, style: Style, folder: Path) -> dict[str, Path]:
     from toolkit.files import write_atomic
-    from toolkit.report.comparison_plots import comparison_plots
+    from toolkit.report.comparison.plots import comparison_plots
     from toolkit.report.figures import draw
 
     drawn = {}

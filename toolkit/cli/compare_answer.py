@@ -143,7 +143,7 @@ def comparison_text(
 ) -> str:
     """Return a comparison for people."""
     from toolkit.comparison.model import PARTS
-    from toolkit.report.comparison_cells import conclusion, shown_rows
+    from toolkit.report.comparison.cells import conclusion, shown_rows
 
     simulated = "  SIMULATED" if any(one.simulated for one in found.entries) else ""
     parts = [f"comparison of {found.mode}, reference {found.reference.label}{simulated}"]
@@ -184,7 +184,7 @@ def _conditions(found: Comparison) -> str:
 
 
 def _table(rows: Sequence[Difference], style: Style) -> str:
-    from toolkit.report.comparison_cells import named, p_text, shown_unit, with_U
+    from toolkit.report.comparison.cells import named, p_text, shown_unit, with_U
 
     load_unit, load_factor = style.unit("N")
     shown = []
@@ -219,7 +219,7 @@ def _factors(found: Comparison) -> str:
 def _precision(found: Comparison, style: Style) -> str:
     assert found.repeats is not None  # noqa: S101  asked before
     load_unit, load_factor = style.unit("N")
-    from toolkit.report.comparison_cells import factor_text, named, shown_unit
+    from toolkit.report.comparison.cells import factor_text, named, shown_unit
 
     names = [one.name for one in found.repeats.factors if one.varied]
     rows = []
@@ -246,7 +246,7 @@ def _precision(found: Comparison, style: Style) -> str:
 
 
 def _pattern(found: Comparison, style: Style) -> str:
-    from toolkit.report.comparison_cells import shown_unit, with_U
+    from toolkit.report.comparison.cells import shown_unit, with_U
 
     load_unit, load_factor = style.unit("N")
     rows = []

@@ -63,7 +63,7 @@ def tell(fit: SessionFit, *, title: str, full: bool, figures: Path | None) -> To
     """
     from toolkit.calibration.fit.balance_report import report_balance
     from toolkit.calibration.fit.report import report_session
-    from toolkit.report.calibration_text import balance_dict, balance_text, report_dict, report_text
+    from toolkit.report.calibration.text import balance_dict, balance_text, report_dict, report_text
 
     reports = report_session(fit)
     blocks = [report_text(one) for one in reports] if full else []
@@ -91,7 +91,7 @@ def tell(fit: SessionFit, *, title: str, full: bool, figures: Path | None) -> To
 def _write(fit: SessionFit, title: str, folder: Path) -> list[str]:
     from toolkit.calibration.fit.report import report_session
     from toolkit.files import write_atomic
-    from toolkit.report.calibration_figures import report_figures
+    from toolkit.report.calibration.figures import report_figures
 
     made: dict[str, bytes] = {}
     for one in report_session(fit):

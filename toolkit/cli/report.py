@@ -33,8 +33,8 @@ if TYPE_CHECKING:
     from toolkit.errors import ToolkitError
     from toolkit.report.deliver import Delivered, Job
     from toolkit.report.drawer import Drawer
-    from toolkit.report.package import Template
     from toolkit.report.pdf import Office
+    from toolkit.report.template.package import Template
 
 NAME = "report"
 
@@ -118,8 +118,8 @@ def command(
 
     from toolkit.cli.resolve import resolve_test
     from toolkit.report.drawer import Drawer
-    from toolkit.report.package import read_template
     from toolkit.report.pdf import Office
+    from toolkit.report.template.package import read_template
 
     chosen = choose_reader(reader)
     started = time.perf_counter()

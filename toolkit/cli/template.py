@@ -22,9 +22,9 @@ def check(
 
     Example: toolkit template check report_templates/org.docx
     """
-    from toolkit.report.check import check_template
-    from toolkit.report.package import read_template
     from toolkit.report.style import read_style, style_file
+    from toolkit.report.template.check import check_template
+    from toolkit.report.template.package import read_template
 
     template = read_template(file)
     found = check_template(template, read_style(style_file(file)))
@@ -56,10 +56,10 @@ def tags(
 
     Example: toolkit template tags --test tests/2019-06-04
     """
-    from toolkit.report.audit_vocabulary import AUDIT
+    from toolkit.report.audit.vocabulary import AUDIT
     from toolkit.report.build import build_content
     from toolkit.report.certificate.vocabulary import CERTIFICATE
-    from toolkit.report.comparison_vocabulary import COMPARISON
+    from toolkit.report.comparison.vocabulary import COMPARISON
     from toolkit.report.listing import list_tags
     from toolkit.report.style import read_style, style_file
     from toolkit.report.vocabulary import REPORT
@@ -95,8 +95,8 @@ def new(
     """
     from toolkit.errors import OutputError
     from toolkit.files import write_atomic
-    from toolkit.report.default_template import STYLE_FILE
-    from toolkit.report.template_files import packaged_templates
+    from toolkit.report.design.default import STYLE_FILE
+    from toolkit.report.design.files import packaged_templates
 
     known = packaged_templates()
     if like not in known:

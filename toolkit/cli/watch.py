@@ -68,8 +68,8 @@ def command(
     from toolkit.cli.resolve import resolve_test
     from toolkit.cli.watching import Watcher
     from toolkit.errors import ConfigError
-    from toolkit.report.package import read_template
     from toolkit.report.pdf import find_soffice
+    from toolkit.report.template.package import read_template
 
     if not folder.is_dir():
         raise ConfigError(

@@ -18,14 +18,14 @@ from typing import TYPE_CHECKING, Any
 from toolkit.errors import OutputError, RenderError, ToolkitError
 from toolkit.recording.marks import refuse_original
 from toolkit.report.content import Plot, ReportContent
-from toolkit.report.fill import fill, needed_figures
-from toolkit.report.filled import Filled
 from toolkit.report.handover import MANIFEST, content_hash, manifest_json
-from toolkit.report.package import Template
 from toolkit.report.pdf import Office
-from toolkit.report.print_copy import Printed, print_copies
-from toolkit.report.verify import verify_docx, verify_pdf
-from toolkit.report.verify_text import Check
+from toolkit.report.template.fill import fill, needed_figures
+from toolkit.report.template.filled import Filled
+from toolkit.report.template.package import Template
+from toolkit.report.template.print_copy import Printed, print_copies
+from toolkit.report.template.verify import verify_docx, verify_pdf
+from toolkit.report.template.verify_text import Check
 
 if TYPE_CHECKING:
     from toolkit.report.drawer import Drawer

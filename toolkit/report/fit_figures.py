@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolkit.report.calibration_figures import _drawn
+from toolkit.report.calibration.figures import _drawn
 from toolkit.report.content import Curve, Plot
 from toolkit.report.figures import COLOURS, draw
 from toolkit.tires.comparison import Comparison, model_curve

@@ -5,9 +5,9 @@ from __future__ import annotations
 
 import re
 
-from toolkit.report.blocks import Pieces, field, literal, paragraph, run
 from toolkit.report.certificate.vocabulary import FIGURES
-from toolkit.report.default_template import build_document
+from toolkit.report.design.blocks import Pieces, field, literal, paragraph, run
+from toolkit.report.design.default import build_document
 
 _UNKEPT = re.compile(r'(<w:pPr><w:pStyle w:val="[^"]*"/>)(?!<w:keepNext/>)')
 _WIDE = (38.0, 128.0)

@@ -60,7 +60,11 @@ def page(result: Result) -> str:
         f"<style>{_STYLE.replace('VAR', _COLOURS[made.verdict])}</style></head><body>",
         f"<h1>{escape(made.title)}</h1>",
         f'<div class="verdict"><b>{escape(HEADLINES[made.verdict])}</b><br>{_sentence(made)}</div>',
-        _picture(figures.error_bars(made), "error on held-out rows before and after, over the noise"),
+        *(
+            [_picture(figures.error_bars(made), "error before and after, over the noise")]
+            if made.held_out
+            else []
+        ),
         *_effects(made),
         *_where(result),
         *_held_out(made),
@@ -86,6 +90,8 @@ def _sentence(made: Diagnosis) -> str:
     if made.verdict == "unknown":
         told = [f"{channel} over {' and '.join(names)}" for channel, names in made.depends_on[:3]]
         return escape(f"The mismatch depends on: {'; '.join(told)}.")
+    if made.skipped and not made.held_out_by.endswith(("run", "runs")) and not made.mismatch:
+        return escape(f"The budget was spent at: {made.skipped[0]}. Nothing was judged.")
     if made.verdict == "untestable":
         return "The outputs do not vary, or the parameters take up everything; see below."
     return "What is left is noise; the list below says how large each effect would have had to be."
@@ -123,7 +129,7 @@ def _why(one: FoundEffect) -> str:
 
 def _where(result: Result) -> list[str]:
     made, found = result.diagnosis, result.search
-    if not made.mismatch:
+    if not made.mismatch or found is None:
         return []
     after = bool(made.effects)
     parts = ["<h2>Where</h2>"]

@@ -1,0 +1,119 @@
+"""The default template of an audit's summary, ``report_templates/audit.docx``: built by code."""
+
+from __future__ import annotations
+
+from toolkit.report.design.blocks import Pieces, field, paragraph, run
+from toolkit.report.design.default import build_document
+
+_WIDE = (38.0, 128.0)
+_QUARTER = (34.0, 52.0, 31.0, 49.0)
+
+
+def build_audit() -> bytes:
+    """Return the default template of an audit's summary as the bytes of a .docx, the same on every call."""
+    return build_document(
+        title="Audit of an archive", body=lambda p: [*_first(p), *_results(p)], header=_header, footer=_footer
+    )
+
+
+def _header(p: Pieces) -> str:
+    line = (
+        p.inline("tk:audit.title", "title")
+        + "<w:r><w:tab/></w:r><w:r><w:tab/></w:r>"
+        + p.inline("tk:audit.id", "id")
+    )
+    return paragraph(line, style="Header")
+
+
+def _footer(p: Pieces) -> str:
+    line = (
+        run("as known on ")
+        + p.inline("tk:audit.known_at", "date")
+        + "<w:r><w:tab/></w:r><w:r><w:tab/></w:r>"
+        + run("page ")
+        + field("PAGE")
+        + run(" of ")
+        + field("NUMPAGES")
+    )
+    return paragraph(line, style="Footer")
+
+
+def _first(p: Pieces) -> list[str]:
+    return [
+        paragraph(p.inline("tk:audit.title", "title"), style="Title"),
+        paragraph(p.inline("tk:audit.id", "id"), style="Subtitle"),
+        paragraph(p.inline("tk:audit.conclusion", "conclusion")),
+        p.facts(
+            [
+                [("FILES", "audit.files"), ("AS KNOWN ON", "audit.known_at")],
+                [("RIGHT", "audit.right"), ("NOT RIGHT", "audit.not_right")],
+                [("UNREADABLE", "audit.unreadable"), ("WITHOUT A DATE", "audit.undated")],
+            ],
+            _QUARTER,
+        ),
+        paragraph("", style="Gap"),
+        p.facts(
+            [
+                [("LEDGERS", "audit.heads")],
+                [("LEFT OUT?", "audit.refused")],
+                [("REPORTS?", "audit.reports")],
+                [("SINCE GOOD?", "audit.since_good")],
+                [("SOFTWARE", "audit.software")],
+            ],
+            _WIDE,
+        ),
+    ]
+
+
+def _results(p: Pieces) -> list[str]:
+    return [
+        paragraph(run("Grades"), style="Heading1"),
+        p.table(
+            "audit_grades",
+            "Files by their grade, the first that applies.",
+            ["grade", "files", "%", "what it means"],
+            ["grade", "files", "share", "meaning"],
+            [30, 18, 18, 100],
+            "lrrl",
+        ),
+        p.figure("audit_years", 150),
+        paragraph(run("Tests that change most"), style="Heading1"),
+        p.table(
+            "audit_tests",
+            "Largest changes by the record in force: of any row, and of the characteristics at any load.",
+            [
+                "test",
+                "date",
+                "not right",
+                "Fy [N]",
+                "Mz [N·m]",
+                "stiffness [%]",
+                "conicity [N]",
+                "plysteer [N]",
+            ],
+            ["test", "date", "files", "FY", "MZ", "stiffness", "conicity", "plysteer"],
+            [34, 22, 18, 18, 18, 20, 18, 18],
+            "llrrrrrr",
+        ),
+        p.block(
+            "tk:if.reports_to_amend",
+            paragraph(run("Reports that rest on them"), style="Heading1")
+            + p.table(
+                "audit_reports",
+                "Reports to be amended (ISO/IEC 17025:2017, 7.8.8).",
+                ["report", "linked by", "tests", "not right"],
+                ["report", "linked_by", "tests", "files"],
+                [58, 26, 58, 24],
+                "lllr",
+            ),
+        ),
+        paragraph(run("Findings"), style="Heading1"),
+        p.table(
+            "audit_findings",
+            "What was found, by rule.",
+            ["rule", "count", "what it means", "what to do"],
+            ["rule", "count", "means", "do"],
+            [36, 14, 60, 56],
+            "lrll",
+        ),
+    ]

@@ -1,0 +1,1 @@
+"""A calibration for people: the report of a fit, control charts, a budget."""

@@ -1,0 +1,1 @@
+"""A comparison as a document: its vocabulary, tables, figures and default template."""

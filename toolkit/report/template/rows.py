@@ -1,0 +1,142 @@
+"""Fill a table: the prototype row is cloned once a data row, header and following rows stay."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from copy import deepcopy
+
+from toolkit.report.content import Cell, Table
+from toolkit.report.style import Style
+from toolkit.report.tags import Tag, format_number, parse_tag
+from toolkit.report.template.controls import fill_control, fill_literals, set_cell
+from toolkit.report.template.pictures import Ids, free_row
+from toolkit.report.template.scan import LITERAL, control_tag, own_rows, row_in, visible_texts
+from toolkit.report.template.xml import W_P, W_SDT, W_TC, W_TR, Element, ancestor, paragraph_text, q
+
+Said = Callable[[str, str], None]
+
+
+def cell_text(value: Cell, spec: str, style: Style) -> str:
+    """Return a cell's text; what is absent or not finite is the style's visible mark."""
+    if isinstance(value, str):
+        return value
+    if value is None or not math.isfinite(value):
+        return style.missing
+    return format_number(value, spec, decimal_comma=style.decimal_comma)
+
+
+def fill_table(
+    element: Element, table: Table, resolve: Callable[[Tag], str], said: Said, style: Style, ids: Ids
+) -> list[Element]:
+    """Fill a w:tbl and return its new rows.
+
+    Parameters
+    ----------
+    element : the w:tbl, already checked against the catalogue
+    table : what to print
+    resolve : text of a value tag that stands in the prototype row
+    said : receives (column, text) of every cell value
+    """
+    prototype = _prototype(element)
+    tagged = _has_tags(prototype)
+    index = {column.name: i for i, column in enumerate(table.columns)}
+    free_row(prototype)
+    pattern = deepcopy(prototype)
+    _forget_identity(pattern)
+    literals, controls = _places(pattern)
+    made: list[Element] = []
+    last = prototype
+    for values in table.rows:
+        row = deepcopy(pattern)
+        last.addnext(row)
+        last = row
+
+        def text(tag: Tag, values: tuple[Cell, ...] = values) -> str:
+            if tag.family != "row":
+                return resolve(tag)
+            column = table.columns[index[tag.name]]
+            shown = cell_text(values[index[tag.name]], tag.spec or column.spec, style)
+            said(tag.name, shown)
+            return shown
+
+        if tagged:
+            # Literals first: what a control then receives is never read as a literal.
+            nodes = list(row.iter())
+            for place in literals:
+                fill_literals(nodes[place], text)
+            for place, tag in controls:
+                fill_control(nodes[place], text(tag))
+        else:
+            cells = [cell for cell in row.iter(W_TC) if ancestor(cell, W_TR) is row]
+            for cell, column, value in zip(cells, table.columns, values, strict=True):
+                shown = cell_text(value, column.spec, style)
+                said(column.name, shown)
+                set_cell(cell, shown)
+        _fresh_ids(row, ids)
+        made.append(row)
+    prototype.getparent().remove(prototype)
+    return made
+
+
+def _prototype(table: Element) -> Element:
+    for element, tag in _tags(table):
+        if tag.family == "row":
+            row = row_in(table, element)
+            if row is not None:
+                return row
+    return own_rows(table)[-1]
+
+
+def _has_tags(row: Element) -> bool:
+    return any(tag.family == "row" for _, tag in _tags(row))
+
+
+def _tags(root: Element) -> Iterator[tuple[Element, Tag]]:
+    for element in root.iter(W_SDT, W_P):
+        if element.tag == W_SDT:
+            tag = control_tag(element)
+            if tag is not None:
+                yield element, tag
+            continue
+        for match in LITERAL.finditer(paragraph_text(element)):
+            found = parse_tag(match[1])
+            if found is not None:
+                yield element, found
+
+
+def _places(pattern: Element) -> tuple[list[int], list[tuple[int, Tag]]]:
+    """Return where a row has literals and controls, counted over its elements: the same in every clone."""
+    literals, controls = [], []
+    for place, element in enumerate(list(pattern.iter())):
+        if element.tag == W_P and any(
+            parse_tag(match[1]) is not None
+            for match in LITERAL.finditer("".join(t.text or "" for t in visible_texts(element)))
+        ):
+            literals.append(place)
+        elif element.tag == W_SDT:
+            tag = control_tag(element)
+            if tag is not None and tag.family in ("row", "value"):
+                controls.append((place, tag))
+    return literals, controls
+
+
+_BOOKMARKS = (q("w:bookmarkStart"), q("w:bookmarkEnd"), q("w:commentRangeStart"), q("w:commentRangeEnd"))
+
+
+def _forget_identity(row: Element) -> None:
+    """Take off what must be unique in a document before a row is cloned."""
+    for element in list(row.iter(*_BOOKMARKS)):
+        element.getparent().remove(element)
+    for element in row.iter():
+        for name in ("w14:paraId", "w14:textId"):
+            element.attrib.pop(q(name), None)
+
+
+def _fresh_ids(row: Element, ids: Ids) -> None:
+    for element in row.iter(q("w:id")):
+        if element.getparent().tag == q("w:sdtPr"):
+            ids.control += 1
+            element.set(q("w:val"), str(ids.control))
+    for element in row.iter(q("wp:docPr")):
+        element.set("id", str(ids.next_drawing()))

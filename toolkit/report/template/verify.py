@@ -1,0 +1,162 @@
+"""Verify a filled report: what was meant to be printed is in the document and in its PDF."""
+
+from __future__ import annotations
+
+import io
+import re
+import subprocess
+import tempfile
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+from toolkit.errors import RenderError
+from toolkit.report.template.filled import Filled
+from toolkit.report.template.scan import BROKEN, LITERAL, control_tag
+from toolkit.report.template.verify_text import Check, text_checks
+from toolkit.report.template.xml import SDT_PR, W_P, W_SDT, clean, in_fallback, paragraph_text, q, stories
+
+
+def verify_docx(filled: Filled) -> tuple[Check, ...]:
+    """Check the filled Word file itself: placeholders gone, every figure there with its text."""
+    from docx.package import Package
+
+    parts = stories(Package.open(io.BytesIO(filled.docx)))
+    values = " ".join(entry.text for entry in filled.manifest)
+    left, alts = [], []
+    for story in parts:
+        for paragraph in story.root.iter(W_P):
+            text = paragraph_text(paragraph)
+            left += [m[0] for m in LITERAL.finditer(text) if m[0] not in values]
+            if BROKEN.search(text) and "{{" not in values:
+                left.append(text[:40])
+        for sdt in story.root.iter(W_SDT):
+            tag = control_tag(sdt)
+            if tag is not None and (
+                tag.family == "if" or sdt.find(f"{SDT_PR}/{q('w:showingPlcHdr')}") is not None
+            ):
+                left.append(str(tag))
+        alts += [p.get("descr") or "" for p in story.root.iter(q("wp:docPr")) if not in_fallback(p)]
+    absent = [
+        tag
+        for tag, alt in filled.figures
+        if " ".join(alt.split()) not in {" ".join(one.split()) for one in alts}
+    ]
+    return (
+        Check(name="placeholders", ok=not left, message=", ".join(left[:5]) or "none left"),
+        Check(
+            name="alt-text",
+            ok=not absent and all(alt for _, alt in filled.figures),
+            message=", ".join(absent) or f"{len(filled.figures)} figures with alternative text",
+        ),
+    )
+
+
+def verify_pdf(pdf: Path, filled: Filled) -> tuple[tuple[Check, ...], int]:
+    """Check the PDF and return the checks and its number of pages.
+
+    Raises
+    ------
+    RenderError
+        poppler's programs are not installed
+    """
+    info = _run(["pdfinfo", str(pdf)])
+    found = re.search(r"^Pages:\s+(\d+)", info, re.MULTILINE)
+    pages = int(found[1]) if found else 0
+    data = pdf.read_bytes()
+    with ThreadPoolExecutor(2) as pool:
+        fonts = pool.submit(_run, ["pdffonts", str(pdf)])
+        text = pdf_text(pdf)
+        listing = fonts.result()
+    pictures = data.count(b"/Subtype/Image")
+    mute = [tag for tag, alt in filled.figures if _pdf_string(alt) not in data]
+    return (
+        (
+            *text_checks(text, filled),
+            *_contents(pdf, text, filled),
+            _fonts(listing),
+            Check(name="pages", ok=pages > 0 and text.count("\f") == pages, message=f"{pages} pages"),
+            Check(
+                name="figures",
+                ok=pictures >= len({tag for tag, _ in filled.figures}) and not mute,
+                message=f"no alternative text in the PDF for {', '.join(mute)}"
+                if mute
+                else f"{pictures} pictures in the PDF, {len(filled.figures)} figures in the report",
+            ),
+            Check(
+                name="archive",
+                ok=b"pdfaid" in data and "yes" in _line(info, "Tagged"),
+                message="PDF/A-2 and tagged" if b"pdfaid" in data else "not PDF/A",
+            ),
+        ),
+        pages,
+    )
+
+
+def _contents(pdf: Path, text: str, filled: Filled) -> list[Check]:
+    from toolkit.report.template.verify_contents import contents_problems
+
+    if not filled.contents.entries:
+        return []
+    problems = contents_problems(pdf, text, filled)
+    lines = len(filled.contents.entries)
+    return [
+        Check(
+            name="contents",
+            ok=not problems,
+            message="; ".join(problems[:5]) or f"{lines} lines of contents with the pages of the print",
+        )
+    ]
+
+
+def pdf_text(pdf: Path) -> str:
+    """Return a PDF's text, a form feed after each page."""
+    with tempfile.TemporaryDirectory(prefix="toolkit-verify-") as folder:
+        # The text is the same without PDF/A's colour profile, which pdftotext sets up anew for each page:
+        # 50 ms a page. The name is blotted out in place, so that every offset stays right.
+        plain = Path(folder) / "text.pdf"
+        plain.write_bytes(pdf.read_bytes().replace(b"/OutputIntents", b"/OutputIntent_"))
+        return _run(["pdftotext", "-raw", "-enc", "UTF-8", str(plain), "-"])
+
+
+def _pdf_string(text: str) -> bytes:
+    # LibreOffice writes alternative texts as UTF-16 in hexadecimal, in objects that are not packed.
+    plain = clean(text).replace("\n", " ")
+    return b"<FEFF" + plain.encode("utf-16-be").hex().upper().encode() + b">"
+
+
+def _fonts(listing: str) -> Check:
+    loose = []
+    for line in listing.splitlines()[2:]:
+        # name  type  encoding  emb sub uni  object ID: the flags are the last three words before two numbers.
+        words = line.split()
+        if len(words) >= 6 and words[-5] != "yes":
+            loose.append(words[0])
+    return Check(name="fonts", ok=not loose, message=", ".join(loose) or "all fonts embedded")
+
+
+def _line(info: str, name: str) -> str:
+    return next((line for line in info.splitlines() if line.startswith(name)), "")
+
+
+def _run(command: list[str]) -> str:
+    try:
+        done = subprocess.run(command, capture_output=True, timeout=120, check=False)
+    except FileNotFoundError as error:
+        raise RenderError(
+            "the PDF cannot be verified",
+            where=command[0],
+            got="no program of that name on the PATH",
+            expected="poppler's pdftotext, pdffonts and pdfinfo",
+            next_step="run 'toolkit doctor': it prints the command that installs poppler-utils",
+            rule="no-poppler",
+        ) from error
+    except subprocess.TimeoutExpired as error:
+        raise RenderError(
+            "the PDF cannot be verified in time",
+            where=command[0],
+            got="no end after 120 s",
+            expected="an answer",
+            next_step="open the PDF; try again with --keep",
+            rule="render-timeout",
+        ) from error
+    return done.stdout.decode("utf-8", "replace")
