@@ -100,7 +100,7 @@ def test_no_word_of_an_effect(plan, tmp_path):
 def test_parameters_and_columns_of_the_plan(plan, tmp_path):
     free = Free(name="LMUY", value=1.0, unit="1", sd=0.02, bounds=(0.8, 1.2))
     wanted = dataclasses.replace(
-        plan, case=CasePlan(columns=("DRUM_ANGLE",), judge_load=True, parameters=(free,))
+        plan, case=CasePlan(columns=("DRUM_ANGLE",), load="judged", parameters=(free,))
     )
     case = read_case(write_case(simulate(wanted), tmp_path)[0])
     assert {one.name: one.role for one in case.channels} == {
@@ -119,7 +119,7 @@ def test_columns_that_never_vary_are_left_out(plan, tmp_path):
 
 @pytest.mark.parametrize(
     "case",
-    [CasePlan(outputs="cells"), CasePlan(judge_load=True),
+    [CasePlan(outputs="cells"), CasePlan(load="commanded"),
      CasePlan(parameters=(Free(name="LMUY", value=1.0, unit="1", sd=None, bounds=None),))],
 )  # fmt: skip
 def test_what_a_published_tire_cannot_be(virtual_plan, tmp_path, case):

@@ -124,7 +124,7 @@ def test_runs_of_a_plan(plan):
         ("effects = ['relaxaton=0.5m']", "relaxation"),
         ("[case]\noutputs = 'all'", "all"),
         ("[case]\ncolumns = ['FY']", "FY"),
-        ("[case]\njudge_load = 1", "true or false"),
+        ("[case]\nload = 1", "measured"),
         ("[case.parameters.LMUY]\nvalue = 1", "unit"),
         ("[case.parameters.LMUY]\nunit = '1'", "number"),
         ("[case.parameters.LMUY]\nvalue = 1\nunit = '1'\nbounds = [1]", "bounds"),

@@ -59,7 +59,7 @@ def write_case(test: VirtualTest, folder: Path, *, record: str | None = None) ->
     inputs = _inputs(test)
     cells = plan.case.outputs == "cells"
     outputs = list(CELLS) if cells else ["FY", "MZ"]
-    names = ("t", *inputs, *(["FZ"] if plan.case.judge_load else []), *outputs)
+    names = ("t", *inputs, *_judged(plan), *outputs)
     simulated = [] if kind == "machine" else ["FY", "MZ"]
     made = []
     for i, file in enumerate(test.files):
@@ -99,7 +99,7 @@ def case_toml(
     lines += ["", "[recording]", 'time = "t"', 'axes = "machine"', "", "[recording.channels]"]
     lines.append('t = { unit = "s", role = "time" }')
     lines += [f'{name} = {{ unit = {_text(unit_of(name))}, role = "{_role(name)}" }}' for name in inputs]
-    judged = [*(["FZ"] if plan.case.judge_load else []), *outputs]
+    judged = [*_judged(plan), *outputs]
     lines += [f'{name} = {{ unit = {_text(unit_of(name))}, role = "output" }}' for name in judged]
     turned = any(file.run.mounting == "turned" for file in test.files)
     if plan.case.outputs == "cells":
@@ -122,7 +122,7 @@ def check_case(plan: Plan, record: str | None) -> str:
     """
     kind = "columns" if plan.tire_file is None else "machine"
     wrong: tuple[str, str] | None = None
-    if kind == "columns" and (plan.case.outputs == "cells" or plan.case.judge_load):
+    if kind == "columns" and (plan.case.outputs == "cells" or plan.case.load != "measured"):
         wrong = "a tire that is no file", '[tire] file = "tire.tir" in the plan'
     elif plan.case.outputs == "cells" and record is None:
         wrong = "no calibration of the virtual machine", "--calibrations DIR with a record in force"
@@ -138,7 +138,7 @@ def check_case(plan: Plan, record: str | None) -> str:
 
 def _inputs(test: VirtualTest) -> list[str]:
     """Return the driving columns: slip angle and load, and those that the plan names or that vary."""
-    judged = {"FZ"} if test.plan.case.judge_load else set()
+    load = test.plan.case.load
     wanted = test.plan.case.columns
     if wanted is None:
         wanted = tuple(
@@ -147,8 +147,12 @@ def _inputs(test: VirtualTest) -> list[str]:
             if not name.endswith("_CMD")
             and len({float(v) for file in test.files for v in shown(file.signals, name)[[0, -1]]}) > 1
         )
-    chosen = dict.fromkeys(("SA", "FZ", *(("FZ_CMD",) if judged else ()), *wanted))
-    return [name for name in chosen if name not in judged]
+    chosen = dict.fromkeys(("SA", "FZ" if load == "measured" else "FZ_CMD", *wanted))
+    return [name for name in chosen if name != "FZ" or load == "measured"]
+
+
+def _judged(plan: Plan) -> list[str]:
+    return ["FZ"] if plan.case.load == "judged" else []
 
 
 def _role(name: str) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any, Literal, cast
+from typing import Any, Literal, cast, get_args
 
 from toolkit.errors import ConfigError
 from toolkit.files import check_keys
@@ -12,6 +12,7 @@ from toolkit.machine.quantity import one_of
 from toolkit.units import unit
 
 Outputs = Literal["forces", "cells"]
+Load = Literal["measured", "judged", "commanded"]
 COLUMNS = (
     "SA", "FZ", "V", "TIRE_ANGLE", "DRUM_ANGLE", "P_INFL", "T_TREAD", "T_AMBIENT", "SA_CMD", "FZ_CMD"
 )  # fmt: skip
@@ -32,13 +33,14 @@ class Free:
 class CasePlan:
     """Outputs: ``forces`` FY and MZ by the calibration, or ``cells`` with the calibration named.
 
-    ``columns`` beside t, SA and FZ (None: those that vary); ``judge_load`` makes FZ an output that FZ_CMD
-    drives.
+    ``columns`` beside t, SA and the load (None: those that vary). ``load`` says what is known of it: FZ
+    ``measured`` drives the tire, or is ``judged`` as an output that FZ_CMD drives, or only FZ_CMD was
+    ``commanded``.
     """
 
     outputs: Outputs = "forces"
     columns: tuple[str, ...] | None = None
-    judge_load: bool = False
+    load: Load = "measured"
     parameters: tuple[Free, ...] = ()
 
 
@@ -52,16 +54,13 @@ def read_case_plan(table: Any, *, where: str) -> CasePlan:
     """
     if not isinstance(table, dict):
         raise _wrong("case is no table", where, table, "[case] with its keys")
-    check_keys(table, ("outputs", "columns", "judge_load", "parameters"), where=where)
+    check_keys(table, ("outputs", "columns", "load", "parameters"), where=where)
     columns = table.get("columns")
     if columns is not None:
         if not isinstance(columns, list):
             raise _wrong("columns are no list", f"{where}.columns", columns, f"some of {', '.join(COLUMNS)}")
         for one in columns:
             one_of(one, COLUMNS, f"{where}.columns")
-    judge = table.get("judge_load", False)
-    if not isinstance(judge, bool):
-        raise _wrong("judge_load is neither true nor false", f"{where}.judge_load", judge, "true or false")
     parameters = table.get("parameters", {})
     if not isinstance(parameters, dict):
         raise _wrong("parameters are no table", f"{where}.parameters", parameters, "[case.parameters.NAME]")
@@ -70,7 +69,7 @@ def read_case_plan(table: Any, *, where: str) -> CasePlan:
             "Outputs", one_of(table.get("outputs", "forces"), ("forces", "cells"), f"{where}.outputs")
         ),
         columns=None if columns is None else tuple(columns),
-        judge_load=judge,
+        load=cast("Load", one_of(table.get("load", "measured"), get_args(Load), f"{where}.load")),
         parameters=tuple(_free(name, one, f"{where}.parameters.{name}") for name, one in parameters.items()),
     )
 

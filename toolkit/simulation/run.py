@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from toolkit.simulation.disturb import Signals
 
 _TARE_FILE = 1_000_000  # the tare's place among the seeds, beyond any file's number
+_TARE_ROWS = 100  # of the lifted wheel's one revolution, however few a recording has
 _BETWEEN = 1  # the stream of the rows that a dwell recording leaves out
 
 
@@ -239,7 +240,7 @@ def _truth(name: str, run: RunSteps, line: Timeline, walked: Walked) -> tuple[Bl
 def _tare(plan: Plan) -> tuple[Signals, float]:
     """Return the samples of the lifted wheel: the zeros and its weight, before any zero has moved."""
     rng = np.random.default_rng([plan.seed, _TARE_FILE])
-    rows = plan.acquisition.rows_per_revolution
+    rows = max(plan.acquisition.rows_per_revolution, _TARE_ROWS)
     none = np.zeros(rows)
     dt = tire.revolution_time_s(plan.tire, plan.machine.drum.speed_m_s) / rows
     hub = carriage.HubLoads(FY=none, MZ=none, MX=np.full(rows, plan.carriage.overturning_Nm), FZ=none)
