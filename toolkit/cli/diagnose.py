@@ -39,32 +39,30 @@ def command(
     Example: toolkit diagnose case.toml --out answer
     """
     _one_thread()
+    import json as json_module
+
     from toolkit.diagnosis.case_read import read_case
     from toolkit.diagnosis.diagnose import diagnose
-    from toolkit.diagnosis.serial import as_json, prediction_csv
+    from toolkit.diagnosis.serial import as_json
     from toolkit.files import write_atomic
-    from toolkit.report.diagnosis.page import write_page
+    from toolkit.report.diagnosis.page import page
 
     started = time.perf_counter()
     read = read_case(case)
+    _writable(out)
     registry = _registry(calibrations, home) if read.simulation.kind == "machine" else None
     tell = _teller(show=not quiet and not json)
     result = diagnose(read, registry, budget_s=budget, tell=tell)
     tell("")
     made = result.diagnosis
     payload = as_json(made)
-    unknown = not made.effects
-    for run in read.predict:
-        name = Path(run.name).with_suffix(".csv").name
-        write_atomic(out / "predictions" / name, prediction_csv(result.search, run, unknown=unknown))
+    drawn = page(result)
     payload["timing"] = {"seconds": time.perf_counter() - started}
-    import json as json_module
-
-    write_atomic(
-        out / "diagnosis.json",
-        json_module.dumps({"schema": 1, **payload}, ensure_ascii=False, indent=2, allow_nan=False) + "\n",
-    )
-    write_page(out / "diagnosis.html", result)
+    text = json_module.dumps({"schema": 1, **payload}, ensure_ascii=False, indent=2, allow_nan=False) + "\n"
+    for name, content in result.predictions:
+        write_atomic(out / "predictions" / name, content)
+    write_atomic(out / "diagnosis.html", drawn)
+    write_atomic(out / "diagnosis.json", text)
     answer({**payload, "out": str(out)}, _text(made, out), as_json=json, quiet=quiet)
     return 0 if made.verdict == "nothing" else 1
 
@@ -75,6 +73,26 @@ def _one_thread() -> None:
 
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
         os.environ.setdefault(name, "1")
+
+
+def _writable(out: Path) -> None:
+    """Refuse a folder that cannot be written before the search, not after it."""
+    import os
+
+    from toolkit.errors import OutputError
+
+    folder = out.absolute()
+    while not folder.exists() and folder != folder.parent:
+        folder = folder.parent
+    if not folder.is_dir() or not os.access(folder, os.W_OK | os.X_OK):
+        raise OutputError(
+            "the answer's folder cannot be written",
+            where=out,
+            got="a file" if folder.is_file() else f"no write permission in {folder}",
+            expected="a folder, or a place where one can be made",
+            next_step="choose another folder with --out",
+            rule="not-writable",
+        )
 
 
 def _registry(calibrations: Path | None, home: Path | None) -> Path | None:

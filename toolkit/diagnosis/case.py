@@ -45,7 +45,8 @@ class Run:
     """One continuous recording: columns in the recording's units, shape (n,), NaN where a sample is missing.
 
     ``t`` is the time [s]; without a time channel the row's number. ``simulated`` has the other program's
-    output of a case of kind ``columns``; ``declared`` the run's table as written.
+    output of a case of kind ``columns``; ``declared`` the run's table as written; ``filled`` how many
+    missing samples of which input were interpolated.
     """
 
     name: str
@@ -54,6 +55,7 @@ class Run:
     conditions: Mapping[str, str]
     declared: Mapping[str, Any]
     simulated: Mapping[str, NDArray[np.float64]]
+    filled: tuple[tuple[str, int], ...] = ()
 
     @property
     def rows(self) -> int:

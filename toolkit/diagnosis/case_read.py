@@ -79,6 +79,10 @@ def read_case(path: Path) -> Case:
         raise _wrong(
             "a case has no recording", f"{path}: recording", "no [[recording.run]]", "one run or more"
         )
+    if all(one.conditions.get("phase") == "tare" for one in runs):
+        raise _wrong(
+            "every recording is a tare", f"{path}: recording.run", 'phase = "tare"', 'a run of phase = "test"'
+        )
     predict = [
         _run(
             entry,

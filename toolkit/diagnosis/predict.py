@@ -10,8 +10,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from toolkit.units import unit
-
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
@@ -26,10 +24,10 @@ VARIANTS = ("nominal", "refitted", "augmented")
 
 
 def prediction_names(runs: Sequence[Run]) -> tuple[str, ...]:
-    """Return the file name of every prediction below ``predictions/``: that of the input, a workbook's as CSV.
+    """Return the file name of every prediction below ``predictions/``: that of the inputs.
 
-    The path of the case is kept without what would lead out of the folder; where two would then be one, a
-    number tells them apart.
+    The path of the case is kept without what would lead out of the folder, a workbook becomes a CSV; where
+    two would then be one, a number tells them apart.
     """
     made: list[str] = []
     for run in runs:
@@ -55,7 +53,7 @@ def prediction_csv(problem: Problem, run: Run, fits: Sequence[Fit | None]) -> st
     columns: dict[str, NDArray[np.float64]] = {}
     for one in case.channels:
         if one.role == "time":
-            columns[one.name] = run.t / unit(one.unit).factor
+            columns[one.name] = run.columns[one.name]
     made = [_simulated(problem, run, one) for one in fits]
     for output in problem.model.outputs:
         for variant, values in zip(VARIANTS, made, strict=True):

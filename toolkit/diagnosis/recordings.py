@@ -65,12 +65,16 @@ def read_run(
     else:
         t = columns[time.name] * unit(time.unit).factor
         _check_time(path, time.name, t)
+    filled = []
     for channel in channels:
         if channel.role in ("input", "covariate") and channel.name in columns:
+            missing = int(np.isnan(columns[channel.name]).sum())
+            filled += [(channel.name, missing)] if missing else []
             columns[channel.name] = _filled(path, channel.name, t, columns[channel.name])
     return Run(
-        name=name, t=t, columns=columns, conditions=conditions(declared), declared=declared, simulated=others
-    )
+        name=name, t=t, columns=columns, conditions=conditions(declared), declared=declared, simulated=others,
+        filled=tuple(filled),
+    )  # fmt: skip
 
 
 def conditions(declared: Mapping[str, Any]) -> dict[str, str]:

@@ -1,7 +1,7 @@
 """Signs of an effect's parameters: inside SAE and the machine's axes, in an answer those of the case.
 
-An effect's equation is read with the recorded channels: ``alpha = SA - offset`` holds with SA as the case has it,
-so that an offset of +0.3 deg says in every axis system that the recorded slip angle is 0.3 deg too large.
+An effect's equation is read with the recorded channels: ``alpha = SA - offset`` holds with SA as the case has
+it, so that an offset of +0.3 deg says in every axis system that the recorded slip angle is 0.3 deg too large.
 """
 
 from __future__ import annotations

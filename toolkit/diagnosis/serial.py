@@ -1,22 +1,17 @@
-"""The answer as the contract's JSON, and predictions as CSV."""
+"""The answer as the contract's JSON: what is no finite number is null."""
 
 from __future__ import annotations
 
 import math
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
-from toolkit.diagnosis.answer import Diagnosis, FoundEffect, Mismatch
-
 if TYPE_CHECKING:
-    from toolkit.diagnosis.case import Run
-    from toolkit.diagnosis.search import Search
+    from toolkit.diagnosis.answer import Diagnosis, FoundEffect, Mismatch
 
 
 def as_json(made: Diagnosis) -> dict[str, Any]:
     """Return the answer as the contract has it, without ``schema`` and ``timing``."""
-    return {
+    answer: dict[str, Any] = _finite({
         "title": made.title,
         "case_sha256": made.case_sha256,
         "verdict": made.verdict,
@@ -46,14 +41,15 @@ def as_json(made: Diagnosis) -> dict[str, Any]:
         "depends_on": [{"channel": channel, "variables": list(names)} for channel, names in made.depends_on],
         "not_found": [
             {
-                "name": one.name, "minimum_detectable": _finite(one.minimum_detectable), "unit": one.unit,
+                "name": one.name, "minimum_detectable": one.minimum_detectable, "unit": one.unit,
                 "observable": one.observable, "why": one.why,
             }
             for one in made.not_found
         ],
         "next_measurements": list(made.next_measurements),
         "findings": [one.as_dict() for one in made.findings],
-    }  # fmt: skip
+    })  # fmt: skip
+    return answer
 
 
 def _mismatch(one: Mismatch) -> dict[str, Any]:
@@ -79,9 +75,9 @@ def _effect(one: FoundEffect) -> dict[str, Any]:
         "parameters": [
             {
                 "name": each.name,
-                "value": each.value if isinstance(each.value, str) else _finite(each.value),
+                "value": each.value,
                 "unit": each.unit,
-                "ci95": None if each.ci95 is None else [_finite(end) for end in each.ci95],
+                "ci95": None if each.ci95 is None else list(each.ci95),
                 "runs": None if each.runs is None else list(each.runs),
             }
             for each in one.parameters
@@ -92,22 +88,10 @@ def _effect(one: FoundEffect) -> dict[str, Any]:
     }
 
 
-def _finite(value: float | None) -> float | None:
-    return value if value is not None and math.isfinite(value) else None
-
-
-def prediction_csv(found: Search, run: Run, *, unknown: bool) -> str:
-    """Return a run's outputs as declared, refitted and augmented, under the recording's time."""
-    problem = found.problem
-    fits = {"nominal": found.nominal, "refitted": found.refitted}
-    fits["augmented"] = found.refitted if unknown else found.augmented
-    columns: dict[str, np.ndarray[Any, np.dtype[np.float64]]] = {"t": run.t}
-    for output in problem.model.outputs:
-        for name, made in fits.items():
-            values = dict(problem.known)
-            values.update(zip((one.name for one in problem.free), made.p, strict=True))
-            simulated = problem.model.simulate(run, values, made.active)
-            columns[f"{output.name}_{name}"] = simulated[output.name]
-    lines = [",".join(columns)]
-    lines += [",".join(repr(float(v)) for v in row) for row in np.stack(list(columns.values()), axis=1)]
-    return "\n".join(lines) + "\n"
+def _finite(value: Any) -> Any:
+    """Return a JSON value with null in the place of every number that is none."""
+    if isinstance(value, dict):
+        return {key: _finite(one) for key, one in value.items()}
+    if isinstance(value, list | tuple):
+        return [_finite(one) for one in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -34,10 +34,9 @@ def _motion(case: Case, model: Model, active: Active) -> tuple[str, str, str]:
     if forces is not None:
         state = str(active.channel)
         position = model.position_of(state)  # type: ignore[attr-defined]
-        return (
-            forces.get(state) or f"{_channel(case, model, state)}/s",
-            _state(case, model, state), _state(case, model, position or state),
-        )  # fmt: skip
+        force = forces.get(state) or f"{_channel(case, model, state)}/s"
+        speed = _state(case, model, state, f"{force}*s")
+        return force, speed, speed if position is None else _state(case, model, position, f"{speed}*s")
     motion = getattr(model, "motion", None)
     own = _channel(case, model, active.channel)
     if motion is None:
@@ -50,7 +49,7 @@ def _motion(case: Case, model: Model, active: Active) -> tuple[str, str, str]:
     return f"{length}/s^2", f"{length}/s", length
 
 
-def _state(case: Case, model: Model, name: str) -> str:
-    """Return the unit of a state: that of the output of its name, else the state's name itself."""
+def _state(case: Case, model: Model, name: str, derived: str) -> str:
+    """Return the unit of a state: that of the output of its name, else what its equation implies."""
     unit = _channel(case, model, name)
-    return name if unit == "1" else unit
+    return derived if unit == "1" else unit

@@ -84,6 +84,15 @@ class PythonModel:
             self._kept[key] = self._called(run, p, changed)
         return self._kept[key]
 
+    def repeats(self, run: Run, p: Mapping[str, float]) -> None:
+        """Refuse a simulator that answers one question in two ways: its noise would pass for physics."""
+        first, again = self.call(run, p, {}), self._called(run, p, {})
+        for name, values in first.items():
+            if not np.allclose(values, again[name], rtol=1e-9, atol=1e-12 * float(np.abs(values).max())):
+                raise _failed(
+                    self.case, run, f"other values of {name!r} on a second call with the same inputs"
+                )
+
     def _called(
         self, run: Run, p: Mapping[str, float], changed: Mapping[str, NDArray[np.float64]]
     ) -> dict[str, NDArray[np.float64]]:

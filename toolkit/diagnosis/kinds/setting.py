@@ -45,6 +45,8 @@ def setting(
         slip_work_before_kJ=work_kJ,
         nominal_load_N=nominal_load_N,
         nominal_speed_m_s=speed_m_s,
+        # Forces stand in the machine's axes, which do not follow a reversed drum.
+        travel=-1.0 if run.conditions.get("rotation") == "reverse" else 1.0,
         facing=-1.0 if run.conditions.get("mounting") == "turned" else 1.0,
     )
 

@@ -62,7 +62,7 @@ def page(result: Result) -> str:
         f'<div class="verdict"><b>{escape(HEADLINES[made.verdict])}</b><br>{_sentence(made)}</div>',
         *(
             [_picture(figures.error_bars(made), "error before and after, over the noise")]
-            if made.held_out
+            if result.search is not None
             else []
         ),
         *_effects(made),

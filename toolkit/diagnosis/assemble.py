@@ -1,0 +1,312 @@
+"""From a search to the answer: verdict, mismatch, effects with intervals, errors, power."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from toolkit.diagnosis.answer import (
+    Diagnosis,
+    FoundEffect,
+    FoundParameter,
+    HeldOutFit,
+    Mismatch,
+    NominalParameter,
+    Verdict,
+)
+from toolkit.diagnosis.case import Case
+from toolkit.diagnosis.classes import equivalent_to
+from toolkit.diagnosis.locate import places
+from toolkit.diagnosis.model import Active
+from toolkit.diagnosis.power import not_found
+from toolkit.diagnosis.search import ALPHA, Search, Step
+from toolkit.diagnosis.sense import sense
+from toolkit.diagnosis.units_of import unit_of
+from toolkit.findings import Finding
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+_FAR = 3.0  # prior standard deviations that a parameter must not be moved by
+_MOSTLY = 0.5  # of the log-likelihood that named effects must explain, beside the structure that stays
+
+
+def answer_of(case: Case, found: Search, told: tuple[Finding, ...]) -> Diagnosis:
+    """Return the answer of a search; ``told`` are the findings on the case itself."""
+    problem = found.problem
+    unknown = mostly_unknown(found)
+    effects = () if unknown else tuple(_effect(found, step) for step in found.steps)
+    nominal = _nominal(found, before_effects=unknown)
+    verdict = _verdict(found, effects, nominal, unknown=unknown)
+    remaining = "unknown" if found.structure else "nothing"
+    named = {one.name for one in effects} | {name for one in effects for name in one.equivalent_to}
+    units = {
+        id(one): unit_of(case, problem.model, one.active, one.active.searched[0].name)
+        for one in found.scored
+        if one.active.searched
+    }
+    tests = max(len(found.scored), 1)
+    return Diagnosis(
+        title=case.title,
+        case_sha256=case.sha256,
+        verdict=verdict,
+        remaining="unknown" if verdict == "unknown" else remaining,  # type: ignore[arg-type]
+        mismatch=_mismatches(found, unknown=unknown),
+        effects=effects,
+        nominal_parameters=nominal,
+        held_out=_held_out(found, unknown=unknown),
+        held_out_by="run" if found.folds.by_run else "contiguous blocks of one run",
+        depends_on=tuple((one.output, one.variables) for one in found.structure),
+        not_found=not_found(found.screen, found.scored, named, alpha=ALPHA / tests, units=units),
+        next_measurements=_next(found, effects, verdict),
+        findings=(*told, *_outliers(case, found)),
+        complete=not found.skipped,
+        skipped=found.skipped,
+    )
+
+
+def mostly_unknown(found: Search) -> bool:
+    """Tell whether what stays after the named effects outweighs them: they then only imitate it."""
+    if not found.structure:
+        return False
+    left = found.structure[0].gain / 2
+    explained = sum(one.gain for one in found.steps)
+    return explained < _MOSTLY * (explained + left)
+
+
+def _verdict(
+    found: Search, effects: tuple[FoundEffect, ...], nominal: tuple[NominalParameter, ...], *, unknown: bool
+) -> Verdict:
+    if effects:
+        return "equivalent" if any(one.equivalent_to for one in effects) else "named"
+    if unknown or found.structure:
+        return "unknown"
+    if any(abs(one.shift_in_sd or 0.0) > _FAR for one in nominal):
+        return "untestable"
+    return "nothing"
+
+
+def _effect(found: Search, step: Step) -> FoundEffect:
+    problem, active = found.problem, step.active
+    runs = None if active.runs is None else tuple(run.name for run in problem.runs if run.name in active.runs)
+    same = equivalent_to(problem, step)
+    rejected = {
+        one.active.effect.name: one.difference
+        for one in reversed(step.rivals)
+        if one.active.effect.name not in (*same, active.effect.name)
+    }
+    return FoundEffect(
+        name=active.effect.name,
+        stage=active.effect.stage,
+        channel=active.channel,
+        statement=active.effect.statement,
+        equation=active.effect.equation,
+        reference=active.effect.reference,
+        parameters=(*_parameters(found, active, runs), *_named(active, runs)),
+        equivalent_to=same,
+        rejected=tuple(rejected.items()),
+        held_out_log_score_gain=step.held_out_gain,
+        p_value=step.p_value,
+    )
+
+
+def _parameters(found: Search, active: Active, runs: tuple[str, ...] | None) -> tuple[FoundParameter, ...]:
+    from scipy.stats import t as student
+
+    problem, made = found.problem, found.augmented
+    at = len(problem.free)
+    for other in made.active:
+        if _same(other, active):
+            break
+        at += len(other.searched)
+    n = sum(int(one.sum()) for one in problem.kept.values())
+    quantile = float(student.ppf(0.975, max(n - len(made.covariance), 1)))
+    result = []
+    for i, one in enumerate(active.effect.parameters):
+        value = active.values.get(one.name, 0.0)
+        ci: tuple[float, float] | None = None
+        if active.searched:
+            variance = float(made.covariance[at + i, at + i])
+            reach = quantile * math.sqrt(max(variance, 0.0))
+            if math.isfinite(reach) and reach < 1e5 * max(abs(value), 1e-300):
+                ci = (max(value - reach, one.bounds[0]), min(value + reach, one.bounds[1]))
+        turned = sense(active, one.name, problem.case.axes)
+        if turned < 0:
+            value, ci = -value, None if ci is None else (-ci[1], -ci[0])
+        unit = unit_of(problem.case, problem.model, active, one.name)
+        result.append(FoundParameter(name=one.name, value=value, unit=unit, ci95=ci, runs=runs))
+    return tuple(result)
+
+
+def _named(active: Active, runs: tuple[str, ...] | None) -> tuple[FoundParameter, ...]:
+    names = {"channel_swap": "with", "wrong_calibration": "record", "crosstalk": "from"}
+    if active.effect.name not in names or active.source is None:
+        return ()
+    name = names[active.effect.name]
+    return (FoundParameter(name=name, value=active.source, unit="", ci95=None, runs=runs),)
+
+
+def _same(one: Active, other: Active) -> bool:
+    return (one.effect.name, one.channel, one.source, one.runs) == (
+        other.effect.name,
+        other.channel,
+        other.source,
+        other.runs,
+    )
+
+
+def _nominal(found: Search, *, before_effects: bool) -> tuple[NominalParameter, ...]:
+    after = found.refitted if before_effects else found.augmented
+    fitted = dict(zip((one.name for one in found.problem.free), after.p, strict=True))
+    return tuple(
+        NominalParameter(
+            name=one.name,
+            before=one.value,
+            after=fitted.get(one.name, one.value),
+            unit=one.unit,
+            prior_sd=one.sd,
+        )
+        for one in found.problem.model.parameters
+    )
+
+
+def _mismatches(found: Search, *, unknown: bool) -> tuple[Mismatch, ...]:
+    problem = found.problem
+    made = []
+    for name in problem.names:
+        kept = problem.kept[name]
+        if not kept.any():
+            continue
+        before, after = found.refitted.residual[name], found.augmented.residual[name]
+        p_values = [one.p_value for one in found.structure_before if one.output == name]
+        if found.steps:
+            share = max(
+                0.0, 1 - float(np.sum(after[kept] ** 2)) / max(float(np.sum(before[kept] ** 2)), 1e-300)
+            )
+            signal = before - after
+            ratio = float(np.mean(signal[kept] ** 2)) / max(
+                found.augmented.noise[name].marginal_sd ** 2, 1e-300
+            )
+            if ratio * kept.sum() > 20:
+                p_values.append(found.steps[0].p_value)
+        else:
+            share, signal = _structured(found, name)
+        if not p_values:
+            continue
+        if unknown:
+            share, signal = max((share, signal), _structured(found, name), key=lambda one: one[0])
+        made.append(
+            Mismatch(
+                channel=name,
+                p_value=min(p_values),
+                share_of_variance=share,
+                where=places(problem, name, signal, found.refitted.simulated[name]),
+            )
+        )
+    return tuple(made)
+
+
+def _structured(found: Search, name: str) -> tuple[float, NDArray[np.float64]]:
+    """Return share and signal of the smooth structure in an output's refitted residual."""
+    from toolkit.diagnosis.structure import groups
+
+    problem, kept = found.problem, found.problem.kept[name]
+    residual = found.refitted.residual[name]
+    best, signal = 0.0, np.zeros(problem.rows)
+    wanted = {one.variables for one in found.structure_before if one.output == name}
+    for group in groups(problem, found.refitted):
+        if group.output != name or (wanted and group.variables not in wanted):
+            continue
+        fit = np.linalg.lstsq(group.columns[kept], residual[kept], rcond=None)[0]
+        made = group.columns @ fit
+        share = 1 - float(np.sum((residual - made)[kept] ** 2)) / max(
+            float(np.sum(residual[kept] ** 2)), 1e-300
+        )
+        if share > best:
+            best, signal = share, made
+    return best, signal
+
+
+def _held_out(found: Search, *, unknown: bool) -> tuple[HeldOutFit, ...]:
+    problem = found.problem
+    made = []
+    augmented = found.held_refitted if unknown else found.held_augmented
+    for output in problem.model.outputs:
+        kept, observed = problem.kept[output.name], problem.observed[output.name]
+        if not kept.any():
+            continue
+
+        def rmse(
+            simulated: NDArray[np.float64], o: NDArray[np.float64] = observed, k: NDArray[np.bool_] = kept
+        ) -> float:
+            return math.sqrt(float(np.mean((o[k] - simulated[k]) ** 2)))
+
+        made.append(
+            HeldOutFit(
+                channel=output.name,
+                unit=output.unit,
+                nominal_rmse=rmse(found.nominal.simulated[output.name]),
+                refitted_rmse=rmse(found.held_refitted.simulated[output.name]),
+                augmented_rmse=rmse(augmented.simulated[output.name]),
+                noise_floor=_floor(found, output.name, output.sd),
+            )
+        )
+    return tuple(made)
+
+
+def _floor(found: Search, name: str, sd: float | None) -> float:
+    """Return an output's noise: as stated, else what is left when smooth structure is taken out too."""
+    if sd is not None:
+        return sd
+    kept = found.problem.kept[name]
+    left = math.sqrt(float(np.mean(found.augmented.residual[name][kept] ** 2)))
+    if any(one.output == name for one in found.structure):
+        share, _ = _structured(found, name)
+        whole = math.sqrt(float(np.mean(found.refitted.residual[name][kept] ** 2)))
+        left = min(left, whole * math.sqrt(max(1 - share, 0.0)))
+    return left
+
+
+def _next(found: Search, effects: tuple[FoundEffect, ...], verdict: Verdict) -> tuple[str, ...]:
+    from toolkit.effects.catalogue import effects as catalogue
+
+    said = []
+    for one in effects:
+        if one.equivalent_to:
+            apart = dict.fromkeys(catalogue()[name].separates for name in (one.name, *one.equivalent_to))
+            said.append(
+                f"To tell {one.name} from {', '.join(one.equivalent_to)}: "
+                f"{'; '.join(text for text in apart if text)}."
+            )
+    if verdict == "unknown":
+        names = dict.fromkeys(name for one in found.structure for name in one.variables)
+        said.append(
+            f"The mismatch depends on {', '.join(names)}: repeat the run with "
+            f"{next(iter(names), 'one input')} alone varied, everything else held."
+        )
+    if verdict == "untestable":
+        said.append(
+            "Tighten the priors of the parameters that moved (certificate, data sheet), or vary the inputs."
+        )
+    if len(found.problem.runs) == 1:
+        said.append("Repeat the run: with one recording alone, only blocks of it could be held out.")
+    return tuple(said)
+
+
+def _outliers(case: Case, found: Search) -> tuple[Finding, ...]:
+    made = []
+    problem = found.problem
+    for name, kept in problem.kept.items():
+        left_out = int(np.isfinite(problem.observed[name]).sum() - kept.sum())
+        if left_out:
+            made.append(
+                Finding(
+                    rule="case-outlier",
+                    where=f"{case.path.name}: {name}",
+                    level="note",
+                    message=f"{left_out} single values far off all neighbours were left out of every fit",
+                )
+            )
+    return tuple(made)

@@ -1,0 +1,81 @@
+"""What a reader of an answer must know of the case itself: one run, filled samples, the record's state."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from toolkit.findings import Finding
+
+if TYPE_CHECKING:
+    from toolkit.diagnosis.case import Case
+    from toolkit.diagnosis.problem import Problem
+
+
+def case_findings(problem: Problem) -> tuple[Finding, ...]:
+    """Return notes on the recordings: one run only, and inputs that were interpolated."""
+    case = problem.case
+    made = []
+    if len(problem.runs) == 1:
+        made.append(
+            Finding(
+                rule="case-one-run",
+                where=case.path.name,
+                level="note",
+                message="one run only: contiguous blocks of it are held out, not whole runs",
+            )
+        )
+    for run in (*case.runs, *case.predict):
+        if run.filled:
+            told = ", ".join(f"{count} of {name}" for name, count in run.filled)
+            made.append(
+                Finding(
+                    rule="case-filled",
+                    where=run.name,
+                    level="note",
+                    message=f"missing samples of inputs were interpolated between their neighbours: {told}",
+                )
+            )
+    for name in ("FZ", "FZ_CMD"):
+        loads = [run.columns[name] for run in case.runs if name in run.columns]
+        if loads and float(np.nanmedian(np.concatenate(loads))) < 0:
+            made.append(
+                Finding(
+                    rule="case-load-sign",
+                    where=f"{case.path.name}: {name}",
+                    level="note",
+                    message="most loads are negative: FZ is the load, positive; below zero there is no force",
+                )
+            )
+    return tuple(made)
+
+
+def calibration_findings(case: Case, calibrations: Path | None) -> tuple[Finding, ...]:
+    """Return notes on the calibration of a case that is no approved record, or an unverified one."""
+    from toolkit.calibration.registry.registry import Registry
+    from toolkit.diagnosis.load import record_of
+    from toolkit.errors import RegistryError
+
+    named = case.simulation.calibration
+    if not named:
+        return ()
+    record = record_of(case, calibrations)
+    said = []
+    if (case.path.parent / named).is_file():
+        said.append("a file beside the case: no registry says whether it is approved")
+    elif calibrations is not None:
+        try:
+            state = Registry(calibrations).status(record.id).state
+        except RegistryError:
+            state = "candidate"
+        if state != "approved":
+            article = "a candidate: nobody has approved it" if state == "candidate" else "withdrawn"
+            said.append(article)
+    if record.kind == "legacy":
+        said.append("imported, not fitted here: unverified")
+    return tuple(
+        Finding(rule="case-calibration", where=record.id, level="note", message=f"the calibration is {one}")
+        for one in said
+    )
