@@ -77,7 +77,7 @@ def page(view: AuditView) -> Iterator[str]:
         f'<meta name=keywords content="{OWN_OUTPUT}"><meta name=viewport content="width=device-width">'
         "<meta http-equiv=Content-Security-Policy content=\"default-src 'none'; style-src 'unsafe-inline'; "
         "script-src 'unsafe-inline'; img-src data:\">"
-        f"<style>{_asset('audit_page.css')}</style></head><body><main>"
+        f"<style>{_asset('page.css')}</style></head><body><main>"
     )
     yield from _summary(view, title)
     for one in view.timelines:
@@ -94,7 +94,7 @@ def page(view: AuditView) -> Iterator[str]:
     yield from _findings(view)
     yield '</main><script type="application/json" id="data">'
     yield from _data(view)
-    yield f"</script><script>{_asset('audit_page.js')}</script></body></html>\n"
+    yield f"</script><script>{_asset('page.js')}</script></body></html>\n"
 
 
 def _summary(view: AuditView, title: str) -> Iterator[str]:
