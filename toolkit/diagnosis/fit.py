@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
+from toolkit.diagnosis.covariance import covariance
 from toolkit.diagnosis.model import Active
-from toolkit.diagnosis.noise import Layout, Noise, autocovariance, fit_noise, log_likelihood, whiten
+from toolkit.diagnosis.noise import Layout, Noise, fit_noise, log_likelihood, whiten
 from toolkit.errors import FitError
 
 if TYPE_CHECKING:
@@ -134,7 +135,7 @@ def fit(
         simulated=chosen.simulated,
         noise=chosen.noise,
         log_posterior=chosen.score,
-        covariance=covariance(space, chosen, layouts, plain=plain),
+        covariance=_covariance(space, chosen, layouts, plain=plain),
         rows=rows,
         plain=plain,
     )
@@ -359,52 +360,11 @@ def _differences(space: _Space, x: NDArray[np.float64], base: Stacked) -> dict[s
     return made
 
 
-def covariance(
+def _covariance(
     space: _Space, solved: _Solved, layouts: dict[str, Layout], *, plain: bool
 ) -> NDArray[np.float64]:
-    """Return the covariance of (p, effects' parameters) in their units.
-
-    Of ordinary least squares it is the sandwich with the residual's autocovariance in it.
-    """
-    x, noise, problem = solved.x, solved.noise, space.problem
-    if not len(x):
-        return np.zeros((0, 0))
-    J = _differences(space, x, solved.simulated)
-    prior = np.zeros((len(problem.free), len(x)))
-    for i, one in enumerate(problem.free):
+    J = _differences(space, solved.x, solved.simulated) if len(solved.x) else {}
+    prior = np.zeros((len(space.problem.free), len(solved.x)))
+    for i, one in enumerate(space.problem.free):
         prior[i, i] = space.sizes[i] / (one.sd or 1.0)
-    parts, spread = [], prior.T @ prior
-    for name, where in layouts.items():
-        columns = J[name][where.index]
-        if plain:
-            weight = 1 / (noise[name].marginal_sd ** 2 * noise[name].correlation_rows)
-            parts.append(columns * math.sqrt(weight))
-            spread = spread + weight**2 * columns.T @ _correlated(columns, where, noise[name])
-        else:
-            parts.append(whiten(columns, where, noise[name]))
-    whole = np.vstack([*parts, prior])
-    size = np.sqrt((whole**2).sum(axis=0))
-    size[size == 0] = 1.0
-    _, s, vt = np.linalg.svd(whole / size, full_matrices=False)
-    keep = s > 1e-10 * s.max()
-    inverse = (vt[keep].T / s[keep] ** 2) @ vt[keep]
-    if plain:
-        inverse = inverse @ (spread / np.outer(size, size)) @ inverse
-    if not keep.all():
-        # What the data leave open altogether has no finite interval.
-        inverse[np.diag_indices_from(inverse)] += np.where(np.abs(vt[~keep]).max(axis=0) > 0.1, 1e12, 0.0)
-    scale = space.sizes / size
-    return np.asarray(inverse * np.outer(scale, scale))
-
-
-def _correlated(columns: NDArray[np.float64], where: Layout, noise: Noise) -> NDArray[np.float64]:
-    """Return the noise's covariance matrix times columns, segment by segment."""
-    from scipy.signal import fftconvolve
-
-    made = np.empty_like(columns)
-    for one in where.segments:
-        n = one.stop - one.start
-        gamma = autocovariance(noise, n)
-        kernel = np.concatenate([gamma[:0:-1], gamma])[:, None]
-        made[one] = fftconvolve(columns[one], kernel, mode="full", axes=0)[n - 1 : 2 * n - 1]
-    return made
+    return covariance(J, prior, space.sizes, layouts, solved.noise, plain=plain)

@@ -35,7 +35,7 @@ def read_csv(data: bytes, wanted: Collection[str], *, where: Path) -> dict[str, 
     except UnicodeDecodeError as error:
         raise _unreadable(where, f"byte {error.start} is not UTF-8", "CSV in UTF-8") from error
     try:
-        rows = csv.reader(io.StringIO(text, newline=""))
+        rows = csv.reader(io.StringIO(text, newline=""), skipinitialspace=True)
         header = [cell.strip() for cell in next(rows, [])]
         doubled = sorted({one for one in header if one in wanted and header.count(one) > 1})
         if doubled:
@@ -70,7 +70,11 @@ def header_of(data: bytes) -> list[str]:
     """Return the names in a file's header row; none where it cannot be read."""
     try:
         text = data.decode("utf-8-sig")
-        return [cell.strip() for cell in next(csv.reader(io.StringIO(text, newline="")), []) if cell.strip()]
+        return [
+            cell.strip()
+            for cell in next(csv.reader(io.StringIO(text, newline=""), skipinitialspace=True), [])
+            if cell.strip()
+        ]
     except (UnicodeDecodeError, csv.Error):
         return []
 

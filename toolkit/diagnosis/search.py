@@ -13,6 +13,7 @@ from toolkit.diagnosis.candidates import Candidate, candidates
 from toolkit.diagnosis.fit import Fit, fit, replace_effects
 from toolkit.diagnosis.folds import Folds, HeldOut, folds_of, hold_out
 from toolkit.diagnosis.lattice import lattice_of
+from toolkit.diagnosis.lines import strongest_line
 from toolkit.diagnosis.model import Active
 from toolkit.diagnosis.null import search_p_values
 from toolkit.diagnosis.problem import Problem, without_outliers
@@ -22,9 +23,11 @@ from toolkit.diagnosis.structure import Group, groups
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-ALPHA = 0.01  # of the whole search, a step
+ALPHA = 0.003  # of the whole search, a step
 ALPHA_STRUCTURE = 0.002
 MOST_EFFECTS = 4
+_STATED = 1.1  # times a stated noise that a residual may have: certificates are round numbers
+_LINE = 1e-4  # p-value of a spectral line
 _SHARPENED = 30  # starts whose gain is computed with the noise estimated anew
 _FAR_BEHIND = 0.25  # of the best gain: a candidate below cannot win a joint fit
 _REFINED = 8  # candidates that are fitted jointly, of those that screening ranks first
@@ -309,7 +312,32 @@ def _structure(problem: Problem, screen: Screen, base: Fit, seed: int) -> tuple[
         for one, gain, p in zip(listed, gains, p_values, strict=True)
         if p < ALPHA_STRUCTURE and _share(problem, base, one) > 2 * _NOTICED
     ]
+    for name in problem.names:
+        line = strongest_line(problem, name, base.residual[name])
+        if line is not None and line.p_value < _LINE and line.share > 2 * _NOTICED:
+            gain = -2 * math.log(max(line.p_value, 1e-300))
+            told = f"time (a line at {line.frequency:.4g} Hz)"
+            found.append(StructureFound(output=name, variables=(told,), gain=gain, p_value=line.p_value))
+        beyond = _beyond_noise(problem, base, name)
+        if beyond is not None:
+            found.append(beyond)
     return tuple(sorted(found, key=lambda one: -one.gain))
+
+
+def _beyond_noise(problem: Problem, base: Fit, name: str) -> StructureFound | None:
+    """Return the finding that a residual is larger than the sensor noise which a certificate states."""
+    from scipy.stats import chi2
+
+    sd, kept = problem.sd_of(name), problem.kept[name]
+    if sd is None or kept.sum() < 10:
+        return None
+    ratio = float(np.mean(base.residual[name][kept] ** 2)) / sd**2
+    worth = max(kept.sum() / base.noise[name].correlation_rows, 3.0)
+    p = float(chi2.sf(ratio / _STATED**2 * worth, worth))
+    if p >= ALPHA_STRUCTURE:
+        return None
+    gain = float(worth * (ratio - 1 - math.log(ratio)))
+    return StructureFound(output=name, variables=("more than its stated noise",), gain=gain, p_value=p)
 
 
 def _share(problem: Problem, base: Fit, group: Group) -> float:
