@@ -10,7 +10,7 @@ JOBS   ?= 2
 
 APT_PACKAGES := libreoffice-writer-nogui fonts-crosextra-carlito fonts-crosextra-caladea fonts-liberation2 poppler-utils
 
-.PHONY: demo test check bench setup lock clean
+.PHONY: demo test check bench proof setup lock clean
 
 setup: $(STAMP) $(SYSTEM)
 
@@ -28,6 +28,12 @@ check: $(STAMP)
 
 bench: setup
 	$(BIN)/python -m tests.benchmarks
+
+# A new sealed batch of concealed effects, the tool once on every case, then the answers opened. Resumable.
+CASES ?= 400
+proof: setup
+	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m tests.concealed all --out build/proof \
+	  --cases $(CASES) --workers $(JOBS) --proof . --log tests/concealed/batches.jsonl
 
 # The virtual environment from the lock file: exact versions, each with its hash.
 $(STAMP): requirements.lock pyproject.toml
