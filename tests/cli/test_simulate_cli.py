@@ -125,6 +125,9 @@ def test_a_case_that_cannot_be_or_a_foreign_folder_writes_nothing(run, short, tm
     (tmp_path / "mine" / "keep.txt").write_text("keep")
     found = run(short, "--out", tmp_path / "t", "--case", tmp_path / "mine")
     assert isinstance(found.exception, OutputError)
+    for option in ("--case", "--csv"):
+        for folder in (tmp_path / "t", tmp_path / "t" / "inside"):
+            assert isinstance(run(short, "--out", tmp_path / "t", option, folder).exception, OutputError)
     short.write_text(SHORT + "[case]\noutputs = 'cells'\n")
     found = run(short, "--out", tmp_path / "t", "--case", tmp_path / "c")
     assert isinstance(found.exception, ConfigError)

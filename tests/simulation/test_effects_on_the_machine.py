@@ -214,10 +214,13 @@ def test_revolution_locked_forces_follow_their_shaft(plan, base):
     assert np.all(np.diff(signal(base, "DRUM_ANGLE", 1)) < 0)
 
 
-def test_heat_of_the_tread_is_slip_work_less_what_has_left(plan):
-    """T' = 0.5 K/kJ |FY V sin(SA)| - (T - room)/60 s, integrated over the recording apart from the chain."""
-    still = dataclasses.replace(plan, motion=dataclasses.replace(plan.motion, ambient_drift_K_s=0.0))
-    s = simulate(still).files[0].signals
+@pytest.mark.parametrize(("heat", "cooling"), [(0.5, 60.0), (1.0, 15.0)])
+def test_heat_of_the_tread_is_slip_work_less_what_has_left(plan, heat, cooling):
+    """T' = heat |FY V sin(SA)| - (T - room)/cooling, integrated over the recording apart from the chain."""
+    motion = dataclasses.replace(
+        plan.motion, ambient_drift_K_s=0.0, tread_heating_K_J=heat * 1e-3, tread_cooling_s=cooling
+    )
+    s = simulate(dataclasses.replace(plan, motion=motion)).files[0].signals
     rise = s["T_TREAD"] - s["T_AMBIENT"]
     power = np.abs(s["FY"] * s["V"] * np.sin(s["SA"])) * 1e-3
 
@@ -225,7 +228,7 @@ def test_heat_of_the_tread_is_slip_work_less_what_has_left(plan):
         return float(np.sum((y[1:] + y[:-1]) / 2 * np.diff(s["t"])))
 
     assert rise[0] == 0
-    assert 0.5 * integral(power) == pytest.approx(rise[-1] + integral(rise) / 60.0, rel=2e-3)
+    assert heat * integral(power) == pytest.approx(rise[-1] + integral(rise) / cooling, rel=2e-3)
 
 
 def test_warmth_and_wear_go_on_from_file_to_file_and_cool_between(plan):

@@ -137,3 +137,11 @@ def test_bad_runs_and_motions_are_told_as_such(tmp_path, text, told):
     assert told in str(caught.value)
     assert caught.value.exit_code == 2
     assert caught.value.next_step
+
+
+@pytest.mark.parametrize("record", ["dwell", "continuous"])
+def test_a_recording_longer_than_a_sheet_is_refused_before_it_is_made(plan, record):
+    endless = dataclasses.replace(plan, record=record, runs=(dataclasses.replace(plan.runs[0], dwell_s=1e9),))
+    with pytest.raises(ToolkitError, match="too long") as caught:
+        simulate(endless)
+    assert caught.value.next_step

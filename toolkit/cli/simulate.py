@@ -92,7 +92,7 @@ def _no_runs(plan: Plan) -> ToolkitError:
 def _test(
     plan: Plan, out: Path, registry: Registry | None, csv: Path | None, case: Path | None
 ) -> tuple[dict[str, Any], str]:
-    from toolkit.simulation.case import CASE, RUNS, TIRE, check_case, write_case, write_runs
+    from toolkit.simulation.case import CASE, RUNS, TIRE, check_case, run_names, write_case, write_runs
     from toolkit.simulation.program import other_programs
     from toolkit.simulation.run import simulate
     from toolkit.simulation.write import TEST, TRUTH, check_folder, write_test
@@ -100,9 +100,12 @@ def _test(
     program = _program(plan, registry)
     record = None if program is None else program.record
     others = other_programs(plan, registry)
+    for folder, names in ((csv, {*run_names(plan)}), (case, {CASE, RUNS, TIRE})):
+        if folder is not None:
+            _check_apart(folder, out)
+            check_folder(folder, names)
     if case is not None:
         check_case(plan, record)
-        check_folder(case, {CASE, RUNS, TIRE})
     test = simulate(plan, program, others)
     files = write_test(test, out)
     payload = _common(plan, out, files) | {
@@ -125,6 +128,17 @@ def _test(
         payload["case"] = str(write_case(test, case, record=record)[0])
         text += f"\n  case         {case / CASE}   (toolkit diagnose {case / CASE} --out DIR)"
     return payload, text + _effects(plan)
+
+
+def _check_apart(folder: Path, out: Path) -> None:
+    from toolkit.errors import OutputError
+
+    if out.resolve() in (folder.resolve(), *folder.resolve().parents):
+        raise OutputError(
+            "CSV files would lie among the test's recordings", where=folder, got=f"a folder in {out}",
+            expected="a folder beside the one of --out",
+            next_step="choose another folder; nothing was written",
+        )  # fmt: skip
 
 
 def _table(plan: Plan, out: Path) -> tuple[dict[str, Any], str]:

@@ -7,7 +7,6 @@ else of kind ``columns`` with what the plan's tire does at the measured slip ang
 from __future__ import annotations
 
 import json
-import shutil
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,7 +14,7 @@ import numpy as np
 
 from toolkit.effects.signals import Drive, drive
 from toolkit.errors import ConfigError
-from toolkit.files import write_atomic
+from toolkit.files import read_bytes, write_atomic
 from toolkit.simulation.case_plan import COLUMNS, Free
 from toolkit.simulation.cells import CELLS
 from toolkit.simulation.columns import shown, unit_of
@@ -38,7 +37,8 @@ def write_runs(test: VirtualTest, folder: Path) -> tuple[Path, ...]:
     """Write every recording as plain CSV, all columns, names in the header; return the files."""
     names = ("t", "SA", "FZ", *CELLS, "FY", "MZ", *(one for one in COLUMNS if one not in ("SA", "FZ")))
     return tuple(
-        _csv(folder / _run_name(i, test), _columns(file, names, [])) for i, file in enumerate(test.files)
+        _csv(folder / name, _columns(file, names, []))
+        for name, file in zip(run_names(test.plan), test.files, strict=True)
     )
 
 
@@ -62,14 +62,13 @@ def write_case(test: VirtualTest, folder: Path, *, record: str | None = None) ->
     names = ("t", *inputs, *_judged(plan), *outputs)
     simulated = [] if kind == "machine" else ["FY", "MZ"]
     made = []
-    for i, file in enumerate(test.files):
+    for name, file in zip(run_names(plan), test.files, strict=True):
         nominal = _nominal(test, file) if simulated else []
-        made.append(_csv(folder / RUNS / _run_name(i, test), _columns(file, names, nominal)))
+        made.append(_csv(folder / RUNS / name, _columns(file, names, nominal)))
     if cells:
         made.append(_csv(folder / RUNS / _TARE, _tare(test, names)))
     if plan.tire_file is not None:
-        folder.mkdir(parents=True, exist_ok=True)
-        shutil.copyfile(plan.tire_file.path, folder / TIRE)
+        write_atomic(folder / TIRE, read_bytes(plan.tire_file.path))
         made.append(folder / TIRE)
     write_atomic(folder / CASE, case_toml(test, kind=kind, record=record, inputs=inputs, outputs=outputs))
     return (folder / CASE, *made)
@@ -104,8 +103,8 @@ def case_toml(
     turned = any(file.run.mounting == "turned" for file in test.files)
     if plan.case.outputs == "cells":
         lines += ["", "[[recording.run]]", f"file = {_text(f'{RUNS}/{_TARE}')}", 'phase = "tare"']
-    for i, file in enumerate(test.files):
-        lines += ["", "[[recording.run]]", f"file = {_text(f'{RUNS}/{_run_name(i, test)}')}"]
+    for name, file in zip(run_names(plan), test.files, strict=True):
+        lines += ["", "[[recording.run]]", f"file = {_text(f'{RUNS}/{name}')}"]
         for key, value in file.run.conditions.items():
             if key != "mounting" or turned:
                 lines.append(f"{_text(key) if not key.isidentifier() else key} = {_text(value)}")
@@ -204,9 +203,11 @@ def _tare(test: VirtualTest, names: Sequence[str]) -> list[tuple[str, NDArray[np
     return made
 
 
-def _run_name(index: int, test: VirtualTest) -> str:
-    width = max(2, len(str(len(test.files))))
-    return f"run{index + 1:0{width}d}.csv"
+def run_names(plan: Plan) -> tuple[str, ...]:
+    """Return the names of the runs' CSV files, in their order."""
+    count = len(plan.recordings)
+    width = max(2, len(str(count)))
+    return tuple(f"run{number:0{width}d}.csv" for number in range(1, count + 1))
 
 
 def _csv(path: Path, columns: list[tuple[str, Any]]) -> Path:

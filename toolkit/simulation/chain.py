@@ -16,7 +16,6 @@ import numpy as np
 from toolkit.effects.filters import lag
 from toolkit.effects.signals import Drive, Setting, TireForces, drive
 from toolkit.effects.similarity import similar
-from toolkit.effects.thermal_friction import HEATING_K_PER_KJ
 from toolkit.simulation import carriage, road
 from toolkit.simulation.disturb import driven, through
 from toolkit.simulation.plan import Plan
@@ -29,7 +28,6 @@ from toolkit.simulation.tire import TireForces as HubTire
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-COOLING_S = 60.0  # of the tread to the room, in the order of a minute for a rolling passenger tire
 _HEAT_TURNS = 4  # of the fixed point between heat and the forces that it changes
 
 
@@ -87,7 +85,7 @@ def walk(plan: Plan, run: RunSteps, line: Timeline, before: Before) -> Walked:
         made = driven(start, own, setting, tire)
         forces = tire(made)
         power = np.abs(forces.FY * made.V * np.sin(made.SA))
-        setting = _warmed(setting, line, power, before)
+        setting = _warmed(plan, setting, line, power, before)
     on_top = through({"FY": forces.FY, "MZ": forces.MZ}, rolling, setting, plan.machine)
     answer = HubTire(FY=on_top["FY"], MZ=on_top["MZ"], loaded_radius=loaded_radius(plan, made.FZ))
     steps = 0.5 * (power[1:] + power[:-1]) * np.diff(line.t)
@@ -102,7 +100,7 @@ def walk(plan: Plan, run: RunSteps, line: Timeline, before: Before) -> Walked:
         after=Before(
             elapsed_s=before.elapsed_s + float(line.t[-1]) + gap,
             work_kJ=before.work_kJ + 1e-3 * float(steps.sum()),
-            warmth_K=warmth * math.exp(-gap / COOLING_S),
+            warmth_K=warmth * math.exp(-gap / plan.motion.tread_cooling_s),
         ),
     )
 
@@ -141,9 +139,12 @@ def _setting(plan: Plan, run: RunSteps, line: Timeline, before: Before, speed: f
     )
 
 
-def _warmed(setting: Setting, line: Timeline, power_W: NDArray[np.float64], before: Before) -> Setting:
+def _warmed(
+    plan: Plan, setting: Setting, line: Timeline, power_W: NDArray[np.float64], before: Before
+) -> Setting:
     # T' = heat * power - (T - room) / cooling, on top of the room's own temperature.
-    gain = HEATING_K_PER_KJ * COOLING_S * 1e-3
-    rise = gain * lag(line.t, power_W, COOLING_S, start=before.warmth_K / gain)
+    cooling = plan.motion.tread_cooling_s
+    gain = plan.motion.tread_heating_K_J * cooling
+    rise = gain * lag(line.t, power_W, cooling, start=before.warmth_K / gain)
     tread = setting.channels["T_AMBIENT"] + rise
     return dataclasses.replace(setting, channels={**setting.channels, "T_TREAD": tread})

@@ -24,7 +24,16 @@ MOUNTINGS: tuple[Mounting, ...] = ("normal", "turned")
 _KEYS = (
     "rotation mounting slip_angles loads outer speed pressure steer_rate load_rate dwell times conditions"
 ).split()
-_MOTION = ("steer_rate", "load_rate", "dwell", "between_files", "ambient", "ambient_drift")
+_MOTION = (
+    "steer_rate",
+    "load_rate",
+    "dwell",
+    "between_files",
+    "ambient",
+    "ambient_drift",
+    "tread_heating",
+    "tread_cooling",
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -33,7 +42,8 @@ class Motion:
 
     ``steer_rate_rad_s`` of the rack, ``load_rate_N_s`` of the load actuator, ``dwell_s`` at each condition
     (None: the protocol's revolutions), ``between_files_s`` until the next recording begins; ``ambient_K`` and
-    its drift are the room's.
+    its drift are the room's. Slip work heats the tread by ``tread_heating_K_J`` (some 2 kJ/K of rubber) and
+    it cools to the room with ``tread_cooling_s``, a minute for a rolling passenger tire.
     """
 
     steer_rate_rad_s: float = 0.0698131700797732  # 4 deg/s
@@ -42,6 +52,8 @@ class Motion:
     between_files_s: float = 30.0
     ambient_K: float = 294.15
     ambient_drift_K_s: float = 0.0
+    tread_heating_K_J: float = 0.5e-3
+    tread_cooling_s: float = 60.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -150,6 +162,8 @@ def read_motion(table: Any, *, where: str) -> Motion:
         between_files_s=_positive(table, "between_files", "time", where) or default.between_files_s,
         ambient_K=default.ambient_K if ambient is None else ambient,
         ambient_drift_K_s=drift,
+        tread_heating_K_J=_positive(table, "tread_heating", "K/J", where) or default.tread_heating_K_J,
+        tread_cooling_s=_positive(table, "tread_cooling", "time", where) or default.tread_cooling_s,
     )
 
 

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from toolkit.errors import ConfigError
 from toolkit.simulation import acquisition, carriage, tire
 from toolkit.simulation.acquisition import Noise
 from toolkit.simulation.plan import Plan
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 _LIFT_S = 1.0  # from the lifted wheel to the first load
-_MOVES = 1  # the stream of random numbers of the rows between blocks
+_MOST_ROWS = 1_048_575  # of an .xlsx sheet, less its header
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -89,6 +90,7 @@ def dwell(plan: Plan, run: RunSteps, rng: np.random.Generator, extra: np.random.
     keep = round(protocol.average_revolutions * per_turn)
     if run.dwell_s is not None or plan.motion.dwell_s is not None:
         keep = max(1, round((run.dwell_s or plan.motion.dwell_s or 0.0) / dt))
+    _refuse_long(len(run.steps) * (settle + keep))
     rates = _rates(plan, run)
     clock = float(rng.uniform(0.0, 60.0))  # the drum turns on between files
     paths = {"SA": _Path(), "CMD": _Path(), "SET": _Path()}
@@ -143,6 +145,7 @@ def continuous(plan: Plan, run: RunSteps, rng: np.random.Generator) -> Timeline:
         now = _move(paths, now, angle, load, stop, rates) + hold
         ends.append((angle, load, now))
     rows = int((now - clock) / dt) + 1
+    _refuse_long(rows)
     times = clock + dt * np.arange(rows, dtype=np.float64)
     blocks = []
     for angle, load, end in ends:
@@ -157,6 +160,15 @@ def continuous(plan: Plan, run: RunSteps, rng: np.random.Generator) -> Timeline:
         )
     noise = [acquisition.draw_noise(plan.acquisition, plan.cells, rows, rng)]
     return _made(paths, times, dt, noise, np.ones(rows, dtype=bool), blocks)
+
+
+def _refuse_long(rows: int) -> None:
+    if rows > _MOST_ROWS:
+        raise ConfigError(
+            "a recording is too long", where="the plan's runs, [motion] and rows_per_revolution",
+            got=f"{rows} rows", expected=f"at most {_MOST_ROWS}, as many as a sheet of the machine holds",
+            next_step="shorten the dwell, quicken the moves, or split the run", rule="wrong-value",
+        )  # fmt: skip
 
 
 def _interval(plan: Plan, run: RunSteps) -> float:
