@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     Rate = Callable[[float, "NDArray[np.float64]"], "NDArray[np.float64]"]
 
 RTOL = 1e-6
+_MOST = 20_000  # rates that the stiff solver may ask for between two rows
 _OFF = 1e100  # in no unit is a state of any plant as large
 _MANY = 60  # steps within one interval: the equation is stiff there
 
@@ -103,7 +104,17 @@ def _stiff(
 ) -> NDArray[np.float64]:
     from scipy.integrate import solve_ivp
 
-    made = solve_ivp(rate, (t, end), x, method="LSODA", rtol=RTOL, atol=atol)
+    left = _MOST
+
+    def counted(at: float, state: NDArray[np.float64]) -> NDArray[np.float64]:
+        # Before a state that runs off within finite time, the solver's steps would shrink for ever.
+        nonlocal left
+        left -= 1
+        if left < 0:
+            raise IntegrationError(f"no end is reached near {at:g} s")
+        return rate(at, state)
+
+    made = solve_ivp(counted, (t, end), x, method="LSODA", rtol=RTOL, atol=atol)
     if not made.success or not np.isfinite(made.y[:, -1]).all():
         raise IntegrationError(str(made.message))
     return np.asarray(made.y[:, -1], dtype=np.float64)

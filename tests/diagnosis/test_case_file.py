@@ -1,0 +1,186 @@
+"""A case file: every entry checked, with its place and the nearest known word; nothing guessed."""
+
+import os
+
+import numpy as np
+import pytest
+
+from tests.diagnosis.cases import HEAD, ONE, TWO, carriage, write_case
+from toolkit.diagnosis.case_read import read_case
+from toolkit.errors import CellError, ColumnError, ConfigError, ToolkitError, UnreadableError
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "what", "nearest"),
+    [
+        ("title =", "titel =", "unknown key", "title"),
+        ("function =", "functon =", "unknown key", "function"),
+        ("sd = 5.0", "std = 5.0", "unknown key", "sd"),
+        ('time = "t"', 'tyme = "t"', "unknown key", "time"),
+        ('role = "time"', 'rol = "time"', "unknown key", "role"),
+        ('"python"', '"pyhton"', "kind", "python"),
+        ('role = "input"', 'role = "inputs"', "role", "input"),
+        ("[recording]\n", '[recording]\naxes = "iso-w"\n', "axis system", "ISO-W"),
+        ('file = "r1.csv"', 'file = "r1.csv"\nrotation = "foward"', "condition", "forward"),
+        ('file = "r1.csv"', 'file = "r1.csv"\nphase = "tar"', "condition", "tare"),
+    ],
+)
+def test_a_word_that_is_not_known_names_the_nearest_one(tmp_path, old, new, what, nearest):
+    assert old in HEAD + TWO
+    with pytest.raises(ConfigError, match=what) as caught:
+        read_case(write_case(tmp_path, (HEAD + TWO).replace(old, new)))
+    assert repr(nearest) in str(caught.value.next_step)
+    assert "CASE.toml" in str(caught.value.where)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "what", "where"),
+    [
+        ('unit = "m/s", ', "", "no unit", "channels.v.unit"),
+        ('unit = "m/s", ', 'unit = "mm/sx", ', "unit is unknown", "channels.v.unit"),
+        ('unit = "kg"\n', "", "no unit", "parameters.mass.unit"),
+        ('unit = "kg"\n', 'unit = "kgg"\n', "unit is unknown", "parameters.mass.unit"),
+        ("value = 94.0", 'value = "94"', "no number", "parameters.mass.value"),
+        ("value = 94.0", "value = inf", "no number", "parameters.mass.value"),
+        ("value = 94.0", "", "no number", "parameters.mass.value"),
+        ("sd = 5.0", "sd = 0.0", "no width", "parameters.mass.sd"),
+        ("[80.0, 110.0]", "[110.0, 80.0]", "bounds", "parameters.mass.bounds"),
+        ("[80.0, 110.0]", "[95.0, 110.0]", "bounds", "parameters.mass.bounds"),
+        ("schema = 1", "schema = 2", "schema", "schema"),
+        ('unit = "s"', 'unit = "m"', "unit of time", "channels.t"),
+        ('role = "output"', 'role = "input"', "judged", "recording.channels"),
+        ('file = "r1.csv"', 'file = "r0.csv"', "stands twice", "run[2].file"),
+        ('file = "r1.csv"', 'file = ""', "no file", "run[2].file"),
+        (TWO, ONE + 'phase = "tare"\n', "every recording is a tare", "recording.run"),
+        (TWO, "", "no recording", "recording"),
+    ],
+)
+def test_a_wrong_entry_is_refused_at_its_place(tmp_path, old, new, what, where):
+    assert old in HEAD + TWO
+    with pytest.raises(ConfigError, match=what) as caught:
+        read_case(write_case(tmp_path, (HEAD + TWO).replace(old, new)))
+    error = caught.value
+    assert str(error.where).endswith(where)
+    assert error.got is not None
+    assert error.expected
+    assert error.next_step
+    assert error.rule
+
+
+@pytest.mark.parametrize(
+    "content", [b"", b"\xff\xfe", b"schema = 1\nschema = 1\n", b"schema = 1\nsimulation = 3\n"]
+)
+def test_what_is_no_case_is_refused(tmp_path, content):
+    with pytest.raises(ConfigError):
+        read_case(write_case(tmp_path, content))
+
+
+def test_a_pipe_a_folder_and_nothing_are_no_recording(tmp_path):
+    os.mkfifo(tmp_path / "pipe.csv")
+    for name in ("pipe.csv", ".", "absent.csv"):
+        case = write_case(tmp_path, HEAD + f'[[recording.run]]\nfile = "{name}"\n')
+        with pytest.raises(ConfigError, match="cannot be read") as caught:
+            read_case(case)
+        assert caught.value.rule == "no-file"
+
+
+def test_a_simulator_that_is_a_pipe_is_refused_not_waited_for(tmp_path):
+    case = write_case(tmp_path, simulator=None)
+    os.mkfifo(tmp_path / "sim.py")
+    with pytest.raises(ConfigError, match="cannot be read"):
+        read_case(case)
+
+
+def test_a_missing_column_names_the_nearest_one(tmp_path):
+    case = write_case(tmp_path, r1__csv=carriage().rename(columns={"a": "acc"}))
+    with pytest.raises(ColumnError, match="'a'") as caught:
+        read_case(case)
+    assert caught.value.rule == "case-column"
+    assert "t, v, acc, F" in str(caught.value.got)
+
+
+def test_columns_that_nobody_names_may_hold_anything(tmp_path):
+    df = carriage()
+    df.insert(1, "note", 'said "so, or so"')
+    df["when"] = "2024-05-01 10:00"
+    read = read_case(write_case(tmp_path, r0__csv=df))
+    np.testing.assert_allclose(read.runs[0].columns["F"], df["F"])
+    assert set(read.runs[0].columns) == {"t", "v", "a", "F"}
+
+
+ROWS = "".join(f"{i},{0.1 * i},{i % 3},{i % 5}\n" for i in range(20))
+TABLE = "t,v,a,F\n" + ROWS
+
+
+@pytest.mark.parametrize(
+    ("content", "error", "said"),
+    [
+        ("", UnreadableError, "no rows"),
+        ("t,v,a,F\n", UnreadableError, "no rows"),
+        ("t,v,a,F\n\n \n", UnreadableError, "no rows"),
+        (TABLE.encode("utf-16"), UnreadableError, "UTF-8"),
+        (TABLE + "30,1,1," + "9" * 200_000 + "\n", UnreadableError, "field"),
+        (TABLE.replace("\n7,", "\n7\0,", 1), CellError, "line 9, column t"),
+        (TABLE + "30,1\n", CellError, "line 22"),
+        (TABLE + "30,1,1,inf\n", CellError, "column F"),
+        (TABLE + "30,1,1,1e308\n", CellError, "column F"),
+        (TABLE + "30,1,1,1_0\n", CellError, "column F"),
+        (TABLE + "30,1,1,=1+1\n", CellError, "column F"),
+        (TABLE + "30,1,1,٣\n", CellError, "column F"),
+        (TABLE + "30,1,1,1\n30,1,1,1\n", CellError, "does not rise"),
+        (TABLE + ",1,1,1\n", CellError, "no time"),
+        (TABLE.replace("t,v,a,F", "t,v,F,F"), ColumnError, "twice"),
+        (TABLE.replace(",", ";"), ColumnError, "commas"),
+        ("t,v,a,F\n" + "".join(f"{i},,1,2\n" for i in range(9)), ColumnError, "no value at all"),
+        (b"PK\x03\x04rest", UnreadableError, "workbook"),
+    ],
+)
+def test_a_hostile_table_is_refused_with_its_place(tmp_path, content, error, said):
+    with pytest.raises(error) as caught:
+        read_case(write_case(tmp_path, HEAD + ONE, r0__csv=content))
+    assert said in str(caught.value)
+    assert isinstance(caught.value, ToolkitError)
+    assert caught.value.next_step
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        TABLE,
+        TABLE.replace("\n", "\r\n"),
+        TABLE.replace("\n", "\r").encode(),
+        "\ufeff" + TABLE,
+        TABLE + "\n\n,,,\n",
+        TABLE.replace("t,v,a,F", '"t", "v","a",F'),
+        "t,v,a,F,\n" + ROWS.replace("\n", ",\n"),
+    ],
+)
+def test_line_ends_marks_and_blank_rows_change_nothing(tmp_path, content):
+    run = read_case(write_case(tmp_path, HEAD + ONE, r0__csv=content)).runs[0]
+    assert run.rows == 20
+    np.testing.assert_array_equal(run.columns["F"], np.arange(20) % 5)
+
+
+def test_missing_samples_stay_missing_in_outputs_and_are_counted_in_inputs(tmp_path):
+    text = TABLE.replace("\n3,0.30000000000000004,0,3", "\n3,,0,3").replace("\n5,0.5,2,0", "\n5,0.5,2,NaN")
+    run = read_case(write_case(tmp_path, HEAD + ONE, r0__csv=text)).runs[0]
+    assert run.columns["v"][3] == pytest.approx(0.3)  # linear between 0.2 and 0.4
+    assert run.filled == (("v", 1),)
+    assert np.flatnonzero(np.isnan(run.columns["F"])).tolist() == [5]
+
+
+def test_the_hash_covers_the_case_and_every_file_that_it_names(tmp_path):
+    first = read_case(write_case(tmp_path / "a")).sha256
+    assert read_case(write_case(tmp_path / "b")).sha256 == first
+    changed = [
+        write_case(tmp_path / "c", r1__csv=carriage(seed=5)),
+        write_case(tmp_path / "d", simulator="def simulate(inputs, p): pass\n"),
+        write_case(tmp_path / "e", HEAD.replace("A carriage", "Another") + TWO),
+    ]
+    assert first not in {read_case(one).sha256 for one in changed}
+
+
+def test_conditions_of_any_key_are_kept(tmp_path):
+    told = 'date = 2024-01-02\norder = 2\ncolour = "blue"\npressure = { value = 200, unit = "kPa" }\n'
+    run = read_case(write_case(tmp_path, HEAD + TWO + told)).runs[1]
+    assert run.conditions == {"date": "2024-01-02", "order": "2", "colour": "blue", "pressure": "200 kPa"}
