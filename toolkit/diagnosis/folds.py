@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolkit.diagnosis.fit import Fit, fit, held_out_score
+from toolkit.diagnosis.fit import Fit, fit, held_out_score, jacobian
 from toolkit.diagnosis.model import Active
 
 if TYPE_CHECKING:
@@ -27,10 +27,14 @@ class Folds:
     by_run: bool
 
 
-def folds_of(problem: Problem) -> Folds:
-    """Return the folds of a problem, at most five, runs dealt out in turn."""
+def folds_of(problem: Problem, made: Fit) -> Folds:
+    """Return the folds of a problem, at most five, runs dealt out in turn.
+
+    Where a free parameter belongs to one run alone (its own initial state), a run that is held out whole
+    would leave it at its prior: then blocks of every run are held out in its place.
+    """
     runs = [one for one in problem.slices if one.stop > one.start]
-    if len(runs) >= 2:
+    if len(runs) >= 2 and not _own_parameters(problem, made):
         count = min(_FOLDS, len(runs))
         held = []
         for k in range(count):
@@ -40,12 +44,26 @@ def folds_of(problem: Problem) -> Folds:
             held.append(mask)
         return Folds(held=tuple(held), by_run=True)
     held = []
-    for block in np.array_split(np.arange(problem.rows), _FOLDS):
+    for k in range(_FOLDS):
         mask = np.zeros(problem.rows, dtype=bool)
-        mask[block] = True
+        for one in runs:
+            mask[np.array_split(np.arange(one.start, one.stop), _FOLDS)[k]] = True
         if mask.any():
             held.append(mask)
     return Folds(held=tuple(held), by_run=False)
+
+
+def _own_parameters(problem: Problem, made: Fit) -> bool:
+    columns, _ = jacobian(problem, made)
+    for i in range(len(problem.free)):
+        moved = [
+            any(float(np.abs(columns[name][one, i]).max()) > 0 for name in problem.names)
+            for one in problem.slices
+            if one.stop > one.start
+        ]
+        if sum(moved) == 1:
+            return True
+    return False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

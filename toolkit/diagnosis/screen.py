@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     Stacked = dict[str, NDArray[np.float64]]
 
 _TURNS = 2
+_SHORT, _LEAST_TRUST = 10.0, 0.3
 _COLLINEAR = 1e-11  # of the largest eigenvalue: what lies below adds nothing that could be told apart
 
 
@@ -147,6 +148,16 @@ class Screen:
             blocks.append(block)
         # White noise overrates what is smooth; as a first look that is what is wanted.
         return (max(gains) if self._is_coloured else gains[0]), blocks[0]
+
+    @property
+    def trust(self) -> float:
+        """Share of a gain that short coloured series leave: their noise is itself estimated from few rows.
+
+        In the manner of Bartlett's correction, with rows counted by what they are worth; found on clean
+        series of AR(1) noise.
+        """
+        worth = sum(where.n / self.base.noise[name].correlation_rows for name, where in self.layouts.items())
+        return max(_LEAST_TRUST, 1 - _SHORT / max(worth, 1.0))
 
     @property
     def _is_coloured(self) -> bool:

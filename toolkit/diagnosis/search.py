@@ -27,7 +27,7 @@ ALPHA = 0.003  # of the whole search, a step
 ALPHA_STRUCTURE = 0.002
 MOST_EFFECTS = 4
 _STATED = 1.1  # times a stated noise that a residual may have: certificates are round numbers
-_LINE = 1e-4  # p-value of a spectral line
+_LINE, _LINE_SHARE = 1e-8, 0.05  # p-value and share of variance of a spectral line
 _SHARPENED = 30  # starts whose gain is computed with the noise estimated anew
 _FAR_BEHIND = 0.25  # of the best gain: a candidate below cannot win a joint fit
 _REFINED = 8  # candidates that are fitted jointly, of those that screening ranks first
@@ -118,7 +118,7 @@ def search(problem: Problem, *, seed: int, budget: Budget) -> Search:
     refitted = fit(problem)
     problem = without_outliers(problem, refitted.residual)
     refitted = fit(problem, start=refitted.p)
-    folds = folds_of(problem)
+    folds = folds_of(problem, refitted)
     listed = candidates(problem)
     skipped: list[str] = []
     steps: list[Step] = []
@@ -133,9 +133,7 @@ def search(problem: Problem, *, seed: int, budget: Budget) -> Search:
             budget.check(f"step {turn + 1}: screening {len(listed)} candidates")
             screen = Screen.of(problem, base)
             taken = {_place(one) for one in base.active}
-            left = [
-                each for each in listed if _place(each.active) not in taken and each.name != "quantisation"
-            ]
+            left = [each for each in listed if _place(each.active) not in taken and _is_sought(each, turn)]
             scored = screen.sharpened([one for each in left for one in screen.score(each)], _SHARPENED)
             ranked = best_of(scored)
             p_values = search_p_values(
@@ -161,7 +159,8 @@ def search(problem: Problem, *, seed: int, budget: Budget) -> Search:
             if found is None:
                 break
             base, held_base, step = found
-            steps.append(step)
+            if not _is_reference(step, steps):
+                steps.append(step)
         base, held_base, steps = _stepped(problem, base, held_base, steps)
         if len(steps) > 1:
             budget.check("swaps")
@@ -186,6 +185,24 @@ def search(problem: Problem, *, seed: int, budget: Budget) -> Search:
     )
 
 
+def _is_reference(step: Step, steps: Sequence[Step]) -> bool:
+    """Tell whether an offset only moves the point from which a drift that was found is counted."""
+    return step.active.effect.name == "zero_offset" and any(
+        one.active.effect.name in ("thermal_drift", "zero_drift")
+        and one.active.channel == step.active.channel
+        for one in steps
+    )
+
+
+def _is_sought(one: Candidate, turn: int) -> bool:
+    """Tell whether a candidate is searched for.
+
+    Coarse steps have a test of their own; what is there or not (a sign, a swap, a unit) is so gross that it
+    comes first or second.
+    """
+    return one.name != "quantisation" and not (one.discrete and turn > 1)
+
+
 def _best_step(
     problem: Problem,
     folds: Folds,
@@ -204,7 +221,7 @@ def _best_step(
     for score, one, made in tried[:3]:
         held = hold_out(problem, folds, made.active, made)
         gain = held.total - held_base.total
-        if gain < _LEAST_GAIN or made.log_posterior - base.log_posterior < _LEAST_GAIN:
+        if gain < _LEAST_GAIN or score - base.log_posterior < _LEAST_GAIN:
             continue
         if not _matters(problem, held_base, held):
             continue
@@ -314,7 +331,7 @@ def _structure(problem: Problem, screen: Screen, base: Fit, seed: int) -> tuple[
     ]
     for name in problem.names:
         line = strongest_line(problem, name, base.residual[name])
-        if line is not None and line.p_value < _LINE and line.share > 2 * _NOTICED:
+        if line is not None and line.p_value < _LINE and line.share > _LINE_SHARE:
             gain = -2 * math.log(max(line.p_value, 1e-300))
             told = f"time (a line at {line.frequency:.4g} Hz)"
             found.append(StructureFound(output=name, variables=(told,), gain=gain, p_value=line.p_value))

@@ -24,6 +24,7 @@ EFFECT = Effect(
             text="force for each unit of velocity squared",
             typical=(0.01, 1.0),
             relative=True,
+            bounds=(0.0, float("inf")),
         ),
     ),
     force=_resisting,

@@ -21,8 +21,7 @@ def _warming(y: NDArray[np.float64], values: Values, setting: Setting) -> NDArra
     if name is None or not len(y):
         return y
     temperature = setting.channels[name]
-    rest = setting.first.get(name, float(temperature[0])) + values.get("reference", 0.0)
-    return y + values["coefficient"] * (temperature - rest)
+    return y + values["coefficient"] * (temperature - setting.first.get(name, float(temperature[0])))
 
 
 EFFECT = Effect(
@@ -40,15 +39,6 @@ EFFECT = Effect(
             text="change of the zero",
             typical=(1e-05, 0.001),
             relative=True,
-        ),
-        EffectParameter(
-            name="reference",
-            unit="K",
-            text="temperature of no drift, above that of the first reading",
-            typical=(-20.0, 20.0),
-            off=None,
-            bounds=(-300.0, 300.0),
-            starts=(0.0,),
         ),
     ),
     channel=_warming,
