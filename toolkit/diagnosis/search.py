@@ -167,6 +167,9 @@ def search(problem: Problem, *, seed: int, budget: Budget) -> Search:
             base, held_base, steps = _pruned(problem, folds, base, held_base, steps)
     except BudgetSpentError as error:
         skipped.append(str(error))
+    # Every effect with its values of the last joint fit, not of the step that found it.
+    values = {_place(one): one for one in base.active}
+    steps = [replace(one, active=values[_place(one.active)]) for one in steps]
     return Search(
         problem=problem,
         folds=folds,
@@ -303,8 +306,7 @@ def _pruned(
             kept = {_place(one) for one in rest}
             steps = [one for one in steps if _place(one.active) in kept]
             return _pruned(problem, folds, base, held_base, steps)
-    values = {_place(one): one for one in base.active}
-    return base, held_base, [replace(one, active=values[_place(one.active)]) for one in steps]
+    return base, held_base, steps
 
 
 def _place(one: Active) -> tuple[object, ...]:
