@@ -26,7 +26,7 @@ EFFECT = Effect(
     name="wear",
     stage="tire",
     statement="The tread wears with slip work, and its stiffness changes with it.",
-    equation="stiffness = 1 + rate * integral(|FY V sin(alpha)| dt)",
+    equation="stiffness = 1 + rate * integral(|FY V sin(alpha)| dt), FY of the tire as new",
     reference="Archard, J. Appl. Phys. 24 (1953); Pacejka 2012, 3.2",
     signature="monotone in slip work",
     separates="the first angle repeated at the end, after a pause",

@@ -51,7 +51,6 @@ class Walked:
     SA: NDArray[np.float64]
     sensed: NDArray[np.float64]
     setting: Setting
-    power_W: NDArray[np.float64]
     after: Before
 
 
@@ -88,6 +87,10 @@ def walk(plan: Plan, run: RunSteps, line: Timeline, before: Before) -> Walked:
         setting = _warmed(plan, setting, line, power, before)
     on_top = through({"FY": forces.FY, "MZ": forces.MZ}, rolling, setting, plan.machine)
     answer = HubTire(FY=on_top["FY"], MZ=on_top["MZ"], loaded_radius=loaded_radius(plan, made.FZ))
+    if any(one.effect.name == "wear" for one in own):
+        # The effect counts the work of the tire as new: what wear itself adds to it is of second order.
+        new = driven(start, [one for one in own if one.effect.name != "wear"], setting, tire)
+        power = np.abs(tire(new).FY * new.V * np.sin(new.SA))
     steps = 0.5 * (power[1:] + power[:-1]) * np.diff(line.t)
     gap = plan.motion.between_files_s
     warmth = float(setting.channels["T_TREAD"][-1] - setting.channels["T_AMBIENT"][-1])
@@ -96,7 +99,6 @@ def walk(plan: Plan, run: RunSteps, line: Timeline, before: Before) -> Walked:
         SA=start.SA,
         sensed=carriage.sensed_angle(plan.carriage, SA=wheel),
         setting=setting,
-        power_W=power,
         after=Before(
             elapsed_s=before.elapsed_s + float(line.t[-1]) + gap,
             work_kJ=before.work_kJ + 1e-3 * float(steps.sum()),

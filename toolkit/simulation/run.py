@@ -261,7 +261,7 @@ def _tare(plan: Plan) -> tuple[Signals, float]:
         noise=acquisition.draw_noise(plan.acquisition, plan.cells, rows, rng),
         recorded=np.ones(rows, dtype=bool), blocks=(),
     )  # fmt: skip
-    still = Walked(hub=hub, SA=none, sensed=none, setting=setting, power_W=none, after=Before())
+    still = Walked(hub=hub, SA=none, sensed=none, setting=setting, after=Before())
     effects = [one for one in here(plan.effects, {}) if one.effect.name != "zero_offset"]
     return _measured(at_rest, line, still, effects), dt
 
