@@ -39,13 +39,15 @@ ONE = '[[recording.run]]\nfile = "r0.csv"\n'
 TWO = ONE + '[[recording.run]]\nfile = "r1.csv"\n'
 
 
-def carriage(*, seed: int = 0, rows: int = 80, coulomb: float = 20.0, noise: float = 2.0) -> pd.DataFrame:
-    """Return mass 95 kg, 200 N s/m and a dry friction, driven by two sines."""
+def carriage(
+    *, seed: int = 0, rows: int = 80, coulomb: float = 20.0, drag: float = 0.0, noise: float = 2.0
+) -> pd.DataFrame:
+    """Return mass 95 kg, 200 N s/m, a dry friction and a drag, driven by two sines."""
     rng = np.random.default_rng(seed)
     t = np.arange(rows) * 0.1
     v = 0.2 * np.sin(1.3 * t + seed) + 0.1 * np.sin(3.1 * t)
     a = 0.26 * np.cos(1.3 * t + seed) + 0.31 * np.cos(3.1 * t)
-    force = 95 * a + 200 * v + coulomb * np.sign(v) + rng.normal(0, noise, rows)
+    force = 95 * a + 200 * v + coulomb * np.sign(v) + drag * v * np.abs(v) + rng.normal(0, noise, rows)
     return pd.DataFrame({"t": t, "v": v, "a": a, "F": force})
 
 

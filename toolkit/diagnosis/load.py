@@ -59,6 +59,9 @@ def _machine(case: Case, calibrations: Path | None) -> Model:
             next_step="name the tire file",
             rule="case",
         )
+    # Where FY and MZ are given in place of the cells, a calibration has nothing to be applied to.
+    if record is not None and not any(name in roles for name in record.indications):
+        record = None
     return MachineModel(case, read_tir(case.simulation.tire), record, machine.drum.speed_m_s)
 
 

@@ -49,6 +49,15 @@ class AcquisitionModel:
                 next_step="declare the cells as inputs, or name a tire file",
                 rule="case",
             )
+        if case.parameters:
+            raise ConfigError(
+                "an acquisition program has no free parameter",
+                where=f"{case.path}: simulation.parameters",
+                got=", ".join(one.name for one in case.parameters),
+                expected="none: a record's coefficients are known exactly",
+                next_step="remove them, or declare the cells as outputs and name the tire",
+                rule="case",
+            )
         self.case, self.record = case, record
         self._others = {one.id: one for one in others if one.id != record.id}
         self.parameters = case.parameters

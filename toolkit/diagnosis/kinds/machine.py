@@ -27,6 +27,8 @@ if TYPE_CHECKING:
     from toolkit.diagnosis.case import Case, Run
     from toolkit.tires.tir import TirFile
 
+# Numbers of the machine definition that the simulation of FY and MZ depends on or may be asked for.
+_MACHINE_NUMBERS = {"drum.speed": "speed", "drum.circumference": "length", "cells.pitch_diameter": "length"}
 _FORCES = {"FY": "N", "MZ": "N*m"}
 
 
@@ -42,16 +44,22 @@ class MachineModel:
         self.cells = None if record is None else Cells(case, record)
         self.parameters = case.parameters
         for one in case.parameters:
-            if one.name not in self._tire.names:
-                near = difflib.get_close_matches(one.name, sorted(self._tire.names), n=1)
+            if one.name in _MACHINE_NUMBERS:
+                _check_dimension(case, one.name, one.unit)
+            elif one.name not in self._tire.names:
+                near = difflib.get_close_matches(
+                    one.name, sorted((*self._tire.names, *_MACHINE_NUMBERS)), n=1
+                )
                 raise ConfigError(
                     f"the simulation has no parameter {one.name!r}",
                     where=f"{case.path}: simulation.parameters",
                     got=one.name,
-                    expected="a coefficient or scale factor of the tire file",
+                    expected="a coefficient or scale factor of the tire file, or a number of the machine: "
+                    + ", ".join(_MACHINE_NUMBERS),
                     next_step=f"did you mean {near[0]!r}?" if near else "correct the name",
                     rule="case",
                 )
+        self._direct = {one.name for one in case.outputs}
         self.outputs = self._outputs()
         self._settings: dict[Run, Any] = {}
 
@@ -82,9 +90,11 @@ class MachineModel:
         """Return FY and MZ as recorded, or from the cells by the calibration; FZ where it is judged."""
         made = {}
         for one in self.outputs:
-            if one.name in run.columns:
-                made[one.name] = run.columns[one.name]
-            elif self.cells is not None:
+            # The acquisition program's own FY beside the cells is judged only where its role says so.
+            if one.name in self._direct:
+                if one.name in run.columns:
+                    made[one.name] = run.columns[one.name]
+            elif self.cells is not None and all(cell in run.columns for cell in self.cells.names):
                 made[one.name] = self.cells.load(run, one.name) / unit(one.unit).factor
         return made
 
@@ -93,7 +103,7 @@ class MachineModel:
     ) -> dict[str, NDArray[np.float64]]:
         """Return every output of a run with effects in it."""
         case, here = self.case, self._setting(run)
-        start = base_drive(case, run, load_N=self._load, speed_m_s=self._speed)
+        start = base_drive(case, run, load_N=self._load, speed_m_s=self._drum_speed(p))
         reverse = rotation(run) == "reverse"
         pressure = first_of(case, run, "P_INFL", "P")
 
@@ -120,10 +130,17 @@ class MachineModel:
         values = through_channels(made, active, run, here, run.columns)
         return values if self.cells is None else self.cells.disturbed(values, active, run, here, self.outputs)
 
+    def _drum_speed(self, p: Mapping[str, float]) -> float:
+        """Return the surface speed [m/s]: that of the machine definition, unless a parameter frees it."""
+        for one in self.parameters:
+            if one.name == "drum.speed":
+                return p[one.name] * unit(one.unit).factor
+        return self._speed
+
     def _load_output(self, run: Run, active: Sequence[Active]) -> NDArray[np.float64]:
         commanded = first_of(self.case, run, "FZ_CMD")
         if commanded is None:
-            return np.abs(si(self.case, "FZ", run.columns["FZ"]))
+            return si(self.case, "FZ", run.columns["FZ"])
         for one in active:
             if one.effect.name == "load_lag" and one.acts_in(run):
                 commanded = lag(run.t, commanded, one.values["time_constant"])
@@ -172,3 +189,15 @@ class MachineModel:
             power = np.abs(FY * start.V * np.sin(start.SA)) * 1e-3
             total += float(np.sum(0.5 * (power[1:] + power[:-1]) * np.diff(one.t))) if one.rows > 1 else 0.0
         return total
+
+
+def _check_dimension(case: Case, name: str, text: str) -> None:
+    if unit(text).dimension != _MACHINE_NUMBERS[name]:
+        raise ConfigError(
+            "a parameter's unit does not fit it",
+            where=f"{case.path}: simulation.parameters.{name}.unit",
+            got=text,
+            expected=f"a unit of {_MACHINE_NUMBERS[name]}",
+            next_step="correct the unit",
+            rule="case",
+        )

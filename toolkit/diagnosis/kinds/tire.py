@@ -51,7 +51,7 @@ def base_drive(case: Case, run: Run, *, load_N: float, speed_m_s: float = NOMINA
     return drive(
         run.t,
         zero if SA is None else turn["SA"] * SA,
-        zero + load_N if FZ is None else np.abs(FZ),
+        zero + load_N if FZ is None else FZ,
         IA=0.0 if IA is None else IA,
         V=speed_m_s if V is None else V,
     )

@@ -1,0 +1,80 @@
+"""A budget ends a search, and a simulator's call; outputs that stand still need no search."""
+
+import math
+import time
+
+import pytest
+
+from tests.diagnosis.cases import HEAD, ONE, SIMULATOR, TWO, carriage, write_case
+from toolkit.diagnosis.case_read import read_case
+from toolkit.diagnosis.diagnose import diagnose
+from toolkit.diagnosis.search import BudgetSpentError
+from toolkit.diagnosis.serial import as_json
+from toolkit.diagnosis.watch import Watch
+
+WAITS = SIMULATOR.replace("import pandas as pd", "import pandas as pd, time\n    WAIT")
+PREDICT = '[[recording.predict]]\nfile = "more.csv"\n'
+
+
+def test_a_call_is_ended_where_it_stands_even_if_it_catches_everything():
+    def stubborn():
+        try:
+            time.sleep(600)
+        except Exception:  # noqa: BLE001
+            return 0
+
+    with pytest.raises(BudgetSpentError):
+        Watch(0.2, lambda _: None).guarded(stubborn)()
+
+
+def test_a_call_in_time_returns_and_leaves_no_alarm():
+    watch = Watch(0.3, lambda _: None)
+    assert watch.guarded(lambda a, b: a - b)(5, b=3) == 2
+    time.sleep(0.4)
+    with pytest.raises(BudgetSpentError, match="declared"):
+        watch.guarded(lambda: None)()
+
+
+def test_a_simulator_of_ten_minutes_gives_a_partial_answer(tmp_path):
+    slow = WAITS.replace("WAIT", "time.sleep(600)")
+    case = read_case(write_case(tmp_path, HEAD + TWO + PREDICT, simulator=slow, more__csv=carriage(seed=4)))
+    result = diagnose(case, None, budget_s=1.0)
+    made = as_json(result.diagnosis)
+    assert made["complete"] is False
+    assert made["verdict"] == "untestable"
+    assert made["skipped"][0] == "the simulation as declared"
+    assert {"screening of the effects", "predictions"} <= set(made["skipped"])
+    assert made["effects"] == made["fit"]["held_out"] == []
+    assert made["not_found"]
+    assert not any(one["observable"] for one in made["not_found"])
+    assert result.search is None
+
+
+def test_a_simulator_that_does_not_even_load_in_time_gives_a_partial_answer(tmp_path):
+    case = read_case(write_case(tmp_path, simulator="import time\ntime.sleep(600)\n" + SIMULATOR))
+    made = diagnose(case, None, budget_s=0.5).diagnosis
+    assert not made.complete
+    assert [one.name for one in made.nominal_parameters] == ["mass", "c"]
+
+
+def test_a_budget_that_ends_in_the_refit_still_tells_the_error_as_declared(tmp_path):
+    case = read_case(write_case(tmp_path, simulator=WAITS.replace("WAIT", "time.sleep(0.2)")))
+    made = diagnose(case, None, budget_s=2.0).diagnosis
+    assert not made.complete
+    # 20 N of dry friction, and parameters off by 1 kg and 10 N s/m: about 20 N
+    assert made.held_out[0].nominal_rmse == pytest.approx(20.0, abs=3.0)
+    assert math.isnan(made.held_out[0].noise_floor)
+
+
+@pytest.mark.parametrize("rows", [1, 2, 30])
+def test_outputs_that_stand_still_are_untestable(tmp_path, rows):
+    still = carriage(rows=rows).assign(F=3.0)
+    made = diagnose(read_case(write_case(tmp_path, r0__csv=still, r1__csv=still)), None).diagnosis
+    assert (made.verdict, made.complete, made.effects) == ("untestable", True, ())
+    assert as_json(made)["fit"]["held_out"][0]["noise_floor"] is None
+
+
+def test_an_output_without_a_single_sample_is_untestable(tmp_path):
+    none = carriage(rows=20).assign(F=math.nan)
+    made = diagnose(read_case(write_case(tmp_path, HEAD + ONE, r0__csv=none)), None).diagnosis
+    assert (made.verdict, made.held_out) == ("untestable", ())

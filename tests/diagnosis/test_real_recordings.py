@@ -1,0 +1,68 @@
+"""Public recordings whose left-out physics is known and stands in no case: the quick ones of the real layer.
+
+Sources stand with the cases in `tests.concealed.real_cases`; all of them are run by the proof.
+"""
+
+import pytest
+
+from tests.concealed.real_cases import CASES
+from tests.conftest import EXAMPLES, SHARED_DATA
+from toolkit.diagnosis.case_read import read_case
+from toolkit.diagnosis.diagnose import diagnose
+
+REGISTRY = EXAMPLES.parents[1] / "calibrations"
+
+
+def diagnosed(name, folder):
+    one = next(each for each in CASES if each.name == name)
+    if not (SHARED_DATA / one.folder).is_dir():
+        pytest.skip(f"the recordings of {one.folder} are not here")
+    one.make(SHARED_DATA, folder)
+    return diagnose(read_case(folder / "CASE.toml"), REGISTRY).diagnosis
+
+
+def classes(made):
+    return [{one.name, *one.equivalent_to} for one in made.effects]
+
+
+def test_a_load_cell_taken_as_a_straight_line_is_not_linear(tmp_path):
+    made = diagnosed("pontius", tmp_path)
+    assert len(made.effects) == 1
+    assert "nonlinearity" in classes(made)[0]
+    assert made.remaining == "nothing"
+    # NIST certifies a residual standard deviation of 0.000205163 for the quadratic
+    assert made.held_out[0].noise_floor == pytest.approx(0.000205163, rel=0.15)
+    assert made.held_out[0].augmented_rmse < 0.2 * made.held_out[0].refitted_rmse
+
+
+def test_the_programs_sign_of_E5(tmp_path):
+    made = diagnosed("figure-4-4", tmp_path)
+    assert made.verdict == "equivalent"
+    assert classes(made) == [{"channel_sign", "wrong_calibration"}]
+    assert made.effects[0].name != "channel_sign" or made.effects[0].channel == "E5"
+    assert [one.channel for one in made.held_out] == ["FY", "MZ"]
+    # what the printed digits leave: half a unit of the cells' fourth decimal, three cells, in lbf
+    assert made.held_out[0].augmented_rmse < 1e-3
+
+
+def test_a_light_ball_is_held_back_by_the_air(tmp_path):
+    made = diagnosed("whiffle-1", tmp_path)
+    assert len(made.effects) == 1
+    assert classes(made)[0] & {"viscous_damping", "quadratic_drag"}
+    assert made.held_out[0].augmented_rmse < 0.1 * made.held_out[0].refitted_rmse
+
+
+def test_a_bowling_ball_falls_freely(tmp_path):
+    made = diagnosed("bowling", tmp_path)
+    assert (made.verdict, made.remaining, made.effects) == ("nothing", "nothing", ())
+    assert {one.name: one.unit for one in made.nominal_parameters}["g"] == "m/s^2"
+
+
+def test_a_standard_resistor_drifts(tmp_path):
+    made = diagnosed("dziuba1", tmp_path)
+    assert "zero_drift" in set().union(*classes(made))
+
+
+def test_calibration_factors_of_a_heat_flow_meter_need_nothing(tmp_path):
+    made = diagnosed("zarr13", tmp_path)
+    assert (made.verdict, made.effects) == ("nothing", ())
