@@ -5,7 +5,15 @@ import pytest
 from scipy.linalg import toeplitz
 from scipy.stats import multivariate_normal
 
-from toolkit.diagnosis.noise import Noise, autocovariance, fit_noise, layout, log_likelihood, predictor, whiten
+from toolkit.diagnosis.noise import (
+    Noise,
+    autocovariance,
+    fit_noise,
+    layout,
+    log_likelihood,
+    predictor,
+    whiten,
+)
 
 
 def _one(n: int):

@@ -36,5 +36,8 @@ def test_a_ramp_input_is_integrated_to_its_kink():
 def test_what_runs_off_ends_with_an_error():
     with pytest.raises(IntegrationError):
         integrate(
-            lambda _, x: np.array([min(x[0], 1e150) ** 2]), np.linspace(0, 3, 31), np.array([1.0]), np.full(1, TIGHT)
+            lambda _, x: np.array([min(x[0], 1e150) ** 2]),
+            np.linspace(0, 3, 31),
+            np.array([1.0]),
+            np.full(1, TIGHT),
         )
