@@ -40,7 +40,8 @@ def answer_of(case: Case, found: Search, told: tuple[Finding, ...]) -> Diagnosis
     effects = () if unknown else tuple(_effect(found, step) for step in found.steps)
     nominal = _nominal(found, before_effects=unknown)
     verdict = _verdict(found, effects, nominal, unknown=unknown)
-    remaining = "unknown" if found.structure else "nothing"
+    # A search that did not come to its end has not shown that nothing is left.
+    remaining = "unknown" if found.structure or found.skipped else "nothing"
     named = {one.name for one in effects} | {name for one in effects for name in one.equivalent_to}
     units = {
         id(one): unit_of(case, problem.model, one.active, one.active.searched[0].name)
@@ -83,7 +84,7 @@ def _verdict(
         return "equivalent" if any(one.equivalent_to for one in effects) else "named"
     if unknown or found.structure:
         return "unknown"
-    if any(abs(one.shift_in_sd or 0.0) > _FAR for one in nominal):
+    if found.skipped or any(abs(one.shift_in_sd or 0.0) > _FAR for one in nominal):
         return "untestable"
     return "nothing"
 

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from toolkit.diagnosis.model import DISCRETE, Active
+from toolkit.diagnosis.nuisance import INPUT_NOISE
 from toolkit.effects.catalogue import effects
 from toolkit.effects.effect import Effect, EffectParameter
 
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
 _IN_TIME = frozenset(
     (
         "channel_delay filter_lag zero_drift creep relaxation thermal_friction wear viscoelastic_settling "
-        "turn_slip load_lag"
+        "turn_slip load_lag input_noise"
     ).split()
 )
 _SUBSETS = 8
@@ -58,7 +59,7 @@ class Candidate:
 def candidates(problem: Problem) -> tuple[Candidate, ...]:
     """Return every candidate of a case."""
     made = []
-    for effect in effects().values():
+    for effect in (*effects().values(), INPUT_NOISE):
         if effect.name in _IN_TIME and not problem.case.has_time:
             continue
         for channel, source in problem.model.places(effect):

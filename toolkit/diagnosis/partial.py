@@ -71,7 +71,7 @@ def without_search(
             for one in case.parameters
         ),
         held_out=() if problem is None or simulated is None else _as_declared(problem, simulated),
-        held_out_by="nothing: no fit was made",
+        held_out_by="none: no fit was made",
         depends_on=(),
         not_found=tuple(
             NotFound(name=name, minimum_detectable=None, unit="", observable=False, why=why)

@@ -15,6 +15,7 @@ from toolkit.diagnosis.folds import Folds, HeldOut, folds_of, hold_out
 from toolkit.diagnosis.lattice import lattice_of
 from toolkit.diagnosis.lines import strongest_line
 from toolkit.diagnosis.model import Active
+from toolkit.diagnosis.nuisance import INPUT_NOISE
 from toolkit.diagnosis.null import search_p_values
 from toolkit.diagnosis.problem import Problem, without_outliers
 from toolkit.diagnosis.screen import Scored, Screen, best_of
@@ -32,6 +33,7 @@ _SHARPENED = 30  # starts whose gain is computed with the noise estimated anew
 _FAR_BEHIND = 0.25  # of the best gain: a candidate below cannot win a joint fit
 _REFINED = 8  # candidates that are fitted jointly, of those that screening ranks first
 _CLOSE = 3.0  # log-likelihood within which two effects cannot be told apart
+_BOUND = 1e-3
 _LEAST_GAIN = 1.5  # of the held-out log score
 _NOTICED = 0.01  # of an output's held-out error: a smaller gain is real perhaps, and matters to nobody
 
@@ -159,7 +161,7 @@ def search(problem: Problem, *, seed: int, budget: Budget) -> Search:
             if found is None:
                 break
             base, held_base, step = found
-            if not _is_reference(step, steps):
+            if not _is_nuisance(step, steps):
                 steps.append(step)
         base, held_base, steps = _stepped(problem, base, held_base, steps)
         if len(steps) > 1:
@@ -188,13 +190,25 @@ def search(problem: Problem, *, seed: int, budget: Budget) -> Search:
     )
 
 
-def _is_reference(step: Step, steps: Sequence[Step]) -> bool:
-    """Tell whether an offset only moves the point from which a drift that was found is counted."""
+def _is_nuisance(step: Step, steps: Sequence[Step]) -> bool:
+    """Tell whether a step is no physics: input noise, or the point from which a drift is counted."""
+    if step.active.effect.name == INPUT_NOISE.name:
+        return True
     return step.active.effect.name == "zero_offset" and any(
         one.active.effect.name in ("thermal_drift", "zero_drift")
         and one.active.channel == step.active.channel
         for one in steps
     )
+
+
+def _at_bound(one: Active) -> bool:
+    """Tell whether a parameter ends at a bound other than zero: then the effect only imitates another."""
+    for parameter in one.searched:
+        value = one.values[parameter.name]
+        for bound in parameter.bounds:
+            if math.isfinite(bound) and bound != 0 and abs(value - bound) < _BOUND * abs(bound):
+                return True
+    return False
 
 
 def _is_sought(one: Candidate, turn: int) -> bool:
@@ -226,12 +240,12 @@ def _best_step(
         gain = held.total - held_base.total
         if gain < _LEAST_GAIN or score - base.log_posterior < _LEAST_GAIN:
             continue
-        if not _matters(problem, held_base, held):
+        if _at_bound(made.active[-1]) or not _matters(problem, held_base, held):
             continue
         rivals = tuple(
             Rival(active=other_fit.active[-1], difference=other_score - score)
             for other_score, other, other_fit in tried
-            if other is not one
+            if other is not one and other.candidate.name != INPUT_NOISE.name
         )
         step = Step(
             active=made.active[-1],

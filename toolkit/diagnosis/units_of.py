@@ -14,9 +14,13 @@ def unit_of(case: Case, model: Model, active: Active, name: str) -> str:
     if active.effect.stage == "dynamics":
         force, velocity, position = _motion(case, model, active)
         return text.format(force=force, velocity=velocity, position=position)
-    return text.format_map(
-        {"channel": _channel(case, model, active.channel), "from": _channel(case, model, active.source)}
-    )
+    own, other = _channel(case, model, active.channel), _channel(case, model, active.source)
+    return text.format_map({"channel": _bracketed(own, text), "from": _bracketed(other, text)})
+
+
+def _bracketed(unit: str, text: str) -> str:
+    """Return a unit in brackets where what stands around it would take it apart."""
+    return f"({unit})" if ("*" in unit or "/" in unit) and ("/" in text or "^" in text) else unit
 
 
 def _channel(case: Case, model: Model, name: str | None) -> str:

@@ -22,6 +22,9 @@ if TYPE_CHECKING:
     from toolkit.diagnosis.case import Case, Run
 
 
+_ON_TARE = ("channel_sign", "sensitivity_error", "unit_error")
+
+
 class Cells:
     """Recorded cells and the record that turns them into loads, with the tare of the case's tare runs."""
 
@@ -72,7 +75,12 @@ class Cells:
 
     def loads_of(self, cells: dict[str, NDArray[np.float64]]) -> dict[str, NDArray[np.float64]]:
         """Return FY and MZ [SI] of cells in the record's units."""
-        return apply_record(self.record, cells, units=self._recorded_unit, tare=self._tare, only=self.loads)
+        return self._loads(cells, self._tare)
+
+    def _loads(
+        self, cells: dict[str, NDArray[np.float64]], tare: dict[str, float] | None
+    ) -> dict[str, NDArray[np.float64]]:
+        return apply_record(self.record, cells, units=self._recorded_unit, tare=tare, only=self.loads)
 
     def noise(self, load: str) -> float | None:
         """Return a load's noise from the cells' stated noise, None where a cell has none."""
@@ -111,10 +119,14 @@ class Cells:
             return values
         recorded = {name: self._cell(run, name) for name in self.names}
         true = dict(recorded)
+        tare = None if self._tare is None else dict(self._tare)
         for one in reversed(here):
             name = str(one.channel)
             true[name] = undone(true[name], one, setting, true)
-        shown, without = self.loads_of(recorded), self.loads_of(true)
+            if tare is not None and one.effect.name in _ON_TARE:
+                # The tare was read through the same fault; what came later (creep, drift) is not in it.
+                tare[name] = float(undone(np.array([tare[name]]), one, setting, true)[0])
+        shown, without = self.loads_of(recorded), self._loads(true, tare)
         made = dict(values)
         for output in outputs:
             if output.name in self.loads:

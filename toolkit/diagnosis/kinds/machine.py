@@ -119,7 +119,10 @@ class MachineModel:
             )
             return TireForces(FY=FY if reverse else -FY, MZ=-MZ)
 
-        forces = through_tire(start, steady, active, run, here)
+        # A load that was measured is late already: its lag shows in FZ against the command, not in the tire.
+        measured = first_of(case, run, "FZ") is not None
+        on_tire = [one for one in active if not (measured and one.effect.name == "load_lag")]
+        forces = through_tire(start, steady, on_tire, run, here)
         turn = tire_signs("machine", case.axes, run)
         made = {}
         for one in self.outputs:

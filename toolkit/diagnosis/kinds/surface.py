@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 _KNOTS, _LOADS = 22, 3
 _ENOUGH = 0.02  # of the simulated output's spread that the surface may miss
-_RIDGE = 1e-7
+_RIDGE, _BEND = 1e-7, 1e-3
 
 
 class Surface:
@@ -44,9 +44,13 @@ class Surface:
         y = np.concatenate([run.simulated[name] for run, _ in chosen])
         good = np.isfinite(y)
         basis, y = basis[good], y[good]
-        size = np.sqrt((basis**2).sum(axis=0).max()) * _RIDGE
-        stacked = np.vstack([basis, size * np.eye(basis.shape[1])])
-        found = np.linalg.lstsq(stacked, np.concatenate([y, np.zeros(basis.shape[1])]), rcond=None)[0]
+        size = float(np.sqrt((basis**2).sum(axis=0).max()))
+        # Smooth between few slip angles: second differences of the splines' heights cost a little.
+        width = basis.shape[1] // self._powers
+        bend = np.kron(np.eye(self._powers), np.diff(np.eye(width), 2, axis=0))
+        penalty = np.vstack([_BEND * size * bend, _RIDGE * size * np.eye(basis.shape[1])])
+        stacked = np.vstack([basis, penalty])
+        found = np.linalg.lstsq(stacked, np.concatenate([y, np.zeros(len(penalty))]), rcond=None)[0]
         self._fits[name, way] = found
         missed = np.sqrt(np.mean((basis @ found - y) ** 2)) if len(y) else 0.0
         if missed > _ENOUGH * max(float(np.std(y)), 1e-300):
