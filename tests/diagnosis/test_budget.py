@@ -78,3 +78,18 @@ def test_an_output_without_a_single_sample_is_untestable(tmp_path):
     none = carriage(rows=20).assign(F=math.nan)
     made = diagnose(read_case(write_case(tmp_path, HEAD + ONE, r0__csv=none)), None).diagnosis
     assert (made.verdict, made.held_out) == ("untestable", ())
+
+
+def test_a_search_that_is_cut_off_never_says_that_nothing_is_missing(tmp_path):
+    frames = {f"r{i}__csv": carriage(seed=i, coulomb=0.0) for i in range(2)}
+    case = read_case(write_case(tmp_path, **frames))
+    assert diagnose(case, None).diagnosis.verdict == "nothing"
+
+    def late(step):
+        if step.startswith("step 1: structure"):
+            raise BudgetSpentError(step)
+
+    made = diagnose(case, None, tell=late).diagnosis
+    assert (made.verdict, made.remaining, made.complete) == ("untestable", "unknown", False)
+    assert made.skipped[0].startswith("step 1: structure")
+    assert made.held_out[0].refitted_rmse > 0

@@ -10,8 +10,10 @@ from tests.diagnosis.tire_case import TIR, sweep, toml
 from toolkit.diagnosis.case_read import read_case
 from toolkit.diagnosis.diagnose import diagnose
 from toolkit.diagnosis.load import model_of
+from toolkit.diagnosis.model import Active
 from toolkit.diagnosis.notes import calibration_findings, case_findings
 from toolkit.diagnosis.problem import problem_of
+from toolkit.effects.catalogue import effects
 from toolkit.errors import ConfigError
 
 REGISTRY = EXAMPLES.parents[1] / "calibrations"
@@ -127,6 +129,28 @@ def test_a_negative_load_is_noted(tmp_path):
     frames = {f"r{i}__csv": sweep("machine", seed=i).assign(FZ=lambda df: -df["FZ"]) for i in range(2)}
     case = machine(tmp_path, frames=frames)
     assert [one.rule for one in case_findings(problem_of(case, model_of(case, None)))] == ["case-load-sign"]
+
+
+@pytest.mark.parametrize("measured", [True, False])
+def test_a_lag_of_the_load_acts_once(tmp_path, measured):
+    # Where FZ was measured, it drives the tire as it is, and is itself judged against the command.
+    rows = sweep("machine", seed=0)
+    rows["FZ_CMD"] = np.where(rows["t"] < 6, 3000.0, 5000.0)
+    channels = 'FZ_CMD = { unit = "N", role = "input" }\nFY = { unit = "N", role = "output" }\n'
+    text = toml('kind = "machine"\ntire = "tire.tir"', axes="machine", mu="LMUY", channels=channels)
+    load = 'FZ = { unit = "N", role = "input" }\n'
+    text = text.replace(load, load.replace("input", "output") if measured else "")
+    case = read_case(write_case(tmp_path, text, simulator=None, tire__tir=TIR, r0__csv=rows, r1__csv=rows))
+    model = model_of(case, None)
+    late = Active(effect=effects()["load_lag"], values={"time_constant": 0.5})
+    plain, made = (model.simulate(case.runs[0], {"LMUY": 1.0}, one) for one in ((), (late,)))
+    step = 60  # the command's row; one row later the lag has come exp(-0.1/0.5) of the way, less the ramp's
+    assert (np.abs(made["FY"] - plain["FY"])[step:].max() > 100) is not measured
+    if measured:
+        np.testing.assert_array_equal(plain["FZ"], rows["FZ_CMD"])
+        # linear between rows: 1 - (1 - exp(-0.2))/0.2 of the step at its own row, then exp(-0.2) each row
+        left = (1 - np.exp(-0.2)) / 0.2 * np.exp(-0.2 * np.arange(60))
+        np.testing.assert_allclose(made["FZ"][step:], 5000 - 2000 * left, rtol=1e-9)
 
 
 FIGURE = """schema = 1

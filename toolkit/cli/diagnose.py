@@ -151,8 +151,11 @@ def _text(made: Diagnosis, out: Path) -> str:
         ]
         for o in made.held_out
     ]
-    lines += ["", f"error on held-out rows (by {made.held_out_by}):"]
-    lines.append(table(["output", "unit", "nominal", "refitted", "augmented", "noise"], rows, align="<<>>>>"))
+    if rows:
+        lines += ["", f"error on held-out rows (by {made.held_out_by}):"]
+        lines.append(
+            table(["output", "unit", "nominal", "refitted", "augmented", "noise"], rows, align="<<>>>>")
+        )
     moved = [one for one in made.nominal_parameters if one.prior_sd]
     if moved:
         cells = [

@@ -90,8 +90,8 @@ def _sentence(made: Diagnosis) -> str:
     if made.verdict == "unknown":
         told = [f"{channel} over {' and '.join(names)}" for channel, names in made.depends_on[:3]]
         return escape(f"The mismatch depends on: {'; '.join(told)}.")
-    if made.skipped and not made.held_out_by.endswith(("run", "runs")) and not made.mismatch:
-        return escape(f"The budget was spent at: {made.skipped[0]}. Nothing was judged.")
+    if made.skipped and made.verdict == "untestable":
+        return escape(f"The budget was spent at: {made.skipped[0]}. Nothing can be said yet.")
     if made.verdict == "untestable":
         return "The outputs do not vary, or the parameters take up everything; see below."
     return "What is left is noise; the list below says how large each effect would have had to be."
@@ -159,12 +159,15 @@ def _place(one: Mismatch) -> str:
 
 
 def _held_out(made: Diagnosis) -> list[str]:
+    if not made.held_out:
+        return []
     rows = []
     for one in made.held_out:
         errors = (one.nominal_rmse, one.refitted_rmse, one.augmented_rmse, one.noise_floor)
         rows.append((one.channel, one.unit, *(f"{value:.4g}" for value in errors)))
     head = ("output", "unit", "as declared", "refitted", "with the effects", "noise")
-    return ["<h2>Error on held-out rows</h2>", _table(head, rows, numbers=(2, 3, 4, 5))]
+    title = "Error on held-out rows" if made.complete or made.effects else "Error as far as it was reached"
+    return [f"<h2>{title}</h2>", _table(head, rows, numbers=(2, 3, 4, 5))]
 
 
 def _parameters(made: Diagnosis) -> list[str]:
@@ -181,6 +184,8 @@ def _parameters(made: Diagnosis) -> list[str]:
 
 
 def _remaining(made: Diagnosis) -> list[str]:
+    if made.remaining == "unknown" and not made.depends_on:
+        return ["<h2>What remains</h2>", "<p>Not judged: no search was made, or none to its end.</p>"]
     if not made.depends_on:
         return ["<h2>What remains</h2>", "<p>Nothing that stands out of the noise.</p>"]
     rows = [(channel, " and ".join(names)) for channel, names in made.depends_on[:8]]
