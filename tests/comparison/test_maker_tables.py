@@ -152,7 +152,7 @@ def test_no_text_and_no_file(tmp_path: Path) -> None:
 
 def test_a_real_table_of_a_hundred_hertz_compares_with_a_thinned_copy_of_itself(tmp_path: Path) -> None:
     """Calspan's cornering run at 100 Hz: rows that the two share none of tell the same stiffness."""
-    from conftest import SHARED_DATA
+    from tests.conftest import SHARED_DATA
 
     source = SHARED_DATA / "ttc_cornering" / "cornering_IA0_P83kPa.csv"
     if not source.is_file():

@@ -1,6 +1,6 @@
 """What imitates physics without being any: noise in the recorded slip angle, which every lag smooths away.
 
-A simulation that is driven by a noisy channel carries that noise into its outputs. Any lag on the channel then
+A simulation that is driven by a noisy channel carries that noise into its outputs. A lag on the channel then
 improves the fit, by its smoothing and not by its delay. Smoothing that looks both ways improves it too, and
 delays nothing: it is searched beside the effects, kept in the fits where it wins, and never named.
 """

@@ -201,6 +201,11 @@ def _is_nuisance(step: Step, steps: Sequence[Step]) -> bool:
     )
 
 
+def _shapes(one: Active) -> int:
+    """Return how many parameters only shape an effect: they make it no less able to imitate another."""
+    return sum(each.off is None for each in one.searched)
+
+
 def _at_bound(one: Active) -> bool:
     """Tell whether a parameter ends at a bound other than zero: then the effect only imitates another."""
     for parameter in one.searched:
@@ -228,11 +233,11 @@ def _best_step(
     promising: Sequence[Scored],
     p_of: dict[int, float],
 ) -> tuple[Fit, HeldOut, Step] | None:
-    n = sum(int(one.sum()) for one in problem.kept.values())
+    weight = 0.5 * math.log(sum(int(one.sum()) for one in problem.kept.values()))
     tried: list[tuple[float, Scored, Fit]] = []
     for one in promising:
         made = fit(problem, (*base.active, one.active), start=base.p, noise=None)
-        penalty = 0.5 * len(one.active.searched) * math.log(n)
+        penalty = weight * len(one.active.searched)
         tried.append((made.log_posterior - penalty, one, made))
     tried.sort(key=lambda each: -each[0])
     for score, one, made in tried[:3]:
@@ -243,7 +248,10 @@ def _best_step(
         if _at_bound(made.active[-1]) or not _matters(problem, held_base, held):
             continue
         rivals = tuple(
-            Rival(active=other_fit.active[-1], difference=other_score - score)
+            Rival(
+                active=other_fit.active[-1],
+                difference=other_score - score + weight * (_shapes(other.active) - _shapes(one.active)),
+            )
             for other_score, other, other_fit in tried
             if other is not one and other.candidate.name != INPUT_NOISE.name
         )
