@@ -52,9 +52,9 @@ def test_a_mistake_of_the_program_is_in_the_file(effect: str) -> None:
 def test_the_file_has_the_machines_columns_and_the_case_no_time(tmp_path: Path) -> None:
     case = drawn()
     files.write_case(case.scenario, case.measured, tmp_path / "case")
-    sheet = openpyxl.load_workbook(tmp_path / "case" / "run01.xlsx", read_only=True).active
-    assert sheet is not None
-    rows = list(sheet.iter_rows(values_only=True))
+    book = openpyxl.load_workbook(tmp_path / "case" / "run01.xlsx")
+    assert book.active is not None
+    rows = list(book.active.iter_rows(values_only=True))
     assert rows[0] == HEADER
     assert len(rows) == 1 + 60
     assert all(isinstance(x, float) for x in rows[1])

@@ -30,7 +30,7 @@ def search_p_values(
     Parameters
     ----------
     blocks : orthonormal whitened responses of every candidate and start, (values, k)
-    gains : their gains of twice the log-likelihood
+    gains : their gains of twice the log-likelihood, each times its trust
     """
     if not blocks:
         return []
@@ -57,7 +57,7 @@ def search_p_values(
     smallest.sort()
     found = []
     for gain, width in zip(gains, widths, strict=True):
-        p = float(_log_p(np.array([max(gain * screen.trust, 0.0)]), max(width, 1))[0])
+        p = float(_log_p(np.array([max(gain, 0.0)]), max(width, 1))[0])
         below = int(np.searchsorted(smallest, p, side="right"))
         if below >= 20:
             found.append((below + 1) / (_DRAWS + 1))

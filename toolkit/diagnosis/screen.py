@@ -47,6 +47,7 @@ class Scored:
     gain: float
     directions: Stacked
     block: NDArray[np.float64]
+    trust: float
 
     @property
     def dof(self) -> int:
@@ -129,6 +130,7 @@ class Screen:
                     gain=gain,
                     directions=directions,
                     block=block,
+                    trust=self.trust(self.base.noise),
                 )
             )
         return made
@@ -149,14 +151,13 @@ class Screen:
         # White noise overrates what is smooth; as a first look that is what is wanted.
         return (max(gains) if self._is_coloured else gains[0]), blocks[0]
 
-    @property
-    def trust(self) -> float:
-        """Share of a gain that short coloured series leave: their noise is itself estimated from few rows.
+    def trust(self, noise: dict[str, Noise]) -> float:
+        """Return the share of a gain that short coloured series leave: their noise is known from few rows.
 
         In the manner of Bartlett's correction, with rows counted by what they are worth; found on clean
         series of AR(1) noise.
         """
-        worth = sum(where.n / self.base.noise[name].correlation_rows for name, where in self.layouts.items())
+        worth = sum(where.n / noise[name].correlation_rows for name, where in self.layouts.items())
         return max(_LEAST_TRUST, 1 - _SHORT / max(worth, 1.0))
 
     @property
@@ -183,21 +184,21 @@ class Screen:
         return [*made, *(replace(one, gain=min(one.gain, least)) for one in ranked[most:])]
 
     def _exact(self, one: Scored) -> Scored:
-        gain, coefficients = self.gain(one.directions, fixed=one.candidate.discrete)
+        gain, coefficients, trust = self.gain(one.directions, fixed=one.candidate.discrete)
         values = dict(one.start.values)
         for name, c in zip(one.start.amplitudes, coefficients, strict=False):
             off = next(each.off for each in one.active.effect.parameters if each.name == name) or 0.0
             if math.isfinite(off) and not one.candidate.discrete:
                 values[name] = off + c * (one.start.values[name] - off)
-        return replace(one, gain=gain, active=replace(one.active, values=values))
+        return replace(one, gain=gain, trust=trust, active=replace(one.active, values=values))
 
-    def gain(self, directions: Stacked, *, fixed: bool = False) -> tuple[float, tuple[float, ...]]:
-        """Return twice the gain of the log-likelihood, and the responses' coefficients.
+    def gain(self, directions: Stacked, *, fixed: bool = False) -> tuple[float, tuple[float, ...], float]:
+        """Return twice the gain of the log-likelihood, the responses' coefficients, and its trust.
 
         ``fixed`` takes the responses as they are (coefficients one) and fits the nominal parameters alone.
         """
         width = next(iter(directions.values())).shape[1]
-        best, chosen = -math.inf, tuple([1.0] * width)
+        best, chosen, left = -math.inf, tuple([1.0] * width), self.base.noise
         for first in (self.base.noise, None) if self._is_coloured else (self.base.noise,):
             known = first
             for _ in range(_TURNS):
@@ -206,8 +207,8 @@ class Screen:
                     break
                 value, coefficients, known = made
                 if value > best:
-                    best, chosen = value, coefficients
-        return 2 * (best - self.log_likelihood), chosen
+                    best, chosen, left = value, coefficients, known
+        return 2 * (best - self.log_likelihood), chosen, self.trust(left)
 
     def _once(
         self, directions: Stacked, noise: dict[str, Noise] | None, *, fixed: bool

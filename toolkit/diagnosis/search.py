@@ -13,29 +13,24 @@ from toolkit.diagnosis.candidates import Candidate, candidates
 from toolkit.diagnosis.fit import Fit, fit, replace_effects
 from toolkit.diagnosis.folds import Folds, HeldOut, folds_of, hold_out
 from toolkit.diagnosis.lattice import lattice_of
-from toolkit.diagnosis.lines import strongest_line
 from toolkit.diagnosis.model import Active
 from toolkit.diagnosis.nuisance import INPUT_NOISE
 from toolkit.diagnosis.null import search_p_values
 from toolkit.diagnosis.problem import Problem, without_outliers
+from toolkit.diagnosis.remainder import NOTICED, StructureFound, remainder
 from toolkit.diagnosis.screen import Scored, Screen, best_of
-from toolkit.diagnosis.structure import Group, groups
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 ALPHA = 0.003  # of the whole search, a step
-ALPHA_STRUCTURE = 0.002
 MOST_EFFECTS = 4
-_STATED = 1.1  # times a stated noise that a residual may have: certificates are round numbers
-_LINE, _LINE_SHARE = 1e-8, 0.05  # p-value and share of variance of a spectral line
 _SHARPENED = 30  # starts whose gain is computed with the noise estimated anew
 _FAR_BEHIND = 0.25  # of the best gain: a candidate below cannot win a joint fit
 _REFINED = 8  # candidates that are fitted jointly, of those that screening ranks first
 _CLOSE = 3.0  # log-likelihood within which two effects cannot be told apart
 _BOUND = 1e-3
 _LEAST_GAIN = 1.5  # of the held-out log score
-_NOTICED = 0.01  # of an output's held-out error: a smaller gain is real perhaps, and matters to nobody
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -55,16 +50,6 @@ class Step:
     held_out_gain: float
     gain: float
     rivals: tuple[Rival, ...]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class StructureFound:
-    """Structure that stays: where it is, and its p-value in the search."""
-
-    output: str
-    variables: tuple[str, ...]
-    gain: float
-    p_value: float
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -139,11 +124,11 @@ def search(problem: Problem, *, seed: int, budget: Budget) -> Search:
             scored = screen.sharpened([one for each in left for one in screen.score(each)], _SHARPENED)
             ranked = best_of(scored)
             p_values = search_p_values(
-                screen, [one.block for one in scored], [one.gain for one in scored], seed + turn
+                screen, [one.block for one in scored], [one.gain * one.trust for one in scored], seed + turn
             )
             p_of = {id(one): p for one, p in zip(scored, p_values, strict=True)}
             budget.check(f"step {turn + 1}: structure of the residual")
-            structure = _structure(problem, screen, base, seed + 100 + turn)
+            structure = remainder(problem, screen, base, seed + 100 + turn)
             if turn == 0:
                 before = structure
             if turn == MOST_EFFECTS:
@@ -308,7 +293,7 @@ def _matters(problem: Problem, before: HeldOut, after: HeldOut) -> bool:
         one, other = (
             float(np.mean((observed[kept] - each.simulated[name][kept]) ** 2)) for each in (before, after)
         )
-        if other < one * (1 - 2 * _NOTICED):
+        if other < one * (1 - 2 * NOTICED):
             return True
     return False
 
@@ -333,60 +318,6 @@ def _pruned(
 
 def _place(one: Active) -> tuple[object, ...]:
     return (one.effect.name, one.channel, one.source, one.runs)
-
-
-def _structure(problem: Problem, screen: Screen, base: Fit, seed: int) -> tuple[StructureFound, ...]:
-    listed: list[Group] = groups(problem, base)
-    directions = [one.directions(problem) for one in listed]
-    quick = [screen.quick(one) for one in directions]
-    order = sorted(range(len(listed)), key=lambda i: -quick[i][0])
-    gains = [gain for gain, _ in quick]
-    for place, i in enumerate(order):
-        if place < _SHARPENED // 2:
-            gains[i] = screen.gain(directions[i])[0]
-    least = min((gains[i] for i in order[: _SHARPENED // 2]), default=0.0)
-    for i in order[_SHARPENED // 2 :]:
-        gains[i] = min(gains[i], least)
-    p_values = search_p_values(screen, [block for _, block in quick], gains, seed)
-    found = [
-        StructureFound(output=one.output, variables=one.variables, gain=gain, p_value=p)
-        for one, gain, p in zip(listed, gains, p_values, strict=True)
-        if p < ALPHA_STRUCTURE and _share(problem, base, one) > 2 * _NOTICED
-    ]
-    for name in problem.names:
-        line = strongest_line(problem, name, base.residual[name])
-        if line is not None and line.p_value < _LINE and line.share > _LINE_SHARE:
-            gain = -2 * math.log(max(line.p_value, 1e-300))
-            told = f"time (a line at {line.frequency:.4g} Hz)"
-            found.append(StructureFound(output=name, variables=(told,), gain=gain, p_value=line.p_value))
-        beyond = _beyond_noise(problem, base, name)
-        if beyond is not None:
-            found.append(beyond)
-    return tuple(sorted(found, key=lambda one: -one.gain))
-
-
-def _beyond_noise(problem: Problem, base: Fit, name: str) -> StructureFound | None:
-    """Return the finding that a residual is larger than the sensor noise which a certificate states."""
-    from scipy.stats import chi2
-
-    sd, kept = problem.sd_of(name), problem.kept[name]
-    if sd is None or kept.sum() < 10:
-        return None
-    ratio = float(np.mean(base.residual[name][kept] ** 2)) / sd**2
-    worth = max(kept.sum() / base.noise[name].correlation_rows, 3.0)
-    p = float(chi2.sf(ratio / _STATED**2 * worth, worth))
-    if p >= ALPHA_STRUCTURE:
-        return None
-    gain = float(worth * (ratio - 1 - math.log(ratio)))
-    return StructureFound(output=name, variables=("more than its stated noise",), gain=gain, p_value=p)
-
-
-def _share(problem: Problem, base: Fit, group: Group) -> float:
-    """Return the share of a residual's variance that a group's columns explain."""
-    kept = problem.kept[group.output]
-    residual, columns = base.residual[group.output][kept], group.columns[kept]
-    found = np.linalg.lstsq(columns, residual, rcond=None)[0]
-    return 1 - float(np.sum((residual - columns @ found) ** 2)) / max(float(np.sum(residual**2)), 1e-300)
 
 
 def _as_declared(problem: Problem) -> Fit:

@@ -19,16 +19,27 @@ def _resisting(position: float, velocity: float, values: Values) -> float:
 
 
 def _recorded(t: NDArray[np.float64], velocity: NDArray[np.float64], values: Values) -> NDArray[np.float64]:
-    # Dahl's bristle, exact for a velocity that is constant between rows: z tends to distance * sign(v).
-    distance = max(values["presliding"], 0.0)
-    if distance <= 0 or len(t) < 2:
+    # Dahl's bristle along a velocity that is linear between rows: z tends to sign(v) with the distance
+    # travelled. An interval in which the velocity changes its sign is two: before the reversal and after.
+    reach = max(values["presliding"], 0.0)
+    if reach <= 0 or len(t) < 2:
         return values["coulomb"] * np.sign(velocity)
-    middle = 0.5 * (velocity[1:] + velocity[:-1])
-    decay = np.exp(-np.abs(middle) * np.diff(t) / distance)
+    v, w, h = velocity[:-1], velocity[1:], np.diff(t)
+    turns = v * w < 0
+    share = np.where(turns, v / np.where(turns, v - w, 1.0), 1.0)
+    first = np.where(turns, 0.5 * np.abs(v) * share, 0.5 * np.abs(v + w)) * h
+    second = np.where(turns, 0.5 * np.abs(w) * (1 - share), 0.0) * h
+    ways = np.sign(np.where(turns, v, v + w))
     made = np.empty_like(velocity)
     made[0] = last = float(np.sign(velocity[0]))
-    for i, (keep, way) in enumerate(zip(decay.tolist(), np.sign(middle).tolist(), strict=True), start=1):
+    steps = zip(
+        ways.tolist(), np.exp(-first / reach).tolist(), np.exp(-second / reach).tolist(), turns.tolist(),
+        strict=True,
+    )  # fmt: skip
+    for i, (way, keep, keep_on, turned) in enumerate(steps, start=1):
         last = way + (last - way) * keep
+        if turned:
+            last = -way + (last + way) * keep_on
         made[i] = last
     return values["coulomb"] * made
 
@@ -58,7 +69,7 @@ EFFECT = Effect(
             off=None,
             relative=True,
             bounds=(0.0, float("inf")),
-            starts=(0.2, 2.0),
+            starts=(0.01, 0.2, 2.0),
         ),
     ),
     force=_resisting,
