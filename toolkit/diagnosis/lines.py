@@ -60,7 +60,7 @@ def strongest_line(problem: Problem, name: str, residual: NDArray[np.float64]) -
         power += np.abs(np.fft.rfft(x * window)) ** 2
     level = np.array([_level(power, k) for k in range(len(power))])
     ratio = np.where(level > 0, power / np.maximum(level, 1e-300), 0.0)
-    ratio[:5] = 0.0  # below five cycles a run it is a trend
+    ratio[:8] = 0.0  # below eight cycles a run it is a trend
     k = int(np.argmax(ratio))
     # A sum of R independent periodograms is chi-squared with 2R degrees, its median the level.
     p = min(1.0, len(power) * _tail(ratio[k], len(runs)))

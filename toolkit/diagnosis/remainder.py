@@ -14,7 +14,7 @@ from toolkit.diagnosis.problem import Problem
 from toolkit.diagnosis.screen import Screen
 from toolkit.diagnosis.structure import Group, groups
 
-ALPHA_STRUCTURE = 0.002
+ALPHA_STRUCTURE = 0.0005
 NOTICED = 0.01  # of an error: a smaller gain is real perhaps, and matters to nobody
 _EXACT = 15  # groups whose gain is computed with the noise estimated anew
 _STATED = 1.1  # times a stated noise that a residual may have: certificates are round numbers
