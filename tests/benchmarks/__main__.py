@@ -15,6 +15,7 @@ from pathlib import Path
 
 from tests.benchmarks import (
     audit_rate,
+    diagnose_nulls,
     fit_rows,
     help_time,
     monte_carlo,
@@ -35,6 +36,7 @@ BENCHES: dict[str, Callable[[Path, int], list[dict[str, object]]]] = {
     "monte-carlo": monte_carlo.run,
     "audit": audit_rate.run,
     "tires": tire_fits.run,
+    "diagnose": diagnose_nulls.run,
 }
 
 
