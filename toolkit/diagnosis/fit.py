@@ -46,11 +46,6 @@ class Fit:
     rows: NDArray[np.bool_] | None
     plain: bool = False
 
-    @property
-    def parameters(self) -> int:
-        """Number of the effects' parameters."""
-        return sum(len(one.searched) for one in self.active)
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Solved:

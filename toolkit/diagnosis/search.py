@@ -28,7 +28,6 @@ MOST_EFFECTS = 4
 _SHARPENED = 30  # starts whose gain is computed with the noise estimated anew
 _FAR_BEHIND = 0.25  # of the best gain: a candidate below cannot win a joint fit
 _REFINED = 8  # candidates that are fitted jointly, of those that screening ranks first
-_CLOSE = 3.0  # log-likelihood within which two effects cannot be told apart
 _BOUND = 1e-3
 _LEAST_GAIN = 1.5  # of the held-out log score
 
@@ -66,7 +65,6 @@ class Search:
     structure_before: tuple[StructureFound, ...]
     held_refitted: HeldOut
     held_augmented: HeldOut
-    considered: tuple[Candidate, ...]
     screen: Screen
     scored: tuple[Scored, ...]
     skipped: tuple[str, ...]
@@ -168,7 +166,6 @@ def search(problem: Problem, *, seed: int, budget: Budget) -> Search:
         structure_before=before,
         held_refitted=held_refitted,
         held_augmented=held_base,
-        considered=listed,
         screen=screen,
         scored=tuple(scored),
         skipped=tuple(skipped),

@@ -7,7 +7,6 @@ own null; what is found is `unknown`, with the variables that it depends on.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -119,8 +118,3 @@ def _run_offsets(problem: Problem) -> NDArray[np.float64]:
     for i, one in enumerate(problem.slices):
         columns[one, i] = 1.0
     return columns[:, 1:] if len(problem.slices) > 1 else columns
-
-
-def best_variables(found: Sequence[Group]) -> tuple[str, ...]:
-    """Return the variables of groups, in their order, once each."""
-    return tuple(dict.fromkeys(name for one in found for name in one.variables))

@@ -1,0 +1,56 @@
+"""Forces that are locked to a revolution: two harmonics of a shaft's angle, for tire and drum alike."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from toolkit.effects.effect import ChannelHook, EffectParameter, Values
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from toolkit.effects.signals import Setting
+
+
+def harmonics(*angles: str) -> ChannelHook:
+    """Return the hook that adds two harmonics of the first of these channels that was recorded [rad]."""
+
+    def ripple(y: NDArray[np.float64], values: Values, setting: Setting) -> NDArray[np.float64]:
+        angle = setting.channel(*angles)
+        if angle is None:
+            return y
+        made = y
+        for n in (1, 2):
+            made = made + values[f"amplitude_{n}"] * np.cos(n * angle + np.deg2rad(values[f"phase_{n}"]))
+        return made
+
+    return ripple
+
+
+def _order(n: int, text: str, typical: tuple[float, float]) -> tuple[EffectParameter, EffectParameter]:
+    return (
+        EffectParameter(
+            name=f"amplitude_{n}",
+            unit="{channel}",
+            text=text,
+            typical=typical,
+            relative=True,
+            bounds=(0.0, float("inf")),
+        ),
+        EffectParameter(
+            name=f"phase_{n}",
+            unit="deg",
+            text="of it",
+            typical=(-180.0, 180.0),
+            off=None,
+            starts=(0.0, 90.0, 180.0, -90.0),
+        ),
+    )
+
+
+PARAMETERS = (
+    *_order(1, "at one cycle a revolution", (0.005, 0.05)),
+    *_order(2, "at two cycles a revolution", (0.002, 0.02)),
+)
