@@ -4,13 +4,11 @@ step."""
 from __future__ import annotations
 
 import argparse
-import datetime as dt
 import json
 import sys
 from pathlib import Path
-from typing import Any
 
-from tests.concealed import page
+from tests.concealed import log, page
 from tests.concealed.batch import draw_batch, seed_of
 from tests.concealed.real import run_real
 from tests.concealed.running import run_batch
@@ -24,27 +22,11 @@ def _say(text: str) -> None:
     print(f"\r\033[K{text}", end="", file=sys.stderr, flush=True)  # noqa: T201
 
 
-def _log(path: Path, score: dict[str, Any], batch: dict[str, Any], changed: str) -> list[dict[str, Any]]:
-    """Append a batch to the log and return the log; a batch stands in it once."""
-    rows = [json.loads(x) for x in path.read_text(encoding="utf-8").splitlines()] if path.exists() else []
-    if batch["answers_sha256"] not in {r["answers_sha256"] for r in rows}:
-        met = f"{sum(b.met is True for b in score['bars'])} of {len(score['bars'])}"
-        rows.append({
-            "date": dt.datetime.now(tz=dt.UTC).date().isoformat(), "cases": score["cases"],
-                "bars": met,
-            "answers_sha256": batch["answers_sha256"], "data_sha256": batch["data_sha256"],
-                "changed": changed,
-            "figures": {b.title: b.observed for b in score["bars"]},
-        })  # fmt: skip
-        path.write_text("".join(json.dumps(r) + "\n" for r in rows), encoding="utf-8")
-    return rows
-
-
 def _score(given: argparse.Namespace) -> None:
     score = score_batch(given.out, workers=given.workers, progress=_say)
     batch = verify(given.out)
     if given.log:
-        score["log"] = _log(given.log, score, batch, given.changed)
+        score["log"] = log.scored(given.log, batch, score)
     real = given.out / "real" / "real.json"
     if real.exists():
         score["real"] = json.loads(real.read_text(encoding="utf-8"))
@@ -65,6 +47,8 @@ def _draw(given: argparse.Namespace) -> None:
         workers=given.workers,
         progress=lambda n: _say(f"{n} drawn"),
     )
+    if given.log:
+        log.drawn(given.log, found, given.changed)
     print(f"answers {found['answers_sha256']}\ndata    {found['data_sha256']}")  # noqa: T201
 
 
@@ -122,6 +106,7 @@ def _parser() -> argparse.ArgumentParser:
             )
         if name in ("score", "all"):
             step.add_argument("--proof", type=Path, help="folder of PROOF.md and proof.html (default: --out)")
+        if name in ("draw", "score", "all"):
             step.add_argument("--log", type=Path, help="file of batches to append to, one JSON object a line")
             step.add_argument(
                 "--changed", default="", help="what changed since the batch before, for the log"

@@ -77,9 +77,16 @@ def _log(score: dict[str, Any]) -> Table:
     return Table(
         title="Batches",
         sentence="Every batch that was opened; none is scored again after a change.",
-        head=("date", "answers sealed as", "cases", "bars met", "changed since the one before"),
+        head=("drawn", "scored", "answers sealed as", "cases", "bars met", "changed since the one before"),
         rows=[
-            [r["date"], f"`{r['answers_sha256'][:16]}`", str(r["cases"]), r["bars"], r["changed"]]
+            [
+                r["drawn"],
+                r.get("scored", "not yet"),
+                f"`{r['answers_sha256'][:16]}`",
+                str(r["cases"]),
+                r.get("bars", ""),
+                r["changed"],
+            ]
             for r in score["log"]
         ],
     )
