@@ -138,8 +138,8 @@ def test_a_folder_that_cannot_be_written_is_refused_before_the_fit(tire, tmp_pat
 
 
 def test_all_names_every_model_of_the_catalogue():
-    assert set(fit._names(["all"])) == set(model_names())
-    assert fit._names(["brush", "mf52", "brush"]) == ("brush", "mf52")
+    assert set(fit.model_choice(["all"])) == set(model_names())
+    assert fit.model_choice(["brush", "mf52", "brush"]) == ("brush", "mf52")
 
 
 def test_robust_and_weights_are_told(tire):

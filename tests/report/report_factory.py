@@ -13,6 +13,7 @@ from toolkit.findings import Finding
 from toolkit.pipeline import TestResult
 from toolkit.recording.model import TestInfo
 from toolkit.reduction.model import CalibrationUse, Condition, ReducedTest, Tare
+from toolkit.tires.comparison import Comparison, ComparisonRow
 from toolkit.tires.model import CurveFit, Parameter
 
 LOADS_N = (1112.0, 2522.0, 3705.0, 4897.0, 6103.0)
@@ -227,3 +228,24 @@ def make_record() -> CalibrationRecord:
         inputs_sha256="0" * 64,
         sha256=SHA,
     )
+
+
+def entry(model: str, channel: str, error: float, away: float | None = None, **more: object) -> ComparisonRow:
+    told: dict[str, object] = {
+        "condition": "pure", "n": 65, "parameters": 8, "converged": True, "not_determined": ()
+    } | more  # fmt: skip
+    return ComparisonRow(
+        model=model, channel=channel, error_percent=error, prediction_error_percent=away, **told
+    )  # type: ignore[arg-type]
+
+
+COMPARISON = Comparison(
+    rows=(
+        entry("magic_formula", "FY", 1.33, parameters=30),
+        entry("magic_formula", "MZ", 7.02, parameters=30, not_determined=("C E at 2 of 5 loads",)),
+        entry("tmeasy", "FY", 2.12, 2.5),
+        entry("tmeasy", "MZ", 17.2, 19.0, converged=False, not_determined=tuple("abcdef")),
+    ),
+    floors=(("FY", 0.9), ("MZ", None)),
+    seconds=(("magic_formula", 0.02), ("tmeasy", 1.5)),
+)

@@ -8,7 +8,7 @@ import struct
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from report_factory import LOADS_N, formula, make_record, make_result, shape
+from report_factory import COMPARISON, LOADS_N, formula, make_record, make_result, shape
 
 from toolkit.errors import ConfigError, TemplateError
 from toolkit.report.build import build_content, report_id
@@ -22,7 +22,9 @@ DAY = dt.date(2026, 11, 21)
 
 def content(**changes: object):
     style = changes.pop("style", None)
-    return build_content(make_result(**changes), make_record(), style=style, issued=DAY)
+    return build_content(
+        make_result(**changes), make_record(), style=style, issued=DAY, comparison=COMPARISON
+    )
 
 
 def test_title_page_values_of_the_source_document() -> None:

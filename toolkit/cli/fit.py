@@ -80,7 +80,7 @@ def command(
     from toolkit.cli.fit_tir import check_tir, write_fit
 
     started = time.perf_counter()
-    names = _names(model or ["magic_formula"])
+    names = model_choice(model or ["magic_formula"])
     chosen = _options(loss, weights, rated_load, radius)
     into = check_tir(tir, source, names) if tir is not None else None
     if figures is not None:
@@ -102,13 +102,16 @@ def command(
         findings += write_fit(
             tir, one, fitted.data, source=source, side=side.upper(), radius_m=fitted.radius_m
         )
-    written = _draw(fitted, figures, source) if figures is not None else []
+    written = _draw(fitted, figures) if figures is not None else []
     told: dict[str, Any] = {
         **payload(fitted),
         "tir": None if tir is None else str(tir),
         "figures": written,
         "findings": [finding.as_dict() for finding in findings],
-        "timing": {"seconds": time.perf_counter() - started},
+        "timing": {
+            "seconds": time.perf_counter() - started,
+            "models": dict(fitted.comparison.seconds),
+        },
     }
     lines = text(fitted, findings)
     if tir is not None:
@@ -119,8 +122,14 @@ def command(
     return exit_code(findings)
 
 
-def _names(given: Sequence[str]) -> tuple[str, ...]:
-    # Unknown names are refused before anything is read.
+def model_choice(given: Sequence[str]) -> tuple[str, ...]:
+    """Return the models named, ``all`` being every one.
+
+    Raises
+    ------
+    FitError
+        no model of a name is built: to be told before anything is read
+    """
     from toolkit.tires.catalog import find, model_names
 
     names = [name for one in given for name in (model_names() if one == "all" else (one,))]
@@ -151,11 +160,11 @@ def _options(loss: str, weights: str, rated_load: float | None, radius: float | 
     return "robust" if loss == "robust" else "linear"
 
 
-def _draw(fitted: Fitted, folder: Path, source: Path) -> list[str]:
+def _draw(fitted: Fitted, folder: Path) -> list[str]:
     from toolkit.files import write_atomic
     from toolkit.report.fit_figures import fit_figures
 
-    made = fit_figures(fitted.data, fitted.curves, fitted.globals, fitted.comparison, title=source.stem)
+    made = fit_figures(fitted.data, fitted.curves, fitted.globals, fitted.comparison)
     for name, data in made.items():
         write_atomic(folder / name, data)
     return sorted(made)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import date
@@ -12,6 +13,7 @@ from toolkit.errors import ConfigError, FitError
 from toolkit.findings import Finding
 
 if TYPE_CHECKING:
+    from toolkit.cli.resolve import Resolved
     from toolkit.tires.comparison import Comparison
     from toolkit.tires.global_data import Measured
     from toolkit.tires.global_model import GlobalModel
@@ -63,13 +65,17 @@ def fit_table_models(
     single, every = _split(names)
     curves: tuple[CurveFit, ...] = ()
     findings: tuple[Finding, ...] = ()
-    if single:
-        result = fit_table(measured, single, loss=loss)
-        curves, findings = result.fits, result.findings
-    made, more, found = _global(data, every, loss, weights, str(table))
+    seconds: dict[str, float] = {}
+    for one in single:
+        started = time.perf_counter()
+        result = fit_table(measured, (one,), loss=loss)
+        seconds[one.name] = time.perf_counter() - started
+        curves += result.fits
+        findings += tuple(finding for finding in result.findings if finding not in findings)
+    made, more, found = _global(data, every, loss, weights, str(table), seconds)
     if not single:
         findings = tuple(axes_findings(measured, found))
-    return _fitted(data, curves, (None,) * len(curves), made, (*findings, *more), radius_m)
+    return _fitted(data, curves, (None,) * len(curves), made, (*findings, *more), radius_m, seconds)
 
 
 def fit_test_models(
@@ -93,16 +99,7 @@ def fit_test_models(
     ToolkitError
         the test cannot be resolved; a model cannot be fitted to it
     """
-    import numpy as np
-
-    from toolkit.characteristics.groups import group
-    from toolkit.cli.fit_tir import STAND_IN_RADIUS
     from toolkit.cli.resolve import resolve_test
-    from toolkit.reduction.averaging import free_radius_m
-    from toolkit.tires.catalog import fit_model
-    from toolkit.tires.fit import Curve, why_not
-    from toolkit.tires.global_data import measured
-    from toolkit.tires.table_fit import fit_findings
 
     if axes != "SAE":
         raise ConfigError(
@@ -112,22 +109,53 @@ def fit_test_models(
     resolved = resolve_test(
         test, calibration=calibration, calibrations=calibrations, home=home, known_at=known_at
     )
+    return fit_resolved(
+        resolved, names, where=str(test), loss=loss, weights=weights, rated_load_N=rated_load_N,
+        radius_m=radius_m,
+    )  # fmt: skip
+
+
+def fit_resolved(
+    resolved: Resolved,
+    names: Sequence[str],
+    *,
+    where: str,
+    loss: Loss = "linear",
+    weights: str = "equal",
+    rated_load_N: float | None = None,
+    radius_m: float | None = None,
+) -> Fitted:
+    """Return the fits of a test that was read already; ``where`` names it.
+
+    Raises
+    ------
+    FitError
+        a model cannot be fitted to it
+    """
+    import numpy as np
+
+    from toolkit.characteristics.groups import group
+    from toolkit.cli.fit_tir import STAND_IN_RADIUS
+    from toolkit.reduction.averaging import free_radius_m
+    from toolkit.tires.catalog import fit_model
+    from toolkit.tires.fit import Curve, why_not
+    from toolkit.tires.global_data import measured
+    from toolkit.tires.table_fit import fit_findings
+
     groups = group(resolved.result.reduced)
     single, every = _split(names)
     rows: list[tuple[CurveFit, str]] = []
+    seconds: dict[str, float] = {}
     for one in single:
-        if one.name == "magic_formula" and loss == "linear":
-            # The characteristics stand on these fits already.
-            for direction in resolved.result.characteristics.fits:
-                rows += [(fit, direction.rotation) for fit in (direction.FY, direction.MZ) if fit is not None]
-            continue
         made = [
             (Curve(SA=g.SA, y=g.values(channel), channel=channel, load_N=g.load_N), g.rotation)
             for g in groups
             for channel in ("FY", "MZ")
         ]
         made = [(curve, rotation) for curve, rotation in made if why_not(curve) is None]
+        started = time.perf_counter()
         fits = fit_model(one, [curve for curve, _ in made], loss=loss)
+        seconds[one.name] = time.perf_counter() - started
         rows += list(zip(fits, [rotation for _, rotation in made], strict=True))
     own = [finding for finding in fit_findings([fit for fit, _ in rows]) if finding.level == "note"]
     info = resolved.result.reduced.info
@@ -151,11 +179,12 @@ def fit_test_models(
         columns, axes="SAE", rated_load_N=rated_load_N or info.rated_load_N,
         unloaded_radius_m=radius or STAND_IN_RADIUS,
     )  # fmt: skip
-    fits_all, more, _ = _global(data, every, loss, weights, str(test))
+    fits_all, more, _ = _global(data, every, loss, weights, where, seconds)
     findings = (*resolved.findings, *own, *more)
     return _fitted(
-        data, tuple(fit for fit, _ in rows), tuple(turn for _, turn in rows), fits_all, findings, radius
-    )
+        data, tuple(fit for fit, _ in rows), tuple(turn for _, turn in rows), fits_all, findings, radius,
+        seconds,
+    )  # fmt: skip
 
 
 def _split(names: Sequence[str]) -> tuple[tuple[TireModel, ...], tuple[GlobalModel, ...]]:
@@ -168,7 +197,12 @@ def _split(names: Sequence[str]) -> tuple[tuple[TireModel, ...], tuple[GlobalMod
 
 
 def _global(
-    data: Measured, models: Sequence[GlobalModel], loss: Loss, weights: str, where: str
+    data: Measured,
+    models: Sequence[GlobalModel],
+    loss: Loss,
+    weights: str,
+    where: str,
+    seconds: dict[str, float],
 ) -> tuple[tuple[ModelFit, ...], tuple[Finding, ...], tuple[CurveFit, ...]]:
     from toolkit.tires.global_checks import why_not_global
     from toolkit.tires.global_fit import fit_global, global_findings, not_varied
@@ -183,7 +217,12 @@ def _global(
                 next_step=problem.next_step, rule=problem.rule,
             )  # fmt: skip
     found = seeds_of(data)
-    fits = tuple(fit_global(model, data, loss=loss, weights=weights, seeds=found.seeds) for model in models)
+    made = []
+    for model in models:
+        started = time.perf_counter()
+        made.append(fit_global(model, data, loss=loss, weights=weights, seeds=found.seeds))
+        seconds[model.name] = time.perf_counter() - started
+    fits = tuple(made)
     findings = [finding for fit in fits for finding in global_findings(fit)]
     return fits, (*not_varied(fits, where), *findings), found.fits
 
@@ -195,6 +234,7 @@ def _fitted(
     fits: tuple[ModelFit, ...],
     findings: tuple[Finding, ...],
     radius_m: float | None,
+    seconds: dict[str, float],
 ) -> Fitted:
     from toolkit.tires.comparison import compare
 
@@ -204,7 +244,7 @@ def _fitted(
         curves=curves,
         rotations=rotations,
         globals=fits,
-        comparison=compare(data, forward, fits),
+        comparison=compare(data, forward, fits, seconds=seconds),
         findings=findings,
         radius_m=radius_m,
     )

@@ -132,6 +132,9 @@ def comparison_text(one: Comparison) -> str:
         if any(value is not None for value in away):
             shown = ["-" if value is None else f"{value:.2f}" for value in away]
             lines.append([f"  {channel}, load left out", *shown, ""])
+    if seconds := dict(one.seconds):
+        shown = [f"{seconds[model]:.2f}" if model in seconds else "-" for model in one.models]
+        lines.append(["time / s", *shown, ""])
     header = ["error in %", *one.models, "floor"]
     note = (
         "100 sqrt(sum (model - measured)^2 / sum measured^2) over the rows fitted; floor: the rows about\n"

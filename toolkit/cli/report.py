@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from toolkit.report.drawer import Drawer
     from toolkit.report.pdf import Office
     from toolkit.report.template.package import Template
+    from toolkit.tires.comparison import Comparison
 
 NAME = "report"
 
@@ -49,6 +50,7 @@ class Options:
     xlsx: bool = False
     tydex: bool = False
     tir: bool = False
+    models: tuple[str, ...] = ()
     allow_missing: bool = False
     keep: bool = False
 
@@ -92,6 +94,14 @@ def command(
     hand_over: Annotated[
         bool, typer.Option("--hand-over", help="All of the three: test.xlsx, test.tdx, tire.tir.")
     ] = False,
+    models: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--models",
+            help="Compare tire models in the report (tk:table.models): a name, may be repeated; 'all' is "
+            "every one. Fits take seconds.",
+        ),
+    ] = None,
     calibration: CalibrationId = None,
     known_at: KnownAt = None,
     reader: Reader = "calamine",
@@ -116,12 +126,14 @@ def command(
     """
     from functools import partial
 
+    from toolkit.cli.fit import model_choice
     from toolkit.cli.resolve import resolve_test
     from toolkit.report.drawer import Drawer
     from toolkit.report.pdf import Office
     from toolkit.report.template.package import read_template
 
     chosen = choose_reader(reader)
+    compared = model_choice(models or [])
     started = time.perf_counter()
     # The template is judged before anything is read: its error must not wait for a long reduction.
     opened = read_template(template or home_template("org.docx", home))
@@ -141,6 +153,7 @@ def command(
             xlsx=xlsx or hand_over,
             tydex=tydex or hand_over,
             tir=tir or hand_over,
+            models=compared,
             allow_missing=allow_missing,
             keep=keep,
         )
@@ -184,7 +197,10 @@ def make_reports(
             one = options.resolve(test)
             alone = len(tests) == 1
             folder = folders[index] if folders else _folder(one, out, alone=alone, taken=taken)
-            jobs.append(_job(test, one, folder, options))
+            if options.models:
+                step(f"{test.name}: tire models")
+            one, comparison = _compared(test, one, options.models)
+            jobs.append(_job(test, one, folder, options, comparison))
             resolved.append(one)
         except ToolkitError as error:
             if len(tests) == 1:
@@ -229,7 +245,20 @@ def _folder(resolved: Resolved, out: Path | None, *, alone: bool, taken: set[Pat
     return folder
 
 
-def _job(test: Path, resolved: Resolved, folder: Path, options: Options) -> Job:
+def _compared(test: Path, resolved: Resolved, models: tuple[str, ...]) -> tuple[Resolved, Comparison | None]:
+    """Return the models side by side, and the test with what was found of their fits but mere notes."""
+    from toolkit.cli.fit_models import fit_resolved
+
+    if not models:
+        return resolved, None
+    fitted = fit_resolved(resolved, models, where=str(test))
+    more = [one for one in fitted.findings if one.level != "note" and one not in resolved.findings]
+    return replace(resolved, findings=(*resolved.findings, *more)), fitted.comparison
+
+
+def _job(
+    test: Path, resolved: Resolved, folder: Path, options: Options, comparison: Comparison | None
+) -> Job:
     from toolkit.cli.handover import details_of, provenance, writers
     from toolkit.report.build import build_content
     from toolkit.report.deliver import Job
@@ -241,6 +270,7 @@ def _job(test: Path, resolved: Resolved, folder: Path, options: Options) -> Job:
         findings=resolved.findings,
         style=read_style(style_file(options.template.path)),
         details=details_of(test, options.details),
+        comparison=comparison,
     )
     return Job(
         template=options.template,

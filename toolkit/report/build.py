@@ -14,6 +14,7 @@ from toolkit.recording.details import ReportDetails
 from toolkit.report.columns import UNITS
 from toolkit.report.content import Cell, ReportContent, Table, Value
 from toolkit.report.details import details_values
+from toolkit.report.models import model_plots
 from toolkit.report.plots import build_plots, load_groups
 from toolkit.report.style import Style
 from toolkit.report.tables import build_tables, summary_load
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
     from toolkit.estimate import Estimate
     from toolkit.findings import Finding
     from toolkit.pipeline import TestResult
+    from toolkit.tires.comparison import Comparison
 
 SIMULATED = "SIMULATED DATA"
 UNVERIFIED = "UNVERIFIED CALIBRATION"
@@ -38,6 +40,7 @@ def build_content(
     style: Style | None = None,
     issued: dt.date | None = None,
     details: ReportDetails | None = None,
+    comparison: Comparison | None = None,
 ) -> ReportContent:
     """Return what a template can ask for.
 
@@ -49,6 +52,7 @@ def build_content(
     style : units, decimals and laboratory
     issued : date of issue; default today
     details : what the report says beyond the measurement: customer, item, method, opinions
+    comparison : tire models fitted to the test; None leaves their table and figures out
     """
     style = style or Style()
     day = (issued or dt.datetime.now(tz=dt.UTC).date()).isoformat()
@@ -56,13 +60,15 @@ def build_content(
         (*result.reduced.findings, *result.characteristics.findings) if findings is None else findings
     )
     info, use = result.reduced.info, result.reduced.calibration
-    drawn = build_plots(result, style, SIMULATED if info.simulated else None)
+    watermark = SIMULATED if info.simulated else None
+    drawn = build_plots(result, style, watermark)
+    drawn |= model_plots(comparison, watermark=watermark, decimal_comma=style.decimal_comma)
     plots = {
         name: replace(say_plot(plot, dict(style.words)), decimal_comma=style.decimal_comma)
         for name, plot in drawn.items()
     }
     details = details or ReportDetails()
-    tables = build_tables(result, record, listed, style, details.opinions)
+    tables = build_tables(result, record, listed, style, details.opinions, comparison)
     values = _values(result, record, listed, style, day)
     values |= details_values(details, result, style, len(listed))
     values["report.id"] = Value(kind="text", value=report_id(result, details))

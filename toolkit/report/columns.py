@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 UNITS = {"force": "N", "moment": "N*m", "force/angle": "N/deg", "moment/angle": "N*m/deg"}
@@ -10,7 +10,10 @@ UNITS = {"force": "N", "moment": "N*m", "force/angle": "N/deg", "moment/angle": 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Column:
-    """A column of a report table; ``unit`` is the SI-side default, shown in the heading."""
+    """A column of a report table; ``unit`` is the SI-side default, shown in the heading.
+
+    ``of_the_run`` says that its cells differ from run to run: the hash of the content leaves them out.
+    """
 
     name: str
     kind: Literal["text", "number"]
@@ -18,6 +21,7 @@ class Column:
     unit: str | None = None
     spec: str = "g"
     quantity: str | None = None
+    of_the_run: bool = False
 
 
 def _text(name: str, description: str) -> Column:
@@ -42,6 +46,23 @@ def _with_u(name: str, description: str, spec: str, quantity: str) -> list[Colum
         _number(name, description, spec, quantity=quantity),
         _number(f"U_{name}", f"expanded uncertainty (95 %) of {name}", spec, quantity=quantity),
     ]
+
+
+def _model_columns() -> list[Column]:
+    columns = []
+    for channel in ("FY", "MZ"):
+        columns += [
+            _number(f"{channel}_parameters", f"parameters fitted for {channel}, all loads", "d", unit="1"),
+            _number(f"{channel}_error", f"error of {channel} over the rows fitted", ".2f", unit="%"),
+            _number(f"{channel}_floor", f"scatter of {channel} about its bin means", ".2f", unit="%"),
+            _number(
+                f"{channel}_left_out",
+                f"error of {channel} where every load is predicted by a fit without it",
+                ".2f",
+                unit="%",
+            ),
+        ]
+    return columns
 
 
 def _fit_columns() -> list[Column]:
@@ -163,6 +184,17 @@ TABLES: dict[str, tuple[str, tuple[Column, ...]]] = {
             *_fit_columns(),
             _number("error", "error of the fit", ".2f", unit="%"),
             _number("floor", "scatter of the measurements about their bin means", ".2f", unit="%"),
+        ),
+    ),
+    "models": (
+        "tire models side by side, one row a model and condition; of the forward run, asked for by --models",
+        (
+            _text("model", "tire model; magic_formula has one curve a load, the others are over all loads"),
+            _text("condition", "pure or combined slip"),
+            *_model_columns(),
+            replace(_number("seconds", "time of all fits of the model", ".2f", unit="s"), of_the_run=True),
+            _text("converged", "yes where several starts ended at every lowest cost, else no"),
+            _text("not_determined", "parameters that the data do not determine, by channel"),
         ),
     ),
     "calibration": (

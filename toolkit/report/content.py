@@ -49,21 +49,28 @@ class Table:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Curve:
-    """One line or point set: ``x``, ``y`` and optional standard error bars, in the axes' units."""
+    """One line or point set: ``x``, ``y`` and optional standard error bars, in the axes' units.
+
+    ``note`` stands at the end of a line, ``notes`` on each of its bars.
+    """
 
     label: str
     x: tuple[float, ...]
     y: tuple[float, ...]
     error: tuple[float, ...] | None = None
     group: int = 0
-    style: Literal["points", "line", "both", "grid"] = "points"
+    style: Literal["points", "line", "both", "grid", "bars"] = "points"
     open: bool = False
     note: str | None = None
+    notes: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Plot:
-    """A figure before it is drawn: its curves, labels with units, caption and alternative text."""
+    """A figure before it is drawn: its curves, labels with units, caption and alternative text.
+
+    ``names`` stand at x = 0, 1, 2 ... in place of numbers.
+    """
 
     name: str
     x_label: str
@@ -75,6 +82,7 @@ class Plot:
     zero_x: bool = False
     legend_title: str | None = None
     decimal_comma: bool = False
+    names: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

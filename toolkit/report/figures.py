@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from toolkit.report.content import Curve, Plot
 
 if TYPE_CHECKING:
+    from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
@@ -35,35 +36,10 @@ def draw(plot: Plot) -> Picture:
     The margins are fixed fractions: measuring every text to trim them doubles the time.
     """
     import matplotlib as mpl
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
     from PIL import Image
 
     with mpl.rc_context(_RC):
-        figure = Figure(figsize=SIZE_IN, dpi=DPI)
-        canvas: Any = FigureCanvasAgg(figure)
-        named = {(c.label, c.group) for c in plot.curves if c.label}
-        aside = bool(plot.legend_title) or len(named) > 1
-        axes = figure.add_axes((0.115, 0.135, 0.70 if aside else 0.86, 0.835))
-        _furnish(axes, plot)
-        for curve in plot.curves:
-            _curve(axes, curve)
-        _legend(figure, plot)
-        if plot.watermark:
-            axes.text(
-                0.5,
-                0.5,
-                plot.watermark,
-                transform=axes.transAxes,
-                ha="center",
-                va="center",
-                rotation=24,
-                fontsize=30,
-                color="#000000",
-                alpha=0.10,
-                fontweight="bold",
-                zorder=0,
-            )
+        canvas: Any = _figure(plot).canvas
         canvas.draw()
         pixels = canvas.buffer_rgba()
     width, height = canvas.get_width_height()
@@ -72,6 +48,49 @@ def draw(plot: Plot) -> Picture:
     image = Image.frombuffer("RGBA", (width, height), pixels, "raw", "RGBA", 0, 1).convert("RGB")
     image.save(stream, "PNG", compress_level=3, dpi=(DPI, DPI))
     return Picture(png=stream.getvalue(), width_px=width, height_px=height)
+
+
+def draw_svg(plot: Plot) -> bytes:
+    """Draw one figure as SVG, letters as outlines: the same data give the same file."""
+    import matplotlib as mpl
+
+    with mpl.rc_context(_RC | {"svg.hashsalt": "toolkit", "svg.fonttype": "path"}):
+        stream = io.BytesIO()
+        metadata: Any = {"Date": None}
+        _figure(plot).savefig(stream, format="svg", metadata=metadata)
+    return stream.getvalue()
+
+
+def _figure(plot: Plot) -> Figure:
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=SIZE_IN, dpi=DPI)
+    FigureCanvasAgg(figure)
+    named = {(c.label, c.group) for c in plot.curves if c.label}
+    aside = bool(plot.legend_title) or len(named) > 1
+    foot = 0.20 if plot.names else 0.135
+    axes = figure.add_axes((0.115, foot, 0.70 if aside else 0.86, 0.97 - foot))
+    _furnish(axes, plot)
+    for curve in plot.curves:
+        _curve(axes, curve)
+    _legend(figure, plot)
+    if plot.watermark:
+        axes.text(
+            0.5,
+            0.5,
+            plot.watermark,
+            transform=axes.transAxes,
+            ha="center",
+            va="center",
+            rotation=24,
+            fontsize=30,
+            color="#000000",
+            alpha=0.10,
+            fontweight="bold",
+            zorder=0,
+        )
+    return figure
 
 
 _RC: Any = {
@@ -105,6 +124,10 @@ def _furnish(axes: Axes, plot: Plot) -> None:
     axes.xaxis.set_major_locator(
         MultipleLocator(2) if plot.zero_x else MaxNLocator(nbins=9, steps=round_steps)
     )
+    if plot.names:
+        axes.set_xticks(range(len(plot.names)), plot.names, rotation=25, ha="right", fontsize=9)
+        axes.set_xlim(-0.6, len(plot.names) - 0.4)
+        axes.grid(visible=False, axis="x")
 
 
 def _comma_formatter() -> Any:
@@ -139,6 +162,11 @@ def _curve(axes: Axes, curve: Curve) -> None:
                 zorder=6,
             )
         return
+    if curve.style == "bars":
+        axes.bar(curve.x, curve.y, 0.38, color=colour, zorder=3)
+        for x, y, note in zip(curve.x, curve.y, curve.notes, strict=False):
+            axes.annotate(note, (x, y), ha="center", va="bottom", fontsize=7.5, zorder=6)
+        return
     if curve.style == "line":
         axes.plot(curve.x, curve.y, color=colour, linewidth=1.3, linestyle=dashes, zorder=3)
         return
@@ -165,8 +193,10 @@ def _curve(axes: Axes, curve: Curve) -> None:
 
 def _legend(figure: Figure, plot: Plot) -> None:
     from matplotlib.lines import Line2D
+    from matplotlib.patches import Patch
 
-    handles, seen = [], set()
+    handles: list[Artist] = []
+    seen = set()
     for curve in plot.curves:
         # A reversed run or a negative angle shares its colour and its entry with the other one.
         key = (curve.label, curve.group)
@@ -175,6 +205,9 @@ def _legend(figure: Figure, plot: Plot) -> None:
         seen.add(key)
         colour = COLOURS[curve.group % len(COLOURS)]
         alone = curve.open and curve.style == "both" and not plot.legend_title
+        if curve.style == "bars":
+            handles.append(Patch(color=colour, label=curve.label))
+            continue
         lines = {c.style for c in plot.curves if (c.label, c.group) == key} == {"line"}
         handles.append(
             Line2D(

@@ -7,16 +7,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolkit.report.calibration.figures import _drawn
 from toolkit.report.content import Curve, Plot
-from toolkit.report.figures import COLOURS, draw
+from toolkit.report.figures import draw, draw_svg
+from toolkit.report.models import model_plot
 from toolkit.tires.comparison import Comparison, model_curve
 from toolkit.tires.evaluate import value_at
 from toolkit.tires.global_data import Measured, binned
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
     from toolkit.tires.global_result import ModelFit
     from toolkit.tires.model import CurveFit
 
@@ -35,8 +33,6 @@ def fit_figures(
     curves: Sequence[CurveFit],
     models: Sequence[ModelFit],
     comparison: Comparison,
-    *,
-    title: str,
 ) -> dict[str, bytes]:
     """Return the figures by file name: two a model and channel (PNG), one comparison a channel (PNG, SVG)."""
     made = {}
@@ -44,11 +40,10 @@ def fit_figures(
         made[f"{plot.name}.png"] = draw(plot).png
     if len(comparison.models) > 1:
         for condition, channel in comparison.conditions:
-            drawn = _drawn(
-                lambda axes, key=(condition, channel): _bars(axes, comparison, *key),  # type: ignore[misc]
-                f"{title}: {condition} {channel}, error of the models",
-            )
-            made |= {f"comparison_{condition}_{channel}.{kind}": image for kind, image in drawn.items()}
+            name = f"comparison_{condition}_{channel}"
+            bars = model_plot(comparison, condition, channel, name=name)
+            if bars is not None:
+                made |= {f"{name}.png": draw(bars).png, f"{name}.svg": draw_svg(bars)}
     return made
 
 
@@ -133,27 +128,3 @@ def _curve(label: str, x: np.ndarray, y: np.ndarray, group: int, style: str) -> 
         group=group,
         style="line" if style == "line" else "points",
     )
-
-
-def _bars(axes: Axes, comparison: Comparison, condition: str, channel: str) -> None:
-    rows = [comparison.get(model, condition, channel) for model in comparison.models]
-    kept = [row for row in rows if row is not None]
-    place = np.arange(len(kept), dtype=np.float64)
-    axes.bar(place - 0.2, [row.error_percent for row in kept], 0.38, color=COLOURS[0], label="fitted")
-    away = [row.prediction_error_percent for row in kept]
-    if any(value is not None for value in away):
-        heights = [value if value is not None else 0.0 for value in away]
-        axes.bar(place + 0.2, heights, 0.38, color=COLOURS[4], label="load left out")
-    floor = dict(comparison.floors).get(channel)
-    if floor is not None:
-        axes.axhline(floor, color=COLOURS[1], linestyle="--", linewidth=1.2, label="scatter floor")
-    for at, row in zip(place, kept, strict=True):
-        axes.annotate(
-            f"{row.error_percent:.2f}", (at - 0.2, row.error_percent), ha="center", va="bottom", fontsize=8,
-        )  # fmt: skip
-    many = len(kept) > 5
-    names = [row.model for row in kept]
-    axes.set_xticks(place, names, rotation=25 if many else 0, ha="right" if many else "center")
-    axes.set_ylabel("error / %")
-    axes.grid(visible=False, axis="x")
-    axes.legend(frameon=False, fontsize=9)

@@ -21,12 +21,14 @@ def content_hash(filled: Filled, template: Template) -> str:
     """Return the SHA-256 of what a report says: every printed value, cell, figure, and the template.
 
     Neither a .docx nor a PDF is the same byte for byte twice, so the content is hashed. The day of issue
-    is left out: the same inputs give the same hash on another day.
+    is left out, and so is what a run took: the same inputs give the same hash on another day. (A row of a
+    table with such a value is hashed by its other values, not as a row of cells.)
     """
+    passing = {*_OF_THE_DAY, *filled.of_the_run}
     told = {
         "template": template.sha256,
-        "values": [[one.tag, one.text, one.part] for one in filled.manifest if one.tag not in _OF_THE_DAY],
-        "cells": filled.cells,
+        "values": [[one.tag, one.text, one.part] for one in filled.manifest if one.tag not in passing],
+        "cells": [row for at, row in enumerate(filled.cells) if at not in filled.rows_of_the_run],
         "figures": [[tag, alt] for tag, alt in filled.figures],
         "pictures": filled.pictures,
         "contents": [[one.text, one.level] for one in filled.contents.entries],

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from toolkit.report.columns import TABLES, Column
 from toolkit.report.content import Cell, Table
+from toolkit.report.models import model_rows
 from toolkit.report.style import Style
 
 if TYPE_CHECKING:
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
     from toolkit.findings import Finding
     from toolkit.pipeline import TestResult
     from toolkit.recording.details import Opinion
+    from toolkit.tires.comparison import Comparison
 
 _DEG = math.pi / 180
 Row = dict[str, Cell]
@@ -28,6 +30,7 @@ def build_tables(
     findings: Sequence[Finding],
     style: Style,
     opinions: Sequence[Opinion] = (),
+    comparison: Comparison | None = None,
 ) -> dict[str, Table]:
     """Return every table of the catalogue; one without data has no rows."""
     makers: dict[str, Callable[[], list[Row]]] = {
@@ -39,6 +42,7 @@ def build_tables(
         "budget": lambda: _budget(result, style),
         "characteristics": lambda: _characteristics(result, style),
         "fits": lambda: _fits(result, style),
+        "models": lambda: model_rows(comparison),
         "calibration": lambda: _calibration(record),
         "acquisition": lambda: _acquisition(result),
         "findings": lambda: [one.as_dict() for one in findings],  # type: ignore[misc]

@@ -169,6 +169,8 @@ FIGURES = {
     "prat": "plysteer residual aligning torque against load, both definitions",
     "cornering_stiffness": "cornering stiffness against load, secant and slope",
     "aligning_stiffness": "aligning stiffness against load, secant and slope",
+    "models_fy": "error of each tire model in lateral force, fitted and with each load left out",
+    "models_mz": "error of each tire model in aligning moment, fitted and with each load left out",
 }
 
 CONDITIONS = {

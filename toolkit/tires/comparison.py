@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,6 +12,7 @@ import numpy as np
 from toolkit.channels import signs
 from toolkit.tires.evaluate import value_at
 from toolkit.tires.global_data import CHANNELS, Measured, cell
+from toolkit.tires.global_fit import undetermined
 from toolkit.tires.global_model import GlobalModel, make_rows
 from toolkit.tires.global_result import ModelFit, pooled_percent
 from toolkit.tires.model import CurveFit
@@ -28,7 +30,9 @@ class ComparisonRow:
 
     ``error_percent`` = 100 sqrt(sum(model - measured)^2 / sum(measured^2)) over ``n`` rows; curves of single
     loads are pooled. ``prediction_error_percent``: every load by a fit without it, None where there is
-    none (a curve of one load predicts no other). ``parameters`` counts those that were fitted.
+    none (a curve of one load predicts no other). ``parameters`` counts those that were fitted;
+    ``not_determined`` names what the data, though they vary as asked, do not determine (of single loads
+    with the number of loads).
     """
 
     model: str
@@ -39,14 +43,20 @@ class ComparisonRow:
     error_percent: float
     prediction_error_percent: float | None
     converged: bool
+    not_determined: tuple[str, ...]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Comparison:
-    """All models on one data set; ``floors`` (channel, percent) is what no model could remove."""
+    """All models on one data set; ``floors`` (channel, percent) is what no model could remove.
+
+    ``seconds`` (model, time of its fits of all channels, loads left out included) is the machine's, not the
+    data's: it differs from run to run and is no part of the JSON form.
+    """
 
     rows: tuple[ComparisonRow, ...]
     floors: tuple[tuple[str, float | None], ...]
+    seconds: tuple[tuple[str, float], ...] = ()
 
     @property
     def models(self) -> tuple[str, ...]:
@@ -69,12 +79,18 @@ class Comparison:
     def as_dict(self) -> dict[str, Any]:
         """Return the JSON form."""
         return {
-            "rows": [{name: getattr(row, name) for name in ComparisonRow.__slots__} for row in self.rows],
+            "rows": [asdict(row) | {"not_determined": list(row.not_determined)} for row in self.rows],
             "scatter_floor_percent": dict(self.floors),
         }
 
 
-def compare(data: Measured, curves: Sequence[CurveFit], models: Sequence[ModelFit]) -> Comparison:
+def compare(
+    data: Measured,
+    curves: Sequence[CurveFit],
+    models: Sequence[ModelFit],
+    *,
+    seconds: Mapping[str, float] | None = None,
+) -> Comparison:
     """Return the table of the models that were fitted to these rows; ``curves`` are of single loads."""
     made = []
     for name in dict.fromkeys(one.model for one in curves):
@@ -88,12 +104,12 @@ def compare(data: Measured, curves: Sequence[CurveFit], models: Sequence[ModelFi
             free = sum(p.name not in dict(one.fixed) for p in one.parameters)
             made += _rows(
                 data, one.model, one.channel, y, model, np.isfinite(y), free,
-                one.prediction_error_percent, one.converged,
+                one.prediction_error_percent, one.converged, undetermined(one),
             )  # fmt: skip
     floors = {
         channel: scatter_floor_percent(data.rows.SA, data[channel], cell(data)) for channel in data.channels
     }
-    return Comparison(rows=tuple(made), floors=tuple(floors.items()))
+    return Comparison(rows=tuple(made), floors=tuple(floors.items()), seconds=tuple((seconds or {}).items()))
 
 
 def _of_curves(data: Measured, fits: Sequence[CurveFit]) -> list[ComparisonRow]:
@@ -105,7 +121,12 @@ def _of_curves(data: Measured, fits: Sequence[CurveFit]) -> list[ComparisonRow]:
             model[own] = value_at(fit, data.rows.SA[own])
     count = sum(len(fit.parameters) for fit in fits)
     converged = all(fit.converged for fit in fits)
-    return _rows(data, fits[0].model, channel, y, model, np.isfinite(model), count, None, converged)
+    times = Counter(name for fit in fits for name in fit.not_determined)
+    names: dict[int, list[str]] = {}
+    for name, number in times.items():
+        names.setdefault(number, []).append(name)
+    open_ = tuple(f"{' '.join(names[number])} at {number} of {len(fits)} loads" for number in sorted(names))
+    return _rows(data, fits[0].model, channel, y, model, np.isfinite(model), count, None, converged, open_)
 
 
 def _rows(
@@ -118,6 +139,7 @@ def _rows(
     parameters: int,
     prediction: float | None,
     converged: bool,
+    not_determined: tuple[str, ...],
 ) -> list[ComparisonRow]:
     pure = np.abs(data.rows.KAPPA) <= _FREE
     made = []
@@ -133,6 +155,7 @@ def _rows(
                     error_percent=pooled_percent(model[own] - y[own], y[own]),
                     prediction_error_percent=prediction if condition == "pure" or not pure.any() else None,
                     converged=converged,
+                    not_determined=not_determined,
                 )
             )
     return made

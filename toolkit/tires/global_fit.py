@@ -15,7 +15,7 @@ from toolkit.tires.global_checks import LACKS, why_not_global
 from toolkit.tires.global_data import CHANNELS, Measured, binned, what_varies
 from toolkit.tires.global_model import GlobalModel, Rows, Seeds
 from toolkit.tires.global_report import Report
-from toolkit.tires.global_result import ModelFit
+from toolkit.tires.global_result import GlobalFit, ModelFit
 from toolkit.tires.global_seeds import seeds_of
 from toolkit.tires.global_stage import Found, Task, refit, run
 from toolkit.tires.model import LOSSES, Loss
@@ -72,16 +72,20 @@ def global_findings(fit: ModelFit) -> list[Finding]:
         where = f"{one.model} {one.channel} over all loads"
         if not one.converged:
             found.append(Finding(rule="not-converged", where=where, message=one.message))
-        lacking = tuple(LACKS.values())
-        open_ = [name for name, why in one.fixed if not why.startswith(lacking)]
-        open_ += [name for name in one.not_determined if name not in dict(one.fixed)]
-        if one.converged and open_:
+        if one.converged and (open_ := undetermined(one)):
             text = f"not determined by these data: {', '.join(open_)}"
             found.append(Finding(rule="not-determined", where=where, message=text, level="note"))
         if one.at_bound:
             text = f"{', '.join(one.at_bound)}: the search ended at the bound"
             found.append(Finding(rule="at-bound", where=where, message=text, level="note"))
     return found
+
+
+def undetermined(fit: GlobalFit) -> tuple[str, ...]:
+    """Return the parameters that the data do not determine, though what they describe varies in them."""
+    fixed, lacking = dict(fit.fixed), tuple(LACKS.values())
+    open_ = [name for name, why in fixed.items() if not why.startswith(lacking)]
+    return (*open_, *(name for name in fit.not_determined if name not in fixed))
 
 
 def not_varied(fits: Sequence[ModelFit], where: str) -> list[Finding]:

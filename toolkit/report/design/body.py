@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from toolkit.report.design.blocks import Pieces, literal, paragraph, run
 from toolkit.report.design.budget import budget_table
+from toolkit.report.design.models import models_section
 from toolkit.report.design.pieces import contents
 
 
@@ -209,6 +210,7 @@ def chapters(p: Pieces) -> list[str]:
                 "llrrrrrrrrr",
             ),
         ),
+        models_section(p),
         heading("7  Calibration"),
         p.table(
             "calibration",

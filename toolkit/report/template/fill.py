@@ -109,6 +109,8 @@ class _Log:
     missing: list[str] = field(default_factory=list)
     rows: list[Element] = field(default_factory=list)
     pictures: list[str] = field(default_factory=list)
+    of_the_run: set[str] = field(default_factory=set)
+    rows_of_the_run: set[int] = field(default_factory=set)
 
 
 class _Filler:
@@ -183,6 +185,8 @@ class _Filler:
             pictures=tuple(dict.fromkeys(self.log.pictures)),
             never_shown=never,
             perhaps_shown=perhaps,
+            of_the_run=frozenset(self.log.of_the_run),
+            rows_of_the_run=frozenset(self.log.rows_of_the_run),
         )
 
     def _conditions(self) -> None:
@@ -264,6 +268,10 @@ class _Filler:
             self.ids,
         )
         if not site.fallback:
+            passing = {f"tk:{site.tag.path}.{one.name}" for one in table.columns if one.of_the_run}
+            if passing:
+                self.log.of_the_run |= passing
+                self.log.rows_of_the_run |= set(range(len(self.log.rows), len(self.log.rows) + len(made)))
             self.log.rows += made
 
     def _literals(self, sites: list[Site]) -> None:

@@ -28,7 +28,8 @@ class Filled:
     ``figures`` are (tag, alt) of every picture; ``cells`` the rows of filled tables, cell by cell;
     ``missing`` the tags that print the visible mark; ``contents`` the lines of its tables of contents;
     ``pictures`` the SHA-256 of each figure as it was drawn; ``never_shown`` the headers and footers that no
-    page can show, ``perhaps_shown`` those that depend on the number of pages, with their own words.
+    page can show, ``perhaps_shown`` those that depend on the number of pages, with their own words;
+    ``of_the_run`` the tags whose values differ from run to run, and ``rows_of_the_run`` the rows with them.
     """
 
     docx: bytes
@@ -43,3 +44,5 @@ class Filled:
     pictures: tuple[str, ...] = ()
     never_shown: tuple[str, ...] = ()
     perhaps_shown: tuple[tuple[str, tuple[str, ...]], ...] = ()
+    of_the_run: frozenset[str] = frozenset()
+    rows_of_the_run: frozenset[int] = frozenset()

@@ -1,0 +1,127 @@
+"""Tire models side by side in a report: the table in the form of the thesis's table 3.1, and its figures."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from toolkit.report.content import Cell, Curve, Plot
+from toolkit.report.tags import format_number
+
+if TYPE_CHECKING:
+    from toolkit.tires.comparison import Comparison, ComparisonRow
+
+_SYMBOLS = {"FX": "longitudinal force FX", "FY": "lateral force FY", "MZ": "aligning moment MZ"}
+_NAMED = 5
+_WIDTH = 0.38  # of a bar; two stand side by side at a model
+
+
+def model_rows(comparison: Comparison | None) -> list[dict[str, Cell]]:
+    """Return the table's rows, one a model and condition; none without a comparison."""
+    if comparison is None:
+        return []
+    floors, seconds = dict(comparison.floors), dict(comparison.seconds)
+    made: list[dict[str, Cell]] = []
+    for condition in dict.fromkeys(one for one, _ in comparison.conditions):
+        for model in comparison.models:
+            found = {name: comparison.get(model, condition, name) for name in ("FY", "MZ")}
+            own = [one for one in found.values() if one is not None]
+            if not own:
+                continue
+            row: dict[str, Cell] = {
+                "model": model,
+                "condition": condition,
+                "seconds": seconds.get(model),
+                "converged": "yes" if all(one.converged for one in own) else "no",
+                "not_determined": _open(own),
+            }
+            for name, one in found.items():
+                row[f"{name}_floor"] = floors.get(name)
+                if one is not None:
+                    row[f"{name}_parameters"] = one.parameters
+                    row[f"{name}_error"] = one.error_percent
+                    row[f"{name}_left_out"] = one.prediction_error_percent
+            made.append(row)
+    return made
+
+
+def _open(rows: Sequence[ComparisonRow]) -> str:
+    # More names than that would make the row a list: the JSON of `toolkit fit` has them all.
+    parts = []
+    for one in rows:
+        count = len(one.not_determined)
+        if count:
+            named = ", ".join(one.not_determined)
+            parts.append(f"{one.channel}: {named if count <= _NAMED else f'{count} of {one.parameters}'}")
+    return "; ".join(parts) or "-"
+
+
+def model_plots(
+    comparison: Comparison | None, *, watermark: str | None = None, decimal_comma: bool = False
+) -> dict[str, Plot]:
+    """Return the figures ``models_fy`` and ``models_mz`` of pure side slip, where there are two models."""
+    if comparison is None or len(comparison.models) < 2:
+        return {}
+    made = (
+        model_plot(
+            comparison, "pure", channel, name=f"models_{channel.lower()}", watermark=watermark,
+            decimal_comma=decimal_comma,
+        )
+        for channel in ("FY", "MZ")
+    )  # fmt: skip
+    return {plot.name: plot for plot in made if plot is not None}
+
+
+def model_plot(
+    comparison: Comparison,
+    condition: str,
+    channel: str,
+    *,
+    name: str,
+    watermark: str | None = None,
+    decimal_comma: bool = False,
+) -> Plot | None:
+    """Return bars of all models' errors [%] in one channel, fitted and predicted, over the scatter floor."""
+    found = [comparison.get(model, condition, channel) for model in comparison.models]
+    rows = [one for one in found if one is not None]
+    if not rows:
+        return None
+    places = range(len(rows))
+    said = [format_number(one.error_percent, ".2f", decimal_comma=decimal_comma) for one in rows]
+    curves = [
+        Curve(
+            label="fitted",
+            x=tuple(place - _WIDTH / 2 for place in places),
+            y=tuple(one.error_percent for one in rows),
+            style="bars",
+            notes=tuple(said),
+        )
+    ]
+    away = [(place, one.prediction_error_percent) for place, one in zip(places, rows, strict=True)]
+    if known := [(place, value) for place, value in away if value is not None]:
+        x, y = zip(*known, strict=True)
+        curves.append(
+            Curve(label="load left out", x=tuple(p + _WIDTH / 2 for p in x), y=y, group=4, style="bars")
+        )
+    floor = dict(comparison.floors).get(channel)
+    if floor is not None:
+        curves.append(
+            Curve(
+                label="scatter floor", x=(-0.5, len(rows) - 0.5), y=(floor, floor), group=1, style="line",
+                open=True,
+            )
+        )  # fmt: skip
+    told = ", ".join(f"{one.model} {text} %" for one, text in zip(rows, said, strict=True))
+    mark = f"{watermark}. " if watermark else ""
+    symbol = _SYMBOLS[channel]
+    return Plot(
+        name=name,
+        x_label="",
+        y_label=f"error of {symbol} / %",
+        curves=tuple(curves),
+        caption=f"Error of each tire model in {symbol}, fitted and where each load is predicted without it.",
+        alt=f"{mark}Error of the tire models in {symbol}, {condition} slip: {told}.",
+        watermark=watermark,
+        decimal_comma=decimal_comma,
+        names=tuple(one.model for one in rows),
+    )
