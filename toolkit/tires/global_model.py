@@ -191,6 +191,11 @@ class Seeds:
         slope, base = np.polyfit(dfz, values[good], 1)
         return float(base), float(slope)
 
+    def law(self, values: Array) -> tuple[float, float]:
+        """Return base and change of values that are base exp(change dfz): `contact.with_load`."""
+        base, change = self.at_nominal(np.log(values))
+        return float(np.exp(base)), change
+
 
 Forces = Callable[[Sequence[Any], Rows], Responses]
 Starts = Callable[[Seeds], Sequence[Mapping[str, float]]]

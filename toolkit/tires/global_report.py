@@ -125,7 +125,7 @@ class Report:
             [-_H, _H], load, FNOMIN=r.FNOMIN, NOMPRES=r.NOMPRES, LONGVL=r.LONGVL,
             UNLOADED_RADIUS=r.UNLOADED_RADIUS,
         )  # fmt: skip
-        left = list(stage.left)
+        left = [*stage.left, *stage.held]
         size = np.array([self.model.parameters[place].size for place in left])
         step = 1e-4 * size
         copies: list[object] = []
@@ -142,7 +142,7 @@ class Report:
         flip = signs(self.model.axes, self.given.axes)
         slopes = (y[:, 1] - y[:, 0]) / (2 * _H) * flip["SA"] * flip[channel]
         gradient = (slopes[1 : len(left) + 1] - slopes[len(left) + 1 :]) / (2 * step)
-        variance = float(gradient @ stage.covariance @ gradient) if left else 0.0
+        variance = float(gradient @ stage.spread @ gradient) if left else 0.0
         return Estimate(
             value=float(slopes[0]), u=float(np.sqrt(max(variance, 0.0))), unit=f"{_UNIT[channel]}/rad",
             dof=stage.dof,
@@ -165,6 +165,10 @@ class Report:
             if place in own:
                 reasons.setdefault(why, []).append(self.model.parameters[place].name)
         parts += [f"{', '.join(names)}: {why}" for why, names in reasons.items()]
+        if any(place in own for place in stage.held):
+            parts.append(
+                "standard errors of the others are with these held; that of a stiffness contains their spread"
+            )
         if at_bound:
             parts.append(f"at its bound: {', '.join(at_bound)}")
         if joint:

@@ -2,9 +2,9 @@
 
 The search starts from the model's own starts and deterministic variations of them. Few steps show which
 starts lose; the rest go on to the end. A parameter that the data do not determine is set to its neutral
-default where the fit is as good with it (within a 95 % interval and a thousandth of the cost, for a model's
-own misfit is no noise); else it stays where the search ended, named, and free in the covariance, so that
-the errors of what moves with it stay true.
+default where the fit is as good with it: all defaults together lie in the 95 % region of the whole model, and
+raise its cost by no more than a thousandth, for a model's own misfit is no noise. Else it stays where the
+search ended, named, and free in the covariance, so that the errors of what moves with it stay true.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ _PLAN = (12, 6, 5, 60)  # starts, first steps, how many go on, steps to the end
 _PATIENT = (36, 8, 10, 90)
 _AGAIN = (25, 12, 8, 90)
 _WIDE = (0.3, 2.5)  # an interval of more than 30 % of the value and 2.5 sizes to either side says little
-_ALLOWED = 4.0  # of the variance of a row: the rise of the cost by which a default is as good as the fit
+_LEVEL = 0.95
 _BIWEIGHT = 4.685  # 95 % efficiency on normal noise
 _POLISH = 4_000_000  # rows x inner points x copies that a polish on the rows may cost a step
 
@@ -53,8 +53,10 @@ class Task:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Found:
-    """What a stage found: ``values`` of all parameters, ``covariance`` of those in ``free`` that are left.
+    """What a stage found: ``values`` of all parameters, ``covariance`` of those that are ``left`` free.
 
+    ``held`` were set to their defaults, and ``spread`` that of ``left`` and ``held`` with the held
+    ones free within their bounds: what follows from the curve, a stiffness, is uncertain by theirs too.
     ``fixed`` (place, reason); ``bound`` places at a bound; ``undetermined`` places without a standard error;
     ``time`` autocorrelation time of the residuals; ``dof`` degrees of freedom;
     ``bin_width`` [rad] of the means that were fitted, zero where the rows were.
@@ -63,6 +65,8 @@ class Found:
     values: Array
     left: tuple[int, ...]
     covariance: Array
+    held: tuple[int, ...]
+    spread: Array
     fixed: tuple[tuple[int, str], ...]
     bound: tuple[int, ...]
     undetermined: tuple[int, ...]
@@ -107,6 +111,12 @@ class Misfit:
             size=np.array([one.size for one in own]),
             cost_per_copy=len(self.data) * self.model.grid,
         )
+
+    def release(self, places: Sequence[int], x: Array) -> Array:
+        """Free parameters that were held; return all free ones (1, p), those of ``x`` (1, free) first."""
+        self.base[self.free] = x[0]
+        self.free += list(places)
+        return self.base[self.free][None]
 
     def hold(self, place: int, value: float) -> None:
         """Take a parameter out of the search."""
@@ -154,12 +164,17 @@ def run(task: Task, coarse: Measured, count: Array, width: float) -> Found:
     undetermined = [p for p, at, too in zip(misfit.free, bound, wide, strict=True) if at or too]
     values = misfit.base.copy()
     values[misfit.free] = x[0]
+    left, held = tuple(misfit.free), tuple(place for place, _ in fixed)
+    bounded = tuple(p for p, at in zip(left, bound, strict=True) if at)
+    spread, _ = _covariance(misfit, misfit.release(held, x), variance) if held else (covariance, None)
     return Found(
         values=values,
-        left=tuple(misfit.free),
+        left=left,
         covariance=covariance,
+        held=held,
+        spread=spread,
         fixed=tuple(fixed),
-        bound=tuple(p for p, at in zip(misfit.free, bound, strict=True) if at),
+        bound=bounded,
         undetermined=tuple(undetermined),
         starts=starts,
         agreeing=agreeing,
@@ -266,11 +281,14 @@ def _at_bound(x: Array, box: Box) -> Sequence[bool]:
 
 
 def _prune(misfit: Misfit, x: Array, variance: float, dof: float, fixed: list[tuple[int, str]]) -> Array:
-    # One at a time, the worst first: parameters that are not determined move together.
+    # One at a time, the worst first: parameters that are not determined move together. Every trial is held
+    # against the whole model, not against the last trial: many small rises would add up to a large one.
+    from scipy.special import fdtri
+
     factor = coverage_factor(dof)
     kept: set[int] = set()
     r = misfit(x)[0]
-    cost = float(r @ r)
+    whole, rounding = float(r @ r), _EXACT * float(np.sum((misfit.y * misfit.weight) ** 2))
     while misfit.free:
         box = misfit.box()
         _, errors = _covariance(misfit, x, variance)
@@ -287,8 +305,10 @@ def _prune(misfit: Misfit, x: Array, variance: float, dof: float, fixed: list[tu
         others = np.delete(x, worst, axis=1)
         misfit.hold(place, spec.default)
         trial = descend(misfit, others.copy(), misfit.box(), steps=12, tolerance=1e-7)
-        if trial.cost[0] <= cost + min(_ALLOWED * variance, _SAME * cost):
-            x, cost = trial.x, max(cost, float(trial.cost[0]))
+        count = len(fixed) + 1
+        allowed_rise = min(count * float(fdtri(count, dof, _LEVEL)) * variance, _SAME * whole)
+        if trial.cost[0] <= whole + allowed_rise + rounding:
+            x = trial.x
             fixed.append((place, f"not determined by these data, fixed at its default {spec.default:g}"))
         else:
             # It matters, though its value is not known: it stays free, so that the errors of what moves

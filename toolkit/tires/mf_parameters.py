@@ -6,14 +6,9 @@ state that B, C, D, K and 1 - E must keep their sign), wide enough for bicycle t
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, cast
+from toolkit.tires.parameter_table import parameters
 
-from toolkit.tires.global_model import GlobalParameter
-
-if TYPE_CHECKING:
-    from toolkit.tires.global_model import Channel, Need
-
-# name, default, low, high, size, needs ("2" loads, "3" loads, "c"amber, "p"ressure, "s"igns, "k"appa), text
+# name, default, low, high, size, needs, text
 _LATERAL = """
 PCY1  1.3    0.8   2.2  0.1   -    shape factor C
 PDY1  1.0    0.05  3.0  0.1   -    friction at the nominal load
@@ -128,39 +123,14 @@ SSZ2   0.0   -0.3   0.3  0.005 ka  change of the arm with FY
 SSZ3   0.0   -3.0   3.0  0.05  cka change of the arm with camber
 SSZ4   0.0   -3.0   3.0  0.05  2cka change of that with load
 """
-_NEEDS: dict[str, str] = {
-    "2": "two_loads", "3": "three_loads", "c": "camber", "p": "pressure", "P": "three_pressures",
-    "s": "both_signs", "k": "kappa", "K": "both_kappas", "a": "alpha_and_kappa",
-}  # fmt: skip
-
-
-def _rows(text: str, stage: Channel) -> tuple[GlobalParameter, ...]:
-    made = []
-    for line in filter(None, text.splitlines()):
-        name, default, low, high, size, needs, words = line.split(maxsplit=6)
-        made.append(
-            GlobalParameter(
-                name=name,
-                unit="1",
-                default=float(default),
-                low=float(low),
-                high=float(high),
-                size=float(size),
-                text=words,
-                stage=stage,
-                needs=tuple(cast("Need", _NEEDS[mark]) for mark in needs.replace("-", "")),
-            )
-        )
-    return tuple(made)
-
 
 MF52 = (
-    *_rows(_LONGITUDINAL, "FX"),
-    *_rows(_LATERAL + _LATERAL_52 + _COMBINED_LATERAL, "FY"),
-    *_rows(_ALIGNING + _COMBINED_ALIGNING, "MZ"),
+    *parameters(_LONGITUDINAL, stage="FX", unit="1"),
+    *parameters(_LATERAL + _LATERAL_52 + _COMBINED_LATERAL, stage="FY", unit="1"),
+    *parameters(_ALIGNING + _COMBINED_ALIGNING, stage="MZ", unit="1"),
 )
 MF61 = (
-    *_rows(_LONGITUDINAL + _LONGITUDINAL_61, "FX"),
-    *_rows(_LATERAL + _LATERAL_61 + _COMBINED_LATERAL, "FY"),
-    *_rows(_ALIGNING + _ALIGNING_61 + _COMBINED_ALIGNING, "MZ"),
+    *parameters(_LONGITUDINAL + _LONGITUDINAL_61, stage="FX", unit="1"),
+    *parameters(_LATERAL + _LATERAL_61 + _COMBINED_LATERAL, stage="FY", unit="1"),
+    *parameters(_ALIGNING + _ALIGNING_61 + _COMBINED_ALIGNING, stage="MZ", unit="1"),
 )

@@ -19,7 +19,19 @@ from typing import Any
 import numpy as np
 
 from toolkit.tires.contact import directed, half_length, slips, with_load
-from toolkit.tires.global_model import GlobalModel, GlobalParameter, Responses, Rows, Seeds
+from toolkit.tires.global_model import GlobalModel, Responses, Rows, Seeds
+from toolkit.tires.parameter_table import CAMBER, OFFSETS, SHIFT, parameters
+
+# name, unit, default, low, high, size, stage, needs, text
+_TABLE = """
+C     1/rad  15.0    1.0  200.0    1.0  FY  -  cornering stiffness over load at FNOMIN
+C_Z   1       0.0   -3.0    3.0    0.1  FY  2  its change with load: CF/FZ = C exp(C_Z dfz + C_ZZ dfz^2)
+C_ZZ  1       0.0   -1.5    1.5    0.1  FY  3  its second change with load
+MU    1       1.0   0.05    5.0   0.05  FY  -  friction at FNOMIN
+MU_Z  1       0.0   -2.0    2.0   0.05  FY  2  its change with load: mu = MU exp(MU_Z dfz)
+A     m      0.08  0.002    0.5  0.005  MZ  -  effective half contact length at FNOMIN
+A_P   1       0.5   0.05    2.0    0.1  MZ  2  its growth with load: a = A (FZ/FNOMIN)^A_P
+"""
 
 
 def forces(values: Sequence[Any], rows: Rows) -> Responses:
@@ -38,19 +50,14 @@ def forces(values: Sequence[Any], rows: Rows) -> Responses:
 
 def starts(seeds: Seeds) -> tuple[Mapping[str, float], ...]:
     """Return start values: stiffness, peak and trail of each load, brought to their laws of load."""
-    stiffness, change = _law(seeds, seeds.stiffness / seeds.load)
-    friction, fade = _law(seeds, seeds.peak / seeds.load)
+    stiffness, change = seeds.law(seeds.stiffness / seeds.load)
+    friction, fade = seeds.law(seeds.peak / seeds.load)
     trail = seeds.at_nominal(seeds.trail)[0]
     start = {"C": stiffness, "C_Z": change, "MU": friction, "MU_Z": fade}
     if np.isfinite(trail) and trail > 0:
         start["A"] = 3 * trail
     # The brush bends more gently than tires do: its best stiffness lies above the measured one.
     return start, {**start, "C": 1.3 * stiffness}, {**start, "MU": 1.3 * friction}
-
-
-def _law(seeds: Seeds, ratio: Any) -> tuple[float, float]:
-    base, slope = seeds.at_nominal(np.log(ratio))
-    return float(np.exp(base)), slope
 
 
 MODEL = GlobalModel(
@@ -61,51 +68,7 @@ MODEL = GlobalModel(
     "friction does not depend on speed, so that FY never falls beyond its peak; MZ vanishes when all slides",
     axes="SAE",
     channels=("FY", "MZ"),
-    parameters=(
-        GlobalParameter(
-            name="C", unit="1/rad", default=15.0, low=1.0, high=200.0, size=1.0,
-            text="cornering stiffness over load at FNOMIN",
-        ),
-        GlobalParameter(
-            name="C_Z", unit="1", default=0.0, low=-3.0, high=3.0, size=0.1,
-            text="its change with load: CF/FZ = C exp(C_Z dfz + C_ZZ dfz^2)", needs=("two_loads",),
-        ),
-        GlobalParameter(
-            name="C_ZZ", unit="1", default=0.0, low=-1.5, high=1.5, size=0.1,
-            text="its second change with load", needs=("three_loads",),
-        ),
-        GlobalParameter(
-            name="MU", unit="1", default=1.0, low=0.05, high=5.0, size=0.05, text="friction at FNOMIN",
-        ),
-        GlobalParameter(
-            name="MU_Z", unit="1", default=0.0, low=-2.0, high=2.0, size=0.05,
-            text="its change with load: mu = MU exp(MU_Z dfz)", needs=("two_loads",),
-        ),
-        GlobalParameter(
-            name="A", unit="m", default=0.08, low=0.002, high=0.5, size=0.005,
-            text="effective half contact length at FNOMIN", stage="MZ",
-        ),
-        GlobalParameter(
-            name="A_P", unit="1", default=0.5, low=0.05, high=2.0, size=0.1,
-            text="its growth with load: a = A (FZ/FNOMIN)^A_P", stage="MZ", needs=("two_loads",),
-        ),
-        GlobalParameter(
-            name="SH", unit="rad", default=0.0, low=-0.1, high=0.1, size=1e-3,
-            text="equivalent slip angle of plysteer and steering zero", needs=("both_signs",),
-        ),
-        GlobalParameter(
-            name="K_IA", unit="1", default=0.0, low=-0.5, high=1.0, size=0.02,
-            text="equivalent slip angle of camber, per rad", needs=("camber",),
-        ),
-        GlobalParameter(
-            name="SV", unit="1", default=0.0, low=-0.2, high=0.2, size=0.01,
-            text="offset of FY over load (conicity)", needs=("both_signs",),
-        ),
-        GlobalParameter(
-            name="SM", unit="m", default=0.0, low=-0.05, high=0.05, size=1e-3,
-            text="offset of MZ over load", stage="MZ", needs=("both_signs",),
-        ),
-    ),
+    parameters=parameters(_TABLE + SHIFT + CAMBER + OFFSETS),
     forces=forces,
     starts=starts,
-)  # fmt: skip
+)

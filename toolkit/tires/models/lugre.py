@@ -24,7 +24,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from toolkit.tires.contact import directed, half_length, slips, with_load
-from toolkit.tires.global_model import GlobalModel, GlobalParameter, Responses, Rows, Seeds
+from toolkit.tires.global_model import GlobalModel, Responses, Rows, Seeds
+from toolkit.tires.parameter_table import CAMBER, OFFSETS, SHIFT, parameters
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -32,6 +33,22 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 _NODES = 10  # of Gauss-Legendre on each of the trapezoid's three parts
+
+# name, unit, default, low, high, size, stage, needs, text
+_TABLE = """
+C      1/rad  15.0    1.0  200.0    1.0  FY  -  cornering stiffness over load at FNOMIN, sigma0 L tm
+C_Z    1       0.0   -3.0    3.0    0.1  FY  2  its change with load: CF/FZ = C exp(C_Z dfz + C_ZZ dfz^2)
+C_ZZ   1       0.0   -1.5    1.5    0.1  FY  3  its second change with load
+MU     1       1.0   0.05    6.0    0.1  FY  -  static friction at FNOMIN
+MU_Z   1       0.0   -2.0    2.0   0.05  FY  2  its change with load: mu = MU exp(MU_Z dfz)
+R      1       1.0    0.3    1.0    0.1  FY  -  Coulomb over static friction
+VS     m/s     5.0    0.5  100.0    2.0  FY  -  Stribeck speed
+S2     s/m     0.0    0.0   0.02  0.002  FY  v  viscous friction over load and speed
+L      m      0.16  0.005    1.0   0.01  MZ  -  effective contact length at FNOMIN
+L_P    1       0.5   0.05    2.0    0.1  MZ  2  its growth with load: L (FZ/FNOMIN)^L_P
+TOP    1       0.5    0.0    1.0   0.15  FY  -  flat part of the pressure trapezoid
+FRONT  1       0.5    0.0    1.0    0.1  MZ  -  share of its rise in what is not flat; < 0.5: load in front
+"""
 
 
 def forces(values: Sequence[Any], rows: Rows) -> Responses:
@@ -84,8 +101,8 @@ def filled(growth: Any, front: Any, rear: Any) -> tuple[Array, Array]:
 
 def starts(seeds: Seeds) -> tuple[Mapping[str, float], ...]:
     """Return start values: stiffness, peak and trail of each load, with and without a falling friction."""
-    stiffness, change = _law(seeds, seeds.stiffness / seeds.load)
-    friction, fade = _law(seeds, seeds.peak / seeds.load)
+    stiffness, change = seeds.law(seeds.stiffness / seeds.load)
+    friction, fade = seeds.law(seeds.peak / seeds.load)
     trail = seeds.at_nominal(seeds.trail)[0]
     start = {"C": 1.2 * stiffness, "C_Z": change, "MU": 1.1 * friction, "MU_Z": fade}
     if np.isfinite(trail) and trail > 0:
@@ -95,11 +112,6 @@ def starts(seeds: Seeds) -> tuple[Mapping[str, float], ...]:
         {**start, "R": 0.6, "VS": 3.0, "MU": 1.5 * friction},
         {**start, "TOP": 0.8, "FRONT": 0.3, "C": 1.5 * stiffness},
     )
-
-
-def _law(seeds: Seeds, ratio: Any) -> tuple[float, float]:
-    base, slope = seeds.at_nominal(np.log(ratio))
-    return float(np.exp(base)), slope
 
 
 MODEL = GlobalModel(
@@ -112,72 +124,7 @@ MODEL = GlobalModel(
     channels=("FY", "MZ"),
     joint=True,
     grid=3 * _NODES,
-    parameters=(
-        GlobalParameter(
-            name="C", unit="1/rad", default=15.0, low=1.0, high=200.0, size=1.0,
-            text="cornering stiffness over load at FNOMIN, sigma0 L tm",
-        ),
-        GlobalParameter(
-            name="C_Z", unit="1", default=0.0, low=-3.0, high=3.0, size=0.1,
-            text="its change with load: CF/FZ = C exp(C_Z dfz + C_ZZ dfz^2)", needs=("two_loads",),
-        ),
-        GlobalParameter(
-            name="C_ZZ", unit="1", default=0.0, low=-1.5, high=1.5, size=0.1,
-            text="its second change with load", needs=("three_loads",),
-        ),
-        GlobalParameter(
-            name="MU", unit="1", default=1.0, low=0.05, high=6.0, size=0.1,
-            text="static friction at FNOMIN",
-        ),
-        GlobalParameter(
-            name="MU_Z", unit="1", default=0.0, low=-2.0, high=2.0, size=0.05,
-            text="its change with load: mu = MU exp(MU_Z dfz)", needs=("two_loads",),
-        ),
-        GlobalParameter(
-            name="R", unit="1", default=1.0, low=0.3, high=1.0, size=0.1,
-            text="Coulomb over static friction",
-        ),
-        GlobalParameter(
-            name="VS", unit="m/s", default=5.0, low=0.5, high=100.0, size=2.0, text="Stribeck speed",
-        ),
-        GlobalParameter(
-            name="S2", unit="s/m", default=0.0, low=0.0, high=0.02, size=2e-3,
-            text="viscous friction over load and speed; a curve of one speed cannot tell it from shape",
-            needs=("speed",),
-        ),
-        GlobalParameter(
-            name="L", unit="m", default=0.16, low=0.005, high=1.0, size=0.01,
-            text="effective contact length at FNOMIN", stage="MZ",
-        ),
-        GlobalParameter(
-            name="L_P", unit="1", default=0.5, low=0.05, high=2.0, size=0.1,
-            text="its growth with load: L (FZ/FNOMIN)^L_P", stage="MZ", needs=("two_loads",),
-        ),
-        GlobalParameter(
-            name="TOP", unit="1", default=0.5, low=0.0, high=1.0, size=0.15,
-            text="flat part of the pressure trapezoid",
-        ),
-        GlobalParameter(
-            name="FRONT", unit="1", default=0.5, low=0.0, high=1.0, size=0.1,
-            text="share of its rise in what is not flat; under 0.5 the load lies in front", stage="MZ",
-        ),
-        GlobalParameter(
-            name="SH", unit="rad", default=0.0, low=-0.1, high=0.1, size=1e-3,
-            text="equivalent slip angle of plysteer and steering zero", needs=("both_signs",),
-        ),
-        GlobalParameter(
-            name="K_IA", unit="1", default=0.0, low=-0.5, high=1.0, size=0.02,
-            text="equivalent slip angle of camber, per rad", needs=("camber",),
-        ),
-        GlobalParameter(
-            name="SV", unit="1", default=0.0, low=-0.2, high=0.2, size=0.01,
-            text="offset of FY over load (conicity)", needs=("both_signs",),
-        ),
-        GlobalParameter(
-            name="SM", unit="m", default=0.0, low=-0.05, high=0.05, size=1e-3,
-            text="offset of MZ over load", stage="MZ", needs=("both_signs",),
-        ),
-    ),
+    parameters=parameters(_TABLE + SHIFT + CAMBER + OFFSETS),
     forces=forces,
     starts=starts,
-)  # fmt: skip
+)

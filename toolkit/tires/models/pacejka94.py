@@ -22,18 +22,19 @@ The moment is a curve of its own and not trail times force: the two are fitted a
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from toolkit.tires.global_model import GlobalModel, GlobalParameter, Responses
+from toolkit.tires.global_model import GlobalModel, Responses
+from toolkit.tires.parameter_table import parameters
 from toolkit.tires.slip import nonzero, sine
 
 if TYPE_CHECKING:
-    from toolkit.tires.global_model import Array, Channel, Need, Rows, Seeds
+    from toolkit.tires.global_model import Array, Rows, Seeds
 
-# name, unit, default, low, high, size, needs ("2", "3" loads, "c"amber, "s"igns), text
-_TABLE = """
+# name, unit, default, low, high, size, needs, text
+_FY = """
 a0   1              1.3     0.8    2.2  0.1  -  shape factor of FY
 a1   N/kN^2         0.0  -400.0  200.0  20.0 2  load dependence of friction
 a2   N/kN        1000.0    50.0 3000.0  100  -  friction, in thousandths
@@ -52,6 +53,8 @@ a14  N/deg/kN       0.0 -200.0   200.0  5    c  camber force over load
 a15  1/deg^2        0.0   -0.02   0.02 0.001 c  camber dependence of friction
 a16  1/deg          0.0   -0.3     0.3  0.02 cs camber dependence of the asymmetry
 a17  1              0.0   -1.0     1.0  0.2  s  asymmetry of curvature
+"""
+_MZ = """
 c0   1              2.3     1.0    3.5  0.1  -  shape factor of MZ
 c1   N*m/kN^2      -2.0  -40.0    20.0  1.0  2  load dependence of the largest moment
 c2   N*m/kN        -3.0 -200.0    60.0  2.0  -  largest moment over load
@@ -74,32 +77,14 @@ c18  1/deg^2        0.0   -0.02   0.02 0.001 c  camber dependence of the largest
 c19  1/deg          0.0   -0.3     0.3  0.02 cs camber dependence of the asymmetry
 c20  1              0.0   -1.0     1.0  0.2  s  asymmetry of curvature
 """
-_NEEDS = {"2": "two_loads", "3": "three_loads", "c": "camber", "s": "both_signs"}
-
-
-def _parameters() -> tuple[GlobalParameter, ...]:
-    made = []
-    for line in _TABLE.strip().splitlines():
-        name, unit, default, low, high, size, needs, text = line.split(maxsplit=7)
-        stage: Channel = "FY" if name.startswith("a") else "MZ"
-        made.append(
-            GlobalParameter(
-                name=name, unit=unit, default=float(default), low=float(low), high=float(high),
-                size=float(size), text=text, stage=stage,
-                needs=tuple(cast("Need", _NEEDS[mark]) for mark in needs.replace("-", "")),
-            )
-        )  # fmt: skip
-    return tuple(made)
-
-
-_LATERAL = 18
+_SPLIT = 18  # a0 to a17
 
 
 def forces(values: Sequence[Any], rows: Rows) -> Responses:
     """Return FY [N] and MZ [N·m], adapted-SAE, of (a0 ... a17, c0 ... c20) at rows in SI."""
     F, x, g = rows.FZ / 1000.0, np.degrees(rows.SA), np.degrees(rows.IA)
     return Responses(
-        FY=lateral(values[:_LATERAL], F, x, g) * (F > 0), MZ=aligning(values[_LATERAL:], F, x, g) * (F > 0)
+        FY=lateral(values[:_SPLIT], F, x, g) * (F > 0), MZ=aligning(values[_SPLIT:], F, x, g) * (F > 0)
     )
 
 
@@ -167,7 +152,7 @@ MODEL = GlobalModel(
     valid="within the loads and angles of the data; one pressure, pure side slip",
     axes="adapted-SAE",
     channels=("FY", "MZ"),
-    parameters=_parameters(),
+    parameters=(*parameters(_FY, stage="FY"), *parameters(_MZ, stage="MZ")),
     forces=forces,
     starts=starts,
     moment_alone=True,

@@ -33,9 +33,30 @@ from typing import Any
 import numpy as np
 
 from toolkit.tires.contact import directed, slips
-from toolkit.tires.global_model import Channel, GlobalModel, GlobalParameter, Need, Responses, Rows, Seeds
+from toolkit.tires.global_model import GlobalModel, Responses, Rows, Seeds
+from toolkit.tires.parameter_table import OFFSETS, SHIFT, parameters
 
 _LEAST = 0.05  # a quadratic in load turns over far out; no value falls below this part of its law
+
+# name, unit, default, low, high, size, stage, needs, text
+_TABLE = """
+dFx0  1  20.0     1.0  300.0    1.0  FX  k  longitudinal slope at zero slip over FNOMIN
+FxM   1   1.0    0.05    5.0   0.05  FX  k  largest longitudinal force over FNOMIN
+sxM   1  0.15    0.01    2.0   0.03  FX  k  slip at the largest longitudinal force
+FxD   1   0.0     0.0    3.0    0.1  FX  k  longitudinal force lost to sliding over FNOMIN
+sxD   1   0.5    0.02    5.0    0.1  FX  k  slip from the longitudinal peak to sliding
+dFy0  1  15.0     1.0  300.0    1.0  FY  -  lateral slope at zero slip over FNOMIN
+FyM   1   1.0    0.05    5.0   0.05  FY  -  largest lateral force over FNOMIN
+syM   1  0.15    0.01    2.0   0.03  FY  -  slip at the largest lateral force
+FyD   1   0.0     0.0    3.0    0.1  FY  -  lateral force lost to sliding over FNOMIN
+syD   1   0.5    0.02    5.0    0.1  FY  -  slip from the lateral peak to sliding
+n0    m  0.03  0.0001    0.2  0.002  MZ  -  dynamic trail at zero slip, (n/L)0 L
+sy0   1  0.15    0.01    2.0   0.03  MZ  -  lateral slip where the trail changes sign
+syED  1  0.25     0.0    5.0    0.1  MZ  -  slip from there to where no trail is left
+"""
+_CAMBER = """
+K_IA  1  0.0  -0.5  1.0  0.02  FY  c  lateral slip of camber over sin(IA)
+"""
 
 
 def forces(values: Sequence[Any], rows: Rows) -> Responses:
@@ -157,32 +178,14 @@ def starts(seeds: Seeds) -> tuple[Mapping[str, float], ...]:
     )
 
 
-def _pair(
-    name: str, unit: str, default: float, low: float, high: float, size: float, text: str, stage: Channel
-) -> tuple[GlobalParameter, GlobalParameter]:
-    # A value at payload and its change with load.
-    first: tuple[Need, ...] = ("kappa",) if stage == "FX" else ()
-    return (
-        GlobalParameter(
-            name=name, unit=unit, default=default, low=low, high=high, size=size, text=text,
-            stage=stage, needs=first,
-        ),
-        GlobalParameter(
-            name=f"{name}_Z", unit="1", default=0.0, low=-0.8, high=1.5, size=0.2,
-            text=f"change of {name} with load", stage=stage, needs=(*first, "two_loads"),
-        ),
-    )  # fmt: skip
-
-
-def _axis(letter: str, slope: float, stage: Channel) -> tuple[GlobalParameter, ...]:
-    word = {"x": "longitudinal", "y": "lateral"}[letter]
-    return (
-        *_pair(f"dF{letter}0", "1", slope, 1.0, 300.0, 1.0, f"{word} slope at zero slip over FNOMIN", stage),
-        *_pair(f"F{letter}M", "1", 1.0, 0.05, 5.0, 0.05, f"largest {word} force over FNOMIN", stage),
-        *_pair(f"s{letter}M", "1", 0.15, 0.01, 2.0, 0.03, f"slip at the largest {word} force", stage),
-        *_pair(f"F{letter}D", "1", 0.0, 0.0, 3.0, 0.1, f"{word} force lost to sliding over FNOMIN", stage),
-        *_pair(f"s{letter}D", "1", 0.5, 0.02, 5.0, 0.1, f"slip from the {word} peak to sliding", stage),
-    )
+def _with_changes(table: str) -> str:
+    # Behind every value at payload its change with load.
+    lines = []
+    for line in filter(None, table.splitlines()):
+        name, *_, stage, needs, _ = line.split(maxsplit=8)
+        both = f"{needs.replace('-', '')}2"
+        lines += [line, f"{name}_Z  1  0.0  -0.8  1.5  0.2  {stage}  {both}  change of {name} with load"]
+    return "\n".join(lines)
 
 
 MODEL = GlobalModel(
@@ -193,29 +196,7 @@ MODEL = GlobalModel(
     "does not depend on longitudinal slip",
     axes="SAE",
     channels=("FX", "FY", "MZ"),
-    parameters=(
-        *_axis("x", 20.0, "FX"),
-        *_axis("y", 15.0, "FY"),
-        *_pair("n0", "m", 0.03, 1e-4, 0.2, 2e-3, "dynamic trail at zero slip, (n/L)0 L", "MZ"),
-        *_pair("sy0", "1", 0.15, 0.01, 2.0, 0.03, "lateral slip where the trail changes sign", "MZ"),
-        *_pair("syED", "1", 0.25, 0.0, 5.0, 0.1, "slip from there to where no trail is left", "MZ"),
-        GlobalParameter(
-            name="SH", unit="rad", default=0.0, low=-0.1, high=0.1, size=1e-3,
-            text="equivalent slip angle of plysteer and steering zero", needs=("both_signs",),
-        ),
-        GlobalParameter(
-            name="K_IA", unit="1", default=0.0, low=-0.5, high=1.0, size=0.02,
-            text="lateral slip of camber over sin(IA)", needs=("camber",),
-        ),
-        GlobalParameter(
-            name="SV", unit="1", default=0.0, low=-0.2, high=0.2, size=0.01,
-            text="offset of FY over load (conicity)", needs=("both_signs",),
-        ),
-        GlobalParameter(
-            name="SM", unit="m", default=0.0, low=-0.05, high=0.05, size=1e-3,
-            text="offset of MZ over load", stage="MZ", needs=("both_signs",),
-        ),
-    ),
+    parameters=parameters(_with_changes(_TABLE) + SHIFT + _CAMBER + OFFSETS),
     forces=forces,
     starts=starts,
-)  # fmt: skip
+)

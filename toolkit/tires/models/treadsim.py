@@ -30,7 +30,8 @@ import numpy as np
 
 from toolkit.tires.bristles import Tread, balance, middles, summed
 from toolkit.tires.contact import bulged, half_length, slips, with_load
-from toolkit.tires.global_model import GlobalModel, GlobalParameter, Responses, Rows, Seeds
+from toolkit.tires.global_model import GlobalModel, Responses, Rows, Seeds
+from toolkit.tires.parameter_table import OFFSETS, SHIFT, parameters
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -40,6 +41,24 @@ if TYPE_CHECKING:
 BRISTLES = 40
 LINES = 5
 _THIN = 1e-2  # of the mean pressure: friction does not grow without end where the pressure vanishes
+
+# name, unit, default, low, high, size, stage, needs, text
+_TABLE = """
+C     1/rad  20.0    1.0  300.0    1.0  FY  -  cornering stiffness of the tread over load at FNOMIN
+C_Z   1       0.0   -2.0    2.0    0.1  FY  2  its change with load: C exp(C_Z dfz)
+A     m      0.07  0.002    0.5  0.005  MZ  -  half contact length at FNOMIN
+A_P   1       0.5   0.05    1.5    0.1  MZ  2  its growth with load: a = A (FZ/FNOMIN)^A_P
+N     1       2.0    1.0   12.0    1.0  FY  -  exponent of the pressure: 2 a parabola, large an even one
+SKEW  1       0.0   -0.9    0.9   0.15  MZ  -  pressure at the leading edge against the trailing one
+MU    1       1.0   0.05    6.0   0.05  FY  -  friction at the mean pressure of FNOMIN without sliding
+MU_P  1       0.0    0.0    0.9    0.1  FY  2  fall of friction with local pressure, exponent
+MU_V  s/m     0.0    0.0    1.0   0.03  FY  -  fall of friction with sliding speed
+YAW   1       0.0    0.0    1.2    0.1  MZ  -  yaw compliance of the carcass
+BEND  1       0.0    0.0    2.0    0.1  MZ  -  bending compliance of the carcass
+LAT   m       0.0    0.0    0.2  0.002  MZ  a  lateral displacement of the patch for FY = FNOMIN
+B     m      0.08    0.0    0.3   0.01  MZ  c  half the width of the tread
+EPS   1       0.5   -0.5    1.0    0.1  FY  c  part of camber that the tire's deformation takes up
+"""
 
 
 def forces(values: Sequence[Any], rows: Rows, *, bristles: int = BRISTLES, lines: int = LINES) -> Responses:
@@ -94,8 +113,8 @@ def _flat(arrays: Mapping[str, Any]) -> tuple[tuple[int, ...], dict[str, Array]]
 
 def starts(seeds: Seeds) -> tuple[Mapping[str, float], ...]:
     """Return start values: stiffness, peak and trail of each load, with a stiff and two soft carcasses."""
-    stiffness, change = _law(seeds, seeds.stiffness / seeds.load)
-    friction, fade = _law(seeds, seeds.peak / seeds.load)
+    stiffness, change = seeds.law(seeds.stiffness / seeds.load)
+    friction, fade = seeds.law(seeds.peak / seeds.load)
     trail = seeds.at_nominal(seeds.trail)[0]
     start = {
         "C": 1.3 * stiffness, "C_Z": change, "MU": 1.1 * friction,
@@ -105,11 +124,6 @@ def starts(seeds: Seeds) -> tuple[Mapping[str, float], ...]:
         start["A"] = 2.5 * trail
     soft = {**start, "C": 1.8 * stiffness, "YAW": 0.4, "BEND": 0.2, "N": 4.0}
     return start, soft, {**soft, "MU_V": 0.03, "SKEW": 0.3, "MU": 1.3 * friction}
-
-
-def _law(seeds: Seeds, ratio: Any) -> tuple[float, float]:
-    base, slope = seeds.at_nominal(np.log(ratio))
-    return float(np.exp(base)), slope
 
 
 MODEL = GlobalModel(
@@ -122,76 +136,7 @@ MODEL = GlobalModel(
     channels=("FY", "MZ"),
     joint=True,
     grid=BRISTLES,
-    parameters=(
-        GlobalParameter(
-            name="C", unit="1/rad", default=20.0, low=1.0, high=300.0, size=1.0,
-            text="cornering stiffness of the tread over load at FNOMIN",
-        ),
-        GlobalParameter(
-            name="C_Z", unit="1", default=0.0, low=-2.0, high=2.0, size=0.1,
-            text="its change with load: C exp(C_Z dfz)", needs=("two_loads",),
-        ),
-        GlobalParameter(
-            name="A", unit="m", default=0.07, low=0.002, high=0.5, size=0.005,
-            text="half contact length at FNOMIN", stage="MZ",
-        ),
-        GlobalParameter(
-            name="A_P", unit="1", default=0.5, low=0.05, high=1.5, size=0.1,
-            text="its growth with load: a = A (FZ/FNOMIN)^A_P", stage="MZ", needs=("two_loads",),
-        ),
-        GlobalParameter(
-            name="N", unit="1", default=2.0, low=1.0, high=12.0, size=1.0,
-            text="exponent of the pressure: 2 a parabola, large an even one",
-        ),
-        GlobalParameter(
-            name="SKEW", unit="1", default=0.0, low=-0.9, high=0.9, size=0.15,
-            text="pressure at the leading edge against the trailing one", stage="MZ",
-        ),
-        GlobalParameter(
-            name="MU", unit="1", default=1.0, low=0.05, high=6.0, size=0.05,
-            text="friction at the mean pressure of FNOMIN without sliding",
-        ),
-        GlobalParameter(
-            name="MU_P", unit="1", default=0.0, low=0.0, high=0.9, size=0.1,
-            text="fall of friction with local pressure, exponent", needs=("two_loads",),
-        ),
-        GlobalParameter(
-            name="MU_V", unit="s/m", default=0.0, low=0.0, high=1.0, size=0.03,
-            text="fall of friction with sliding speed",
-        ),
-        GlobalParameter(
-            name="YAW", unit="1", default=0.0, low=0.0, high=1.2, size=0.1,
-            text="yaw compliance of the carcass", stage="MZ",
-        ),
-        GlobalParameter(
-            name="BEND", unit="1", default=0.0, low=0.0, high=2.0, size=0.1,
-            text="bending compliance of the carcass", stage="MZ",
-        ),
-        GlobalParameter(
-            name="LAT", unit="m", default=0.0, low=0.0, high=0.2, size=2e-3,
-            text="lateral displacement of the patch for FY = FNOMIN", stage="MZ", needs=("alpha_and_kappa",),
-        ),
-        GlobalParameter(
-            name="B", unit="m", default=0.08, low=0.0, high=0.3, size=0.01,
-            text="half the width of the tread", stage="MZ", needs=("camber",),
-        ),
-        GlobalParameter(
-            name="EPS", unit="1", default=0.5, low=-0.5, high=1.0, size=0.1,
-            text="part of camber that the tire's deformation takes up", needs=("camber",),
-        ),
-        GlobalParameter(
-            name="SH", unit="rad", default=0.0, low=-0.1, high=0.1, size=1e-3,
-            text="equivalent slip angle of plysteer and steering zero", needs=("both_signs",),
-        ),
-        GlobalParameter(
-            name="SV", unit="1", default=0.0, low=-0.2, high=0.2, size=0.01,
-            text="offset of FY over load (conicity)", needs=("both_signs",),
-        ),
-        GlobalParameter(
-            name="SM", unit="m", default=0.0, low=-0.05, high=0.05, size=1e-3,
-            text="offset of MZ over load", stage="MZ", needs=("both_signs",),
-        ),
-    ),
+    parameters=parameters(_TABLE + SHIFT + OFFSETS),
     forces=forces,
     starts=starts,
-)  # fmt: skip
+)
