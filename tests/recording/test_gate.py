@@ -77,7 +77,7 @@ def test_a_good_workbook_passes(tmp_path):
         (b"just some words", "not-a-workbook", "text"),
         (b"<html><body>", "not-a-workbook", "HTML"),
         (b"\xff\xfeF\x00Z\x00", "not-a-workbook", "UTF-16"),
-        (b"TDSm" + bytes(40), "not-a-workbook", "TDMS"),
+        (b"TDSm" + bytes(40), "format-version", "TDMS"),
         (bytes(range(256)), "not-a-workbook", "binary"),
         (b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1" + "Workbook".encode("utf-16-le"), "not-a-workbook", ".xls"),
         (

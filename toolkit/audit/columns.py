@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolkit.recording.digits import half_last_place
+from toolkit.recording.digits import rounding
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -59,12 +59,13 @@ def columns_of(recording: Recording) -> Columns:
     cells = [one for one in recording.series if one.role == "indication"]
     own = [one for one in recording.series if one.role == "acquired" and one.symbol in LOADS]
     x = np.column_stack([one.values for one in cells]) if cells else np.empty((recording.rows, 0))
+    half_x = np.column_stack([rounding(one) for one in cells]) if cells else np.empty_like(x)
     return Columns(
         names=tuple(one.symbol for one in cells),
         units=tuple(one.unit for one in cells),
         x=x,
-        half_x=half_last_place(x),
+        half_x=half_x,
         y={one.symbol: one.values for one in own},
-        half_y={one.symbol: half_last_place(one.values) for one in own},
+        half_y={one.symbol: rounding(one) for one in own},
         y_units={one.symbol: one.unit for one in own},
     )

@@ -24,6 +24,7 @@ from toolkit.audit.identify import recompute
 from toolkit.errors import OutputError, ToolkitError
 from toolkit.files import sha256_bytes, sha256_file, write_atomic
 from toolkit.recording.folder import TEST_FILE, nearest_test_toml
+from toolkit.recording.formats.write import WRITERS, Written
 from toolkit.recording.labview import write_labview
 from toolkit.recording.marks import GENERATOR, OWN_OUTPUT
 from toolkit.recording.read import read_recording
@@ -153,6 +154,10 @@ def _write(
     if recording.format == "csv":
         write_atomic(place, _csv(recording, new))
         return
+    title = f"corrected copy of {recording.name}, sha256 {recording.sha256}; Fy and Mz by {record.id}"
+    if recording.format in WRITERS:
+        write_atomic(place, WRITERS[recording.format](_written(recording, new), title))
+        return
     machine = recording.machine
     known = {column.symbol: column.unit for column in machine.columns}
     columns: dict[str, NDArray[np.float64]] = {}
@@ -163,8 +168,19 @@ def _write(
             unit, name = one.unit, f"{one.symbol} [{one.unit}]"
         values = one.values if unit == one.unit else from_si(one.si, unit)
         columns[name] = np.asarray(from_si(new[one.symbol], unit) if one.symbol in new else values)
-    title = f"corrected copy of {recording.name}, sha256 {recording.sha256}; Fy and Mz by {record.id}"
     write_labview(place, machine, columns, simulated=recording.simulated, title=title)
+
+
+def _written(recording: Recording, new: Mapping[str, NDArray[np.float64]]) -> list[Written]:
+    return [
+        Written(
+            symbol=one.symbol,
+            header=one.header,
+            unit=one.unit,
+            values=new[one.symbol] / si_scale(one.unit) if one.symbol in new else one.values,
+        )
+        for one in recording.series
+    ]
 
 
 def _csv(recording: Recording, new: Mapping[str, NDArray[np.float64]]) -> str:
@@ -173,9 +189,7 @@ def _csv(recording: Recording, new: Mapping[str, NDArray[np.float64]]) -> str:
     # A header that a spreadsheet would take for a formula is made a text.
     headers = [one.header for one in recording.series]
     writer.writerow([f"'{text}" if text.startswith(("=", "+", "-", "@")) else text for text in headers])
-    columns = [
-        new[one.symbol] / si_scale(one.unit) if one.symbol in new else one.values for one in recording.series
-    ]
+    columns = [one.values for one in _written(recording, new)]
     writer.writerows([repr(float(v)) for v in row] for row in np.column_stack(columns))
     return stream.getvalue()
 

@@ -44,7 +44,9 @@ def done(result: FileAudit | OwnOutput) -> Done:
     """Return a result as it is kept."""
     if isinstance(result, OwnOutput):
         return Done(result.sha256, b"null")
-    return Done(result.sha256, json.dumps(to_plain(result)).encode())
+    # What a library would have read is asked again: it may be installed by then.
+    lacking = result.reason is not None and result.reason.startswith("missing-extra")
+    return Done(None if lacking else result.sha256, json.dumps(to_plain(result)).encode())
 
 
 class Files(Sequence[FileAudit]):

@@ -66,11 +66,11 @@ def assign_columns(headers: Sequence[str], machine: Machine, *, where: object) -
 
 def looks_like_header(headers: Sequence[str], machine: Machine) -> bool:
     """Tell whether a row has at least one header of the machine: enough to take it for a recording's."""
-    return any(_machine_column(_split(header)[0], machine) is not None for header in headers)
+    return any(_machine_column(split_header(header)[0], machine) is not None for header in headers)
 
 
 def _assign(index: int, header: str, machine: Machine, where: object) -> Assigned:
-    name, printed = _split(header)
+    name, printed = split_header(header)
     column = _machine_column(name, machine)
     if printed is None:
         # Without a printed unit only the machine's own header has one: a bare symbol could be anything.
@@ -96,7 +96,8 @@ def _assign(index: int, header: str, machine: Machine, where: object) -> Assigne
     )
 
 
-def _split(header: str) -> tuple[str, str | None]:
+def split_header(header: str) -> tuple[str, str | None]:
+    """Return a header's name and the unit in its brackets, None where there is none."""
     if len(header) > _LONGEST:
         return header[:_LONGEST], None
     match = _WITH_UNIT.fullmatch(header.strip())

@@ -52,7 +52,7 @@ def read_csv(gated: Gated, machine: Machine) -> Table:
                 rule="not-a-workbook",
             )
         rows = [
-            [_value(cell) for cell in row]
+            [number_or_text(cell) for cell in row]
             for row in csv.reader(io.StringIO(text, newline=""), delimiter=separator, strict=True)
         ]
     except csv.Error as error:
@@ -68,7 +68,8 @@ def read_csv(gated: Gated, machine: Machine) -> Table:
     return Table(where=str(gated.path), rows=[row + [""] * (width - len(row)) for row in rows])
 
 
-def _value(cell: str) -> float | str:
+def number_or_text(cell: str) -> float | str:
+    """Return a cell as a number where it is one in plain digits or a word such as ``nan``, else as text."""
     # float() alone would take '1_000' and digits of other scripts.
     text = cell.strip()
     if _NUMBER.fullmatch(text) or text.lower() in _NO_NUMBER:

@@ -21,6 +21,8 @@ import numpy as np
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
+    from toolkit.recording.model import Series
+
 FULL_DIGITS = 15
 _FEW = 6
 _FULL = 999
@@ -52,6 +54,15 @@ def half_last_place(values: ArrayLike) -> NDArray[np.float64]:
     for column in range(table.shape[1]):
         _column(table[:, column], half[:, column])
     return half.reshape(given.shape)
+
+
+def rounding(series: Series) -> NDArray[np.float64]:
+    """Return how far each value may lie from the one that was measured (rows,), in the channel's unit.
+
+    Half a unit of its last printed place, or half the step in which a binary file stores it if that is more.
+    """
+    printed = half_last_place(series.values)
+    return printed if series.half is None else np.maximum(printed, series.half)
 
 
 def _column(values: NDArray[np.float64], half: NDArray[np.float64]) -> None:

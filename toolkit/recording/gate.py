@@ -1,7 +1,8 @@
 """The gate: a file from outside is hostile until it has passed here; no reader sees it before.
 
 Rules (``error.rule``): ``not-a-workbook empty-file zip-truncated zip-damaged zip-method encrypted
-member-path members inflation macro external-link embedded-object dtd encoding xml far-cell doubled-cell``.
+member-path members inflation macro external-link embedded-object dtd encoding xml far-cell doubled-cell
+truncated damaged format-version formula not-numbers``.
 """
 
 from __future__ import annotations
@@ -18,6 +19,9 @@ from toolkit.files import sha256_bytes
 from toolkit.recording.archive import MAX_FILE_BYTES, read_members
 from toolkit.recording.cells import MalformedSheetError, find_cells
 from toolkit.recording.sniff import Kind, office_kind, ole_kind, sniff
+from toolkit.recording.walks.mat import unpack_mat
+from toolkit.recording.walks.mdf import walk_mdf
+from toolkit.recording.walks.tdms import walk_tdms
 
 _FOREIGN = "find out where the file comes from; the machine does not write such files"
 _RELATIONSHIP = "{http://schemas.openxmlformats.org/package/2006/relationships}Relationship"
@@ -30,9 +34,10 @@ _OBJECT_PARTS = ("xl/embeddings/", "xl/activex/", "xl/ctrlprops/", "xl/webextens
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Gated:
-    """A file that passed: its bytes, their SHA-256, its kind (``xlsx`` or ``text``), and what is inside.
+    """A file that passed: its bytes, their SHA-256, its kind, and what is inside.
 
-    ``members`` of a workbook: name -> inflated content.
+    ``kind`` is ``xlsx``, ``text``, ``lvm``, ``mat``, ``mdf`` or ``tdms``. ``members`` of a workbook: name ->
+    inflated content; of a MAT-file: ``mat`` -> the file with its arrays unpacked.
     """
 
     path: Path
@@ -55,8 +60,11 @@ def gate(path: Path, data: bytes | None = None) -> Gated:
     if data is None:
         data = _bytes(path)
     kind = sniff(data)
-    if kind.id == "text":
-        return Gated(path=path, data=data, sha256=sha256_bytes(data), kind="text", members={})
+    if kind.id in _PLAIN:
+        return Gated(path=path, data=data, sha256=sha256_bytes(data), kind=kind.id, members={})
+    if kind.id in _WALKED:
+        members = _WALKED[kind.id](data, path)
+        return Gated(path=path, data=data, sha256=sha256_bytes(data), kind=kind.id, members=members)
     if kind.id == "ole":
         kind = ole_kind(data)
         if kind.id == "encrypted":
@@ -84,11 +92,11 @@ def check_workbook(path: Path) -> Gated:
     Raises
     ------
     UnreadableError
-        as `gate`, and for a text file
+        as `gate`, and for any other kind of recording
     """
     gated = gate(path)
     if gated.kind != "xlsx":
-        _no_workbook(path, Kind("text", "a text file"))
+        _no_workbook(path, sniff(gated.data))
     return gated
 
 
@@ -124,6 +132,24 @@ def check_members(members: Mapping[str, bytes], *, where: Path) -> None:
             or content[:64].lstrip(b"\xef\xbb\xbf \t\r\n")[:1] == b"<"
         ):
             _check_xml(name, content, where)
+
+
+def _walk_mat(data: bytes, where: Path) -> Mapping[str, bytes]:
+    return {"mat": unpack_mat(data, where)}
+
+
+def _walk_mdf(data: bytes, where: Path) -> Mapping[str, bytes]:
+    walk_mdf(data, where)
+    return {}
+
+
+def _walk_tdms(data: bytes, where: Path) -> Mapping[str, bytes]:
+    walk_tdms(data, where)
+    return {}
+
+
+_PLAIN = ("text", "lvm")
+_WALKED = {"mat": _walk_mat, "mdf": _walk_mdf, "tdms": _walk_tdms}
 
 
 def _check_xml(name: str, xml: bytes, where: Path) -> None:
@@ -196,7 +222,7 @@ def _bytes(path: Path) -> bytes:
 
 def _no_workbook(where: Path, kind: Kind) -> NoReturn:
     _refuse("not-a-workbook", f"the file is {kind.text}, not a recording", where, kind.text,
-            "an .xlsx workbook or a CSV file with a header row",
+            "an .xlsx workbook, a CSV file with a header row, or TDMS, LVM, MDF 4 or MAT (version 5 to 7)",
             "give the file that the acquisition program wrote")  # fmt: skip
 
 

@@ -25,6 +25,8 @@ class Series:
     """One column of a recording.
 
     ``values`` (rows,) float64, read-only, in ``unit`` as the file has them; ``header`` as written there.
+    ``half`` (rows,): half the step in which a binary file stores a value, in ``unit``; None where what its
+    digits show is all that is known of its rounding.
     """
 
     symbol: str
@@ -32,6 +34,7 @@ class Series:
     unit: str
     role: Role
     values: NDArray[np.float64]
+    half: NDArray[np.float64] | None = None
 
     @property
     def si(self) -> NDArray[np.float64]:

@@ -8,6 +8,8 @@ from typing import Literal
 from toolkit.errors import RecordingError, UnreadableError
 from toolkit.machine import Machine
 from toolkit.recording.csvfile import read_csv
+from toolkit.recording.formats import READERS
+from toolkit.recording.formats.vectors import series_of
 from toolkit.recording.gate import gate
 from toolkit.recording.marks import OWN_OUTPUT, RECORDING, SIMULATED, keywords_of, machine_named, saved_on
 from toolkit.recording.model import Recording
@@ -24,7 +26,7 @@ def read_recording(
 
     Parameters
     ----------
-    path : an .xlsx workbook or a CSV file, under any name
+    path : an .xlsx workbook, a CSV file, or TDMS, LVM, MDF 4 or a MAT-file, under any name
     machine : the machine that wrote it
     reader : ``both`` has openpyxl read every cell a second time
     data : the file's content where the caller has read it already
@@ -39,6 +41,8 @@ def read_recording(
         text, an error value, NaN or nothing stands in a number's place
     RecordingError
         several worksheets look like recordings, or the file names another machine
+    ConfigError
+        rule ``missing-extra``: the library that reads the file's format is not installed
     """
     gated = gate(path, data)
     if gated.kind == "text":
@@ -49,6 +53,15 @@ def read_recording(
             series=read_table(read_csv(gated, machine), machine),
             simulated=machine.simulated,
             format="csv",
+        )
+    if gated.kind in READERS:
+        return Recording(
+            path=path,
+            sha256=gated.sha256,
+            machine=machine,
+            series=series_of(READERS[gated.kind](gated, machine), machine),
+            simulated=machine.simulated,
+            format=gated.kind,
         )
     properties = gated.members.get("docProps/core.xml", b"")
     keywords = keywords_of(properties)

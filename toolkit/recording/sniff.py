@@ -33,10 +33,14 @@ _MAGIC = (
     (b"MZ", Kind("program", "a Windows program")),
     (b"TDSm", Kind("tdms", "a LabVIEW TDMS file")),
     (b"MDF     ", Kind("mdf", "an MDF measurement file")),
+    (b"UnFinMF ", Kind("mdf", "an MDF measurement file")),
     (b"MATLAB 5.0 MAT-file", Kind("mat", "a MATLAB file")),
+    (b"MATLAB 7.3 MAT-file", Kind("mat", "a MATLAB file")),
     (b"\x89HDF\r\n\x1a\n", Kind("hdf5", "an HDF5 file")),
     (b"SQLite format 3\x00", Kind("sqlite", "an SQLite database")),
     (b"LabVIEW Measurement", Kind("lvm", "a LabVIEW .lvm file")),
+    (b"\xef\xbb\xbfLabVIEW Measurement", Kind("lvm", "a LabVIEW .lvm file")),
+    (b"PAR1", Kind("parquet", "a Parquet table")),
 )
 _WIDE = {b"\xff\xfe": "UTF-16", b"\xfe\xff": "UTF-16"}
 _BOM = b"\xef\xbb\xbf"

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from toolkit.calibration.apply import apply_record
-from toolkit.recording.digits import half_last_place
+from toolkit.recording.digits import rounding
 from toolkit.units import si_scale
 
 if TYPE_CHECKING:
@@ -61,11 +61,11 @@ def compare(
         for offset in ((None, tare) if tare else (None,))
         for issued in (False, True)
     ]
-    halves = {name: half_last_place(values) for name, values in indications.items()}
+    halves = {name: rounding(recording[name]) for name in indications}
     found = []
     for one in channels:
         bound = _moved(record, one.symbol, indications, units, halves, plain=readings[0][one.symbol])
-        bound = bound + half_last_place(one.values) * si_scale(one.unit) + 1e-9 * np.abs(one.si)
+        bound = bound + rounding(one) * si_scale(one.unit) + 1e-9 * np.abs(one.si)
         misses = [np.abs(reading[one.symbol] - one.si) for reading in readings]
         found.append(
             Difference(

@@ -1,0 +1,247 @@
+"""LVM: LabVIEW's text measurement files.
+
+By National Instruments' "Specification for the LabVIEW Measurement File (.lvm)": a header of tagged lines
+gives the separator and the decimal sign; each segment has a header of its own (or the first alone has one),
+a line of channel names and rows of values; special blocks are passed over. A channel's unit is its
+``Y_Unit_Label``. The x values are a channel where the file saves them: time, unless ``X_Dimension`` says
+otherwise. With ``X_Columns No`` they are not saved, and none is made up.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from toolkit.errors import ColumnError, RecordingError, UnreadableError
+from toolkit.machine import Machine
+from toolkit.recording.csvfile import number_or_text
+from toolkit.recording.formats.vectors import Vector, Vectors, one_table
+from toolkit.recording.table import judge, refuse_cell
+from toolkit.recording.walks.refuse import damaged, truncated
+
+if TYPE_CHECKING:
+    from toolkit.recording.gate import Gated
+
+_END = "***End_of_Header***"
+_SPECIAL, _SPECIAL_END = "***Start_Special***", "***End_Special***"
+_X = "X_Value"
+_COMMENT = "Comment"
+_UNNAMED_UNIT = "default si unit"  # the specification's word for a label that says nothing
+_SEPARATORS = {"tab": "\t", "comma": ",", "semicolon": ";"}
+
+
+@dataclass(slots=True)
+class _Segment:
+    """One segment: its tags, the fields of its line of names, and (line number, fields) of its rows."""
+
+    tags: dict[str, list[str]]
+    names: list[str] = field(default_factory=list)
+    rows: list[tuple[int, list[str]]] = field(default_factory=list)
+
+    def tag(self, name: str, column: int) -> str:
+        values = self.tags.get(name, [])
+        return values[column].strip() if column < len(values) else ""
+
+
+def read_lvm(gated: Gated, machine: Machine) -> Vectors:
+    """Return the channels of an LVM file, its segments one after the other.
+
+    Raises
+    ------
+    UnreadableError
+        rule ``unreadable truncated damaged no-data``
+    ColumnError
+        rule ``doubled-column``: channels with time columns that differ
+    CellError
+        rule ``text-cell empty-cell nan-cell``: with the line of the file
+    RecordingError
+        rule ``several-sheets``: segments with other channels than the first
+    """
+    lines = _text(gated.data).splitlines()
+    head, start, separator = _header(lines, gated)
+    decimal = head.get("Decimal_Separator", ".")[:1] or "."
+    segments = _segments(lines, start, separator, head.get("Multi_Headings", "No"), gated)
+    filled = [one for one in segments if one.rows]
+    if not filled:
+        raise UnreadableError(
+            "the LVM file has no data", where=gated.path, got=f"{len(segments)} segments without rows",
+            expected="a line of channel names and rows of numbers",
+            next_step="repeat the recording, or leave the file out of the test", rule="no-data",
+        )  # fmt: skip
+    columns = _columns(filled[0], head.get("X_Columns", "One"), gated)
+    for other in filled[1:]:
+        if _columns(other, head.get("X_Columns", "One"), gated) != columns:
+            raise RecordingError(
+                "the segments of the LVM file have different channels",
+                where=f"{gated.path}, line {other.rows[0][0] - 1}",
+                got=", ".join(other.names)[:300],
+                expected=", ".join(filled[0].names)[:300],
+                next_step="save each segment as a file of its own",
+                rule="several-sheets",
+            )
+    rows = [row for one in filled for row in one.rows]
+    vectors = [
+        Vector(name=name, unit=unit, values=_values(rows, place, name, decimal, gated))
+        for place, name, unit in columns
+    ]
+    return one_table(
+        [Vectors(where=str(gated.path), vectors=_one_time(vectors, gated))], machine, where=gated.path
+    )
+
+
+def _text(data: bytes) -> str:
+    # The specification says ASCII; LabVIEW writes names and units in the system's own code page.
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        return data.decode("cp1252", "replace")
+
+
+def _header(lines: list[str], gated: Gated) -> tuple[dict[str, str], int, str]:
+    end = next((number for number, line in enumerate(lines) if line.startswith(_END)), None)
+    if end is None:
+        truncated(gated.path, "the LVM file ends within its header", f"{len(lines)} lines", _END)
+    separator = "\t"
+    for line in lines[:end]:
+        if line.startswith("Separator"):
+            said = line.removeprefix("Separator")
+            separator = said[:1] or "\t"
+            word = said[1:].strip(said[:1] + " ").casefold()
+            if _SEPARATORS.get(word, separator) != separator or separator not in _SEPARATORS.values():
+                raise UnreadableError(
+                    "the LVM file has a separator that is not read", where=gated.path, got=repr(said),
+                    expected="a tab, comma or semicolon",
+                    next_step="save it again with tabs", rule="unreadable",
+                )  # fmt: skip
+    head = {}
+    for line in lines[1:end]:
+        name, _, value = line.partition(separator)
+        # The decimal sign may be the separator itself: then nothing but its place tells it.
+        head[name] = value if name == "Decimal_Separator" else value.partition(separator)[0].strip()
+    return head, end + 1, separator
+
+
+def _segments(lines: list[str], place: int, separator: str, multi: str, gated: Gated) -> list[_Segment]:
+    found: list[_Segment] = []
+    while (place := _skip(lines, place, separator, gated)) < len(lines):
+        fields = _split(lines[place], separator)
+        if fields[0] == "Channels" or (not found and _ahead(lines, place)):
+            segment = _Segment({})
+            while not lines[place].startswith(_END):
+                fields = _split(lines[place], separator)
+                segment.tags[fields[0]] = fields[1:]
+                place += 1
+                if place == len(lines):
+                    truncated(
+                        gated.path, "the LVM file ends within a segment's header", f"line {place}", _END
+                    )
+            place += 1
+            if place == len(lines):
+                truncated(gated.path, "the LVM file ends before a segment's names", f"line {place}", _X)
+            segment.names = [name.strip() for name in _split(lines[place], separator)]
+            found.append(segment)
+            place += 1
+        elif not found:
+            found.append(_Segment({}, [name.strip() for name in fields]))  # names without a segment's header
+            place += 1
+        else:
+            found[-1].rows.append((place + 1, fields))
+            place += 1
+    for one in found:
+        _check_rows(one, exact=multi.casefold() == "yes", gated=gated)
+    return found
+
+
+def _ahead(lines: Sequence[str], place: int) -> bool:
+    return any(line.startswith(_END) for line in lines[place : place + 40])
+
+
+def _skip(lines: list[str], place: int, separator: str, gated: Gated) -> int:
+    while place < len(lines):
+        if lines[place].startswith(_SPECIAL):
+            begin = place
+            while place < len(lines) and not lines[place].startswith(_SPECIAL_END):
+                place += 1
+            if place == len(lines):
+                truncated(gated.path, "a special block of the LVM file does not end", f"line {begin + 1}",
+                          _SPECIAL_END)  # fmt: skip
+        elif lines[place].strip(separator + " \t"):
+            return place
+        place += 1
+    return place
+
+
+def _check_rows(one: _Segment, *, exact: bool, gated: Gated) -> None:
+    claims = [text.strip() for text in one.tags.get("Samples", [])]
+    most = max((int(text) for text in claims if re.fullmatch("[0-9]{1,9}", text)), default=None)
+    if most is None:
+        return
+    if len(one.rows) < most:
+        truncated(gated.path, "the LVM file has fewer rows than it says", len(one.rows), f"{most} samples")
+    if exact and len(one.rows) > most:
+        damaged(gated.path, "the LVM file has more rows than it says", len(one.rows), f"{most} samples")
+
+
+def _columns(one: _Segment, saved: str, gated: Gated) -> list[tuple[int, str, str | None]]:
+    """Return (place in the row, name, unit) of the channels of a segment."""
+    found: list[tuple[int, str, str | None]] = []
+    channels = 0
+    for place, name in enumerate(one.names):
+        # The tags of a channel stand in its column; one field, the tag's own name, was taken off.
+        if name == _X:
+            if saved.casefold() != "no":
+                dimension = one.tag("X_Dimension", place) or "Time"
+                label = _label(one.tag("X_Unit_Label", place))
+                is_time = dimension.casefold() == "time"
+                found.append((place, "t" if is_time else dimension, label or ("s" if is_time else None)))
+        elif name and name != _COMMENT:
+            channels += 1
+            found.append((place, name, _label(one.tag("Y_Unit_Label", place - 1))))
+    said = one.tag("Channels", 0)
+    if said and said != str(channels):
+        damaged(gated.path, "the LVM file names more or fewer channels than it says", channels, said)
+    return found
+
+
+def _label(text: str) -> str | None:
+    return None if not text or text.casefold() == _UNNAMED_UNIT else text
+
+
+def _values(
+    rows: list[tuple[int, list[str]]], place: int, name: str, decimal: str, gated: Gated
+) -> np.ndarray:
+    values = []
+    for line, fields in rows:
+        text = fields[place] if place < len(fields) else ""
+        if decimal == ",":
+            text = text.replace(".", "?").replace(",", ".")
+        value = number_or_text(text)
+        rule, got = judge(value)
+        if rule is not None:
+            refuse_cell(rule, got, str(gated.path), line, place + 1, name)
+        values.append(value)
+    return np.array(values, dtype=np.float64)
+
+
+def _one_time(vectors: list[Vector], gated: Gated) -> list[Vector]:
+    # With `X_Columns Multi` every channel brings its own; they must be the same to be one recording's rows.
+    times = [one for one in vectors if one.name == "t"]
+    for one in times[1:]:
+        if one.unit != times[0].unit or not np.array_equal(one.values, times[0].values):
+            raise ColumnError(
+                "the channels of the LVM file were not sampled together",
+                where=gated.path,
+                got="columns of x values that differ",
+                expected="one time for all channels",
+                next_step="resample the channels to one time when they are saved",
+                rule="doubled-column",
+            )
+    return [one for one in vectors if one.name != "t" or one is times[0]]
+
+
+def _split(line: str, separator: str) -> list[str]:
+    return line.split(separator)

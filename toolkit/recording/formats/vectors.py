@@ -1,0 +1,189 @@
+"""Named vectors, as files of channels hold them, to checked columns of numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from toolkit.errors import CellError, ColumnError, RecordingError, UnitError, UnreadableError
+from toolkit.machine import Machine
+from toolkit.recording.columns import assign_columns, looks_like_header, split_header
+from toolkit.recording.model import Series
+from toolkit.units import unit
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Vector:
+    """One channel of a file: its name, the unit that the file states beside it (None: none), its values.
+
+    ``half``: half the step in which the file could store a value (rows,), in the channel's unit; None where
+    that is finer than its printed digits.
+    """
+
+    name: str
+    unit: str | None
+    values: NDArray[Any]
+    half: NDArray[np.float64] | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Vectors:
+    """The channels that a file keeps together, and where they stand, for the messages."""
+
+    where: str
+    vectors: Sequence[Vector]
+
+
+def one_table(tables: Sequence[Vectors], machine: Machine, *, where: object) -> Vectors:
+    """Return the one of a file's groups of channels that is the recording.
+
+    Raises
+    ------
+    RecordingError
+        rule ``several-sheets``: more than one has headers of the machine
+    UnreadableError
+        rule ``no-data``: there is no group with channels
+    """
+    filled = [one for one in tables if one.vectors]
+    if not filled:
+        raise UnreadableError(
+            "the file has no channels", where=where, got="no channel", expected="channels with values",
+            next_step="repeat the recording, or leave the file out of the test", rule="no-data",
+        )  # fmt: skip
+    fitting = [one for one in filled if looks_like_header([v.name for v in one.vectors], machine)]
+    if len(fitting) > 1:
+        raise RecordingError(
+            "more than one group of channels looks like a recording",
+            where=where,
+            got="; ".join(one.where for one in fitting)[:300],
+            expected="one",
+            next_step="save each group as a file of its own",
+            rule="several-sheets",
+        )
+    return (fitting or filled)[0]
+
+
+def series_of(table: Vectors, machine: Machine) -> tuple[Series, ...]:
+    """Return the channels of a table by the machine's definition.
+
+    Raises
+    ------
+    ColumnError
+        see `toolkit.recording.columns.assign_columns`; ``doubled-unit``: a name and its unit disagree
+    CellError
+        rule ``text-cell boolean-cell date-cell empty-cell nan-cell``: the first bad value, by its row
+    UnreadableError
+        rule ``no-data not-numbers``
+    """
+    headers = [_header(one, table.where) for one in table.vectors]
+    assigned = assign_columns(headers, machine, where=table.where)
+    rows = max(len(one.values) for one in table.vectors)
+    if rows == 0:
+        raise UnreadableError(
+            "the recording has no data", where=table.where, got="channels without values",
+            expected="at least one row of numbers",
+            next_step="repeat the recording, or leave the file out of the test", rule="no-data",
+        )  # fmt: skip
+    return tuple(
+        Series(
+            symbol=one.symbol,
+            header=one.header,
+            unit=one.unit,
+            role=one.role,
+            values=_numbers(table.vectors[one.index], one.header, rows, table.where),
+            half=table.vectors[one.index].half,
+        )
+        for one in assigned
+    )
+
+
+def quantum(raw: NDArray[Any], values: NDArray[Any]) -> NDArray[np.float64] | None:
+    """Return half the step in which a file stores values: of a digitiser's counts, or of a single float.
+
+    Parameters
+    ----------
+    raw : (rows,) as they are stored
+    values : (rows,) after the file's own conversion, in its unit
+
+    Returns
+    -------
+    (rows,), or None: doubles, and whole numbers without a conversion, show their digits themselves. Also None
+    for counts whose conversion is not linear.
+    """
+    size = np.abs(values.astype(np.float64))
+    if raw.dtype.kind == "f" and raw.dtype.itemsize == 4:
+        return np.asarray(np.spacing(size.astype(np.float32)).astype(np.float64) / 2)
+    if raw.dtype.kind not in "iu" or raw.dtype == values.dtype:
+        return None
+    counts = raw.astype(np.float64)
+    low, high = int(np.argmin(counts)), int(np.argmax(counts))
+    if counts[low] == counts[high]:
+        return None
+    slope = (float(values[high]) - float(values[low])) / (counts[high] - counts[low])
+    straight = values[low] + slope * (counts - counts[low])
+    if not np.allclose(straight, values, rtol=0, atol=1e-9 * float(size.max())):
+        return None
+    return np.full(len(counts), abs(slope) / 2)
+
+
+def _header(one: Vector, where: str) -> str:
+    name, printed = split_header(one.name)
+    stated = (one.unit or "").strip()
+    if not stated:
+        return one.name
+    if printed is None:
+        return f"{name} [{stated}]"
+    try:
+        same = unit(printed, where=where).text == unit(stated, where=where).text
+    except UnitError:
+        same = printed.strip() == stated
+    if not same:
+        raise ColumnError(
+            f"channel {one.name!r} has two units",
+            where=where,
+            got=f"{printed!r} in its name, {stated!r} beside it",
+            expected="one unit",
+            next_step="correct the channel's unit in a copy of the file",
+            rule="doubled-unit",
+        )
+    return one.name
+
+
+def _numbers(one: Vector, header: str, rows: int, where: str) -> NDArray[np.float64]:
+    values = one.values
+    if values.ndim != 1 or values.dtype.kind not in "fiubSUM":
+        raise UnreadableError(
+            f"channel {header!r} holds no column of numbers", where=where,
+            got=f"{values.dtype} of shape {values.shape}", expected="one number a row",
+            next_step="export the channel as an array of numbers", rule="not-numbers",
+        )  # fmt: skip
+    kind = {"b": "boolean-cell", "S": "text-cell", "U": "text-cell", "M": "date-cell"}.get(values.dtype.kind)
+    if kind is not None and len(values):
+        _bad_cell(kind, repr(values[0])[:80], header, 1, where)
+    if len(values) < rows:
+        _bad_cell("empty-cell", f"the channel ends after {len(values)} of {rows} rows", header,
+                  len(values) + 1, where)  # fmt: skip
+    numbers = np.array(values, dtype=np.float64)
+    bad = ~np.isfinite(numbers)
+    if bad.any():
+        first = int(np.argmax(bad))
+        _bad_cell("nan-cell", str(numbers[first]), header, first + 1, where)
+    numbers.setflags(write=False)
+    return numbers
+
+
+def _bad_cell(rule: str, got: str, header: str, row: int, where: str) -> None:
+    raise CellError(
+        f"data row {row}, channel {header!r}: no number",
+        where=f"{where}, data row {row}, channel {header!r}",
+        got=got,
+        expected="a finite number",
+        next_step="look at that value in the file; repeat the recording or mend a copy of the file",
+        rule=rule,
+    )
