@@ -66,3 +66,14 @@ def test_a_standard_resistor_drifts(tmp_path):
 def test_calibration_factors_of_a_heat_flow_meter_need_nothing(tmp_path):
     made = diagnosed("zarr13", tmp_path)
     assert (made.verdict, made.effects) == ("nothing", ())
+
+
+def test_a_positioning_drive_rubs_and_its_force_has_an_offset(tmp_path):
+    made = diagnosed("emps-force", tmp_path)
+    dry = next(one for one in made.effects if one.name == "coulomb_friction")
+    steady = next(one for one in made.effects if {one.name, *one.equivalent_to} & {"constant_force"})
+    # Janot, Gautier, Brunot (2019), identified on the same recording: 20.4 N, 3.2 N
+    assert dry.parameters[0].value == pytest.approx(20.4, rel=0.1)
+    assert abs(steady.parameters[0].value) == pytest.approx(3.2, rel=0.2)
+    force = made.held_out[0]
+    assert force.augmented_rmse < force.refitted_rmse / 3

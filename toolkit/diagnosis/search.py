@@ -27,6 +27,7 @@ ALPHA = 0.003  # of the whole search, a step
 MOST_EFFECTS = 4
 _SHARPENED = 30  # starts whose gain is computed with the noise estimated anew
 _FAR_BEHIND = 0.25  # of the best gain: a candidate below cannot win a joint fit
+_MOST = 0.5  # of the held-out mean square: what a candidate far behind must take away
 _REFINED = 8  # candidates that are fitted jointly, of those that screening ranks first
 _BOUND = 1e-3
 _LEAST_GAIN = 1.5  # of the held-out log score
@@ -131,16 +132,13 @@ def search(problem: Problem, *, seed: int, budget: Budget) -> Search:
                 before = structure
             if turn == MOST_EFFECTS:
                 break
-            promising = [
-                one
-                for one in ranked
-                if p_of[id(one)] < ALPHA and one.gain > min(_FAR_BEHIND * ranked[0].gain, ranked[0].gain - 40)
-            ][:_REFINED]
-            if not promising:
-                break
-            told = ", ".join(dict.fromkeys(one.candidate.name for one in promising))
-            budget.check(f"step {turn + 1}: joint fits of {told}")
-            found = _best_step(problem, folds, base, held_base, promising, p_of)
+            found = None
+            for promising, least in _groups([one for one in ranked if p_of[id(one)] < ALPHA]):
+                told = ", ".join(dict.fromkeys(one.candidate.name for one in promising))
+                budget.check(f"step {turn + 1}: joint fits of {told}")
+                found = _best_step(problem, folds, base, held_base, promising, p_of, least)
+                if found is not None:
+                    break
             if found is None:
                 break
             base, held_base, step = found
@@ -207,6 +205,20 @@ def _is_sought(one: Candidate, turn: int) -> bool:
     return one.name != "quantisation" and not (one.discrete and turn > 1)
 
 
+def _groups(ranked: Sequence[Scored]) -> list[tuple[Sequence[Scored], float]]:
+    """Return candidates in the order of joint fits, with the least share of the error that each must take.
+
+    Those far behind the first cannot win against it; where none of the first can be fitted, they stand for
+    themselves, and have to explain most of what is left.
+    """
+    if not ranked:
+        return []
+    near = min(_FAR_BEHIND * ranked[0].gain, ranked[0].gain - 40)
+    first = [one for one in ranked if one.gain > near][:_REFINED]
+    behind = [one for one in ranked if all(one is not each for each in first)][:_REFINED]
+    return [(first, 2 * NOTICED), *([(behind, _MOST)] if behind else [])]
+
+
 def _best_step(
     problem: Problem,
     folds: Folds,
@@ -214,6 +226,7 @@ def _best_step(
     held_base: HeldOut,
     promising: Sequence[Scored],
     p_of: dict[int, float],
+    least: float,
 ) -> tuple[Fit, HeldOut, Step] | None:
     weight = 0.5 * math.log(sum(int(one.sum()) for one in problem.kept.values()))
     tried: list[tuple[float, Scored, Fit]] = []
@@ -227,7 +240,7 @@ def _best_step(
         gain = held.total - held_base.total
         if gain < _LEAST_GAIN or score - base.log_posterior < _LEAST_GAIN:
             continue
-        if _at_bound(made.active[-1]) or not _matters(problem, held_base, held):
+        if _at_bound(made.active[-1]) or not _matters(problem, held_base, held, least):
             continue
         rivals = tuple(
             Rival(
@@ -273,7 +286,7 @@ def _stepped(
             simulated={**held_base.simulated, name: _rounded(held_base.simulated[name], found.step)},
             fits=held_base.fits,
         )
-        if _matters(problem, held_base, held):
+        if _matters(problem, held_base, held, 2 * NOTICED):
             held_base = held
         base = with_steps
     return base, held_base, steps
@@ -283,14 +296,14 @@ def _rounded(values: NDArray[np.float64], step: float) -> NDArray[np.float64]:
     return np.asarray(step * np.round(values / step))
 
 
-def _matters(problem: Problem, before: HeldOut, after: HeldOut) -> bool:
-    """Tell whether some output's held-out error falls by what a user of the simulation would notice."""
+def _matters(problem: Problem, before: HeldOut, after: HeldOut, least: float) -> bool:
+    """Tell whether some output's held-out mean square falls by a share that a user would notice."""
     for name, kept in problem.kept.items():
         observed = problem.observed[name]
         one, other = (
             float(np.mean((observed[kept] - each.simulated[name][kept]) ** 2)) for each in (before, after)
         )
-        if other < one * (1 - 2 * NOTICED):
+        if other < one * (1 - least):
             return True
     return False
 
