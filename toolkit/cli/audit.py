@@ -40,6 +40,10 @@ def command(
         Path | None,
         typer.Option("--template", help="Word template of a summary, audit.docx and audit.pdf in --out."),
     ] = None,
+    parquet: Annotated[
+        Path | None,
+        typer.Option("--parquet", help="Also the results of all files as a Parquet table (.parquet)."),
+    ] = None,
     known_at: KnownAt = None,
     calibrations: Calibrations = None,
     home: Home = None,
@@ -58,9 +62,10 @@ def command(
     from toolkit.audit.corrected import check_target, write_copies
     from toolkit.audit.inventory import inventory
     from toolkit.audit.linked import link, read_reports
+    from toolkit.audit.parquet import check_parquet
     from toolkit.audit.since_good import drift_since, drifted_files
     from toolkit.calibration.registry.registry import Registry
-    from toolkit.cli.audit_answer import Answer, payload_of, text_of, write_folder
+    from toolkit.cli.audit_answer import Answer, payload_of, text_of, write_folder, write_table
 
     registry = Registry(calibrations_folder(calibrations, home))
     names = inventory(archive)
@@ -69,6 +74,8 @@ def command(
     drift = None if since_good is None else drift_since(registry, since_good)
     if repair is not None:
         check_target(archive, repair)
+    if parquet is not None:
+        check_parquet(parquet)
     opened = None
     if template is not None:
         from toolkit.report.template.package import read_template
@@ -116,6 +123,8 @@ def command(
         amended=amended,
     )
     written = () if out is None else write_folder(out, told, registry, opened)
+    if parquet is not None:
+        written = (*written, write_table(parquet, told))
     if json:
         seconds = time.perf_counter() - began
         rate = len(names) / seconds if seconds else None

@@ -117,6 +117,20 @@ def write_folder(out: Path, told: Answer, registry: Registry, template: Template
     return out / PAGE, out / LINES, done.docx, done.pdf
 
 
+def write_table(target: Path, told: Answer) -> Path:
+    """Write the results of all files as a Parquet table; return it.
+
+    Raises
+    ------
+    ConfigError, OutputError
+        see `toolkit.audit.parquet.write_parquet`
+    """
+    from toolkit.audit.parquet import write_parquet
+
+    write_parquet(target, _files(told), known_at=told.made.known_at, reports=told.linked is not None)
+    return target
+
+
 def text_of(told: Answer) -> str:
     """Return the answer for people."""
     made = told.made

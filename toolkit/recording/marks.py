@@ -143,7 +143,8 @@ def own_output(data: bytes) -> bool:
     """Tell whether this is the content of a result that the toolkit wrote.
 
     True for JSON with ``"generator": "toolkit"`` at the top level, an .xlsx or .docx whose keywords hold
-    `OWN_OUTPUT`, a PDF that carries it, and any other file that shows it in its first 4096 bytes.
+    `OWN_OUTPUT`, a PDF or a Parquet table that carries it, and any other file that shows it in its first
+    4096 bytes.
     """
     kind = sniff(data)
     if kind.id == "zip":
@@ -152,6 +153,8 @@ def own_output(data: bytes) -> bool:
         # Writers store the keywords as bytes, as UTF-16 or as hexadecimal UTF-16, or in the XMP packet.
         wide = OWN_OUTPUT.encode("utf-16-be")
         return any(mark in data for mark in (OWN_OUTPUT.encode(), wide, wide.hex().upper().encode()))
+    if kind.id == "parquet":  # the marks stand in its footer, whose length is told before the last word
+        return OWN_OUTPUT.encode() in data[-8 - int.from_bytes(data[-8:-4], "little") :]
     if data[:64].lstrip().startswith(b"{"):
         try:
             top = json.loads(data)
