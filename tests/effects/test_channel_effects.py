@@ -7,7 +7,7 @@ import pytest
 
 from tests.effects.rig import setting
 from toolkit.effects.catalogue import effect
-from toolkit.effects.unit_error import FACTORS
+from toolkit.effects.unit_error import factors, factors_for
 from toolkit.units import unit
 
 T = np.linspace(0.0, 20.0, 4001)
@@ -116,9 +116,16 @@ def test_revolutions_are_locked_to_their_own_angle(name, angle):
 
 
 def test_factors_of_confused_units_are_ratios_of_units():
-    for text, factor in FACTORS.items():
+    for text, factor in factors().items():
         if " read as " not in text:
             continue
         true, taken = text.split(" read as ")
         # the number stays and its unit is taken for another: channel over true value
         assert factor == pytest.approx(unit(taken).factor / unit(true).factor, rel=1e-9), text
+
+
+def test_a_unit_is_taken_for_one_of_its_own_dimension():
+    force = factors_for("force")
+    assert 4.4482216152605 in force
+    assert all(abs(one - 57.29577951308232) > 1e-6 for one in force)
+    assert set(factors_for("no dimension of the field")) == {1000.0, 0.001}

@@ -12,8 +12,12 @@ import numpy as np
 
 from toolkit.diagnosis.model import DISCRETE, Active
 from toolkit.diagnosis.nuisance import INPUT_NOISE
+from toolkit.diagnosis.units_of import channel_unit
 from toolkit.effects.catalogue import effects
 from toolkit.effects.effect import Effect, EffectParameter
+from toolkit.effects.unit_error import factors_for
+from toolkit.errors import UnitError
+from toolkit.units import unit
 
 if TYPE_CHECKING:
     from toolkit.diagnosis.problem import Problem
@@ -89,7 +93,7 @@ def _starts(problem: Problem, active: Active) -> tuple[Start, ...]:
         off = {one.name: float(one.off or 0.0) for one in amplitudes}
         if len(amplitudes) == 1 and amplitudes[0].starts:
             one = amplitudes[0]
-            for value in one.starts:
+            for value in _steps(problem, active, one):
                 values = fixed | {one.name: value * scales[one.name]}
                 made.append(Start(values=values, directions=(values,), amplitudes=(one.name,)))
             continue
@@ -101,6 +105,16 @@ def _starts(problem: Problem, active: Active) -> tuple[Start, ...]:
             )
         )
     return tuple(made)
+
+
+def _steps(problem: Problem, active: Active, one: EffectParameter) -> tuple[float, ...]:
+    """Return where the only amplitude of an effect starts: a unit is taken for one of its own dimension."""
+    if active.effect.name != "unit_error":
+        return one.starts
+    try:
+        return factors_for(unit(channel_unit(problem.case, problem.model, active.channel)).dimension)
+    except UnitError:
+        return factors_for(None)
 
 
 def _middle(one: EffectParameter) -> float:
@@ -160,7 +174,8 @@ def _motion_scales(problem: Problem, active: Active) -> tuple[float, float, floa
         position = model.position_of(name)
         place = own if position is None else model.scale[position][1]
         if active.effect.name == "overflow":
-            place = model.largest[name]
+            # A state that starts at zero and only falls has no level to run over.
+            place = model.largest[name] or place
         return rate, own, place
     motion = getattr(model, "motion", None)
     force = _spread(problem, active.channel)

@@ -14,7 +14,7 @@ def unit_of(case: Case, model: Model, active: Active, name: str) -> str:
     if active.effect.stage == "dynamics":
         force, velocity, position = _motion(case, model, active)
         return text.format(force=force, velocity=velocity, position=position)
-    own, other = _channel(case, model, active.channel), _channel(case, model, active.source)
+    own, other = channel_unit(case, model, active.channel), channel_unit(case, model, active.source)
     return text.format_map({"channel": _bracketed(own, text), "from": _bracketed(other, text)})
 
 
@@ -23,7 +23,8 @@ def _bracketed(unit: str, text: str) -> str:
     return f"({unit})" if ("*" in unit or "/" in unit) and ("/" in text or "^" in text) else unit
 
 
-def _channel(case: Case, model: Model, name: str | None) -> str:
+def channel_unit(case: Case, model: Model, name: str | None) -> str:
+    """Return the stated unit of an output or a channel, "1" of none."""
     for one in model.outputs:
         if one.name == name:
             return one.unit
@@ -38,16 +39,16 @@ def _motion(case: Case, model: Model, active: Active) -> tuple[str, str, str]:
     if forces is not None:
         state = str(active.channel)
         position = model.position_of(state)  # type: ignore[attr-defined]
-        force = forces.get(state) or f"{_channel(case, model, state)}/s"
+        force = forces.get(state) or f"{channel_unit(case, model, state)}/s"
         speed = _state(case, model, state, f"{force}*s")
         return force, speed, speed if position is None else _state(case, model, position, f"{speed}*s")
     motion = getattr(model, "motion", None)
-    own = _channel(case, model, active.channel)
+    own = channel_unit(case, model, active.channel)
     if motion is None:
         return own, "1", "1"
     if motion.kind == "force":
-        speed = _channel(case, model, motion.velocity)
-        place = f"{speed}*s" if motion.position is None else _channel(case, model, motion.position)
+        speed = channel_unit(case, model, motion.velocity)
+        place = f"{speed}*s" if motion.position is None else channel_unit(case, model, motion.position)
         return own, speed, place
     length = own if motion.kind == "position" else f"{own}*s"
     return f"{length}/s^2", f"{length}/s", length
@@ -55,5 +56,5 @@ def _motion(case: Case, model: Model, active: Active) -> tuple[str, str, str]:
 
 def _state(case: Case, model: Model, name: str, derived: str) -> str:
     """Return the unit of a state: that of the output of its name, else what its equation implies."""
-    unit = _channel(case, model, name)
+    unit = channel_unit(case, model, name)
     return derived if unit == "1" else unit

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from functools import cache
 from typing import TYPE_CHECKING
 
 from toolkit.effects.effect import Effect, EffectParameter, Values
+from toolkit.units import unit
 
 if TYPE_CHECKING:
     import numpy as np
@@ -13,25 +15,35 @@ if TYPE_CHECKING:
     from toolkit.effects.signals import Setting
 
 
-# Units that files of this field mix up: pound-force, kilogram-force, foot-pound, degree, kilo, inch.
-FACTORS = {
-    "N read as lbf": 4.4482216152605,
-    "lbf read as N": 1 / 4.4482216152605,
-    "N read as kgf": 9.80665,
-    "kgf read as N": 1 / 9.80665,
-    "N*m read as lbf*ft": 1.3558179483314,
-    "lbf*ft read as N*m": 1 / 1.3558179483314,
-    "N*m read as lbf*in": 0.1129848290276,
-    "lbf*in read as N*m": 1 / 0.1129848290276,
-    "deg read as rad": 57.29577951308232,
-    "rad read as deg": 1 / 57.29577951308232,
-    "kilo": 1000.0,
-    "milli": 0.001,
-    "km/h read as m/s": 3.6,
-    "m/s read as km/h": 1 / 3.6,
-    "mm read as inch": 25.4,
-    "inch read as mm": 1 / 25.4,
-}
+# Units that files of this field mix up, each with the one it is taken for; both ways.
+_MIXED = (
+    ("lbf", "N"), ("kgf", "N"), ("kgf", "lbf"), ("kN", "lbf"), ("lbf*ft", "N*m"), ("lbf*in", "N*m"),
+    ("kgf*m", "N*m"), ("lbf*ft", "lbf*in"), ("deg", "rad"), ("m/s", "km/h"), ("mph", "km/h"), ("mph", "m/s"),
+    ("inch", "mm"), ("inch", "cm"), ("ft", "m"), ("inch", "m"), ("psi", "kPa"), ("bar", "kPa"), ("bar", "psi"), ("min", "s"),
+    ("percent", "1"),
+)  # fmt: skip
+_PREFIXES = {"kilo": 1000.0, "milli": 0.001}
+
+
+@cache
+def _all() -> dict[str, tuple[str | None, float]]:
+    """Return for every confusion its dimension, None for any, and the factor of the number."""
+    made: dict[str, tuple[str | None, float]] = {name: (None, value) for name, value in _PREFIXES.items()}
+    for pair in _MIXED:
+        for true, taken in (pair, pair[::-1]):
+            one, other = unit(true), unit(taken)
+            made[f"{true} read as {taken}"] = (one.dimension, other.factor / one.factor)
+    return made
+
+
+def factors() -> dict[str, float]:
+    """Return the factor of every confusion by its name, such as ``N read as lbf``."""
+    return {name: factor for name, (_, factor) in _all().items()}
+
+
+def factors_for(dimension: str | None) -> tuple[float, ...]:
+    """Return the factors that a channel of a dimension can be wrong by; None is an unknown one."""
+    return tuple(dict.fromkeys(factor for of, factor in _all().values() if of is None or of == dimension))
 
 
 def _converted(y: NDArray[np.float64], values: Values, setting: Setting) -> NDArray[np.float64]:
@@ -53,7 +65,7 @@ EFFECT = Effect(
             text="channel over its true value",
             typical=(0.1, 10.0),
             off=1.0,
-            starts=tuple(FACTORS.values()),
+            starts=tuple(_PREFIXES.values()),
         ),
     ),
     channel=_converted,

@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING
 
 from toolkit.effects.catalogue import effect as find_effect
 from toolkit.effects.effect import Effect, EffectParameter
-from toolkit.effects.unit_error import FACTORS
+from toolkit.effects.unit_error import factors
 from toolkit.errors import ConfigError, UnitError
 from toolkit.simulation.places import (
     can_join,
@@ -188,8 +188,8 @@ def _values(
 
 
 def _number(effect: Effect, one: EffectParameter, text: str, stated: str, where: str) -> float:
-    if effect.name == "unit_error" and text.strip() in FACTORS:
-        return FACTORS[text.strip()]
+    if effect.name == "unit_error" and text.strip() in factors():
+        return factors()[text.strip()]
     match = _QUANTITY.fullmatch(text)
     value = float(match[1]) if match else math.nan
     if not match or not math.isfinite(value):
