@@ -19,8 +19,8 @@ if TYPE_CHECKING:
 _MIXED = (
     ("lbf", "N"), ("kgf", "N"), ("kgf", "lbf"), ("kN", "lbf"), ("lbf*ft", "N*m"), ("lbf*in", "N*m"),
     ("kgf*m", "N*m"), ("lbf*ft", "lbf*in"), ("deg", "rad"), ("m/s", "km/h"), ("mph", "km/h"), ("mph", "m/s"),
-    ("inch", "mm"), ("inch", "cm"), ("ft", "m"), ("inch", "m"), ("psi", "kPa"), ("bar", "kPa"), ("bar", "psi"), ("min", "s"),
-    ("percent", "1"),
+    ("inch", "mm"), ("inch", "cm"), ("ft", "m"), ("inch", "m"), ("psi", "kPa"), ("bar", "kPa"),
+    ("bar", "psi"), ("min", "s"), ("percent", "1"),
 )  # fmt: skip
 _PREFIXES = {"kilo": 1000.0, "milli": 0.001}
 
