@@ -138,11 +138,11 @@ def test_a_bad_file_sets_its_test_aside_with_the_reason_until_it_changes(bench: 
     found = bench.look(after=4)
     assert [(one.test, one.rule) for one in found.set_aside] == [("year/bad", "macros")]
     assert bench.reported == [["good"]]  # the other one is not held up
-    note = bench.watcher.out / SET_ASIDE / "year_bad.txt"
+    note = bench.watcher.out / SET_ASIDE / "year%2Fbad.txt"
     assert "the workbook holds macros" in note.read_text()
     assert is_own_output(note)
     assert (bench.folder / "year/bad/run").read_text() == "x"  # the original stays as it is
-    bench.look(after=4)
+    assert bench.look(after=4).set_aside == found.set_aside  # it stands aside until it changes
     assert bench.read.count("bad") == 1
     del bench.faults["bad"]
     bench.test("year/bad", "mended")
@@ -184,9 +184,24 @@ def test_a_restart_goes_on_where_the_last_one_ended(bench: Bench) -> None:
     bench.look()
     os.utime(bench.folder / "one" / "run", (1, 1))  # a copy of the same test is the same test
     bench.look(after=4)
-    bench.look(after=4)
+    after = bench.look(after=4)
     assert bench.reported == [["one"]]
     assert bench.read.count("bad") == 1
+    # A run that makes nothing is not clean while a test stands aside.
+    assert [(one.test, one.rule, one.reason) for one in after.set_aside] == [
+        ("bad", "macros", str(bench.faults["bad"]))
+    ]
+
+
+def test_tests_of_like_names_have_notes_of_their_own(bench: Bench) -> None:
+    names = ["a/b", "a_b", "a%2Fb", "/".join(["long" * 30] * 4)]
+    for name in names:
+        bench.test(name)
+        bench.faults[Path(name).name] = UnreadableError("the workbook holds macros", rule="macros")
+    bench.look()
+    assert len(bench.look(after=4).set_aside) == 4
+    notes = [path.read_text() for path in (bench.watcher.out / SET_ASIDE).iterdir()]
+    assert sorted(note.splitlines()[1] for note in notes) == sorted(f"{name}: macros" for name in names)
 
 
 def test_a_broken_registry_is_no_fault_of_a_test(bench: Bench) -> None:

@@ -78,6 +78,43 @@ def test_a_table_of_several_cambers_is_refused(tmp_path: Path) -> None:
     assert caught.value.rule == "table-varies"
 
 
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("SA [deg]", "SA [rad]"),  # 12 rad: the unit is wrong
+        ("\n-12.0,-2000.0,", "\n-12.0,-1e300,"),
+        ("FY [N]", "FY [MN]"),
+        ("MZ [N*m]", "MZ [MN*m]"),
+    ],
+)
+def test_what_no_tire_does_is_a_wrong_unit(tmp_path: Path, old: str, new: str) -> None:
+    path = table(tmp_path / "m.csv")
+    assert old in path.read_text()
+    path.write_text(path.read_text().replace(old, new, 1))
+    with pytest.raises(ToolkitError) as caught:
+        maker_rows(path, axes="SAE", angles_rad=DEFAULT_ANGLES, identity="m")
+    assert caught.value.rule == "wrong-value"
+    assert caught.value.next_step
+
+
+def test_a_semicolon_separates_as_in_tables_of_forces(tmp_path: Path) -> None:
+    path = tmp_path / "figures.csv"
+    path.write_text(FIGURES)
+    plain = maker_characteristics(path, identity="f")
+    path.write_text(FIGURES.replace(",", ";"))
+    assert is_characteristics_table(path)
+    assert maker_characteristics(path, identity="f") == plain
+
+
+def test_a_misspelt_characteristic_is_told_the_right_name(tmp_path: Path) -> None:
+    path = tmp_path / "figures.csv"
+    path.write_text("FZ [N],conicty [N]\n2500,40\n")
+    assert is_characteristics_table(path)
+    with pytest.raises(ToolkitError) as caught:
+        maker_characteristics(path, identity="f")
+    assert caught.value.expected == "conicity [unit]"
+
+
 def test_a_table_too_short_to_fit_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "m.csv"
     path.write_text("SA [deg],FZ [N],FY [N]\n-1,4000,900\n1,4000,-900\n")
@@ -127,6 +164,10 @@ def test_a_table_of_forces_is_none_of_characteristics(tmp_path: Path) -> None:
         ("833,70", ",70", "empty-cell"),
         ("833,70", "833,x", "text-cell"),
         ("833,70", "833,inf", "text-cell"),
+        ("833,70", "833,1e300", "wrong-value"),
+        ("833,70", "1e9,70", "wrong-value"),
+        ("567,50,4", "567,50,-4", "wrong-value"),
+        ("FZ [lbf],conicity [N]", "FZ [lbf],CRAT [lbf*ft]", "missing-column"),
         ("833,70,,", "833,70,", "ragged-row"),
         ("567,50,4,-20,180,2\n833,70,,-30,220,3\n", "", "no-data"),
     ],

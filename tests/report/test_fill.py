@@ -92,6 +92,13 @@ BOX = (
 )
 
 
+def test_an_empty_control_between_paragraphs_is_filled_with_one(tmp_path: Path) -> None:
+    result = filled(tmp_path, sdt("tk:tire.size", "") + p("see ", sdt("tk:tire.size", "")))
+    block, line = root(result).iter(f"{{{NS['w']}}}sdtContent")
+    assert [one.tag.rpartition("}")[2] for one in block] == ["p"]
+    assert [one.tag.rpartition("}")[2] for one in line] == ["r"]
+
+
 def test_headers_footnotes_and_text_boxes(tmp_path: Path) -> None:
     box = BOX.format(inner=p("{{tk:tire.DOT}} ", sdt("tk:test.operator", run("x"))), mc=NS["mc"], v=NS["v"])
     result = filled(
@@ -260,6 +267,7 @@ def test_a_figure_in_a_footnote_and_in_a_header(tmp_path: Path) -> None:
     )
     assert extents(result, "word/footnotes.xml") == [20.0]
     assert len(result.figures) == 2
+    assert result.in_margins == {"tk:figure.gough"}
 
 
 def test_captions_are_numbered_over_removed_blocks(tmp_path: Path) -> None:

@@ -47,6 +47,10 @@ FIELD = (
         (p("{{tk:summary.load|.2q}}"), "bad-format"),
         (p("{{tk:tire.size"), "malformed-tag"),
         (p("{{tk:}}"), "malformed-tag"),
+        (p("{{Tk:tire.size}}"), "malformed-tag"),
+        (p("{{", " TK", " : tire.size}}"), "malformed-tag"),
+        (p("{{tk :tire.size}}"), "malformed-tag"),
+        (p(sdt("TK:tire.size", run("x"))), "malformed-tag"),
         (p("{{tk:figure.gough}}") + p("{{tk:figure.gough}}"), "doubled-tag"),
         (sdt("tk:figure.gough", p("")) + p("{{tk:figure.gough}}"), "doubled-tag"),
         (p("{{tk:row.SA}}"), "wrong-place"),
@@ -67,6 +71,21 @@ FIELD = (
 def test_each_rule(tmp_path: Path, body: str, rule: str) -> None:
     assert rules(tmp_path, body) == [rule]
     assert rule in RULES
+
+
+def test_a_tag_in_a_tracked_deletion_would_be_printed(tmp_path: Path) -> None:
+    gone = "<w:r><w:delText>{{tk:ti</w:delText></w:r><w:r><w:delText>re.DOT}}</w:delText></w:r>"
+    deleted = f'<w:del w:id="1" w:author="x">{gone}</w:del>'
+    found = check_template(opened(tmp_path, p(deleted)), Style())
+    assert {(one.rule, one.level) for one in found} == {
+        ("tracked-changes", "error"),
+        ("tracked-changes", "warning"),
+    }
+
+
+def test_other_words_and_controls_of_others_are_left_alone(tmp_path: Path) -> None:
+    body = p("{{ticket: 7}} tk: as in {tk:x}") + p(sdt("tkt:ticket", run("x")))
+    assert rules(tmp_path, body) == []
 
 
 def test_column_count_names_both(tmp_path: Path) -> None:

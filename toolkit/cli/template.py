@@ -83,7 +83,10 @@ def tags(
 def new(
     file: Annotated[Path, typer.Argument(metavar="FILE", help="Where to write it: NAME.docx.")],
     like: Annotated[
-        str, typer.Option("--like", help="Which to copy: org, summary, pruefbericht or certificate.")
+        str,
+        typer.Option(
+            "--like", help="Which to copy: org, summary, pruefbericht, certificate, comparison, audit."
+        ),
     ] = "org",
     force: Annotated[bool, typer.Option("--force", help="Overwrite an existing file.")] = False,
     json: Json = False,
@@ -109,6 +112,7 @@ def new(
             got=file.suffix or "no suffix",
             expected=".docx",
             next_step="name it NAME.docx",
+            rule="not-word",
         )
     style = file.with_suffix(".toml")
     for target in (file, style):
@@ -119,6 +123,7 @@ def new(
                 got="a file of that name",
                 expected="a new name",
                 next_step="choose another name, or overwrite with --force",
+                rule="not-empty",
             )
     write_atomic(file, known[like].build())
     write_atomic(style, known[like].style or STYLE_FILE)

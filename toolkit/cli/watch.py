@@ -8,6 +8,7 @@ import shutil
 import signal
 import time
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -16,11 +17,11 @@ import typer
 
 from toolkit.cli.console import Calibrations, Home, Json, Quiet, answer
 from toolkit.cli.delivery import home_template
+from toolkit.cli.watching import Round
 
 if TYPE_CHECKING:
     from toolkit.cli.report import Made, Options
     from toolkit.cli.resolve import Resolved
-    from toolkit.cli.watching import Round
 
 NAME = "watch"
 
@@ -85,7 +86,7 @@ def command(
     )
     target = out or folder / "reports"
     say = (lambda _text: None) if json or quiet else typer.echo
-    rounds: list[Round] = []
+    told = _Told(keep=json)
     with _alone(target), _stopping() as stop:
         watcher = Watcher(
             folder,
@@ -98,12 +99,11 @@ def command(
         )
         while not stop:
             found = watcher.look()
-            _tell(found, rounds[-1] if rounds else None, say)
-            rounds = _merged(rounds, found)
+            told.add(found, say)
             if once and not any(one.reason == "files are arriving" for one in found.waiting):
                 break
             _sleep(interval, stop)
-    payload = _payload(rounds)
+    payload = told.payload()
     answer(payload, "", as_json=json, quiet=quiet)
     return 1 if payload["waiting"] or payload["set_aside"] or payload["attention"] else 0
 
@@ -112,15 +112,13 @@ def _report(
     options: Options, out: Path, resolved: dict[Path, Resolved], folders: Sequence[Path]
 ) -> list[Made]:
     """Make the reports of tests that were read already, each in its folder."""
-    import dataclasses
-
     from toolkit.cli.report import Made, make_reports
     from toolkit.errors import ToolkitError
     from toolkit.report.drawer import Drawer
     from toolkit.report.pdf import Office
 
     tests = list(resolved)
-    own = dataclasses.replace(options, resolve=resolved.__getitem__)
+    own = replace(options, resolve=resolved.__getitem__)
     with Office() as office, Drawer() as drawer:
         try:
             return make_reports(tests, own, out, folders=folders, office=office, drawer=drawer)
@@ -129,40 +127,44 @@ def _report(
             return [Made(test=tests[0], resolved=resolved[tests[0]], outcome=error)]
 
 
-def _tell(found: Round, before: Round | None, say: Any) -> None:
-    for one in found.made:
-        if not isinstance(one.outcome, Exception):
-            say(f"{one.test}: {one.outcome.pdf}, {one.outcome.pages} pages")
-    for fault in found.set_aside:
-        say(f"{fault.test}: set aside, {fault.rule}: {fault.reason.splitlines()[0]}")
-    told = {(one.test, one.reason) for one in before.waiting} if before else set()
-    for waits in found.waiting:
-        if (waits.test, waits.reason) not in told:
-            say(f"{waits.test}: waiting, {waits.reason}")
+class _Told:
+    """What was said of the looks so far: a watch runs for months, so no look and no report is kept whole."""
 
+    def __init__(self, *, keep: bool) -> None:
+        """Keep the answer of every report made, for ``--json``; else their number alone."""
+        self.keep = keep
+        self.made: list[dict[str, Any]] = []
+        self.attention = 0
+        self.last: Round | None = None
 
-def _merged(rounds: list[Round], found: Round) -> list[Round]:
-    """Keep what was made and set aside; of the looks in between only the last one waits."""
-    kept = [one for one in rounds if one.made or one.set_aside]
-    return [*kept, found]
+    def add(self, found: Round, say: Any) -> None:
+        """Say what is new in a look."""
+        from toolkit.cli.report import report_code, report_payload
 
+        for one in found.made:
+            self.attention += report_code(one) != 0
+            if self.keep:
+                self.made.append({"test": one.test, **report_payload(one)})
+            if not isinstance(one.outcome, Exception):
+                say(f"{one.test}: {one.outcome.pdf}, {one.outcome.pages} pages")
+        before = self.last or Round(made=(), waiting=(), set_aside=())
+        for fault in found.set_aside:
+            if fault not in before.set_aside:
+                say(f"{fault.test}: set aside, {fault.rule}: {fault.reason.partition(chr(10))[0]}")
+        for waits in found.waiting:
+            if waits not in before.waiting:
+                say(f"{waits.test}: waiting, {waits.reason}")
+        self.last = replace(found, made=())
 
-def _payload(rounds: list[Round]) -> dict[str, Any]:
-    from toolkit.cli.report import report_code, report_payload
-
-    made = [one for found in rounds for one in found.made]
-    return {
-        "made": [{"test": one.test, **report_payload(one)} for one in made],
-        "waiting": [
-            {"test": one.test, "reason": one.reason} for one in (rounds[-1].waiting if rounds else ())
-        ],
-        "set_aside": [
-            {"test": one.test, "rule": one.rule, "reason": one.reason}
-            for found in rounds
-            for one in found.set_aside
-        ],
-        "attention": sum(report_code(one) != 0 for one in made),
-    }
+    def payload(self) -> dict[str, Any]:
+        """Return the answer: what was made, and what waits or stands aside at the end."""
+        waiting, aside = (self.last.waiting, self.last.set_aside) if self.last else ((), ())
+        return {
+            "made": self.made,
+            "waiting": [{"test": one.test, "reason": one.reason} for one in waiting],
+            "set_aside": [{"test": one.test, "rule": one.rule, "reason": one.reason} for one in aside],
+            "attention": self.attention,
+        }
 
 
 @contextlib.contextmanager

@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from toolkit.errors import OutputError, RegistryError, ToolkitError
+from toolkit.files import sha256_bytes
 
 if TYPE_CHECKING:
     from toolkit.cli.report import Made
@@ -27,6 +28,7 @@ SET_ASIDE = "set-aside"
 _PARTIAL = frozenset(
     "empty-file zip-truncated zip-damaged no-data no-recordings no-file xml not-toml".split()
 )
+_LONGEST = 200  # bytes of a file's name, less than the 255 that file systems allow
 _MISSING = frozenset(("missing", "missing-repeat", "short-block"))
 
 Listing = tuple[tuple[str, int, int], ...]
@@ -51,7 +53,7 @@ class Aside:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Round:
-    """What one look at the folder found and made."""
+    """What one look at the folder made, and which tests wait or stand aside at its end."""
 
     made: tuple[Made, ...]
     waiting: tuple[Waiting, ...]
@@ -110,7 +112,10 @@ class Watcher:
             except OSError as error:
                 waiting.append(Waiting(test=name, reason=f"a file cannot be read yet: {error.strerror}"))
                 continue
-            if self.state.get(name, {}).get("content") == content:
+            before_that = self.state.get(name, {})
+            if before_that.get("content") == content:
+                if before_that.get("state") == SET_ASIDE:
+                    aside.append(_stands_aside(name, before_that))
                 continue
             known = self.waited.get(name)
             if known is not None and known[0] == content and age < self.patience_s:
@@ -206,7 +211,11 @@ class Watcher:
         return test.resolve().name if relative == "." else relative
 
     def _note(self, name: str) -> Path:
-        return self.out / SET_ASIDE / f"{name.replace('/', '_')}.txt"
+        # Two tests never share a note: year/one and year_one are different tests.
+        told = name.replace("%", "%25").replace("/", "%2F")
+        if len(told.encode()) > _LONGEST:
+            told = f"{told[:40]}-{sha256_bytes(name.encode())[:16]}"
+        return self.out / SET_ASIDE / f"{told}.txt"
 
     def _set_aside(self, fault: Aside, content: str) -> None:
         from toolkit.files import write_atomic
@@ -248,9 +257,13 @@ class Watcher:
         write_atomic(self.out / STATE, json.dumps(told, ensure_ascii=False, indent=2) + "\n")
 
 
+def _stands_aside(name: str, told: dict[str, Any]) -> Aside:
+    return Aside(test=name, rule=str(told.get("rule", "error")), reason=str(told.get("reason", "")))
+
+
 def _content(test: Path, listing: Listing) -> str:
     """Return one hash of all of a test's files: a copy of the same test is the same test."""
-    from toolkit.files import sha256_bytes, sha256_file
+    from toolkit.files import sha256_file
     from toolkit.recording.marks import is_own_output
 
     # What the toolkit wrote itself, a reduced test or the truth of a simulation, is no part of the test.

@@ -18,6 +18,7 @@ from typing import NoReturn
 
 from toolkit.characteristics.rows import BOTH, Row
 from toolkit.characteristics.uncertain import Part, Uncertain
+from toolkit.comparison.possible import demand_possible
 from toolkit.comparison.quantities import CHARACTERISTICS
 from toolkit.errors import CellError, ColumnError, UnreadableError
 from toolkit.units import unit
@@ -30,7 +31,9 @@ _NAMES = {one.name: _SI[one.unit] for one in CHARACTERISTICS}
 def is_characteristics_table(path: Path) -> bool:
     """Tell whether a CSV file's header has FZ and a characteristic, and no slip angle."""
     names = {match[1] for match in map(_HEADER.fullmatch, _header(_text(path))) if match}
-    return "SA" not in names and bool(names & set(_NAMES))
+    # A misspelt name still tells which kind of table was meant, and the error then names the right columns.
+    near = any(difflib.get_close_matches(name, _NAMES, n=1, cutoff=0.8) for name in names)
+    return "SA" not in names and near
 
 
 def maker_characteristics(path: Path, *, identity: str) -> tuple[Row, ...]:
@@ -43,7 +46,8 @@ def maker_characteristics(path: Path, *, identity: str) -> tuple[Row, ...]:
     ColumnError
         a column is unknown, doubled, missing, or without a unit; a load stands twice
     CellError
-        a cell that is no finite number; an empty one is a value that the maker does not give
+        a cell that is no finite number, a negative uncertainty, a value that no tire has; an empty one is a
+        value that the maker does not give
     """
     text = _text(path)
     head = _header(text)
@@ -52,11 +56,17 @@ def maker_characteristics(path: Path, *, identity: str) -> tuple[Row, ...]:
     for name in names:
         if names.count(name) > 1:
             _refuse(path, "doubled-column", f"the column {name} stands twice", ", ".join(head), f"one {name}")
+    for name in names:
+        if name.startswith("U_") and name.removeprefix("U_") not in names:
+            _refuse(
+                path, "missing-column", f"{name} has no value beside it", ", ".join(head),
+                f"a column {name.removeprefix('U_')}",
+            )  # fmt: skip
     if "FZ" not in names:
         _refuse(path, "missing-column", "the table has no column FZ", ", ".join(head), "FZ [N]")
     found: list[Row] = []
     loads: set[float] = set()
-    for number, cells in enumerate(list(csv.reader(io.StringIO(text, newline="")))[1:], start=2):
+    for number, cells in enumerate(_lines(text)[1:], start=2):
         if not any(cell.strip() for cell in cells):
             continue
         if len(cells) != len(head):
@@ -69,6 +79,14 @@ def maker_characteristics(path: Path, *, identity: str) -> tuple[Row, ...]:
             name: _number(cell, factor, f"{path}, row {number}, column {name}", needed=name == "FZ")
             for (name, factor), cell in zip(columns, cells, strict=True)
         }
+        for name, value in values.items():
+            if value is not None:
+                demand_possible(
+                    value,
+                    "N" if name == "FZ" else _NAMES[name.removeprefix("U_")],
+                    where=f"{path}, row {number}, column {name}",
+                    U=name.startswith("U_"),
+                )
         load = abs(values["FZ"] or 0.0)
         if load in loads or load <= 0:
             what = f"row {number}: the load {'stands twice' if load else 'is zero'}"
@@ -93,7 +111,7 @@ def _rows_of(values: dict[str, float | None], load: float, identity: str) -> lis
         parts = (
             ()
             if not U
-            else (Part(source="maker's statement", key=f"maker/{identity}/{name}/{load:.9g}", u=abs(U) / 2),)
+            else (Part(source="maker's statement", key=f"maker/{identity}/{name}/{load:.9g}", u=U / 2),)
         )
         found.append(
             Row(
@@ -122,7 +140,13 @@ def _text(path: Path) -> str:
 
 
 def _header(text: str) -> list[str]:
-    return next(csv.reader(io.StringIO(text, newline="")), [])
+    return next(iter(_lines(text)), [])
+
+
+def _lines(text: str) -> list[list[str]]:
+    # As tables of forces are read: a semicolon separates where decimals could take a comma.
+    first = text.partition("\n")[0]
+    return list(csv.reader(io.StringIO(text, newline=""), delimiter=max(",;", key=first.count)))
 
 
 def _column(cell: str, path: Path) -> tuple[str, float]:

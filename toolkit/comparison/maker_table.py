@@ -19,6 +19,7 @@ from toolkit.characteristics.model import DirectionFit
 from toolkit.characteristics.reading import CHANNELS, Direction, Reader
 from toolkit.characteristics.rows import Row
 from toolkit.characteristics.shared import Shared
+from toolkit.comparison.possible import demand_possible
 from toolkit.errors import FitError
 from toolkit.findings import Finding
 from toolkit.machine import TypeB
@@ -46,10 +47,13 @@ def maker_rows(
     ------
     FitError
         not one curve of the table can be fitted, or the table varies camber, pressure or speed
+    CellError
+        a value that no tire has, as of a wrong unit
     ToolkitError
         whatever `read_table` refuses
     """
     table = read_table(path, axes=axes)
+    _check_possible(table)
     _check_one_condition(table)
     curves = [_in_sae(one) for one in table_curves(table)]
     problems = [why_not(one) for one in curves]
@@ -150,6 +154,15 @@ def _nothing_shared(identity: str) -> Shared:
         zero=none("zero"),
         test=identity,
     )
+
+
+def _check_possible(table: TireTable) -> None:
+    for symbol, unit in (("SA", "rad"), ("FZ", "N"), ("FY", "N"), ("MZ", "N*m")):
+        values = table.get(symbol)
+        if values is not None:
+            worst = int(np.argmax(np.abs(values)))
+            where = f"{table.path}, column {symbol}, the value number {worst + 1}"
+            demand_possible(float(values[worst]), unit, where=where)
 
 
 def _check_one_condition(table: TireTable) -> None:

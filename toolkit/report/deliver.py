@@ -136,7 +136,8 @@ def deliver_all(
     """
     office = office or Office()
     with office, contextlib.ExitStack() as stack:
-        work = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="toolkit-print-")))
+        # In the office's own folder, which goes away even after a kill -9.
+        work = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="print-", dir=office.folder)))
         runs = [_Run(job=job, keep=keep) for job in jobs]
         for run in runs:
             stack.callback(run.close)
@@ -317,6 +318,7 @@ def _staging(out: Path) -> Iterator[Path]:
             got=error.strerror or str(error),
             expected="a folder with write permission and free space",
             next_step="choose another folder with --out",
+            rule="not-writable",
         ) from error
     try:
         yield stage
@@ -345,6 +347,7 @@ def _hand_over(files: list[Path], out: Path) -> list[Path]:
             got=error.strerror or str(error),
             expected="a folder with write permission and free space",
             next_step="choose another folder with --out",
+            rule="not-writable",
         ) from error
     return targets
 

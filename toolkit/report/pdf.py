@@ -15,6 +15,7 @@ from pathlib import Path
 from types import TracebackType
 
 from toolkit.errors import RenderError
+from toolkit.report.guard import Guard
 
 # PDF/A-2b and tagged, pictures as they are. LibreOffice ignores options that are not typed like this.
 _OPTIONS = (
@@ -59,6 +60,7 @@ class Office:
         self.timeout_s = timeout_s
         self.program = find_soffice()
         self.folder = Path(tempfile.mkdtemp(prefix="toolkit-office-"))
+        self._guard = Guard(self.folder)
         user = self.folder / "profile" / "user"
         user.mkdir(parents=True)
         (user / "registrymodifications.xcu").write_text(_PROFILE)
@@ -76,6 +78,7 @@ class Office:
         """End what still runs and remove the profile."""
         self._end_warm()
         shutil.rmtree(self.folder, ignore_errors=True)
+        self._guard.dismiss()
 
     def convert(self, documents: Sequence[Path], out: Path) -> list[Path]:
         """Convert Word files to PDF in one call; return the PDFs in the same order.

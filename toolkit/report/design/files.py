@@ -18,6 +18,7 @@ class PackagedTemplate:
 
 def packaged_templates() -> dict[str, PackagedTemplate]:
     """Return the templates by the name of their file."""
+    from toolkit.report.audit.template import build_audit
     from toolkit.report.certificate.template import build_certificate
     from toolkit.report.comparison.template import build_comparison
     from toolkit.report.design.default import STYLE_FILE, build_default
@@ -40,5 +41,6 @@ def packaged_templates() -> dict[str, PackagedTemplate]:
         PackagedTemplate(
             name="comparison", title="a comparison of tests", build=build_comparison, style=None
         ),
+        PackagedTemplate(name="audit", title="an audit's summary", build=build_audit, style=None),
     )
     return {one.name: one for one in listed}

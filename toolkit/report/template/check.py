@@ -24,6 +24,7 @@ from toolkit.report.template.scan import (
     broken_literals,
     control_tag,
     filled_by,
+    misspelt,
     own_rows,
     place_of,
     row_in,
@@ -318,6 +319,14 @@ def _broken(parts: list[Story]) -> Iterator[LintFinding]:
                 part=story.name,
                 place=place_of(paragraph, story),
                 message="a literal {{tk: is not closed by }} in the same paragraph",
+            )
+        for element, text in misspelt(story):
+            yield LintFinding(
+                rule="malformed-tag",
+                level="error",
+                part=story.name,
+                place=place_of(element, story),
+                message=f"{text!r} would be printed as it stands: a tag begins with 'tk:' in small letters",
             )
 
 

@@ -33,6 +33,15 @@ def surroundings(package: object, parts: list[Story], style: Style) -> Iterator[
         for element in story.root.iter(*_TRACKED):
             yield warn("tracked-changes", story, element, "tracked changes: accept or reject them before use")
             break
+        for element in story.root.iter(q("w:del"), q("w:moveFrom")):
+            if _TAG.search("".join(one.text or "" for one in element.iter(q("w:delText"), q("w:t")))):
+                yield LintFinding(
+                    rule="tracked-changes",
+                    level="error",
+                    part=story.name,
+                    place=place_of(element, story),
+                    message="a tag stands in a tracked deletion and would be printed: accept the deletion",
+                )
         for element in story.root.iter(q("w:commentReference")):
             yield warn("comments", story, element, "a comment will stand in the report")
             break

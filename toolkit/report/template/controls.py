@@ -64,7 +64,7 @@ def replace_content(sdt: Element, run: Element) -> None:
     cell = content.find(W_TC)
     holder = cell if cell is not None else content
     paragraph = next(holder.iter(W_P), None)
-    if cell is None and paragraph is None and (ancestor_paragraph(sdt) or content.find(W_P) is None):
+    if cell is None and paragraph is None and in_line(sdt):
         _clear(content)
         content.append(run)
         return
@@ -87,9 +87,10 @@ def replace_content(sdt: Element, run: Element) -> None:
         content.append(fresh)
 
 
-def ancestor_paragraph(element: Element) -> bool:
-    """Tell whether an element stands inside a paragraph."""
-    return next(element.iterancestors(W_P), None) is not None
+def in_line(element: Element) -> bool:
+    """Tell whether an element stands in a line of text, and not between paragraphs, in a text box too."""
+    holder = next(element.iterancestors(W_P, q("w:txbxContent")), None)
+    return holder is not None and holder.tag == W_P
 
 
 def run_properties(sdt: Element) -> Element | None:

@@ -111,6 +111,8 @@ class _Log:
     pictures: list[str] = field(default_factory=list)
     of_the_run: set[str] = field(default_factory=set)
     rows_of_the_run: set[int] = field(default_factory=set)
+    in_margins: set[str] = field(default_factory=set)
+    elsewhere: set[str] = field(default_factory=set)
 
 
 class _Filler:
@@ -187,6 +189,7 @@ class _Filler:
             perhaps_shown=perhaps,
             of_the_run=frozenset(self.log.of_the_run),
             rows_of_the_run=frozenset(self.log.rows_of_the_run),
+            in_margins=frozenset(self.log.in_margins - self.log.elsewhere),
         )
 
     def _conditions(self) -> None:
@@ -324,6 +327,8 @@ class _Filler:
         alt = self.content.plots[tag.name].alt
         if not site.fallback:
             self.log.figures.append((f"tk:{tag.path}", alt))
+            margin = site.story.root.tag in (q("w:hdr"), q("w:ftr"))
+            (self.log.in_margins if margin else self.log.elsewhere).add(f"tk:{tag.path}")
             self.log.pictures.append(f"{tag.name} {sha256_bytes(self.pictures[tag.name].png)}")
         return picture_run(
             site.story,

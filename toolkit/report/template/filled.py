@@ -29,7 +29,8 @@ class Filled:
     ``missing`` the tags that print the visible mark; ``contents`` the lines of its tables of contents;
     ``pictures`` the SHA-256 of each figure as it was drawn; ``never_shown`` the headers and footers that no
     page can show, ``perhaps_shown`` those that depend on the number of pages, with their own words;
-    ``of_the_run`` the tags whose values differ from run to run, and ``rows_of_the_run`` the rows with them.
+    ``of_the_run`` the tags whose values differ from run to run, and ``rows_of_the_run`` the rows with them;
+    ``in_margins`` the figures that stand in headers and footers alone.
     """
 
     docx: bytes
@@ -46,3 +47,4 @@ class Filled:
     perhaps_shown: tuple[tuple[str, tuple[str, ...]], ...] = ()
     of_the_run: frozenset[str] = frozenset()
     rows_of_the_run: frozenset[int] = frozenset()
+    in_margins: frozenset[str] = frozenset()

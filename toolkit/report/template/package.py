@@ -128,7 +128,7 @@ def _refuse(
     return TemplateError(
         what,
         where=f"{path}: {where}" if where else path,
-        got=got,
+        got=got if got is not None else where or path.name,
         expected=expected,
         rule=rule,
         next_step="remove it in Word and save the template as .docx or .dotx",

@@ -25,6 +25,9 @@ from toolkit.report.template.xml import (
 
 LITERAL = re.compile(r"\{\{\s*(tk:[^{}]*?)\s*\}\}")
 BROKEN = re.compile(r"\{\{\s*tk:(?![^{}]*\}\})")
+# Word's autocorrection makes {{Tk: of it at the start of a sentence; it would be printed as it stands.
+MISSPELT = re.compile(r"(?!tk:)[tT][kK]\s*:")
+MISSPELT_LITERAL = re.compile(r"\{\{\s*" + MISSPELT.pattern)
 
 
 @dataclass(slots=True, kw_only=True, eq=False)
@@ -87,6 +90,20 @@ def broken_literals(story: Story) -> Iterator[Element]:
     for paragraph in story.root.iter(W_P):
         if BROKEN.search("".join(t.text or "" for t in visible_texts(paragraph))):
             yield paragraph
+
+
+def misspelt(story: Story) -> Iterator[tuple[Element, str]]:
+    """Yield (element, text) of controls and literals that mean the toolkit and are not written ``tk:``."""
+    for element in story.root.iter(W_SDT, W_P):
+        if element.tag == W_SDT:
+            tag = element.find(f"{SDT_PR}/{q('w:tag')}")
+            text = "" if tag is None else (tag.get(q("w:val")) or "").strip()
+            if MISSPELT.match(text):
+                yield element, text
+        else:
+            text = "".join(t.text or "" for t in visible_texts(element))
+            if found := MISSPELT_LITERAL.search(text):
+                yield element, text[found.start() : found.start() + 40]
 
 
 def table_of(site: Site) -> Element | None:

@@ -68,11 +68,15 @@ def verify_pdf(pdf: Path, filled: Filled) -> tuple[tuple[Check, ...], int]:
         text = pdf_text(pdf)
         listing = fonts.result()
     pictures = data.count(b"/Subtype/Image")
-    mute = [tag for tag, alt in filled.figures if _pdf_string(alt) not in data]
+    # Headers and footers are artifacts of a tagged PDF: nothing in them has a text beside it.
+    mute = [
+        tag for tag, alt in filled.figures if tag not in filled.in_margins and _pdf_string(alt) not in data
+    ]
     return (
         (
             *text_checks(text, filled),
             *_contents(pdf, text, filled),
+            *_margins(filled),
             _fonts(listing),
             Check(name="pages", ok=pages > 0 and text.count("\f") == pages, message=f"{pages} pages"),
             Check(
@@ -90,6 +94,20 @@ def verify_pdf(pdf: Path, filled: Filled) -> tuple[tuple[Check, ...], int]:
         ),
         pages,
     )
+
+
+def _margins(filled: Filled) -> list[Check]:
+    if not filled.in_margins:
+        return []
+    return [
+        Check(
+            name="margins",
+            ok=False,
+            warning=True,
+            message=f"{', '.join(sorted(filled.in_margins))} stands in a header or footer: the Word file has "
+            "its alternative text, a tagged PDF has none there",
+        )
+    ]
 
 
 def _contents(pdf: Path, text: str, filled: Filled) -> list[Check]:
