@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
@@ -27,6 +27,7 @@ from toolkit.calibration.uncertainty.propagation import record_covariance
 from toolkit.channels import seen_by_cells, signs
 from toolkit.characteristics.uncertain import Part
 from toolkit.machine import TypeB
+from toolkit.reduction.corrections import u_SA
 from toolkit.reduction.tare import zero_shifts
 from toolkit.units import si_scale
 
@@ -35,7 +36,7 @@ if TYPE_CHECKING:
 
     from toolkit.calibration.records.record import CalibrationRecord
     from toolkit.channels import Axes, Reversal
-    from toolkit.machine import Machine
+    from toolkit.machine import Correction, Machine
     from toolkit.reduction.model import Condition, ReducedTest
 
 Weighted = Sequence[tuple["Condition", float]]
@@ -54,6 +55,7 @@ class Shared:
     machine states of the slip angle's zero and scale, the load, the pressure and the cells' zeros;
     ``pressure_Pa`` None where the test does not say it. ``machine`` and ``test`` name the owners of
     variables; ``reversal`` says what was turned for the runs called reverse.
+    ``corrections`` are those of the machine on FY and MZ, whose uncertainty all rows share.
     ``covariance`` of each load's coefficients follows from the record and what its session stated.
     """
 
@@ -70,6 +72,7 @@ class Shared:
     machine: str = ""
     test: str = ""
     reversal: Reversal = "drum"
+    corrections: tuple[Correction, ...] = ()
     covariance: Mapping[str, NDArray[np.float64]] = field(init=False, repr=False)
     roots: Mapping[str, NDArray[np.float64]] = field(init=False, repr=False)
 
@@ -110,12 +113,27 @@ class Shared:
         return np.asarray(moved * self.signed(channel, conditions))
 
     def zero_rows(self, channel: str, conditions: Sequence[Condition]) -> NDArray[np.float64]:
-        """Return how each cell's zero moves each condition [SI]: (cells, rows); none where it is known."""
-        if self.record is None or not conditions or not any(self.u_cell_zero):
-            return np.zeros((0, len(conditions)))
-        cells = np.array([one.indications for one in conditions]).T
-        shifts = zero_shifts(self.record, cells, self.u_cell_zero)[channel]
-        return np.asarray(shifts * self.signed(channel, conditions))
+        """Return how each cell's zero, then each correction of the machine, moves each condition [SI].
+
+        Shape (cells + corrections, rows); no row for a cell where its zero is known.
+        """
+        sign = self.signed(channel, conditions)
+        rows = [self._correction_row(one, channel, conditions) for one in self.corrections]
+        if self.record is not None and conditions and any(self.u_cell_zero):
+            cells = np.array([one.indications for one in conditions]).T
+            rows = [*zero_shifts(self.record, cells, self.u_cell_zero)[channel], *rows]
+        return np.reshape(np.asarray(rows, dtype=float), (len(rows), len(conditions))) * sign
+
+    def _correction_row(
+        self, one: Correction, channel: str, conditions: Sequence[Condition]
+    ) -> NDArray[np.float64]:
+        """Return what the uncertainty of a correction moves in each condition [SI], machine axes."""
+        if one.channel != channel:
+            return np.zeros(len(conditions))
+        source = str(one.source)
+        sign = np.ones(len(conditions)) if source == "FZ" else self.signed(source, conditions)
+        values = np.array([getattr(each, source) for each in conditions], dtype=float)
+        return np.asarray(one.u * one.factor * sign * values)
 
     def calibration_parts(self, channel: str, moved: NDArray[np.float64]) -> list[Part]:
         """Return the record's parts of a weighted sum that its variables move by ``moved``."""
@@ -126,13 +144,23 @@ class Shared:
         ]
 
     def zero_parts(self, moved: NDArray[np.float64]) -> list[Part]:
-        """Return the parts of a weighted sum that the cells' zeros move by ``moved``.
+        """Return the parts of a weighted sum that the cells' zeros and the corrections move by ``moved``.
 
         FY and MZ have the same keys: one cell moves both.
         """
         source = "tare" if self.tared else "cell zero"
         owner = f"{self.machine}/{self.test}" if self.tared else self.owner(self.zero)
-        return [Part(source=source, key=f"{source}/{owner}/{i}", u=float(u)) for i, u in enumerate(moved)]
+        cells = len(moved) - len(self.corrections)
+        return [
+            *(
+                Part(source=source, key=f"{source}/{owner}/{i}", u=float(u))
+                for i, u in enumerate(moved[:cells])
+            ),
+            *(
+                Part(source="machine correction", key=f"correction/{self.machine}/{one.label}", u=float(u))
+                for one, u in zip(self.corrections, moved[cells:], strict=True)
+            ),
+        ]
 
     def angle_parts(self, slope: float, stretch: float) -> list[Part]:
         """Return the slip angle's parts.
@@ -177,11 +205,13 @@ class Shared:
 def shared_of(reduced: ReducedTest, *, machine: Machine, record: CalibrationRecord | None) -> Shared:
     """Return what the rows of a reduced test have in common."""
     own_tares = reduced.tare.source == "block"  # a tare of each file is no shift of all rows
+    SA = machine.stated_uncertainty("SA")
+    left = u_SA(machine, np.array([one.MZ for one in reduced.conditions]))
     return Shared(
         record=record,
         machine_axes=machine.axes,
         tared=reduced.tare.source != "none",
-        SA=machine.stated_uncertainty("SA"),
+        SA=replace(SA, u=float(np.hypot(SA.u, left))) if left else SA,
         SA_scale=machine.stated_uncertainty("SA_scale"),
         FZ=machine.stated_uncertainty("FZ"),
         P=machine.stated_uncertainty("P"),
@@ -191,6 +221,7 @@ def shared_of(reduced: ReducedTest, *, machine: Machine, record: CalibrationReco
         machine=machine.name,
         test=identity_of(reduced),
         reversal=reduced.info.reversal,
+        corrections=tuple(one for one in machine.corrections if one.channel in ("FY", "MZ")),
     )
 
 

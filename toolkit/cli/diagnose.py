@@ -23,6 +23,12 @@ def command(
     budget: Annotated[
         float, typer.Option("--budget", min=1.0, help="Seconds after which a partial answer is given.")
     ] = 600.0,
+    model: Annotated[
+        Path | None,
+        typer.Option(
+            "--model", help="Model file (model.toml of an earlier answer) in place of the case's simulation."
+        ),
+    ] = None,
     calibrations: Calibrations = None,
     home: Home = None,
     json: Json = False,
@@ -36,6 +42,9 @@ def command(
     unknown (structure that no known effect explains), nothing, untestable. It ends with 0 for nothing and
     1 for the rest.
 
+    What is named goes into model.toml beside the answer: the simulation with these effects in it, which
+    toolkit simulate and toolkit diagnose (--model, or [simulation] model = "model.toml") read.
+
     Example: toolkit diagnose case.toml --out answer
     """
     _one_thread()
@@ -43,28 +52,55 @@ def command(
 
     from toolkit.diagnosis.case_read import read_case
     from toolkit.diagnosis.diagnose import diagnose
+    from toolkit.diagnosis.model_text import MODEL, model_text
     from toolkit.diagnosis.serial import as_json
     from toolkit.files import write_atomic
     from toolkit.report.diagnosis.page import page
 
     started = time.perf_counter()
-    read = read_case(case)
+    read = read_case(case, model=model)
     _writable(out)
-    registry = _registry(calibrations, home) if read.simulation.kind == "machine" else None
+    _apart(model or read.model, out / MODEL)
+    registry = registry_of(calibrations, home) if read.simulation.kind == "machine" else None
     tell = _teller(show=not quiet and not json)
     result = diagnose(read, registry, budget_s=budget, tell=tell)
     tell("")
     made = result.diagnosis
-    payload = as_json(made)
+    augmented = None if result.search is None else model_text(read, result.search, made, out)
+    payload = as_json(made) | {"model": None if augmented is None else MODEL}
     drawn = page(result)
     payload["timing"] = {"seconds": time.perf_counter() - started}
     text = json_module.dumps({"schema": 1, **payload}, ensure_ascii=False, indent=2, allow_nan=False) + "\n"
     for name, content in result.predictions:
         write_atomic(out / "predictions" / name, content)
+    _write_model(out / MODEL, augmented)
     write_atomic(out / "diagnosis.html", drawn)
     write_atomic(out / "diagnosis.json", text)
     answer({**payload, "out": str(out)}, _text(made, out), as_json=json, quiet=quiet)
     return 0 if made.verdict == "nothing" else 1
+
+
+def _apart(model: Path | None, target: Path) -> None:
+    """Refuse to write the new model over the one that the simulation was taken from."""
+    from toolkit.errors import OutputError
+
+    if model is not None and model.resolve() == target.resolve():
+        raise OutputError(
+            "the answer's model would replace the one that it starts from", where=target,
+            got=f"--model {model}", expected="another folder",
+            next_step="choose another folder with --out", rule="not-writable",
+        )  # fmt: skip
+
+
+def _write_model(path: Path, text: str | None) -> None:
+    """Write the model file; one of an earlier answer does not stay beside an answer that names nothing."""
+    from toolkit.files import read_toml, write_atomic
+    from toolkit.simulation.model_file import is_model
+
+    if text is not None:
+        write_atomic(path, text)
+    elif path.is_file() and is_model(read_toml(path)):
+        path.unlink()
 
 
 def _one_thread() -> None:
@@ -95,7 +131,8 @@ def _writable(out: Path) -> None:
         )
 
 
-def _registry(calibrations: Path | None, home: Path | None) -> Path | None:
+def registry_of(calibrations: Path | None, home: Path | None) -> Path | None:
+    """Return the registry's folder, None where there is no home and none was asked for."""
     from toolkit.errors import ToolkitError
 
     try:

@@ -57,6 +57,7 @@ def _register() -> None:
         fit,
         init,
         inspect,
+        machine,
         process,
         qualify,
         report,
@@ -71,6 +72,7 @@ def _register() -> None:
     for module in (process, fit, evaluate, convert, compare, report, watch):
         app.command(module.NAME)(module.command)
     app.add_typer(template.app, name="template")
+    app.add_typer(machine.app, name="machine")
     for module in (audit, simulate, diagnose, explain, qualify):
         app.command(module.NAME)(module.command)
 

@@ -38,6 +38,14 @@ def command(
         Path | None,
         typer.Option("--case", help="Folder for a case that `toolkit diagnose` reads; it names no effect."),
     ] = None,
+    inputs: Annotated[
+        list[Path] | None,
+        typer.Option("--inputs", metavar="FILE.csv", help="Inputs of a model file; repeatable."),
+    ] = None,
+    condition: Annotated[
+        list[str] | None,
+        typer.Option("--condition", metavar="KEY=VALUE", help="Condition of all inputs; repeatable."),
+    ] = None,
     calibrations: Calibrations = None,
     home: Home = None,
     json: Json = False,
@@ -63,10 +71,20 @@ def command(
       --effect wrong_calibration=m15-virtual-r1
       --effect load_lag@order:1+2=1.5s         (in runs with that condition)
 
+    In place of a plan it takes the model.toml of a diagnosis, of any kind of simulation, and runs it on
+    inputs: DIR gets the outputs of each file as CSV. The model of a tire may also be the tire of a plan,
+    [tire] file = "model.toml": its effects are then switched on.
+
     Example: toolkit simulate toolkit/examples/virtual/test_plan.toml --out virtual-test
     """
+    from toolkit.cli.simulate_model import is_model_file, model_answer
     from toolkit.simulation.plan import read_plan, with_effects
 
+    if inputs or condition or is_model_file(plan):
+        _refuse_options({"--effect": effect, "--seed": seed, "--csv": csv, "--case": case})
+        payload, text = model_answer(plan, inputs or [], condition or [], out, calibrations, home)
+        answer(payload, text, as_json=json, quiet=quiet)
+        return 0
     told = with_effects(read_plan(plan, seed=seed), effect or [])
     if told.kind != "test" and (csv is not None or case is not None):
         raise _no_runs(told)
@@ -78,6 +96,19 @@ def command(
         payload, text = _test(told, out, _registry(calibrations, home), csv, case)
     answer(payload, text, as_json=json, quiet=quiet)
     return 0
+
+
+def _refuse_options(given: dict[str, object]) -> None:
+    """Refuse options of a plan beside a model file."""
+    from toolkit.errors import ConfigError
+
+    for name, value in given.items():
+        if value is not None and value != []:
+            raise ConfigError(
+                "a model file is run on inputs alone", where=name, got=name,
+                expected="--inputs, --condition, --out", rule="model-file",
+                next_step="leave the option out; a plan with [tire] file = the model knows it",
+            )  # fmt: skip
 
 
 def _no_runs(plan: Plan) -> ToolkitError:

@@ -13,6 +13,8 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+    from toolkit.simulation.model_file import ModelEffect
+
 Role = Literal["time", "input", "output", "covariate"]
 Kind = Literal["machine", "python", "ode", "columns"]
 ROLES: tuple[Role, ...] = get_args(Role)
@@ -46,7 +48,7 @@ class Run:
 
     ``t`` is the time [s]; without a time channel the row's number. ``simulated`` has the other program's
     output of a case of kind ``columns``; ``declared`` the run's table as written; ``filled`` how many
-    missing samples of which input were interpolated.
+    missing samples of which input were interpolated; ``sha256`` is the file's.
     """
 
     name: str
@@ -56,6 +58,7 @@ class Run:
     declared: Mapping[str, Any]
     simulated: Mapping[str, NDArray[np.float64]]
     filled: tuple[tuple[str, int], ...] = ()
+    sha256: str = ""
 
     @property
     def rows(self) -> int:
@@ -80,7 +83,12 @@ class Simulation:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Case:
-    """A case, read whole; ``sha256`` covers the case file and every file that it names."""
+    """A case, read whole; ``sha256`` covers the case file and every file that it names.
+
+    ``effects`` are those that its simulation has from the start, of a model file or a corrected machine;
+    ``model`` is that file; ``nominal_load_N`` the load to which their parameters are counted, None for that
+    of the recordings.
+    """
 
     path: Path
     title: str
@@ -92,6 +100,9 @@ class Case:
     runs: tuple[Run, ...]
     predict: tuple[Run, ...]
     sha256: str
+    effects: tuple[ModelEffect, ...] = ()
+    nominal_load_N: float | None = None
+    model: Path | None = None
 
     @property
     def outputs(self) -> tuple[CaseChannel, ...]:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from toolkit.diagnosis.answer import Diagnosis
 from toolkit.diagnosis.assemble import answer_of, mostly_unknown
+from toolkit.diagnosis.built_in import built_in_findings
 from toolkit.diagnosis.case import Case
 from toolkit.diagnosis.load import model_of
 from toolkit.diagnosis.notes import calibration_findings, case_findings
@@ -64,7 +65,11 @@ def diagnose(
     problem = problem_of(case, model)
     simulate = model.simulate
     model.simulate = watch.guarded(simulate)  # type: ignore[method-assign]
-    told = (*case_findings(problem), *calibration_findings(case, calibrations))
+    told = (
+        *case_findings(problem),
+        *built_in_findings(case),
+        *calibration_findings(case, calibrations),
+    )
     declared, found = None, None
     try:
         declared = _first_look(problem, watch)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from toolkit.diagnosis.built_in import build_in
 from toolkit.diagnosis.model import Model
 from toolkit.errors import ConfigError
 
@@ -21,6 +22,12 @@ def model_of(case: Case, calibrations: Path | None) -> Model:
     ConfigError
         the simulator, tire file or calibration cannot be used
     """
+    model = _model(case, calibrations)
+    build_in(case, model)
+    return model
+
+
+def _model(case: Case, calibrations: Path | None) -> Model:
     kind = case.simulation.kind
     if kind == "python":
         from toolkit.diagnosis.kinds.python import PythonModel, load_functions

@@ -58,6 +58,11 @@ def prediction_csv(problem: Problem, run: Run, fits: Sequence[Fit | None]) -> st
     for output in problem.model.outputs:
         for variant, values in zip(VARIANTS, made, strict=True):
             columns[f"{output.name}_{variant}"] = values[output.name]
+    return csv_of(columns)
+
+
+def csv_of(columns: Mapping[str, NDArray[np.float64]]) -> str:
+    """Return columns (n,) as CSV with full doubles; what is no finite number is an empty cell."""
     lines = [",".join(_cell(name) for name in columns)]
     lines += [",".join(_number(v) for v in row) for row in np.stack(list(columns.values()), axis=1)]
     return "\n".join(lines) + "\n"

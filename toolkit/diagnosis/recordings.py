@@ -11,6 +11,7 @@ import numpy as np
 from toolkit.diagnosis.case import CaseChannel, Run
 from toolkit.diagnosis.plain_csv import header_of, missing_column, read_csv
 from toolkit.errors import CellError, ColumnError, UnreadableError
+from toolkit.files import sha256_bytes
 from toolkit.units import unit
 
 if TYPE_CHECKING:
@@ -73,7 +74,7 @@ def read_run(
             columns[channel.name] = _filled(path, channel.name, t, columns[channel.name])
     return Run(
         name=name, t=t, columns=columns, conditions=conditions(declared), declared=declared, simulated=others,
-        filled=tuple(filled),
+        filled=tuple(filled), sha256=sha256_bytes(data),
     )  # fmt: skip
 
 

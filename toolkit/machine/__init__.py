@@ -1,10 +1,12 @@
 """A machine as data: channels and their units, geometry, drum, protocol, limits."""
 
+from toolkit.machine.correction import Correction
 from toolkit.machine.definition import Column, Drum, Machine, TypeB, load_machine, machine_names
 from toolkit.machine.protocol import Protocol, read_protocol
 
 __all__ = [
     "Column",
+    "Correction",
     "Drum",
     "Machine",
     "Protocol",

@@ -11,6 +11,7 @@ from typing import Any, Literal, cast
 from toolkit.channels import AXES, ROTATIONS, Axes, Rotation
 from toolkit.errors import ConfigError
 from toolkit.files import check_keys, read_toml
+from toolkit.machine.correction import Correction, read_corrections
 from toolkit.machine.protocol import KEYS as PROTOCOL_KEYS
 from toolkit.machine.protocol import Protocol, build_protocol
 from toolkit.machine.quantity import one_of, quantity
@@ -18,6 +19,7 @@ from toolkit.units import si_scale, unit
 
 __all__ = [
     "Column",
+    "Correction",
     "Drum",
     "Machine",
     "Protocol",
@@ -33,7 +35,7 @@ Role = Literal["load", "indication", "slip_angle", "acquired", "time", "angle", 
 _PACKAGED = Path(__file__).parent
 _KEYS = (
     "schema name extends title kind axes rotations column drum cells protocol type_b "
-    "indication_unit sample_rate"
+    "indication_unit sample_rate version supersedes correction"
 ).split()
 
 
@@ -81,7 +83,11 @@ class TypeB:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Machine:
-    """A tire test machine as data."""
+    """A tire test machine as data.
+
+    ``version`` counts its definitions; ``supersedes`` is the SHA-256 of the file that this one was made from,
+    and ``corrections`` what the reduction of every test on it puts right.
+    """
 
     name: str
     title: str
@@ -95,6 +101,9 @@ class Machine:
     protocol: Protocol
     type_b: tuple[TypeB, ...]
     sample_rate_Hz: float | None = None
+    version: int = 1
+    supersedes: str | None = None
+    corrections: tuple[Correction, ...] = ()
 
     @property
     def indications(self) -> tuple[Column, ...]:
@@ -138,7 +147,7 @@ def load_machine(name_or_path: str) -> Machine:
     >>> round(m15.drum.radius_m, 3)
     1.353
     """
-    path = Path(name_or_path) if name_or_path.endswith(".toml") else _PACKAGED / f"{name_or_path}.toml"
+    path = machine_file(name_or_path)
     if not path.is_file():
         raise ConfigError(
             f"unknown machine {name_or_path!r}",
@@ -151,8 +160,21 @@ def load_machine(name_or_path: str) -> Machine:
     return _build(_merged(path), path)
 
 
+def machine_file(name_or_path: str) -> Path:
+    """Return the file of a packaged machine, or the path of a .toml that was given."""
+    return Path(name_or_path) if name_or_path.endswith(".toml") else _PACKAGED / f"{name_or_path}.toml"
+
+
+def build_machine(table: dict[str, Any], path: Path) -> Machine:
+    """Return the machine of a parsed definition; ``path`` names it in messages, errors as `load_machine`."""
+    return _build(_extended(table, path), path)
+
+
 def _merged(path: Path) -> dict[str, Any]:
-    table = read_toml(path)
+    return _extended(read_toml(path), path)
+
+
+def _extended(table: dict[str, Any], path: Path) -> dict[str, Any]:
     check_keys(table, _KEYS, where=path)
     if "extends" in table:
         base = _merged(_PACKAGED / f"{table.pop('extends')}.toml")
@@ -197,6 +219,9 @@ def _build(table: dict[str, Any], path: Path) -> Machine:
             sample_rate_Hz=quantity(table["sample_rate"], "frequency", path)
             if "sample_rate" in table
             else None,
+            version=_version(table.get("version", 1), path),
+            supersedes=table.get("supersedes"),
+            corrections=read_corrections(table.get("correction", []), f"{path}: correction"),
         )
     except KeyError as error:
         raise ConfigError(
@@ -206,6 +231,15 @@ def _build(table: dict[str, Any], path: Path) -> Machine:
             expected=error.args[0],
             next_step="add it; the packaged m15.toml shows every entry",
         ) from error
+
+
+def _version(value: object, path: Path) -> int:
+    if isinstance(value, bool) or not isinstance(value, int) or value < 1:
+        raise ConfigError(
+            "a machine definition's version is no whole number", where=f"{path}: version", got=value,
+            expected="1, 2, 3, ...", next_step="correct it", rule="wrong-value",
+        )  # fmt: skip
+    return value
 
 
 def _protocol(entry: object, path: Path) -> Protocol:

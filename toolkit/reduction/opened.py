@@ -13,6 +13,7 @@ from toolkit.errors import RecordError, RecordingError
 from toolkit.reduction.acquired import Difference, compare
 from toolkit.reduction.averaging import ROLLING_RATIO, Window, free_radius_m, window
 from toolkit.reduction.blocks import Block, find_blocks, is_tare
+from toolkit.reduction.corrections import corrected
 from toolkit.reduction.model import Tare
 from toolkit.units import from_si
 
@@ -29,9 +30,9 @@ class OpenedFile:
     """One recording on its way to conditions.
 
     ``name`` is its path inside the test's folder, which tells it from every other file; ``channels``
-    (4, rows) SI: SA, FZ, and the corrected FY and MZ, in machine axes; ``indications`` minus tare, in the
-    record's order and units; ``blocks`` its load blocks and ``windows`` the rows of each that are
-    averaged; ``differences`` what the acquisition program computed otherwise.
+    (4, rows) SI: SA, FZ, and FY and MZ by the record, in machine axes with the machine's corrections;
+    ``indications`` minus tare, in the record's order and units; ``blocks`` its load blocks and ``windows``
+    the rows of each that are averaged; ``differences`` what the acquisition program computed otherwise.
     """
 
     name: str
@@ -111,6 +112,10 @@ def open_file(
     units = {name: recording[name].unit for name in record.indications}
     offsets = dict(tare.values) if tare.source != "none" else None
     loads = apply_record(record, indications, units=units, tare=offsets, only=("FY", "MZ"))
+    channels = corrected(
+        machine,
+        {"SA": recording["SA"].si, "FZ": recording["FZ"].si, "FY": loads["FY"], "MZ": loads["MZ"]},
+    )
     radius = free_radius_m(info.tire_size)
     rolling = None if radius is None else ROLLING_RATIO * radius
     return OpenedFile(
@@ -120,7 +125,7 @@ def open_file(
         indications=np.stack(
             [values - (offsets or {}).get(cell, 0.0) for cell, values in indications.items()]
         ),
-        channels=np.stack([recording["SA"].si, recording["FZ"].si, loads["FY"], loads["MZ"]]),
+        channels=np.stack([channels[name] for name in ("SA", "FZ", "FY", "MZ")]),
         blocks=blocks,
         windows=tuple(
             window(recording, block, machine=machine, rolling_radius_m=rolling) for block in blocks

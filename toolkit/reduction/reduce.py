@@ -14,6 +14,7 @@ from toolkit.reduction import protocol as plan
 from toolkit.reduction import remarks
 from toolkit.reduction.averaging import Window, means
 from toolkit.reduction.common_load import carry, slopes
+from toolkit.reduction.corrections import correction_findings
 from toolkit.reduction.model import CalibrationUse, Condition, ReducedTest, Tare
 from toolkit.reduction.opened import OpenedFile, check_record, open_file, split_blocks
 from toolkit.reduction.repeats import drift_findings
@@ -73,6 +74,7 @@ def reduce_test(
     findings = [
         *plan.check(placed, later, protocol, protocol.rotations or machine.rotations),
         *drift_findings(conditions, protocol),
+        *correction_findings(machine),
         *remarks.machine_findings(info, machine),
         *remarks.pressure_findings(info, machine),
         *remarks.speed_findings(files, machine),

@@ -18,9 +18,12 @@ from toolkit.files import read_bytes, write_atomic
 from toolkit.simulation.case_plan import COLUMNS, Free
 from toolkit.simulation.cells import CELLS
 from toolkit.simulation.columns import shown, unit_of
+from toolkit.simulation.file_tire import FileTire
 from toolkit.simulation.plan import Plan
 from toolkit.simulation.run import VirtualFile, VirtualTest
 from toolkit.simulation.steady import steady_of
+from toolkit.tires.tir import read_tir
+from toolkit.tires.tir_write import file_text
 from toolkit.units import from_si
 
 if TYPE_CHECKING:
@@ -68,7 +71,8 @@ def write_case(test: VirtualTest, folder: Path, *, record: str | None = None) ->
     if cells:
         made.append(_csv(folder / RUNS / _TARE, _tare(test, names)))
     if plan.tire_file is not None:
-        write_atomic(folder / TIRE, read_bytes(plan.tire_file.path))
+        # As the plan has it: of a model file the coefficients that were refitted.
+        write_atomic(folder / TIRE, _tire_text(plan.tire_file))
         made.append(folder / TIRE)
     write_atomic(folder / CASE, case_toml(test, kind=kind, record=record, inputs=inputs, outputs=outputs))
     return (folder / CASE, *made)
@@ -133,6 +137,11 @@ def check_case(plan: Plan, record: str | None) -> str:
             next_step="change the plan's [case] or [tire]; nothing was written", rule="wrong-value",
         )  # fmt: skip
     return kind
+
+
+def _tire_text(file: FileTire) -> bytes:
+    same = read_tir(file.path).coefficients() == file.tir.coefficients()
+    return read_bytes(file.path) if same else file_text(file.tir).encode()
 
 
 def _inputs(test: VirtualTest) -> list[str]:

@@ -23,6 +23,7 @@ from toolkit.simulation.case_plan import CasePlan, read_case_plan
 from toolkit.simulation.cells import CellsTruth
 from toolkit.simulation.effect_text import parse_effect
 from toolkit.simulation.file_tire import FileTire, read_file_tire
+from toolkit.simulation.plan_model import model_tire
 from toolkit.simulation.plan_sections import (
     CARRIAGE,
     ROAD,
@@ -126,7 +127,7 @@ def read_plan(path: Path, *, seed: int | None = None) -> Plan:
     loads = _list(table, "loads", "force", protocol.loads_N, path)
     recording = dict(table.get("acquisition", {}))
     record = choice(recording.pop("record", "dwell"), ("dwell", "continuous"), f"{path}: acquisition.record")
-    tire, file = _tire(table.get("tire", {}), path)
+    tire, file, taken = _tire(table.get("tire", {}), path)
     plan = Plan(
         kind=cast("Kind", kind),
         title=str(table.get("title", path.stem)),
@@ -155,7 +156,7 @@ def read_plan(path: Path, *, seed: int | None = None) -> Plan:
         tire_file=file,
         case=read_case_plan(table.get("case", {}), where=f"{path}: case"),
     )
-    return with_effects(plan, _texts(table.get("effects", []), f"{path}: effects"))
+    return with_effects(plan, [*taken, *_texts(table.get("effects", []), f"{path}: effects")])
 
 
 def with_effects(plan: Plan, given: list[str]) -> Plan:
@@ -202,17 +203,23 @@ def _check_runs(plan: Plan, one: Switched, text: str) -> None:
     )  # fmt: skip
 
 
-def _tire(table: dict[str, Any], path: Path) -> tuple[TireTruth, FileTire | None]:
+def _tire(table: dict[str, Any], path: Path) -> tuple[TireTruth, FileTire | None, tuple[str, ...]]:
+    """Return the published tire, or a file's; of a model file its effects too."""
     where = f"{path}: tire"
     if not isinstance(table, dict) or "file" not in table:
-        return section_of(TireTruth(), table, TIRE, where), None
+        return section_of(TireTruth(), table, TIRE, where), None, ()
     name = table["file"]
     if not isinstance(name, str) or not name:
         raise ConfigError(
-            "the tire's file has no name", where=f"{where}.file", got=name, expected='file = "tire.tir"',
+            "the tire's file has no name", where=f"{where}.file", got=name,
+            expected='file = "tire.tir", or a model file of toolkit diagnose',
             next_step="write the path, relative to the plan", rule="wrong-value",
         )  # fmt: skip
-    file = read_file_tire(path.parent / name)
+    taken: tuple[str, ...] = ()
+    if name.endswith(".toml"):
+        file, taken = model_tire(path.parent / name, where=f"{where}.file")
+    else:
+        file = read_file_tire(path.parent / name)
     default = TireTruth(
         plysteer_rad=0.0,
         aligning_shift_rad=0.0,
@@ -223,7 +230,7 @@ def _tire(table: dict[str, Any], path: Path) -> tuple[TireTruth, FileTire | None
     )
     rest = {key: entry for key, entry in table.items() if key != "file"}
     own = {key: entry for key, entry in TIRE.items() if key not in ("plysteer", "aligning_shift", "conicity")}
-    return section_of(default, rest, own, where), file
+    return section_of(default, rest, own, where), file, taken
 
 
 def _stated_pressure(file: FileTire | None) -> float:

@@ -40,7 +40,7 @@ class MachineModel:
         self.case = case
         self._tire = TirTire(tir)
         self._speed = speed_m_s
-        self._load = self._tire.FNOMIN
+        self._load = self.nominal_load_N = self._tire.FNOMIN
         self.cells = None if record is None else Cells(case, record)
         self.parameters = case.parameters
         for one in case.parameters:

@@ -72,7 +72,9 @@ def dimension(text: str) -> str:
 
 
 def nominal_load(case: Case) -> float:
-    """Return the median load of the case [N], 4000 N where no load was recorded."""
+    """Return the median load of the case [N], 4000 N where no load was recorded; that of its model first."""
+    if case.nominal_load_N is not None:
+        return case.nominal_load_N
     loads = [
         si(case, name, run.columns[name])
         for run in case.runs

@@ -1,0 +1,118 @@
+"""`toolkit machine`: definitions of machines, and their corrections by what a diagnosis has found."""
+
+from __future__ import annotations
+
+from datetime import datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from toolkit.cli.console import Json, Quiet, answer
+
+if TYPE_CHECKING:
+    from toolkit.machine import Machine
+
+app = typer.Typer(help="Machine definitions: show one, correct one by an answer.", no_args_is_help=True)
+
+
+@app.command("show")
+def show(
+    machine: Annotated[str, typer.Argument(help="Name of a packaged machine, or the path of a definition.")],
+    json: Json = False,
+    quiet: Quiet = False,
+) -> int:
+    """Show a machine: version, file hash, and every correction with the answer that it comes from.
+
+    Example: toolkit machine show m15
+    """
+    from toolkit.files import sha256_file
+    from toolkit.machine import load_machine
+    from toolkit.machine.definition import machine_file
+
+    found = load_machine(machine)
+    path = machine_file(machine)
+    payload = {"path": path, "sha256": sha256_file(path)} | _payload(found)
+    answer(payload, _text(found), as_json=json, quiet=quiet)
+    return 0
+
+
+@app.command("correct")
+def correct(
+    source: Annotated[
+        Path, typer.Argument(metavar="ANSWER", help="Folder of toolkit diagnose --out, or its model.toml.")
+    ],
+    effect: Annotated[
+        str, typer.Option("--effect", help="What is corrected: steer_offset, steer_compliance or crosstalk.")
+    ],
+    reason: Annotated[str, typer.Option("--reason", help="Why it is taken for the machine's own.")],
+    by: Annotated[str, typer.Option("--by", help="Who decides it.")],
+    out: Annotated[Path, typer.Option("--out", help="The new definition (.toml); it must not exist yet.")],
+    machine: Annotated[
+        str, typer.Option("--machine", help="Machine that is corrected: a packaged name, or a definition.")
+    ] = "m15",
+    on: Annotated[
+        datetime | None,
+        typer.Option("--on", formats=["%Y-%m-%d"], help="Day of the decision; default today."),
+    ] = None,
+    json: Json = False,
+    quiet: Quiet = False,
+) -> int:
+    """Make the next version of a machine definition, with one effect of an answer as a correction.
+
+    The older definition stays as it is. A test on the new one says so, machine = "NEW.toml" in its test.toml
+    or in a case; its reduction applies the correction, its budget holds the uncertainty, its findings and its
+    report name both. Where the answer could not tell the effect from others, the decision is yours: give the
+    reason, such as a zero that was measured with the wheel at rest.
+
+    Example: toolkit machine correct answer --effect steer_offset --by "J. Doe" --reason "zero measured at
+    rest, 2026-03-02" --machine m15 --out m15-2.toml
+    """
+    from datetime import date
+
+    from toolkit.diagnosis.correction import correction_of, machine_of
+    from toolkit.files import write_atomic
+    from toolkit.machine import load_machine
+    from toolkit.machine.next_version import next_version
+    from toolkit.simulation.model_file import read_model
+
+    _refuse_existing(out)
+    model = read_model(source / "model.toml" if source.is_dir() else source)
+    day = on.date() if on else date.today()  # noqa: DTZ011
+    correction = correction_of(model, effect, reason=reason, by=by, date=day.isoformat())
+    fitted = machine_of(model, load_machine(machine).name)
+    text, made = next_version(machine, correction, out=out, diagnosed_with=fitted)
+    write_atomic(out, text)
+    payload = {"path": out} | _payload(made)
+    answer(payload, f"{_text(made)}\nwritten to {out}", as_json=json, quiet=quiet)
+    return 0
+
+
+def _refuse_existing(out: Path) -> None:
+    from toolkit.errors import OutputError
+
+    if out.exists() or out.suffix != ".toml":
+        raise OutputError(
+            "a new version never replaces a definition" if out.exists() else "a definition is a .toml file",
+            where=out, got="a file that exists" if out.exists() else out.name,
+            expected="a new .toml file", next_step="choose another name with --out", rule="not-writable",
+        )  # fmt: skip
+
+
+def _payload(made: Machine) -> dict[str, Any]:
+    import dataclasses
+
+    return {
+        "name": made.name,
+        "title": made.title,
+        "version": made.version,
+        "supersedes": made.supersedes,
+        "corrections": [dataclasses.asdict(one) for one in made.corrections],
+        "findings": [],
+    }
+
+
+def _text(made: Machine) -> str:
+    lines = [f"{made.title} ({made.name}), version {made.version}"]
+    lines += [f"  correction   {one.as_text()}" for one in made.corrections]
+    return "\n".join(lines if made.corrections else [*lines, "  no corrections"])

@@ -1,0 +1,126 @@
+"""A model file run forward on inputs: what the augmented simulation says, without any recording."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, cast
+
+import numpy as np
+
+from toolkit.diagnosis.built_in import built_in_findings
+from toolkit.diagnosis.case import Case, CaseChannel, Role
+from toolkit.diagnosis.case_entries import number_of, text_of, wrong
+from toolkit.diagnosis.from_model import corrections_of, parameters_of, simulation_of
+from toolkit.diagnosis.load import model_of
+from toolkit.diagnosis.predict import csv_of, prediction_names
+from toolkit.diagnosis.recordings import read_run
+from toolkit.errors import ConfigError
+from toolkit.files import read_bytes
+
+if TYPE_CHECKING:
+    from toolkit.diagnosis.case import Run
+    from toolkit.findings import Finding
+    from toolkit.simulation.model_file import ModelFile
+
+
+def simulate_model(
+    model: ModelFile,
+    inputs: Sequence[Path],
+    calibrations: Path | None,
+    *,
+    conditions: Mapping[str, str] | None = None,
+) -> tuple[tuple[tuple[str, str], ...], tuple[Finding, ...]]:
+    """Return name and content of a CSV file for each file of inputs, and notes on the model's effects.
+
+    The columns are time and every output that the model simulates, in the channels' units.
+
+    Parameters
+    ----------
+    inputs : CSV files with the model's time, inputs and covariates; further columns are not read
+    conditions : of all these runs, such as ``{"rotation": "reverse"}``
+
+    Raises
+    ------
+    ConfigError
+        a file or a column is missing; ``model-place``: an effect has no channel to act on; FitError: the
+        simulation gives no usable output
+    """
+    case = case_of(model, inputs, conditions or {})
+    simulator = model_of(case, calibrations)
+    p = {one.name: one.value for one in simulator.parameters}
+    made = []
+    for name, run in zip(prediction_names(case.runs), case.runs, strict=True):
+        found = simulator.simulate(run, p, ())
+        _refuse_nothing(found, run)
+        columns = {one.name: run.columns[one.name] for one in case.channels if one.role == "time"}
+        columns |= {one.name: found[one.name] for one in simulator.outputs}
+        made.append((name, csv_of(columns)))
+    return tuple(made), built_in_findings(case)
+
+
+def case_of(model: ModelFile, inputs: Sequence[Path], conditions: Mapping[str, str]) -> Case:
+    """Return a model and inputs as a case without recorded outputs."""
+    simulation = simulation_of(model)
+    channels = tuple(
+        _channel(name, entry, f"{model.path}: channels.{name}") for name, entry in model.channels.items()
+    )
+    time = next((one for one in channels if one.name == model.time), None)
+    if not inputs:
+        raise ConfigError(
+            "a model file is run on inputs", where=model.path, got="no --inputs",
+            expected=f"CSV files with {', '.join(one.name for one in channels if one.role != 'output')}",
+            next_step="give --inputs FILE.csv, or name the model as [tire] file of a plan", rule="model-file",
+        )  # fmt: skip
+    runs = tuple(
+        read_run(
+            path,
+            read_bytes(path),
+            name=path.name,
+            channels=channels,
+            time=time,
+            declared={"file": path.name, **conditions},
+            simulated=dict(simulation.simulated),
+            machine=simulation.machine if simulation.kind == "machine" else "",
+            predict=True,
+        )
+        for path in inputs
+    )
+    return Case(
+        path=model.path,
+        title=model.title,
+        simulation=simulation,
+        parameters=parameters_of(model),
+        axes=model.axes,
+        has_time=time is not None,
+        channels=channels,
+        runs=runs,
+        predict=(),
+        sha256=model.sha256,
+        effects=(*model.effects, *corrections_of(simulation)),
+        nominal_load_N=model.nominal_load_N,
+        model=model.path,
+    )
+
+
+def _channel(name: str, entry: object, where: str) -> CaseChannel:
+    if not isinstance(entry, dict) or entry.get("role") not in ("time", "input", "output", "covariate"):
+        raise wrong("a channel of the model has no role", where, entry, '{ unit = "N", role = "input" }')
+    return CaseChannel(
+        name=name,
+        unit=text_of(entry.get("unit"), f"{where}.unit"),
+        role=cast("Role", entry["role"]),
+        sd=number_of(entry["sd"], f"{where}.sd") if "sd" in entry else None,
+    )
+
+
+def _refuse_nothing(made: Mapping[str, np.ndarray], run: Run) -> None:
+    for name, values in made.items():
+        bad = np.flatnonzero(~np.isfinite(values))
+        if len(bad):
+            raise ConfigError(
+                "the model gives no number", where=f"{run.name}, row {bad[0] + 1}, {name}", got=math.nan,
+                expected="inputs in every row, inside what the simulation can do",
+                next_step="look at the inputs of that row", rule="simulator",
+            )  # fmt: skip

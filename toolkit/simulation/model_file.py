@@ -1,0 +1,310 @@
+"""A model file: a simulation with what a diagnosis found in it, as TOML for `simulate` and `diagnose`.
+
+It names the simulation of a case, its refitted parameters, the effects that were found with their fitted
+parameters, units and standard errors, and what it rests on: the hashes of the case and its recordings and of
+every file that the simulation needs, and the version of the program. It is written by `toolkit diagnose`;
+a file that it names and that has changed since is refused, because the fit is not of that file.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, cast
+
+from toolkit.channels import AXES, Axes
+from toolkit.effects.catalogue import effect as find_effect
+from toolkit.effects.effect import Effect
+from toolkit.errors import ConfigError
+from toolkit.files import check_keys, parse_toml, read_bytes, sha256_bytes
+from toolkit.units import unit
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping
+
+CONTENT = "augmented simulation"
+FILES = ("tire", "path", "calibration", "machine")
+_TOP = "schema content title code_version axes time nominal_load_N answer simulation channels effect".split()
+_ANSWER = ("verdict", "remaining", "complete", "case", "case_sha256", "recordings")
+_SIMULATION = (
+    "kind machine calibration tire path function states force_terms simulated parameters sha256".split()
+)
+_EFFECT = (
+    "name stage statement equation channel source runs condition nuisance equivalent_to parameters numerics"
+).split()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ModelParameter:
+    """A fitted number in its own unit; without ``standard_error`` it was not fitted but known."""
+
+    name: str
+    value: float
+    unit: str
+    standard_error: float | None = None
+    bounds: tuple[float, float] | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ModelEffect:
+    """An effect in the simulation: where it acts, its parameters, and in which runs.
+
+    ``condition`` is a key and the values of the runs in which it acts; ``runs`` the names of those that it
+    was fitted on; None for all. ``numerics`` are numbers of the computation that no fit moves. ``axes`` are
+    those in which its parameters are told, ``origin`` the file that they come from and its hash;
+    ``of_machine`` says that it is a correction of the machine's definition.
+    """
+
+    effect: Effect
+    channel: str | None = None
+    source: str | None = None
+    parameters: tuple[ModelParameter, ...] = ()
+    numerics: tuple[tuple[str, float], ...] = ()
+    runs: tuple[str, ...] | None = None
+    condition: tuple[str, tuple[str, ...]] | None = None
+    equivalent_to: tuple[str, ...] = ()
+    nuisance: bool = False
+    axes: Axes | None = None
+    origin: str = ""
+    of_machine: bool = False
+
+    def acts_in(self, run: str, conditions: Mapping[str, str]) -> bool:
+        """Tell whether it acts in a run: by its condition, else by the run's name."""
+        if self.condition is not None:
+            return conditions.get(self.condition[0]) in self.condition[1]
+        return self.runs is None or run in self.runs
+
+    @property
+    def label(self) -> str:
+        """Name and place, as people write it: ``crosstalk FZ to FY``."""
+        place = f" {self.source} to {self.channel}" if self.channel and self.source else ""
+        return self.effect.name + (place or (f" on {self.channel}" if self.channel else ""))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ModelFile:
+    """A model file, read whole and checked; paths are absolute or relative to the working folder.
+
+    ``files`` are the files of the simulation by key (``tire``, ``path``, ``calibration``, ``machine``);
+    ``simulation`` the rest of that table as TOML values; ``channels`` name, unit, role and noise of each.
+    """
+
+    path: Path
+    sha256: str
+    title: str
+    code_version: str
+    verdict: str
+    complete: bool
+    case_sha256: str
+    recordings: tuple[tuple[str, str], ...]
+    axes: Axes
+    time: str | None
+    nominal_load_N: float | None
+    kind: str
+    simulation: Mapping[str, Any]
+    files: tuple[tuple[str, Path], ...]
+    parameters: tuple[ModelParameter, ...]
+    channels: Mapping[str, Any]
+    effects: tuple[ModelEffect, ...]
+
+    def file(self, key: str) -> Path | None:
+        """Return a file of the simulation, None where it has none of that kind."""
+        return dict(self.files).get(key)
+
+
+def is_model(table: Mapping[str, Any]) -> bool:
+    """Tell whether the table of a TOML file is that of a model file."""
+    return table.get("content") == CONTENT
+
+
+def read_model(path: Path) -> ModelFile:
+    """Read a model file and check that every file of its simulation is the one that was fitted.
+
+    Raises
+    ------
+    ConfigError
+        ``no-file``, ``not-toml``; ``model-file``: it is none, or an entry is missing or of the wrong kind;
+        ``model-changed``: a file of the simulation is not the one that the model was fitted with
+    """
+    data = read_bytes(path)
+    table = parse_toml(data, where=path)
+    if not is_model(table):
+        raise _wrong("the file is no model file", path, table.get("content"), f'content = "{CONTENT}"')
+    check_keys(table, _TOP, where=path)
+    if table.get("schema") != 1:
+        raise _wrong("the model file has another schema", f"{path}: schema", table.get("schema"), "1")
+    answer, simulation = (_table(table.get(key), f"{path}: {key}") for key in ("answer", "simulation"))
+    check_keys(answer, _ANSWER, where=f"{path}: answer")
+    check_keys(simulation, _SIMULATION, where=f"{path}: simulation")
+    axes = _text(table.get("axes"), f"{path}: axes")
+    if axes not in AXES:
+        raise _wrong("unknown axis system", f"{path}: axes", axes, ", ".join(AXES))
+    load = table.get("nominal_load_N")
+    rest = {key: one for key, one in simulation.items() if key not in (*FILES, "parameters", "sha256")}
+    named = {key: simulation[key] for key in FILES if key in simulation}
+    known = _table(simulation.get("sha256", {}), f"{path}: simulation.sha256")
+    check_keys(known, FILES, where=f"{path}: simulation.sha256")
+    return ModelFile(
+        path=path,
+        sha256=sha256_bytes(data),
+        title=_text(table.get("title"), f"{path}: title"),
+        code_version=_text(table.get("code_version"), f"{path}: code_version"),
+        verdict=_text(answer.get("verdict"), f"{path}: answer.verdict"),
+        complete=answer.get("complete") is True,
+        case_sha256=_text(answer.get("case_sha256"), f"{path}: answer.case_sha256"),
+        recordings=tuple(
+            (name, _text(one, f"{path}: answer.recordings"))
+            for name, one in _table(answer.get("recordings"), f"{path}: answer.recordings").items()
+        ),
+        axes=axes,
+        time=None if table.get("time") is None else _text(table["time"], f"{path}: time"),
+        nominal_load_N=None if load is None else _number(load, f"{path}: nominal_load_N"),
+        kind=_text(simulation.get("kind"), f"{path}: simulation.kind"),
+        simulation=rest | {key: one for key, one in named.items() if key not in known},
+        files=tuple((key, _same(path, key, named.get(key), one)) for key, one in known.items()),
+        parameters=_parameters(simulation.get("parameters", {}), f"{path}: simulation.parameters"),
+        channels=_table(table.get("channels", {}), f"{path}: channels"),
+        effects=_effects(
+            table.get("effect", []),
+            path,
+            axes,
+            f"{path.name}, SHA-256 {sha256_bytes(data)[:16]}",
+        ),
+    )
+
+
+def _same(path: Path, key: str, name: object, known: object) -> Path:
+    """Return a file of the simulation, or refuse one that has changed."""
+    where = f"{path}: simulation.{key}"
+    file = path.parent / _text(name, where)
+    found = sha256_bytes(read_bytes(file))
+    if found != known:
+        raise ConfigError(
+            "a file of the model is not the one that was fitted", where=where,
+            got=f"{file.name} with SHA-256 {found[:16]}...", expected=f"{str(known)[:16]}...",
+            next_step="restore the file, or diagnose the case again", rule="model-changed",
+        )  # fmt: skip
+    return file
+
+
+def _effects(entry: object, path: Path, axes: Axes, origin: str) -> tuple[ModelEffect, ...]:
+    if not isinstance(entry, list):
+        raise _wrong("effects are no list of tables", f"{path}: effect", entry, "[[effect]]")
+    made = []
+    for i, one in enumerate(entry, start=1):
+        where = f"{path}: effect[{i}]"
+        table = _table(one, where)
+        check_keys(table, _EFFECT, where=where)
+        effect = find_effect(_text(table.get("name"), f"{where}.name"), where=where)
+        parameters = _parameters(table.get("parameters", {}), f"{where}.parameters")
+        check_keys({each.name: 0 for each in parameters}, effect.names, where=f"{where}.parameters")
+        missing = [name for name in effect.names if name not in {each.name for each in parameters}]
+        if missing:
+            raise _wrong(
+                "a parameter of the effect is missing", f"{where}.parameters", "nothing", ", ".join(missing)
+            )
+        for parameter, own in zip(_in_order(parameters, effect), effect.parameters, strict=True):
+            # One bound may be the other's mirror: axes turn the sense of an angle.
+            limit = max(abs(own.bounds[0]), abs(own.bounds[1]))
+            if abs(parameter.value) > limit * (1 + 1e-9):
+                raise _wrong(
+                    "a parameter lies outside what the effect can have",
+                    f"{where}.parameters.{parameter.name}", parameter.value, f"at most {limit:g}",
+                )  # fmt: skip
+        condition = table.get("condition")
+        made.append(
+            ModelEffect(
+                effect=effect,
+                channel=_maybe(table.get("channel"), f"{where}.channel"),
+                source=_maybe(table.get("source"), f"{where}.source"),
+                parameters=_in_order(parameters, effect),
+                numerics=tuple(
+                    (name, _number(value, f"{where}.numerics.{name}"))
+                    for name, value in _table(table.get("numerics", {}), f"{where}.numerics").items()
+                ),
+                runs=None if "runs" not in table else _texts(table["runs"], f"{where}.runs"),
+                condition=None if condition is None else _condition(condition, f"{where}.condition"),
+                equivalent_to=_texts(table.get("equivalent_to", []), f"{where}.equivalent_to"),
+                nuisance=table.get("nuisance") is True,
+                axes=axes,
+                origin=origin,
+            )
+        )
+    return tuple(made)
+
+
+def _in_order(parameters: tuple[ModelParameter, ...], effect: Effect) -> tuple[ModelParameter, ...]:
+    return tuple(sorted(parameters, key=lambda one: effect.names.index(one.name)))
+
+
+def _condition(entry: object, where: str) -> tuple[str, tuple[str, ...]]:
+    table = _table(entry, where)
+    if len(table) != 1:
+        raise _wrong("a condition is one key with its values", where, entry, '{ order = ["1", "2"] }')
+    ((key, values),) = table.items()
+    return key, _texts(values, where)
+
+
+def _parameters(entry: object, where: str) -> tuple[ModelParameter, ...]:
+    made = []
+    for name, one in _table(entry, where).items():
+        here = f"{where}.{name}"
+        table = _table(one, here)
+        check_keys(table, ("value", "unit", "standard_error", "bounds"), where=here)
+        text = _text(table.get("unit"), f"{here}.unit")
+        unit(text, where=f"{here}.unit")
+        error = table.get("standard_error")
+        if error is not None and not _number(error, f"{here}.standard_error") > 0:
+            raise _wrong("a standard error is not positive", f"{here}.standard_error", error, "above zero")
+        bounds = table.get("bounds")
+        if bounds is not None and (not isinstance(bounds, list) or len(bounds) != 2):
+            raise _wrong("bounds are two numbers", f"{here}.bounds", bounds, "[low, high]")
+        made.append(
+            ModelParameter(
+                name=name,
+                value=_number(table.get("value"), f"{here}.value"),
+                unit=text,
+                standard_error=None if error is None else float(error),
+                bounds=None
+                if bounds is None
+                else (_number(bounds[0], f"{here}.bounds"), _number(bounds[1], f"{here}.bounds")),
+            )
+        )
+    return tuple(made)
+
+
+def _table(entry: object, where: str) -> dict[str, Any]:
+    if not isinstance(entry, dict):
+        raise _wrong("a table is missing", where, entry, "a TOML table")
+    return entry
+
+
+def _maybe(entry: object, where: str) -> str | None:
+    return None if entry is None else _text(entry, where)
+
+
+def _text(entry: object, where: str) -> str:
+    if not isinstance(entry, str) or not entry:
+        raise _wrong("an entry is no text", where, entry, "text in quotes")
+    return entry
+
+
+def _texts(entry: object, where: str) -> tuple[str, ...]:
+    if not isinstance(entry, list) or not all(isinstance(one, str) for one in entry):
+        raise _wrong("an entry is no list of texts", where, entry, '["run01.csv"]')
+    return tuple(cast("Iterable[str]", entry))
+
+
+def _number(entry: object, where: str) -> float:
+    if isinstance(entry, bool) or not isinstance(entry, int | float) or not math.isfinite(entry):
+        raise _wrong("an entry is no number", where, entry, "a finite number")
+    return float(entry)
+
+
+def _wrong(what: str, where: object, got: object, expected: str) -> ConfigError:
+    return ConfigError(
+        what, where=where, got="nothing" if got is None else got, expected=expected,
+        next_step="name a file that toolkit diagnose has written; it is not edited by hand",
+        rule="model-file",
+    )  # fmt: skip
