@@ -2,8 +2,14 @@
 
 The source document says of five repeats that conicity and plysteer of the first two differ from the rest,
 because the linear actuator of the load ran at another speed on another day, while CRAT, PRAT and both
-stiffnesses agree. What another speed leaves in the tire is a side force that the contact has not let go: it
-is put here into FY of the reduced tests of the first day, another one forward than reversed, and MZ is left.
+stiffnesses agree. Both halves of that remark are simulated through the whole machine, cells and files:
+
+* A slow actuator (``load_lag``) alone does not do it here. The virtual tire answers its load at once, the
+  load of every row is measured, and reduction carries each value to the common load: a block whose load still
+  creeps gives the same tire. The data's findings name it (out of tolerance), the comparison names nothing.
+* What another speed must leave behind is a side force that the contact has not let go, another one forward
+  than reversed: no effect of the load alone has such a memory. It is put at the hub (``zero_offset.FY`` by
+  direction of rotation), and then conicity and plysteer differ, and nothing else.
 """
 
 from __future__ import annotations
@@ -34,7 +40,9 @@ if TYPE_CHECKING:
     from toolkit.simulation.plan import Plan
 
 MACHINE = load_machine("m15-virtual")
-FORWARD, REVERSE = 70.0, 10.0  # N, in axes that follow the travel: 30 N of conicity, 40 N of plysteer
+SLOW = ("load_lag=1.5s",)
+# In axes that follow the travel 70 N forward and 10 N reversed: 30 N of conicity, 40 N of plysteer.
+KEPT = ("zero_offset.FY@rotation:forward=70N", "zero_offset.FY@rotation:reverse=-10N")
 
 
 @pytest.fixture(scope="module")
@@ -42,25 +50,43 @@ def record() -> CalibrationRecord:
     return Registry(packaged_home() / "calibrations").load("m15-virtual-r1")
 
 
-@pytest.fixture(scope="module")
-def repeats(
-    tmp_path_factory: pytest.TempPathFactory, virtual_plan: Plan, record: CalibrationRecord
-) -> list[ReducedTest]:
-    """Five tests of one tire on the virtual machine: only the noise and the loads differ."""
-    from toolkit.simulation.run import simulate
-    from toolkit.simulation.write import write_test
+class Machine:
+    """The virtual machine at three loads and nine slip angles: a seed and effects to a reduced test."""
 
-    keep = [a for a in virtual_plan.slip_angles_rad if abs(np.degrees(a)) not in (6.0, 10.0)]
-    found = []
-    for seed in range(5):
-        plan = dataclasses.replace(
-            virtual_plan, seed=seed, slip_angles_rad=tuple(keep), loads_N=virtual_plan.loads_N[::2]
-        )
-        folder: Path = tmp_path_factory.mktemp("repeats") / f"run{seed}"
+    def __init__(self, plan: Plan, folder: Path, record: CalibrationRecord) -> None:
+        keep = tuple(a for a in plan.slip_angles_rad if abs(np.degrees(a)) not in (6.0, 10.0))
+        self.plan = dataclasses.replace(plan, slip_angles_rad=keep, loads_N=plan.loads_N[::2])
+        self.folder, self.record = folder, record
+
+    def test(self, seed: int, *effects: str) -> ReducedTest:
+        from toolkit.simulation.plan import with_effects
+        from toolkit.simulation.run import simulate
+        from toolkit.simulation.write import write_test
+
+        plan = with_effects(dataclasses.replace(self.plan, seed=seed), list(effects))
+        folder = self.folder / f"{len(list(self.folder.iterdir()))}" / f"run{seed}"
         write_test(simulate(plan), folder)
         test = read_test_folder(folder)
-        found.append(process(test, read_test(test), record).reduced)
-    return found
+        return process(test, read_test(test), self.record).reduced
+
+
+@pytest.fixture(scope="module")
+def machine(
+    tmp_path_factory: pytest.TempPathFactory, virtual_plan: Plan, record: CalibrationRecord
+) -> Machine:
+    return Machine(virtual_plan, tmp_path_factory.mktemp("repeats"), record)
+
+
+@pytest.fixture(scope="module")
+def repeats(machine: Machine) -> list[ReducedTest]:
+    """Five tests of one tire on the virtual machine: only the noise and the loads differ."""
+    return [machine.test(seed) for seed in range(5)]
+
+
+@pytest.fixture(scope="module")
+def kept(machine: Machine) -> list[ReducedTest]:
+    """The first two again, with the side force that the contact has kept."""
+    return [machine.test(seed, *KEPT) for seed in range(2)]
 
 
 def entry(reduced: ReducedTest, record: CalibrationRecord, **info: str) -> Entry:
@@ -69,28 +95,18 @@ def entry(reduced: ReducedTest, record: CalibrationRecord, **info: str) -> Entry
     return entry_of(named, found, machine=MACHINE, record=record, source=reduced.info.name)
 
 
-def held_back(reduced: ReducedTest) -> ReducedTest:
-    """The same test with the side force that the contact has kept."""
-
-    def moved(c: object) -> object:
-        force = FORWARD if c.rotation == "forward" else REVERSE  # type: ignore[attr-defined]
-        return dataclasses.replace(c, FY=c.FY + force, FY_common=c.FY_common + force)  # type: ignore
-
-    return dataclasses.replace(reduced, conditions=tuple(moved(c) for c in reduced.conditions))  # type: ignore
-
-
 def stated_common(reduced: list[ReducedTest], record: CalibrationRecord) -> list[Entry]:
     return [entry(one, record) for one in reduced]
 
 
-def test_the_source_s_remark_on_its_five_repeats(
-    repeats: list[ReducedTest], record: CalibrationRecord
-) -> None:
-    entries = [
-        *(entry(held_back(one), record, date="2017-05-02") for one in repeats[:2]),
-        *(entry(one, record, date="2017-05-09") for one in repeats[2:]),
-    ]
-    found = compare(entries)
+def of_two_days(first: list[ReducedTest], second: list[ReducedTest], record: CalibrationRecord) -> Comparison:
+    return compare([
+        *(entry(one, record, date="2017-05-02") for one in first),
+        *(entry(one, record, date="2017-05-09") for one in second),
+    ])  # fmt: skip
+
+
+def decided_by_day(found: Comparison) -> dict[str, set[bool]]:
     assert found.mode == "repeats"
     assert found.repeats is not None
     decided: dict[str, set[bool]] = {}
@@ -98,14 +114,36 @@ def test_the_source_s_remark_on_its_five_repeats(
         (day,) = one.factors
         assert day.factor == "day"
         decided.setdefault(one.name, set()).add(day.significant)
+    return decided
+
+
+def test_the_source_s_remark_on_its_five_repeats(
+    kept: list[ReducedTest], repeats: list[ReducedTest], record: CalibrationRecord
+) -> None:
+    found = of_two_days(kept, repeats[2:], record)
+    decided = decided_by_day(found)
     assert decided["conicity"] == decided["plysteer"] == {True}
     for name in ("CRAT", "PRAT", "secant_cornering", "secant_aligning", "slope_cornering", "slope_aligning"):
         assert decided[name] == {False}, name
     # The day's part is that of two levels 30 N and 40 N apart: sqrt(d^2/2) is their standard deviation.
+    assert found.repeats is not None
     for one in found.repeats.precisions:
         wanted = {"conicity": 30.0, "plysteer": 40.0}.get(one.name)
         if wanted:
             assert one.factors[0].s_between == pytest.approx(wanted / np.sqrt(2), rel=0.15)
+
+
+def test_a_slow_load_alone_is_told_by_the_data_and_changes_no_characteristic(
+    machine: Machine, repeats: list[ReducedTest], record: CalibrationRecord
+) -> None:
+    slow = [machine.test(seed, *SLOW) for seed in range(2)]
+    for late, prompt in zip(slow, repeats[:2], strict=True):
+        # When a block begins, 2.26 s after its step, the load still creeps to where it was told to be.
+        told = {one.rule for one in late.findings} - {one.rule for one in prompt.findings}
+        assert "load-tolerance" in told
+    found = of_two_days(slow, repeats[2:], record)
+    assert set().union(*decided_by_day(found).values()) == {False}
+    assert [one.name for one in found.differences if one.significant] == []
 
 
 def test_repeats_of_one_day_do_not_differ(repeats: list[ReducedTest], record: CalibrationRecord) -> None:
@@ -162,9 +200,9 @@ def test_a_shared_record_makes_the_difference_more_certain(
 
 
 def test_another_conicity_is_found_and_measured(
-    repeats: list[ReducedTest], record: CalibrationRecord
+    kept: list[ReducedTest], repeats: list[ReducedTest], record: CalibrationRecord
 ) -> None:
-    found = compare([entry(repeats[0], record), entry(held_back(repeats[1]), record)])
+    found = compare([entry(repeats[0], record), entry(kept[1], record)])
     three = [one for one in found.differences if one.name == "conicity"]
     assert all(one.significant for one in three)
     for one in three:
