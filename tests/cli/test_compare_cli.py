@@ -199,6 +199,30 @@ def test_the_document_is_verified_and_two_runs_agree(
     assert made[0]["content_sha256"] == made[1]["content_sha256"]
 
 
+def test_the_document_takes_the_units_that_were_asked_for(
+    virtual_test: Path, other_test: Path, tmp_path: Path, monkeypatch: Any, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """By the command line, else by the style file beside the template."""
+    from toolkit.errors import RenderError
+    from toolkit.report import deliver as delivery
+
+    loads = []
+
+    def instead(_template: object, content: Any, *_: object, **__: object) -> None:
+        loads.append(content.tables["differences"].rows[0][1].split()[1])
+        raise RenderError("not made here", rule="render-failed")
+
+    monkeypatch.setattr(delivery, "deliver", instead)
+    template = tmp_path / "ours.docx"
+    shutil.copy(packaged_home() / "report_templates" / "comparison.docx", template)
+    words = ("compare", virtual_test, other_test, "--out", tmp_path / "out", "--template", template)
+    for style in ('force = "N"', 'force = "lbf"'):
+        template.with_suffix(".toml").write_text(f"schema = 1\n[units]\n{style}\n")
+        for units in ((), ("--units", "lbf"), ("--units", "SI")):
+            assert toolkit(capsys, *words, *units)[0] == 2
+    assert loads == ["N", "lbf", "N", "lbf", "lbf", "N"]
+
+
 @pytest.mark.parametrize(
     ("words", "rule"),
     [

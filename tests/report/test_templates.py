@@ -174,6 +174,34 @@ def test_own_words_are_whole_words_of_the_toolkit_and_never_of_people() -> None:
     assert made.plots["fy_vs_load"].x_label == "Radlast FZ [N]"
 
 
+def test_the_german_report_speaks_german_to_those_who_hear_it() -> None:
+    """Alternative texts: no English word is left, and every number is that of the English text."""
+    style = read_style(FOLDER / "pruefbericht.toml")
+    for more in ({}, {"simulated": True}):
+        english = build_content(make_result(**more), make_record(), issued=DAY).plots
+        german = build_content(make_result(**more), make_record(), style=style, issued=DAY).plots
+        assert len(german) == len(english) >= 11
+        for name, plot in german.items():
+            words = set(re.findall(r"[a-zäöüß]{2,}", plot.alt.lower()))
+            left = words & set(re.findall(r"[a-z]{2,}", english[name].alt.lower()))
+            # units, quantities and names that are the same in both languages
+            assert left <= {
+                "deg",
+                "fy",
+                "mz",
+                "sae",
+                "gough",
+                "plus",
+                "plysteer",
+                "crat",
+                "prat",
+                "in",
+                "minus",
+            }, left
+            assert re.findall(r"\d+", plot.alt) == re.findall(r"\d+", english[name].alt)
+            assert "." not in re.sub(r"\.( |$)", "", plot.alt)  # decimal commas
+
+
 def test_any_result_can_be_a_condition(tmp_path: Path) -> None:
     made = build_content(make_result(both=False), make_record(), issued=DAY)
     for name, held in (

@@ -17,7 +17,6 @@ from toolkit.cli.console import (
     ProtocolFile,
     Quiet,
     Reader,
-    Units,
     answer,
     day,
     exit_code,
@@ -59,7 +58,14 @@ def command(
         bool,
         typer.Option("--reproducibility", help="Demand it: an error without another laboratory's tests."),
     ] = False,
-    units: Units = "SI",
+    units: Annotated[
+        str | None,
+        typer.Option(
+            "--units",
+            help="SI or lbf, for people: text, figures, document. Default: SI; in the document the style "
+            "file's. The JSON answer is always in SI.",
+        ),
+    ] = None,
     figures: Annotated[
         Path | None,
         typer.Option("--figures", help="Folder for the figures (PNG), as the thesis's 6.6 to 6.29."),
@@ -86,7 +92,7 @@ def command(
     repeatability and intermediate precision by day, operator, mounting.
 
     A maker's table holds forces (SA [deg],FZ [N],FY [N],MZ [N*m]) or characteristics (FZ [N],conicity [N],
-    U_conicity [N],plysteer [N],secant_cornering [N/deg],...). The document's units are its style file's.
+    U_conicity [N],plysteer [N],secant_cornering [N/deg],...).
 
     Ends with 0 whether or not there are differences: they are results. 1: the data has findings.
 
@@ -97,7 +103,7 @@ def command(
     from toolkit.comparison.compare import compare
 
     chosen = choose_reader(reader)
-    style = unit_choice(units)
+    style = unit_choice(units or "SI")
     started = time.perf_counter()
     opened = _template(template, out, home)
     with progress(None, "reading", show=not (json or quiet)) as step:
@@ -108,7 +114,11 @@ def command(
     found = compare(entries, mode=cast("Mode | None", mode), level=level, reproducibility=reproducibility)
     drawn = _draw(found, style, figures) if figures else {}
     every = [*findings, *found.findings]
-    made = None if opened is None or out is None else _document(found, opened, out, every, day(known_at))
+    made = (
+        None
+        if opened is None or out is None
+        else _document(found, opened, out, every, day(known_at), None if units is None else style)
+    )
     payload: dict[str, Any] = comparison_payload(found) | {
         "figures": drawn,
         "document": None if made is None else _document_payload(made),
@@ -140,8 +150,14 @@ def _template(template: Path | None, out: Path | None, home: Path | None) -> Tem
 
 
 def _document(
-    found: Comparison, opened: Template, out: Path, findings: Sequence[Finding], known_at: date | None
+    found: Comparison,
+    opened: Template,
+    out: Path,
+    findings: Sequence[Finding],
+    known_at: date | None,
+    units: Style | None,
 ) -> Delivered:
+    from dataclasses import replace
     from datetime import date
 
     from toolkit.report.comparison.content import build_comparison_content
@@ -149,6 +165,8 @@ def _document(
     from toolkit.report.style import read_style, style_file
 
     style = read_style(style_file(opened.path))
+    if units is not None:
+        style = replace(style, force=units.force, moment=units.moment)
     content = build_comparison_content(found, style, findings, issued=known_at or date.today())  # noqa: DTZ011
     return deliver(opened, content, out, name="comparison")
 

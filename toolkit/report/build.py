@@ -64,7 +64,7 @@ def build_content(
     drawn = build_plots(result, style, watermark)
     drawn |= model_plots(comparison, watermark=watermark, decimal_comma=style.decimal_comma)
     plots = {
-        name: replace(say_plot(plot, dict(style.words)), decimal_comma=style.decimal_comma)
+        name: replace(say_plot(plot, dict(style.words), dict(style.alt)), decimal_comma=style.decimal_comma)
         for name, plot in drawn.items()
     }
     details = details or ReportDetails()

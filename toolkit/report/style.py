@@ -11,8 +11,10 @@ from toolkit.errors import ConfigError
 from toolkit.files import check_keys, read_toml
 from toolkit.units import si_scale
 
-_KEYS = "schema laboratory report words decimal_comma dates missing required styles decimals units".split()
-_TABLES = ("laboratory", "report", "words", "styles", "decimals", "units")
+_KEYS = (
+    "schema laboratory report words alt decimal_comma dates missing required styles decimals units".split()
+)
+_TABLES = ("laboratory", "report", "words", "alt", "styles", "decimals", "units")
 _LABORATORY = "name address contact place country accreditation".split()
 _REPORT = "method authorised_by function".split()
 _STYLES = ("heading", "caption", "table")
@@ -27,7 +29,7 @@ class Style:
     ``method``, ``authorised_by``, ``function`` stand in a report whose test names none. ``decimals`` maps a
     unit, a tag's path or ``<table>.<column>`` to digits after the point; ``styles`` maps heading, caption and
     table to the names of the template's Word styles; ``words`` are the organisation's own for the terms that
-    figures and tables print.
+    figures and tables print, ``alt`` further ones for the sentences of alternative texts alone.
     """
 
     laboratory: str | None = None
@@ -46,6 +48,7 @@ class Style:
     styles: tuple[tuple[str, str], ...] = ()
     decimals: tuple[tuple[str, int], ...] = ()
     words: tuple[tuple[str, str], ...] = ()
+    alt: tuple[tuple[str, str], ...] = ()
     force: str = "N"
     moment: str = "N*m"
 
@@ -118,6 +121,7 @@ def read_style(path: Path | None) -> Style:
         styles=tuple((str(k), str(v)) for k, v in parts["styles"].items()),
         decimals=tuple(parts["decimals"].items()),
         words=tuple((key, str(_text(parts["words"], key, path))) for key in parts["words"]),
+        alt=tuple((key, str(_text(parts["alt"], key, path))) for key in parts["alt"]),
         force=str(parts["units"].get("force", "N")),
         moment=str(parts["units"].get("moment", "N*m")),
     )

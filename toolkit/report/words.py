@@ -52,10 +52,14 @@ def say_table(table: Table, words: Mapping[str, str]) -> Table:
     return replace(table, rows=rows)
 
 
-def say_plot(plot: Plot, words: Mapping[str, str]) -> Plot:
-    """Return a figure with its axes, legend and caption in the organisation's words."""
+def say_plot(plot: Plot, words: Mapping[str, str], alt: Mapping[str, str]) -> Plot:
+    """Return a figure with its axes, legend and caption in the organisation's words.
+
+    Its alternative text is made of sentences: for these ``alt`` has words that would be too short elsewhere.
+    """
     return replace(
         plot,
+        alt=say(plot.alt, {**words, **alt}),
         x_label=say(plot.x_label, words),
         y_label=say(plot.y_label, words),
         caption=say(plot.caption, words),

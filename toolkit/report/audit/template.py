@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
-from toolkit.report.design.blocks import Pieces, field, paragraph, run
+from toolkit.report.design.blocks import Pieces, paragraph, run
 from toolkit.report.design.default import build_document
-
-_WIDE = (38.0, 128.0)
-_QUARTER = (34.0, 52.0, 31.0, 49.0)
+from toolkit.report.design.opening import (
+    QUARTER,
+    WIDE,
+    heading,
+    page_footer,
+    page_header,
+    title_and_conclusion,
+)
 
 
 def build_audit() -> bytes:
@@ -17,39 +22,23 @@ def build_audit() -> bytes:
 
 
 def _header(p: Pieces) -> str:
-    line = (
-        p.inline("tk:audit.title", "title")
-        + "<w:r><w:tab/></w:r><w:r><w:tab/></w:r>"
-        + p.inline("tk:audit.id", "id")
-    )
-    return paragraph(line, style="Header")
+    return page_header(p.inline("tk:audit.title", "title"), "", p.inline("tk:audit.id", "id"))
 
 
 def _footer(p: Pieces) -> str:
-    line = (
-        run("as known on ")
-        + p.inline("tk:audit.known_at", "date")
-        + "<w:r><w:tab/></w:r><w:r><w:tab/></w:r>"
-        + run("page ")
-        + field("PAGE")
-        + run(" of ")
-        + field("NUMPAGES")
-    )
-    return paragraph(line, style="Footer")
+    return page_footer(run("as known on ") + p.inline("tk:audit.known_at", "date"))
 
 
 def _first(p: Pieces) -> list[str]:
     return [
-        paragraph(p.inline("tk:audit.title", "title"), style="Title"),
-        paragraph(p.inline("tk:audit.id", "id"), style="Subtitle"),
-        paragraph(p.inline("tk:audit.conclusion", "conclusion")),
+        *title_and_conclusion(p, "audit"),
         p.facts(
             [
                 [("FILES", "audit.files"), ("AS KNOWN ON", "audit.known_at")],
                 [("RIGHT", "audit.right"), ("NOT RIGHT", "audit.not_right")],
                 [("UNREADABLE", "audit.unreadable"), ("WITHOUT A DATE", "audit.undated")],
             ],
-            _QUARTER,
+            QUARTER,
         ),
         paragraph("", style="Gap"),
         p.facts(
@@ -60,14 +49,14 @@ def _first(p: Pieces) -> list[str]:
                 [("SINCE GOOD?", "audit.since_good")],
                 [("SOFTWARE", "audit.software")],
             ],
-            _WIDE,
+            WIDE,
         ),
     ]
 
 
 def _results(p: Pieces) -> list[str]:
     return [
-        paragraph(run("Grades"), style="Heading1"),
+        heading("Grades"),
         p.table(
             "audit_grades",
             "Files by their grade, the first that applies.",
@@ -77,7 +66,7 @@ def _results(p: Pieces) -> list[str]:
             "lrrl",
         ),
         p.figure("audit_years", 150),
-        paragraph(run("Tests that change most"), style="Heading1"),
+        heading("Tests that change most"),
         p.table(
             "audit_tests",
             "Largest changes by the record in force: of any row, and of the characteristics at any load.",
@@ -97,7 +86,7 @@ def _results(p: Pieces) -> list[str]:
         ),
         p.block(
             "tk:if.reports_to_amend",
-            paragraph(run("Reports that rest on them"), style="Heading1")
+            heading("Reports that rest on them")
             + p.table(
                 "audit_reports",
                 "Reports to be amended (ISO/IEC 17025:2017, 7.8.8).",
@@ -107,7 +96,7 @@ def _results(p: Pieces) -> list[str]:
                 "lllr",
             ),
         ),
-        paragraph(run("Findings"), style="Heading1"),
+        heading("Findings"),
         p.table(
             "audit_findings",
             "What was found, by rule.",

@@ -6,12 +6,11 @@ from __future__ import annotations
 import re
 
 from toolkit.report.certificate.vocabulary import FIGURES
-from toolkit.report.design.blocks import Pieces, field, literal, paragraph, run
+from toolkit.report.design.blocks import Pieces, literal, paragraph, run
 from toolkit.report.design.default import build_document
+from toolkit.report.design.opening import QUARTER, WIDE, heading, mark, page_footer, page_header
 
 _UNKEPT = re.compile(r'(<w:pPr><w:pStyle w:val="[^"]*"/>)(?!<w:keepNext/>)')
-_WIDE = (38.0, 128.0)
-_QUARTER = (34.0, 52.0, 31.0, 49.0)
 
 
 def build_certificate() -> bytes:
@@ -25,36 +24,20 @@ def build_certificate() -> bytes:
 
 
 def _header(p: Pieces) -> str:
-    line = (
-        p.inline("tk:certificate.laboratory", "laboratory")
-        + "<w:r><w:tab/></w:r>"
-        + p.block("tk:if.draft", run("DRAFT, NO CERTIFICATE", bold=True, style="Mark"))
-        + p.block("tk:if.simulated", run("  SIMULATED", bold=True, style="Mark"))
-        + p.block("tk:if.withdrawn", run("  WITHDRAWN", bold=True, style="Mark"))
-        + "<w:r><w:tab/></w:r>"
-        + p.inline("tk:certificate.id", "certificate id")
+    return page_header(
+        p.inline("tk:certificate.laboratory", "laboratory"),
+        mark(p, "draft", "DRAFT, NO CERTIFICATE")
+        + mark(p, "simulated", "  SIMULATED")
+        + mark(p, "withdrawn", "  WITHDRAWN"),
+        p.inline("tk:certificate.id", "certificate id"),
     )
-    return paragraph(line, style="Header")
 
 
 def _footer(p: Pieces) -> str:
-    line = (
-        run("certificate ")
-        + p.inline("tk:certificate.id", "certificate id")
-        + "<w:r><w:tab/></w:r>"
-        + run("issued ")
-        + p.inline("tk:certificate.issued", "date")
-        + "<w:r><w:tab/></w:r>"
-        + run("page ")
-        + field("PAGE")
-        + run(" of ")
-        + field("NUMPAGES")
+    return page_footer(
+        run("certificate ") + p.inline("tk:certificate.id", "certificate id"),
+        run("issued ") + p.inline("tk:certificate.issued", "date"),
     )
-    return paragraph(line, style="Footer")
-
-
-def _heading(text: str) -> str:
-    return paragraph(run(text), style="Heading1")
 
 
 def _kept(fragment: str) -> str:
@@ -108,7 +91,7 @@ def _first_page(p: Pieces) -> list[str]:
                 [("PLACE", "certificate.place")],
                 [("ACCREDITATION?", "certificate.accreditation")],
             ],
-            _WIDE,
+            WIDE,
         ),
         paragraph("", style="Gap"),
         p.facts(
@@ -117,7 +100,7 @@ def _first_page(p: Pieces) -> list[str]:
                 [("RECEIVED?", "certificate.received")],
                 [("CONDITION", "certificate.phase"), ("TEMPERATURE", "certificate.temperature")],
             ],
-            _QUARTER,
+            QUARTER,
         ),
         paragraph("", style="Gap"),
         p.facts(
@@ -125,7 +108,7 @@ def _first_page(p: Pieces) -> list[str]:
                 [("CALIBRATED BY", "certificate.entered_by"), ("CHECKED BY", "certificate.checked_by")],
                 [("AUTHORISED BY", "certificate.approved_by")],
             ],
-            _QUARTER,
+            QUARTER,
         ),
         p.block(
             "tk:if.gaps",
@@ -142,7 +125,7 @@ def _first_page(p: Pieces) -> list[str]:
 
 def _results(p: Pieces) -> list[str]:
     return [
-        _heading("1  Items and reference"),
+        heading("1  Items and reference"),
         p.table(
             "cells",
             "Load cells and the range of their indications during the calibration.",
@@ -152,7 +135,7 @@ def _results(p: Pieces) -> list[str]:
             "lllrrr",
         ),
         _value(p, "traceability"),
-        _heading("2  Expanded uncertainty"),
+        heading("2  Expanded uncertainty"),
         _value(p, "uncertainty"),
         # U is read as a whole: the table does not break where a page can hold it.
         _kept(
@@ -165,7 +148,7 @@ def _results(p: Pieces) -> list[str]:
                 "lrrrlrrr",
             )
         ),
-        _heading("3  Calibration equation"),
+        heading("3  Calibration equation"),
         _value(p, "model"),
         p.table(
             "coefficients",
@@ -184,7 +167,7 @@ def _results(p: Pieces) -> list[str]:
             "llrrrrrr",
         ),
         *(p.figure(name, 160) for name in FIGURES),
-        _heading("4  Check loads and conformity"),
+        heading("4  Check loads and conformity"),
         p.table(
             "check",
             "Check loads, which were not part of the fit: the load from the equation against the reference.",
@@ -211,7 +194,7 @@ def _results(p: Pieces) -> list[str]:
 
 def _statements(p: Pieces) -> list[str]:
     return [
-        _heading("5  Before and after adjustment"),
+        heading("5  Before and after adjustment"),
         _value(p, "adjustment"),
         p.table(
             "adjustment",
@@ -221,7 +204,7 @@ def _statements(p: Pieces) -> list[str]:
             [12, 32, 18, 21, 17, 21, 17, 18, 14],
             "llrrrrrrl",
         ),
-        _heading("6  Uncertainty budget at full scale"),
+        heading("6  Uncertainty budget at full scale"),
         p.table(
             "budget",
             "Standard uncertainties of the components and their shares of the variance.",
@@ -232,15 +215,15 @@ def _statements(p: Pieces) -> list[str]:
         ),
         p.block(
             "tk:if.certificate.opinions",
-            _heading("7  Opinions and interpretations")
+            heading("7  Opinions and interpretations")
             + paragraph(
                 run("Opinion, not a result: ", bold=True) + p.inline("tk:certificate.opinions", "opinion")
             ),
         ),
-        p.block("tk:if.interval_agreed", _heading("Agreed with the customer") + _value(p, "interval")),
+        p.block("tk:if.interval_agreed", heading("Agreed with the customer") + _value(p, "interval")),
         # The end mark never stands on a page of its own.
         _kept(
-            _heading("Record")
+            heading("Record")
             + paragraph(
                 literal(
                     "Made by {{tk:certificate.software}} from calibration record {{tk:certificate.record}} of {{tk:certificate.instrument}}, made with {{tk:certificate.record_software}}."
@@ -251,7 +234,7 @@ def _statements(p: Pieces) -> list[str]:
                     [("RECORD SHA-256", "certificate.record_hash")],
                     [("LEDGER HEAD", "certificate.ledger_head")],
                 ],
-                _WIDE,
+                WIDE,
             )
         ),
         paragraph(

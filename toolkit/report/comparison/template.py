@@ -3,11 +3,17 @@
 from __future__ import annotations
 
 from toolkit.report.comparison.vocabulary import FIGURES
-from toolkit.report.design.blocks import Pieces, field, paragraph, run
+from toolkit.report.design.blocks import Pieces, paragraph, run
 from toolkit.report.design.default import build_document
-
-_WIDE = (38.0, 128.0)
-_QUARTER = (34.0, 52.0, 31.0, 49.0)
+from toolkit.report.design.opening import (
+    QUARTER,
+    WIDE,
+    heading,
+    mark,
+    page_footer,
+    page_header,
+    title_and_conclusion,
+)
 
 
 def build_comparison() -> bytes:
@@ -18,39 +24,21 @@ def build_comparison() -> bytes:
 
 
 def _header(p: Pieces) -> str:
-    line = (
-        p.inline("tk:comparison.mode", "mode")
-        + "<w:r><w:tab/></w:r>"
-        + p.block("tk:if.simulated", run("SIMULATED", bold=True, style="Mark"))
-        + p.block("tk:if.unverified", run("  UNVERIFIED", bold=True, style="Mark"))
-        + "<w:r><w:tab/></w:r>"
-        + p.inline("tk:comparison.id", "id")
+    return page_header(
+        p.inline("tk:comparison.mode", "mode"),
+        mark(p, "simulated", "SIMULATED") + mark(p, "unverified", "  UNVERIFIED"),
+        p.inline("tk:comparison.id", "id"),
     )
-    return paragraph(line, style="Header")
 
 
 def _footer(p: Pieces) -> str:
-    line = (
-        p.inline("tk:comparison.issued", "date")
-        + "<w:r><w:tab/></w:r><w:r><w:tab/></w:r>"
-        + run("page ")
-        + field("PAGE")
-        + run(" of ")
-        + field("NUMPAGES")
-    )
-    return paragraph(line, style="Footer")
-
-
-def _heading(text: str) -> str:
-    return paragraph(run(text), style="Heading1")
+    return page_footer(p.inline("tk:comparison.issued", "date"))
 
 
 def _first(p: Pieces) -> list[str]:
     return [
-        paragraph(p.inline("tk:comparison.title", "title"), style="Title"),
-        paragraph(p.inline("tk:comparison.id", "id"), style="Subtitle"),
-        paragraph(p.inline("tk:comparison.conclusion", "conclusion")),
-        p.facts([[("REFERENCE", "comparison.reference"), ("ISSUED", "comparison.issued")]], _QUARTER),
+        *title_and_conclusion(p, "comparison"),
+        p.facts([[("REFERENCE", "comparison.reference"), ("ISSUED", "comparison.issued")]], QUARTER),
         paragraph("", style="Gap"),
         p.facts(
             [
@@ -60,9 +48,9 @@ def _first(p: Pieces) -> list[str]:
                 [("LEFT OUT?", "comparison.left_out")],
                 [("SOFTWARE", "comparison.software")],
             ],
-            _WIDE,
+            WIDE,
         ),
-        _heading("What is compared"),
+        heading("What is compared"),
         p.table(
             "compared",
             "Tests and tables, as they state their conditions.",
@@ -87,11 +75,11 @@ def _differences(p: Pieces, name: str, caption: str) -> str:
 
 def _results(p: Pieces) -> list[str]:
     return [
-        _heading("Characteristics against load"),
+        heading("Characteristics against load"),
         *(p.figure(name, 150) for name in FIGURES),
         p.block(
             "tk:if.precision",
-            _heading("Precision")
+            heading("Precision")
             + p.table(
                 "factors",
                 "What changed between the tests (ISO 5725-3).",
@@ -111,7 +99,7 @@ def _results(p: Pieces) -> list[str]:
         ),
         p.block(
             "tk:if.pattern",
-            _heading("Pattern effect")
+            heading("Pattern effect")
             + p.table(
                 "pattern",
                 "Pattern and body effect from a regular and a reversed belt.",
@@ -121,7 +109,7 @@ def _results(p: Pieces) -> list[str]:
                 "lrlrrrr",
             ),
         ),
-        _heading("Differences"),
+        heading("Differences"),
         paragraph(p.inline("tk:comparison.shown", "which rows")),
         _differences(p, "differences", "Characteristics: differences from the reference."),
         p.block(
@@ -130,7 +118,7 @@ def _results(p: Pieces) -> list[str]:
         ),
         p.block(
             "tk:if.comparison_findings",
-            _heading("Findings")
+            heading("Findings")
             + p.table(
                 "comparison_findings",
                 "What departs from what was expected; 'toolkit explain RULE' tells more.",

@@ -12,8 +12,9 @@ import zipfile
 from collections.abc import Callable
 from typing import Any
 
-from toolkit.report.design.blocks import Pieces, elements, field, paragraph, placeholder_png, run
+from toolkit.report.design.blocks import Pieces, elements, placeholder_png, run
 from toolkit.report.design.body import chapters
+from toolkit.report.design.opening import mark, page_footer, page_header
 from toolkit.report.design.styles import make_styles
 from toolkit.report.design.title import title_page
 from toolkit.report.template.xml import Element, q
@@ -167,27 +168,14 @@ def _replace(element: Element, fragment: str) -> None:
 
 
 def _header(p: Pieces) -> str:
-    line = (
-        p.inline("tk:laboratory.name", "laboratory")
-        + "<w:r><w:tab/></w:r>"
-        + p.block("tk:if.simulated", run("SIMULATED DATA", bold=True, style="Mark"))
-        + p.block("tk:if.unverified", run("  UNVERIFIED CALIBRATION", bold=True, style="Mark"))
-        + "<w:r><w:tab/></w:r>"
-        + p.inline("tk:report.id", "report id")
+    return page_header(
+        p.inline("tk:laboratory.name", "laboratory"),
+        mark(p, "simulated", "SIMULATED DATA") + mark(p, "unverified", "  UNVERIFIED CALIBRATION"),
+        p.inline("tk:report.id", "report id"),
     )
-    return paragraph(line, style="Header")
 
 
 def _footer(p: Pieces) -> str:
-    line = (
-        p.inline("tk:test.name", "test")
-        + "<w:r><w:tab/></w:r>"
-        + run("calibration ")
-        + p.inline("tk:calibration.id", "record")
-        + "<w:r><w:tab/></w:r>"
-        + run("page ")
-        + field("PAGE")
-        + run(" of ")
-        + field("NUMPAGES")
+    return page_footer(
+        p.inline("tk:test.name", "test"), run("calibration ") + p.inline("tk:calibration.id", "record")
     )
-    return paragraph(line, style="Footer")

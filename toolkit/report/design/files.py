@@ -25,6 +25,7 @@ def packaged_templates() -> dict[str, PackagedTemplate]:
     from toolkit.report.design.german import STYLE_FILE as GERMAN
     from toolkit.report.design.german import build_german
     from toolkit.report.design.summary import build_summary
+    from toolkit.report.diagnosis.template import build_diagnosis
 
     listed = (
         PackagedTemplate(name="org", title="a whole test report", build=build_default, style=STYLE_FILE),
@@ -40,6 +41,9 @@ def packaged_templates() -> dict[str, PackagedTemplate]:
         ),
         PackagedTemplate(
             name="comparison", title="a comparison of tests", build=build_comparison, style=None
+        ),
+        PackagedTemplate(
+            name="diagnosis", title="a diagnosis of a simulation", build=build_diagnosis, style=None
         ),
         PackagedTemplate(name="audit", title="an audit's summary", build=build_audit, style=None),
     )
