@@ -7,12 +7,13 @@ import argparse
 import json
 import sys
 from pathlib import Path
+from typing import Any
 
-from tests.concealed import log, page
-from tests.concealed.batch import draw_batch, seed_of
+from tests.concealed import log, page, proof_file
+from tests.concealed.batch import draw_batch, redrawn, seed_of
 from tests.concealed.real import run_real
 from tests.concealed.running import run_batch
-from tests.concealed.score import score_batch
+from tests.concealed.score import open_batch, score_of
 from tests.concealed.seal import SealError, verify
 
 TOOL = Path(sys.executable).with_name("toolkit")
@@ -23,8 +24,10 @@ def _say(text: str) -> None:
 
 
 def _score(given: argparse.Namespace) -> None:
-    score = score_batch(given.out, workers=given.workers, progress=_say)
-    batch = verify(given.out)
+    proof = open_batch(given.out, workers=given.workers, progress=_say)
+    batch, score = proof.batch, score_of(proof)
+    small = proof_file.path_beside(given.log or given.out / "log", batch)
+    proof_file.write(small, proof)
     if given.log:
         score["log"] = log.scored(given.log, batch, score)
     real = given.out / "real" / "real.json"
@@ -34,6 +37,11 @@ def _score(given: argparse.Namespace) -> None:
     target.mkdir(parents=True, exist_ok=True)
     (target / "PROOF.md").write_text(page.markdown(score, batch), encoding="utf-8")
     (target / "proof.html").write_text(page.page(score, batch), encoding="utf-8")
+    _bars(score)
+    print(f"{small} holds the opened answers and what was answered")  # noqa: T201
+
+
+def _bars(score: dict[str, Any]) -> None:
     for bar in score["bars"]:
         state = {True: "met    ", False: "NOT MET", None: "too few"}[bar.met]
         print(f"{state}  {bar.title}: {bar.observed} ({bar.asked})")  # noqa: T201
@@ -61,7 +69,18 @@ def _real(given: argparse.Namespace) -> None:
 
 
 def _verify(given: argparse.Namespace) -> None:
-    found = verify(given.out)
+    """Compare a batch, or a proof's small file, with its seal; score the file again; draw its data again."""
+    if given.answers is None and given.out is None:
+        raise SealError("nothing to verify: give --out DIR, or --answers FILE")
+    if given.answers is None:
+        found = verify(given.out)
+    else:
+        proof = proof_file.read(given.answers)
+        found = proof.batch
+        _bars(score_of(proof))
+        if given.out:
+            redrawn(proof, given.out, workers=given.workers, progress=lambda n: _say(f"{n} drawn"))
+            print("drawn again from the seed: the same data and answers")  # noqa: T201
     print(f"answers {found['answers_sha256']}\ndata    {found['data_sha256']}")  # noqa: T201
 
 
@@ -90,8 +109,14 @@ def _parser() -> argparse.ArgumentParser:
     steps = parser.add_subparsers(dest="step", required=True)
     for name, text in _HELP.items():
         step = steps.add_parser(name, help=text)
-        step.add_argument("--out", type=Path, required=True, help="the batch's folder")
+        step.add_argument("--out", type=Path, required=name != "verify", help="the batch's folder")
         step.add_argument("--workers", type=int, default=2)
+        if name == "verify":
+            step.add_argument(
+                "--answers", type=Path,
+                help="a scored batch's small file: compared with its seal and scored again; with --out DIR"
+                " (new) its data are drawn again from the opened seed and compared too",
+            )  # fmt: skip
         if name in ("draw", "all"):
             step.add_argument("--seed", default="os", help='a number, or "os": nobody chose it (default)')
             step.add_argument("--cases", type=int, default=400, help="controls, 6 %% more, not counted")

@@ -45,11 +45,12 @@ def library(df: pd.DataFrame, run: Run, nominal: dict[str, Array], output: str) 
         "nonlinearity:y3": y**3, "channel_delay:dy": rate, "hysteresis:sign": np.sign(rate),
     }  # fmt: skip
     tire = {"SA", "V"} <= set(df)
+    load = df.rename(columns={"FZ_CMD": "FZ"}) if "FZ" not in df else df
     for name in ("T", "T_AMBIENT"):
         if (x := _column(df, name)) is not None:
             out[f"thermal_drift:{name}"] = x
     if tire:
-        sa, fz, v = (df[k].to_numpy(float) for k in ("SA", "FZ", "V"))
+        sa, fz, v = (load[k].to_numpy(float) for k in ("SA", "FZ", "V"))
         turn = np.gradient(np.radians(sa), t)
         slope = rate / np.where(np.abs(turn) > 0.01, turn, np.inf)
         pull = "conicity" if output == "FY" else "crosstalk"

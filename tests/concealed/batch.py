@@ -13,7 +13,8 @@ import numpy as np
 from tests.concealed.draw import draw_case, mix
 from tests.concealed.files import write_case
 from tests.concealed.model import Array
-from tests.concealed.seal import seal
+from tests.concealed.proof_file import Proof
+from tests.concealed.seal import SealError, opened, seal
 
 
 def seed_of(text: str) -> int:
@@ -43,3 +44,21 @@ def draw_batch(
             answers[name], predicted[name] = answer, rows
             progress(done + 1)
     return seal(folder, {"seed": hex(seed), "cases": answers}, predicted)
+
+
+def redrawn(proof: Proof, folder: Path, *, workers: int, progress: Callable[[int], None]) -> None:
+    """Draw a batch again from the seed that was opened, into a new folder; it must be the sealed one.
+
+    Raises SealError where the data's hash or an answer differs; the reason may be another state of the
+    generator or of its libraries, which are named.
+    """
+    controls = sum(row["bucket"] == "control" for row in proof.sealed.values())
+    count = len(proof.sealed) - controls
+    made = draw_batch(folder, seed=proof.seed, cases=count, workers=workers, progress=progress)
+    again, _ = opened(folder)
+    other = [k for k in ("generator_sha256", "versions") if made[k] != proof.batch.get(k)]
+    hint = f" ({' and '.join(other)} differ from the batch's)" if other else ""
+    if made["data_sha256"] != proof.batch["data_sha256"]:
+        raise SealError(f"the seed does not give the data that were sealed{hint}")
+    if again["cases"] != proof.sealed:
+        raise SealError(f"the seed does not give the answers that were sealed{hint}")

@@ -88,7 +88,7 @@ def _specs(rng: np.random.Generator, full: float) -> dict[str, EffectSpec]:
     ])  # fmt: skip
 
 
-def session_files(rng: np.random.Generator, matrix: Array) -> dict[str, str]:
+def session_files(rng: np.random.Generator, matrix: Array, *, date: str = "2026-03-02") -> dict[str, str]:
     """Return SESSION.toml with its loads and check loads: combined loads on the true cells."""
     back = np.linalg.inv(matrix)
 
@@ -105,7 +105,7 @@ def session_files(rng: np.random.Generator, matrix: Array) -> dict[str, str]:
     data["direction"] = np.where(np.arange(60) % 20 < 10, "up", "down")
     text = """schema = 1
 instrument = "m15"
-date = 2026-03-02
+date = DATE
 operator = "bench"
 temperature = { value = 21.0, unit = "degC" }
 indications = ["D51", "D52", "E5"]
@@ -123,7 +123,7 @@ FY = { U = 0.1, k = 2, unit = "lbf" }
 MZ = { U = 0.02, k = 2, unit = "lbf*ft" }
 """
     return {
-        "SESSION.toml": text,
+        "SESSION.toml": text.replace("DATE", date),
         "loads.csv": data.to_csv(index=False, float_format="%.6f"),
         "check.csv": rows(9).to_csv(index=False, float_format="%.6f"),
     }
@@ -131,7 +131,7 @@ MZ = { U = 0.02, k = 2, unit = "lbf*ft" }
 
 def build(rng: np.random.Generator, needs: frozenset[str]) -> Scenario:
     """Return a drum test whose recording has the cells' indications in lbf."""
-    made = tire_cases.build(rng, kind="machine", needs=needs)
+    made = tire_cases.build(rng, kind="machine", needs=needs, cells=True)
     matrix = geometry(rng)
     back = np.linalg.inv(matrix)
     peak = max(float(np.abs(made.truth(r, made.true_parameters(), {})["FY"]).max()) for r in made.runs) / LBF
@@ -160,7 +160,7 @@ def build(rng: np.random.Generator, needs: frozenset[str]) -> Scenario:
     tire_level = {k: v for k, v in made.effects.items() if v.channel is None}
     return dataclasses.replace(
         made, family="tire-cells", simulation=dict(made.simulation) | {"calibration": "record.json"},
-        channels=channels, truth=truth, written=written, session=session_files(rng, matrix),
+        channels=channels, truth=truth, written=written, sessions=(session_files(rng, matrix),),
         noise=dict(made.noise) | {"MX": Noise(sd=0.02 * sd, ar=made.noise["FY"].ar)},
         effects=tire_level | _specs(rng, peak * math.sqrt(0.5)),
     )  # fmt: skip

@@ -56,11 +56,60 @@ def _methods(score: dict[str, Any]) -> list[list[str]]:
     ]
 
 
+def _put_in(score: dict[str, Any]) -> Table:
+    never = score["never put in"]
+    what = f"Never put in, so that this batch says nothing of them: {', '.join(never)}." if never else (
+        "Every effect of the catalogue was put in."
+    )  # fmt: skip
+    return Table(
+        title="What was put in",
+        sentence="Families that can conceal it, alone or only as a class; its mean share of a batch as a"
+        f" single effect; how often it was here, in all kinds of case. {what}",
+        head=("effect", "families", "mean share", "times", "right where alone"),
+        rows=[
+            [
+                k,
+                ", ".join(v["families"]) or "none",
+                f"{100 * v['share']:.1f} %",
+                str(v["times"]),
+                str(v["right"]),
+            ]
+            for k, v in score["put in"].items()
+        ],
+    )
+
+
+def _from_outside(score: dict[str, Any]) -> Table:
+    return Table(
+        title="Outside the catalogue",
+        sentence="Why each is outside, and the largest share of its energy here that one catalogue effect,"
+        " with a size of its own in every run, could take; a draw with more than a third is not used.",
+        head=("what", "why it is outside", "largest share", "called unknown", "misnamed"),
+        rows=[
+            [k.removeprefix("hidden_"), v["reason"], f"{100 * v['largest share']:.0f} %", str(v["unknown"]),
+             str(v["misnamed"])]
+            for k, v in score["outside"].items()
+        ],
+    )  # fmt: skip
+
+
+def _classes(score: dict[str, Any]) -> Table:
+    return Table(
+        title="Deliberately confounded",
+        sentence="The right answer is the class, and why no analysis of the recording can say more.",
+        head=("class", "why", "the class", "one member alone", "a false name"),
+        rows=[
+            [k, v["reason"], str(v["right"]), str(v["one alone"]), str(v["false"])]
+            for k, v in score["classes"].items()
+        ],
+    )
+
+
 def _confusion(score: dict[str, Any]) -> list[list[str]]:
     def cells(row: dict[str, int]) -> str:
         return ", ".join(f"{name} {n}" for name, n in sorted(row.items(), key=lambda x: (-x[1], x[0])))
 
-    return [[there, cells(row)] for there, row in score["matrix"].items()]
+    return [[there, str(score["right by row"][there]), cells(row)] for there, row in score["matrix"].items()]
 
 
 def _real(score: dict[str, Any]) -> Table:
@@ -124,6 +173,14 @@ def tables(score: dict[str, Any]) -> list[Table]:
             curve="power by distance",
         ),
         Table(
+            title="Power by predicted size",
+            sentence="Single effects whose parameter the contract fixes: size over what the tool says it sees"
+            " with 80 % power (median of its statements for this effect in the family's other cases).",
+            head=("size over detectable", "right name or class"),
+            rows=[[span(a), str(a["rate"])] for a in score["power by detectable"]],
+            curve="power by detectable",
+        ),
+        Table(
             title="Beside simpler methods",
             sentence="The same cases and judge; a baseline's names are those of its terms.",
             head=("", *HEADLINE, "gap closed"),
@@ -137,10 +194,14 @@ def tables(score: dict[str, Any]) -> list[Table]:
         ),
         Table(
             title="Confusion",
-            sentence="Left what was there, right what was answered and how often.",
-            head=("there", "answers"),
+            sentence="Left what was there, right what was answered and how often: a name alone, a name of"
+            " a class, or the verdict where nothing is named.",
+            head=("there", "right", "answers"),
             rows=_confusion(score),
         ),
+        _put_in(score),
+        _from_outside(score),
+        _classes(score),
     ]
     if score.get("real"):
         out.append(_real(score))

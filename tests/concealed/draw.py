@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from dataclasses import dataclass
 from typing import Any
 
@@ -9,11 +10,12 @@ import numpy as np
 
 from tests.concealed import controls
 from tests.concealed import size as sizing
-from tests.concealed.catalogue import CONFOUNDED, FAMILIES, Confounded
+from tests.concealed.catalogue import CONFOUNDED, FAMILIES, ONE_SIZE, Confounded, share_of
 from tests.concealed.files import missing
 from tests.concealed.instruments import DIGITAL, digital
 from tests.concealed.model import Array, Params, Scenario
 from tests.concealed.noise import coloured, converter, spikes
+from tests.concealed.outside import LARGEST_SHARE, ONE_SIDED, REASONS
 
 MIX = {"single": 0.34, "two": 0.10, "null": 0.38, "outside": 0.10, "confounded": 0.08}
 CONTROLS = 0.06
@@ -27,10 +29,13 @@ _SHADOWS = (
     frozenset("relaxation channel_delay filter_lag backlash hysteresis turn_slip creep".split()),
     frozenset("saturation quantisation dead_band rectification unit_error channel_sign channel_swap".split()),
     frozenset("coulomb_friction viscous_damping quadratic_drag".split()),
-    frozenset("zero_offset zero_drift thermal_drift constant_force crosstalk".split()),
+    frozenset("zero_offset zero_drift thermal_drift constant_force crosstalk conicity camber_offset".split()),
     frozenset("steer_compliance wear drum_curvature thermal_friction load_friction speed_friction".split()),
 )
-_ONE_SIZE = ("unit_error", "channel_sign", "rectification", "channel_swap")
+
+
+TURNED_ROUND = frozenset({"conicity", "camber_offset"})
+"""Effects that stand alone only where the tire was turned round on the hub."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -86,9 +91,9 @@ def _pick(
     if bucket == "outside":
         return family, None, (str(rng.choice(FAMILIES[family].outside)),)
     if bucket == "single":
-        share = np.array([0.5 if name in _ONE_SIZE else 1.0 for name in inside])
+        share = np.array([share_of(name) for name in inside])
         return family, None, (str(rng.choice(inside, p=share / share.sum())),)
-    graded = [name for name in inside if name not in _ONE_SIZE]
+    graded = [name for name in inside if name not in ONE_SIZE]
     first, second = (str(x) for x in rng.choice(graded, 2, replace=False))
     if any({first, second} <= group for group in _SHADOWS):
         raise RedrawError
@@ -111,9 +116,7 @@ def _alike(
     for other, spec in s.effects.items():
         if other == name or other not in FAMILIES[s.family].inside or not spec.scaled:
             continue
-        b = sizing.projected(
-            s, sizing.difference(sizing.truth_of(s, s.runs, p, {other: spec.at(1.0)}), without), slopes
-        )
+        b = sizing.projected(s, sizing.change(s, p, {other: spec.at(1.0)}, without), slopes)
         length = float(np.linalg.norm(b))
         if length < 1e-6:
             continue
@@ -124,21 +127,38 @@ def _alike(
     return near
 
 
-def _largest_cosine(
+def _by_run(s: Scenario, effect: sizing.Signals, slopes: list[sizing.Signals]) -> list[Array]:
+    """Return what the parameters leave of a difference as innovations, a vector for each run."""
+    whole = sizing.projected(s, effect, slopes)
+    ends = np.cumsum([sum(row[k].size for k in s.outputs) for row in effect])
+    return np.split(whole, ends[:-1])
+
+
+def nearest_inside(
     s: Scenario, effect: sizing.Signals, without: sizing.Signals, slopes: list[sizing.Signals]
-) -> float:
-    """Return how much of an effect from outside the nearest one of the catalogue could take."""
-    a = sizing.projected(s, effect, slopes)
-    p, best = s.true_parameters(), 0.0
+) -> tuple[str, float]:
+    """Return the catalogue effect that can take most of an effect from outside, and its share of the energy.
+
+    Every catalogue effect of the scenario with a size of its own in each run, of its own sign where it has
+    one: more than any effect of one size, or confined to some of the runs, can take. Small and large ones
+    where the truth is cheap.
+    """
+    a = _by_run(s, effect, slopes)
+    total = float(sum(x @ x for x in a))
+    p, best = s.true_parameters(), ("", 0.0)
     for other, spec in s.effects.items():
         if other.startswith("hidden") or not spec.scaled:
             continue
-        b = sizing.projected(
-            s, sizing.difference(sizing.truth_of(s, s.runs, p, {other: spec.at(1.0)}), without), slopes
-        )
-        length = float(np.linalg.norm(b) * np.linalg.norm(a))
-        if length > 1e-9:
-            best = max(best, abs(float(a @ b)) / length)
+        for factor in (1.0,) if s.kind == "ode" else (0.5, min(3.0, spec.largest)):
+            b = _by_run(s, sizing.change(s, p, {other: spec.at(factor)}, without), slopes)
+            least = 0.0 if other in ONE_SIDED else -np.inf
+            taken = sum(
+                max(float(x @ y), least) ** 2 / float(y @ y)
+                for x, y in zip(a, b, strict=True)
+                if y @ y > 1e-12
+            )
+            if taken > best[1] * total:
+                best = (other, taken / total)
     return best
 
 
@@ -193,7 +213,7 @@ def _as_control(drawn: Drawn, control: str, rng: np.random.Generator) -> Drawn:
     else:
         p = s.true_parameters()
         there = sizing.truth_of(s, s.runs, p, drawn.effects)
-        without = sizing.truth_of(s, s.runs, p, {})
+        without = sizing.without_of(s, s.runs, p, drawn.effects)
         measured = []
         for row, bare in zip(there, without, strict=True):
             noise = {k: coloured(s.noise[k], y.size, rng) for k, y in row.items()}
@@ -237,6 +257,8 @@ def _draw(
     else:
         family, group, names = _pick(rng, bucket, control)
     needs = frozenset(names) | (group.needs if group else frozenset())
+    if bucket == "single" and needs & TURNED_ROUND:
+        needs |= {"turned"}
     s = (group or FAMILIES[family]).build(rng, needs)
     p = s.true_parameters()
     slopes = sizing.jacobian(s, s.runs)
@@ -267,13 +289,17 @@ def _draw(
             "size": round(found.over_noise, 4),
             "distance": round(found.distance, 3),
         })  # fmt: skip
-    truth = sizing.truth_of(s, s.runs, p, effects)
+    truth, without = sizing.truth_of(s, s.runs, p, effects), sizing.without_of(s, s.runs, p, effects)
     total = sizing.size_of(s, sizing.difference(truth, without), slopes)
     near: dict[str, float] = {}
-    if bucket == "outside" and _largest_cosine(s, sizing.difference(truth, without), without, slopes) > 0.8:
-        raise RedrawError
-    if compare and bucket == "single" and rows[0]["name"] not in _ONE_SIZE:
+    nearest: tuple[str, float] = ("", 0.0)
+    if bucket == "outside" and not s.timeless:
+        nearest = nearest_inside(s, sizing.difference(truth, without), without, slopes)
+        if nearest[1] > LARGEST_SHARE:
+            raise RedrawError
+    if compare and bucket == "single" and rows[0]["name"] not in ONE_SIZE:
         near = _alike(s, names[0], truth, without, slopes, total.distance)
+    s = dataclasses.replace(s, runs=sizing.driven_of(s, s.runs, effects))
     lost = 0.01 if rng.random() < 0.2 else 0.0
     measured = [_recorded(s, row, effects, lost, rng) for row in _before_converter(s, p, effects)]
     _check(s, measured, truth, effects)
@@ -285,6 +311,8 @@ def _draw(
         "class": sorted(group.members) if group else [],
         "alike": near,
         "outside": bucket == "outside",
+        "reason": group.reason if group else REASONS.get(names[0], "") if names else "",
+        "nearest_inside": {"name": nearest[0], "share": round(nearest[1], 3)} if nearest[0] else None,
         "size": round(total.over_noise, 4),
         "distance": round(total.distance, 3),
         "by_output": {k: round(v, 4) for k, v in total.by_output.items()},

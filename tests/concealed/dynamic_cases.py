@@ -17,7 +17,7 @@ import pandas as pd
 
 from tests.concealed import ode, specs
 from tests.concealed.instruments import sampled
-from tests.concealed.model import Array, Channel, Effects, Noise, Parameter, Params, Run, Scenario
+from tests.concealed.model import Array, Channel, Effects, EffectSpec, Noise, Parameter, Params, Run, Scenario
 from tests.concealed.noise import anti_alias
 from tests.concealed.plans import source, walk, wave
 from tests.concealed.simulators import drive as drive_simulator
@@ -65,11 +65,13 @@ def _motion(
 ) -> tuple[Array, Array]:
     """Return true position and velocity; a hidden oscillator rides on the mass where the effect asks for
     one."""
-    hidden = e.get("hidden_resonance")
+    hidden, gust = e.get("hidden_resonance"), e.get("hidden_gust")
 
-    def rhs(_t: float, x: Array, u: dict[str, float]) -> Array:
+    def rhs(time: float, x: Array, u: dict[str, float]) -> Array:
         added, bristle_rate = left_out(x[0], x[1], x[2], e, presliding)
         a = rates(x[0], x[1], u) + added
+        if gust:
+            a += gust["force"] * sum(math.exp(-(((time - at) / gust["seconds"]) ** 2)) for at in gust["at"])
         q_rate, w_rate = 0.0, 0.0
         if hidden:
             w = 2 * math.pi * hidden["frequency"]
@@ -163,6 +165,14 @@ def _scenario(
     )  # fmt: skip
 
 
+def gusts(rng: np.random.Generator, runs: list[Run], force: float) -> EffectSpec:
+    """Return pushes of a moment each in two of the recorded runs."""
+    starts = [
+        float(rng.uniform(*np.quantile(runs[i].rows, (0.2, 0.8)))) for i in rng.permutation(len(runs) - 2)[:2]
+    ]
+    return specs.spec("hidden_gust", {"force": force, "at": starts, "seconds": 0.8}, "force")
+
+
 def _prior(rng: np.random.Generator, name: str, value: float, unit: str, share: float) -> Parameter:
     sd = abs(value) * share
     off = float(np.clip(rng.normal(0, sd), -1.8 * sd, 1.8 * sd)) if sd else 0.0
@@ -193,7 +203,8 @@ def pendulum(rng: np.random.Generator) -> Scenario:
         inputs={"M": Channel(unit="N*m", role="input")}, outputs={"TH": "rad"}, truth=truth,
         effects=lambda peak: specs.motion(rng, coulomb=0.25, viscous=0.08, drag=0.06, cubic=2.0,
             constant=0.15,
-                                          ripple=(0.4, 0.25)) | specs.channel(rng, "TH", peak["TH"]),
+                                          ripple=(0.4, 0.25)) | specs.channel(rng, "TH", peak["TH"])
+            | {"hidden_gust": gusts(rng, runs, 0.5)},
     )  # fmt: skip
 
 
@@ -225,7 +236,8 @@ def drive(rng: np.random.Generator) -> Scenario:
         simulation={"states": ["x", "v"], "force_terms": {"v": "N/kg"}}, parameters=parameters, runs=runs,
         inputs={"R": Channel(unit="m", role="input")}, outputs={"X": "m", "U": "V"}, truth=truth, substeps=4,
         effects=lambda peak: specs.motion(rng, coulomb=0.05, viscous=0.4, drag=4.0, cubic=40.0, constant=0.05,
-                                          ripple=(0.06, 0.02)) | specs.channel(rng, "U", peak["U"]),
+                                          ripple=(0.06, 0.02)) | specs.channel(rng, "U", peak["U"])
+            | {"hidden_gust": gusts(rng, runs, 0.15)},
     )  # fmt: skip
 
 
@@ -251,9 +263,13 @@ def drive_force(rng: np.random.Generator, *, one_speed: bool = False) -> Scenari
     def truth(run: Run, p: Params, e: Effects) -> dict[str, Array]:
         f = run.fine
         z, force = 0.0, np.empty_like(f["t"])
+        notch = e.get("hidden_detent")
         h = float(f["t"][1] - f["t"][0])
         for i, (x, v) in enumerate(zip(f["x"].tolist(), f["v"].tolist(), strict=True)):
             added, _ = left_out(x, v, z, e, 5e-5)
+            if notch:
+                u = (x - notch["at"]) / notch["width"]  # pushed back before it, pulled on behind it
+                added -= notch["force"] * math.sqrt(2 * math.e) * u * math.exp(-(u**2))
             rest = math.copysign(5e-5, v)  # the bristle's exact relaxation towards sliding
             z = rest + (z - rest) * math.exp(-abs(v) * h / 5e-5)
             force[i] = -added
@@ -268,6 +284,10 @@ def drive_force(rng: np.random.Generator, *, one_speed: bool = False) -> Scenari
             rng, coulomb=11.0, viscous=90.0, drag=450.0, cubic=1.0, constant=6.0, ripple=(9.0, 0.02)
         )
         scaled = {k: v for k, v in found.items() if k not in ("cubic_stiffness", "periodic_ripple")}
+        path = np.concatenate([run.fine["x"] for run in runs[:-2]])
+        at = float(np.quantile(path, rng.uniform(0.3, 0.7)))
+        notch = {"force": 12.0, "at": at, "width": 0.06 * float(np.ptp(path))}
+        scaled["hidden_detent"] = specs.spec("hidden_detent", notch, "force")
         return scaled | specs.channel(rng, "F", peak["F"])
 
     inputs = {"v": Channel(unit="m/s", role="input"), "a": Channel(unit="m/s^2", role="input")}

@@ -18,6 +18,8 @@ import pandas as pd
 from tests.concealed.labview_cases import write_xlsx
 from tests.concealed.model import Array, Run, Scenario
 
+SESSIONS = "sessions"
+
 
 def toml_value(x: Any) -> str:
     """Return a TOML value: text, number, list or inline table."""
@@ -85,23 +87,37 @@ def write_csv(df: pd.DataFrame, path: Path) -> None:
     df.to_csv(path, index=False, float_format="%.10g", lineterminator="\n")
 
 
-def _record(session: Mapping[str, str], target: Path) -> None:
-    """Write the record that the public command makes of a session; its exit may be 1 for findings."""
-    with tempfile.TemporaryDirectory() as place:
-        for name, text in session.items():
-            (Path(place) / name).write_text(text, encoding="utf-8")
-        command = [Path(sys.executable).with_name("toolkit"), "calibrate", "SESSION.toml"]
+def enter(sessions: list[Path], registry: Path, tool: list[str]) -> Path:
+    """Enter sessions into a new registry by the public command, in order; return the last one's record.
+
+    The command's exit may be 1 for findings; a registry's ledger has the time of day, its records have not.
+    """
+    path = registry
+    for session in sessions:
         ran = subprocess.run(
-            [*command, "--calibrations", "registry", "--json"],
-            cwd=place,
-            capture_output=True,
-            text=True,
-            check=False,
-        )
+            [*tool, "calibrate", "SESSION.toml", "--calibrations", str(registry.resolve()), "--json"],
+            cwd=session, capture_output=True, text=True, check=False,
+        )  # fmt: skip
         if ran.returncode not in (0, 1):
             raise RuntimeError(f"no record of the session: {ran.stderr or ran.stdout}")
-        path = Path(place) / json.loads(ran.stdout)["record"]["path"]
-        shutil.copyfile(path, target)
+        path = session / json.loads(ran.stdout)["record"]["path"]
+    return path
+
+
+def _records(sessions: tuple[Mapping[str, str], ...], folder: Path) -> None:
+    """Write record.json and, where there are several sessions, the sessions in the case's folder."""
+    with tempfile.TemporaryDirectory() as place:
+        made = []
+        for i, session in enumerate(sessions):
+            made.append(Path(place) / f"session{i + 1}")
+            made[-1].mkdir()
+            for name, text in session.items():
+                (made[-1] / name).write_text(text, encoding="utf-8")
+        tool = [str(Path(sys.executable).with_name("toolkit"))]
+        shutil.copyfile(enter(made, Path(place) / "registry", tool), folder / "record.json")
+        if len(made) > 1:
+            for path in made:
+                shutil.copytree(path, folder / SESSIONS / path.name)
 
 
 def write_case(s: Scenario, measured: list[dict[str, Array]], folder: Path) -> None:
@@ -109,8 +125,8 @@ def write_case(s: Scenario, measured: list[dict[str, Array]], folder: Path) -> N
     folder.mkdir(parents=True)
     for name, text in s.files.items():
         (folder / name).write_text(text, encoding="utf-8")
-    if s.session:
-        _record(s.session, folder / "record.json")
+    if s.sessions:
+        _records(s.sessions, folder)
     for run, y in zip(s.runs, measured, strict=True):
         write_csv(table(s, run, y), folder / run.name)
     for run in s.predict:

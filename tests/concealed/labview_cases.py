@@ -8,6 +8,7 @@ from __future__ import annotations
 import io
 import re
 import zipfile
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -57,16 +58,30 @@ def _runs(rng: np.random.Generator, rows: int) -> list[Run]:
     return out
 
 
-def build(rng: np.random.Generator, _needs: frozenset[str]) -> Scenario:
-    """Return recordings of a steady test; the record of a session is what the program should have used."""
+def _fitted(session: Mapping[str, str]) -> Array:
+    """Return the coefficients (D51, D52, E5, zero x FY, MZ) of a session's loads."""
+    bench = pd.read_csv(io.StringIO(session["loads.csv"]))
+    terms = np.column_stack([bench[[f"{c} [lbf]" for c in cell_cases.CELLS]], np.ones(len(bench))])
+    return np.linalg.lstsq(terms, bench[["FY [lbf]", "MZ [lbf*ft]"]].to_numpy(), rcond=None)[0]
+
+
+def build(rng: np.random.Generator, needs: frozenset[str]) -> Scenario:
+    """Return recordings of a steady test; the record of a session is what the program should have used.
+
+    An older session of the same machine, before two of its cells were exchanged, stands in the registry too.
+    A wrong calibration is that older record; where `needs` has "sign", a record with the sign of E5 wrong.
+    """
     tire = steady.draw_magic_formula(rng, pressure=False)
     matrix = cell_cases.geometry(rng)
     back = np.linalg.inv(matrix)
+    exchanged = 1 + rng.uniform(0.004, 0.04, 3) * rng.choice([-1.0, 1.0], 3) * rng.permutation([1, 1, 0])
+    old = cell_cases.session_files(rng, matrix * exchanged, date="2025-02-11")
     session = cell_cases.session_files(rng, matrix)
-    bench = pd.read_csv(io.StringIO(session["loads.csv"]))
-    terms = np.column_stack([bench[[f"{c} [lbf]" for c in cell_cases.CELLS]], np.ones(len(bench))])
-    fitted = np.linalg.lstsq(terms, bench[["FY [lbf]", "MZ [lbf*ft]"]].to_numpy(), rcond=None)[0]
+    fitted, other = _fitted(session), _fitted(old)
+    if "sign" in needs:
+        other = fitted * np.array([[1.0], [1.0], [-1.0], [1.0]])
     runs = _runs(rng, 12)
+    tares = {run.name: np.repeat(rng.uniform(-1, 1, len(LOADS)), 12) for run in runs}
 
     def cells_of(run: Run) -> Array:
         sign = -1.0 if run.conditions["rotation"] == "reverse" else 1.0
@@ -80,8 +95,8 @@ def build(rng: np.random.Generator, _needs: frozenset[str]) -> Scenario:
         cells = dict(zip(cell_cases.CELLS, cells_of(run), strict=True))
         return pd.DataFrame({"t": run.rows, "FZ": run.fine["FZ"], "SA": run.fine["SA"], **cells})
 
-    def computed(cells: Array) -> dict[str, Array]:
-        fy, mz = fitted[:3].T @ cells + fitted[3][:, None]
+    def computed(cells: Array, by: Array = fitted) -> dict[str, Array]:
+        fy, mz = by[:3].T @ cells + by[3][:, None]
         return {"FY": fy, "MZ": mz}
 
     def nominal(df: pd.DataFrame, _run: Run, _p: Params) -> dict[str, Array]:
@@ -93,7 +108,9 @@ def build(rng: np.random.Generator, _needs: frozenset[str]) -> Scenario:
             cells = cells * np.array([[1.0], [1.0], [-1.0]])
         if "channel_swap" in e:
             cells = cells[[1, 0, 2]]
-        out = computed(cells)
+        out = computed(cells, other if "wrong_calibration" in e else fitted)
+        if "hidden_tare" in e:  # the program took another zero at every load, of FY alone
+            out["FY"] = out["FY"] + e["hidden_tare"]["spread"] * tares[run.name]
         if "unit_error" in e:
             out["MZ"] = out["MZ"] * e["unit_error"]["factor"]
         return {k: np.round(y, DIGITS[k]) for k, y in out.items()}
@@ -104,6 +121,8 @@ def build(rng: np.random.Generator, _needs: frozenset[str]) -> Scenario:
     rows = [
         specs.spec("channel_sign", {"channel": "E5"}, "", channel="E5"),
         specs.spec("channel_swap", {"channel": "D51", "with": "D52"}, "", channel="D51"),
+        specs.spec("wrong_calibration", {}, ""),
+        specs.spec("hidden_tare", {"spread": float(np.exp(rng.uniform(np.log(0.05), np.log(2))))}, ""),
         specs.spec("unit_error", {"channel": "MZ", "factor": cell_cases.LBF_FT}, "", channel="MZ"),
     ]
     return Scenario(
@@ -112,5 +131,6 @@ def build(rng: np.random.Generator, _needs: frozenset[str]) -> Scenario:
         parameters=(),
         channels=channels, outputs=("FY", "MZ"), runs=tuple(runs[:-1]), predict=tuple(runs[-1:]),
         noise={k: Noise(sd=10.0**-d / 12**0.5) for k, d in DIGITS.items()}, inputs=inputs, nominal=nominal,
-        truth=truth, effects=specs.table(rows), axes="machine", session=session, timeless=True,
+        truth=truth, effects=specs.table(rows), axes="machine", sessions=(old, session),
+        timeless=True,
     )  # fmt: skip

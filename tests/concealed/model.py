@@ -109,14 +109,19 @@ class Scenario:
     """What the outputs truly do at the sampling instants, without noise."""
     effects: Mapping[str, EffectSpec]
     axes: str | None = None
+    driven: Callable[[Run, Effects], Run] | None = None
+    """The run whose measured drivers are as the effects made them; None: no effect moves one."""
     simulated: Mapping[str, str] = field(default_factory=dict)
     """For kind `columns`: output -> column of the other program."""
     written: Callable[[dict[str, Array]], dict[str, Array]] | None = None
     """The measured outputs as the file has them, where it has others (load cells)."""
     timeless: bool = False
     """Steady files without a time channel, printed to so many digits and with no other noise."""
-    session: Mapping[str, str] | None = None
-    """Files of a reference-load session whose record the case names as record.json."""
+    sessions: tuple[Mapping[str, str], ...] = ()
+    """Files of the reference-load sessions, oldest first; the last one's record is the case's record.json.
+
+    Where there are several, all stand in the case's folder: they are the laboratory's registry.
+    """
 
     def true_parameters(self) -> Params:
         """Return the true values by name."""

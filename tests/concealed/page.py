@@ -4,17 +4,35 @@ from __future__ import annotations
 
 import html
 import re
+from pathlib import Path
 from typing import Any
 
 from tests.concealed.content import Table, closing, intro, span, tables
+from tests.concealed.proof_file import path_beside
 
 _CHECK = """    python -m tests.concealed draw --cases 400 --out DIR    # seed: the operating system's
     python -m tests.concealed run --out DIR                 # resumable; answers stay sealed
     python -m tests.concealed score --out DIR --proof .     # opens, scores, writes this page
     python -m tests.concealed verify --out DIR              # cases and answers against their seal
+    make proof                                              # all of these, and the log
 
 `batch.json` holds the hashes, `sealed/answers.json` the answers with a salt of 256 bits and the seed; its
-SHA-256 is the seal. From the seed every case can be drawn again."""
+SHA-256 is the seal. This batch without its data stands in the repository:
+
+    python -m tests.concealed verify --answers {small}
+    python -m tests.concealed verify --answers {small} --out NEW
+
+The first compares the opened answers with their seal and scores again what was answered; the second also
+draws the data again from the opened seed and compares them with theirs (the batch names its generator and
+libraries: {generator}). Only the tool's own answers cannot be had without running it: `run --out NEW`."""
+
+
+def check(batch: dict[str, Any]) -> str:
+    """Return how a reader draws, runs, scores and verifies."""
+    small = path_beside(Path("tests/concealed/batches.jsonl"), batch).as_posix()
+    versions = ", ".join(f"{k} {v}" for k, v in batch.get("versions", {}).items())
+    generator = f"sources {batch.get('generator_sha256', 'not stated')[:16]}"
+    return _CHECK.format(small=small, generator=f"{generator}, {versions}" if versions else generator)
 
 
 def markdown(score: dict[str, Any], batch: dict[str, Any]) -> str:
@@ -27,7 +45,7 @@ def markdown(score: dict[str, Any], batch: dict[str, Any]) -> str:
         lines += ["| " + " | ".join(table.head) + " |", "|" + "---|" * len(table.head)]
         lines += ["| " + " | ".join(c.replace("|", "\\|") for c in row) + " |" for row in table.rows]
         lines.append("")
-    lines += ["## To check it", "", _CHECK, "", "## Not covered", ""]
+    lines += ["## To check it", "", check(batch), "", "## Not covered", ""]
     for sentence in closing():
         lines += [sentence, ""]
     return "\n".join(lines)
@@ -94,8 +112,10 @@ def page(score: dict[str, Any], batch: dict[str, Any]) -> str:
     """Return the proof as one HTML page."""
     body = ["<h1>Proof on concealed effects</h1>", *(f"<p>{_inline(s)}</p>" for s in intro(score, batch))]
     for table in tables(score):
-        chart = curve(score[table.curve], f"{table.head[0]} [noise sd]") if table.curve else ""
+        unit = "" if table.curve == "power by detectable" else " [noise sd]"
+        chart = curve(score[table.curve], table.head[0] + unit) if table.curve else ""
         body.append(_table(table, chart))
+    body += ["<h2>To check it</h2>", f"<pre>{html.escape(check(batch))}</pre>"]
     body += ["<h2>Not covered</h2>", *(f"<p>{_inline(s)}</p>" for s in closing())]
     head = '<meta charset="utf-8"><meta name="viewport" content="width=device-width">'
     title = "<title>Proof on concealed effects</title>"

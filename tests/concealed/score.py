@@ -17,9 +17,11 @@ import pandas as pd
 from tests.concealed import baselines, oracle
 from tests.concealed.draw import draw_case
 from tests.concealed.intervals import Rate, rate
+from tests.concealed.inventory import inventory, power_by_detectable
 from tests.concealed.judge import Judgment, judge
+from tests.concealed.proof_file import Case, Proof, judged_part
 from tests.concealed.running import answer_of
-from tests.concealed.seal import SealError, opened
+from tests.concealed.seal import SealError, opened, verify
 
 NAMED = ("single", "two", "confounded")
 SIZES = (0.1, 0.5, 1.0, 2.0, 4.0, 8.0, np.inf)
@@ -81,23 +83,41 @@ def _gaps(job: tuple[Path, str, int, dict[str, Any], list[dict[str, Any]]]) -> d
     return out
 
 
-def score_batch(
-    folder: Path, *, workers: int, progress: Callable[[str], None] = lambda _: None
-) -> dict[str, Any]:
-    """Open a batch that was run and return its whole score; resumable."""
+def open_batch(folder: Path, *, workers: int, progress: Callable[[str], None] = lambda _: None) -> Proof:
+    """Open a batch that was run and fit what its score needs; resumable."""
     answers, truth = opened(folder)
     seed = int(answers["seed"], 16)
-    judged, jobs = [], []
-    for case, sealed in answers["cases"].items():
-        judged.append(judge(case, sealed, answer_of(folder, case)))
-        jobs.append((folder, case, seed, sealed, truth[case]))
-    extra = {}
+    jobs = [(folder, case, seed, sealed, truth[case]) for case, sealed in answers["cases"].items()]
+    cases = {}
     with ProcessPoolExecutor(max_workers=workers) as pool:
         for i, row in enumerate(pool.map(_gaps, jobs)):
-            extra[row["case"]] = row
+            name = row["case"]
+            log = folder / "runs" / name / "run.json"
+            cases[name] = Case(
+                run=json.loads(log.read_text(encoding="utf-8")) if log.exists() else {},
+                answer=judged_part(answer_of(folder, name)), extra=row,
+            )  # fmt: skip
             progress(f"{i + 1}/{len(jobs)} scored")
-    runs = [json.loads(p.read_text(encoding="utf-8")) for p in sorted((folder / "runs").glob("*/run.json"))]
-    return summary(judged, extra, answers["cases"], runs)
+    text = (folder / "sealed" / "answers.json").read_text(encoding="utf-8")
+    return Proof(batch=verify(folder), answers=text, cases=cases)
+
+
+def score_of(proof: Proof) -> dict[str, Any]:
+    """Return the whole score of a batch that was opened, from its data or from its small file."""
+    sealed = proof.sealed
+    judged = [judge(name, sealed[name], case.answer) for name, case in proof.cases.items()]
+    extra = {name: case.extra for name, case in proof.cases.items()}
+    runs = [case.run for case in proof.cases.values() if case.run]
+    return summary(judged, extra, sealed, runs) | inventory(judged, sealed) | {
+        "power by detectable": power_by_detectable(
+            judged, sealed, {name: case.answer for name, case in proof.cases.items()}
+        )
+    }  # fmt: skip
+
+
+def _row(j: Judgment) -> str:
+    """Return the confusion matrix's row of a case."""
+    return "+".join(j.truth) if j.bucket == "single" else f"[{j.bucket}]"
 
 
 def _binned(rows: list[tuple[float, bool]], edges: tuple[float, ...]) -> list[dict[str, Any]]:
@@ -172,8 +192,7 @@ def summary(
     missed = [j.minimum_detectable for j in singles if j.minimum_detectable is not None]
     matrix: dict[str, Counter[str]] = {}
     for j in judged:
-        row = "+".join(j.truth) if j.bucket == "single" else f"[{j.bucket}]"
-        matrix.setdefault(row, Counter())[j.column] += 1
+        matrix.setdefault(_row(j), Counter())[j.column] += 1
     rates = _rates(judged)
     seconds = [float(r["seconds"]) for r in runs]
     return {
@@ -196,6 +215,9 @@ def summary(
         "power by distance": _binned([(j.distance, j.right) for j in singles], DISTANCES),
         "misses above detectable": rate([x < 1.0 for x in missed]),
         "matrix": {k: dict(v) for k, v in sorted(matrix.items())},
+        "right by row": {
+            k: rate([j.right for j in judged if _row(j) == k]) for k in sorted({_row(j) for j in judged})
+        },
         "failed": sorted(j.case for j in judged if j.verdict == "failed"),
         "baselines": {
             k: _of_baseline(k, judged, extra, sealed) for k in (*baselines.METHODS, "commonest effect")

@@ -7,11 +7,13 @@ from __future__ import annotations
 
 import hashlib
 import json
+import platform
 import secrets
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import scipy
 
 from tests.concealed.files import sha256_of_tree
 from tests.concealed.model import Array
@@ -19,6 +21,21 @@ from tests.concealed.model import Array
 
 class SealError(Exception):
     """The batch is not what was sealed."""
+
+
+def generator_sha256() -> str:
+    """Return one hash of the generator's sources: with them and its libraries, a seed gives the same bytes.
+
+    What judges and shows a batch is not among them.
+    """
+    after = ("judge", "score", "page", "content", "inventory", "proof_file", "log", "real", "real_cases",
+             "running", "oracle", "baselines", "intervals", "__main__", "conftest")  # fmt: skip
+    here = Path(__file__).parent
+    total = hashlib.sha256()
+    for path in sorted(here.rglob("*.py")):
+        if path.stem not in after and not path.name.startswith("test_"):
+            total.update(path.relative_to(here).as_posix().encode() + path.read_bytes())
+    return total.hexdigest()
 
 
 def seal(
@@ -44,6 +61,12 @@ def seal(
         "cases": len(predicted),
         "answers_sha256": hashlib.sha256((sealed / "answers.json").read_bytes()).hexdigest(),
         "data_sha256": sha256_of_tree(folder / "cases"),
+        "generator_sha256": generator_sha256(),
+        "versions": {
+            "python": platform.python_version(),
+            "numpy": np.__version__,
+            "scipy": scipy.__version__,
+        },
     }
     (folder / "batch.json").write_text(json.dumps(batch, indent=1) + "\n", encoding="utf-8")
     return batch

@@ -29,6 +29,16 @@ def truth_of(scenario: Scenario, runs: tuple[Run, ...], p: Params, e: Effects) -
     return [scenario.truth(run, p, e) for run in runs]
 
 
+def driven_of(scenario: Scenario, runs: tuple[Run, ...], e: Effects) -> tuple[Run, ...]:
+    """Return the runs with their measured drivers as the effects made them."""
+    return tuple(scenario.driven(run, e) for run in runs) if scenario.driven else runs
+
+
+def without_of(scenario: Scenario, runs: tuple[Run, ...], p: Params, e: Effects) -> Signals:
+    """Return what the outputs would be without the effects, at the drivers that were measured with them."""
+    return truth_of(scenario, driven_of(scenario, runs, e), p, {})
+
+
 def nominal_of(scenario: Scenario, runs: tuple[Run, ...], p: Params) -> Signals:
     """Return the nominal outputs of the runs."""
     return [scenario.nominal(scenario.inputs(run), run, p) for run in runs]
@@ -37,6 +47,12 @@ def nominal_of(scenario: Scenario, runs: tuple[Run, ...], p: Params) -> Signals:
 def difference(a: Signals, b: Signals) -> Signals:
     """Return a - b in the outputs that both have."""
     return [{k: x[k] - y[k] for k in x if k in y} for x, y in zip(a, b, strict=True)]
+
+
+def change(scenario: Scenario, p: Params, e: Effects, without: Signals) -> Signals:
+    """Return what effects change in the recorded runs; `without` serves where no measured driver moves."""
+    bare = without_of(scenario, scenario.runs, p, e) if scenario.driven else without
+    return difference(truth_of(scenario, scenario.runs, p, e), bare)
 
 
 def stacked(scenario: Scenario, signals: Signals) -> Array:
@@ -93,10 +109,11 @@ def scaled_to(scenario: Scenario, name: str, wanted: float, slopes: list[Signals
     """Return the factor on the effect's base, and the size it reaches; as near the wanted one as is
     physical."""
     spec, p = scenario.effects[name], scenario.true_parameters()
-    without = truth_of(scenario, scenario.runs, p, {})
 
     def size_at(factor: float) -> Size:
-        there = truth_of(scenario, scenario.runs, p, {name: spec.at(factor)})
+        e = {name: spec.at(factor)}
+        there = truth_of(scenario, scenario.runs, p, e)
+        without = without_of(scenario, scenario.runs, p, e)
         return size_of(scenario, difference(there, without), slopes)
 
     factor = 1.0

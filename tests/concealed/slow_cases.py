@@ -34,19 +34,18 @@ def tank(rng: np.random.Generator) -> Scenario:
 
     def truth(run: Run, p: Params, e: Effects) -> dict[str, Array]:
         weir = e.get("overflow")
-        reservoir = e.get("hidden_reservoir")
+        hatch = e.get("hidden_hatch")
 
-        def rhs(_t: float, x: Array, u: dict[str, float]) -> Array:
+        def rhs(time: float, x: Array, u: dict[str, float]) -> Array:
             out = p["outlet"] * math.sqrt(max(x[0], 0.0))
             if weir:  # a sharp-crested weir: flow with the head to the power 3/2
                 out += 4.0 * max(x[0] - weir["level"] * (1 - weir["cut"]), 0.0) ** 1.5
-            back = 0.0
-            if reservoir:
-                back = reservoir["conductance"] * (x[1] - x[0])
-            return np.array([(u["Q"] * 1e-3 - out + back) / p["area"], -back / 0.35])
+            if hatch and any(at < time < at + hatch["seconds"] for at in hatch["at"]):
+                out += hatch["outlet"] * math.sqrt(max(x[0], 0.0))
+            return np.array([(u["Q"] * 1e-3 - out) / p["area"]])
 
         t = run.fine["t"]
-        x = ode.truth(rhs, np.array([level0, level0]), t, {"Q": run.fine["Q"]}, longest=1.0)
+        x = ode.truth(rhs, np.array([level0]), t, {"Q": run.fine["Q"]}, longest=1.0)
         return sampled(run, {"H": x[:, 0]}, e, cutoff_Hz=0.4, compensated=True)
 
     def table(peak: dict[str, float]) -> dict[str, Any]:
@@ -55,7 +54,12 @@ def tank(rng: np.random.Generator) -> Scenario:
         level = {"level": top, "cut": 0.1}
         reported = lambda p: {"level": p["level"] * (1 - p["cut"])}  # noqa: E731
         out["overflow"] = specs.spec("overflow", level, "cut", largest=5, reported=reported)
-        out["hidden_reservoir"] = specs.spec("hidden_reservoir", {"conductance": 2e-4}, "conductance")
+        starts = [
+            run.rows[0] + seconds * rng.uniform(0.15, 0.6)
+            for run in [runs[i] for i in rng.permutation(len(runs) - 2)[:2]]
+        ]
+        hatch = {"outlet": 1e-4, "at": starts, "seconds": 0.15 * seconds}
+        out["hidden_hatch"] = specs.spec("hidden_hatch", hatch, "outlet")
         return out
 
     return _scenario(
@@ -158,13 +162,13 @@ def beam(rng: np.random.Generator, *, kind: str, steady_warming: bool = False) -
             fine["S"] = fine["S"] + q["step"] * ((f["t"] > q["from"]) & (f["t"] < q["to"]))
         if "hidden_ambient" in e:
             q = e["hidden_ambient"]
-            fine["S"] = fine["S"] * (1 + q["bump"] * np.exp(-(((f["T"] - 22.5) / 0.9) ** 2)))
+            fine["S"] = fine["S"] * (1 + q["bump"] * np.exp(-(((f["T"] - 22.5) / 0.5) ** 2)))
         return sampled(run, fine, e, cutoff_Hz=0.8, compensated=False)
 
     def table(peak: dict[str, float]) -> dict[str, Any]:
         out = specs.channel(rng, "S", peak["S"], temperature="T", delay=False)
         sign = float(rng.choice([-1.0, 1.0]))
-        slip = {"step": 0.02 * peak["S"] * sign, "from": 0.3 * seconds, "to": 0.75 * seconds}
+        slip = {"step": 0.02 * peak["S"] * sign, "from": 0.3 * seconds, "to": 0.55 * seconds}
         out["hidden_slip"] = specs.spec("hidden_slip", slip, "step")
         out["hidden_ambient"] = specs.spec("hidden_ambient", {"bump": 0.03 * sign}, "bump")
         return out

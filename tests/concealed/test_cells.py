@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import subprocess
 import sys
 from pathlib import Path
@@ -91,19 +92,25 @@ def test_a_case_with_cells_names_its_record_and_has_no_loads(tmp_path: Path) -> 
     assert (tmp_path / "case" / "record.json").stat().st_size > 100
 
 
-@pytest.mark.parametrize("pressure", [False, True])
-def test_the_tire_file_means_the_same_to_the_public_command(tmp_path: Path, pressure: bool) -> None:
-    tire = tire_steady.draw_magic_formula(np.random.default_rng(3), pressure=pressure)
+@pytest.mark.parametrize(("pressure", "camber"), [(False, False), (True, False), (False, True)])
+def test_the_tire_file_means_the_same_to_the_public_command(
+    tmp_path: Path, pressure: bool, camber: bool
+) -> None:
+    tire = tire_steady.draw_magic_formula(np.random.default_rng(3), pressure=pressure, camber=camber)
     (tmp_path / "tire.tir").write_text(tire_steady.tir_text(tire, fittyp=61 if pressure else 52))
     sa, fz = np.repeat(np.linspace(-12, 12, 13), 3), np.tile([1500.0, 4000.0, 6000.0], 13)
     kpa = np.tile([200.0, 220.0, 245.0], 13) if pressure else np.full(39, 220.0)
     grid = pd.DataFrame({"SA [deg]": sa, "FZ [N]": fz} | ({"P [kPa]": kpa} if pressure else {}))
+    if camber:
+        grid["IA [deg]"] = 1.5
     grid.to_csv(tmp_path / "grid.csv", index=False)
     subprocess.run(
         [TOOLKIT, "evaluate", "tire.tir", "grid.csv", "--axes", "SAE", "--out", "out.csv"],
         cwd=tmp_path, capture_output=True, check=True,
     )  # fmt: skip
     out = pd.read_csv(tmp_path / "out.csv")
-    fy, mz = tire.forces(np.radians(sa), fz, tire_steady.Scales(pressure=kpa))
+    fy, mz = tire.forces(
+        np.radians(sa), fz, tire_steady.Scales(pressure=kpa, camber=math.radians(1.5) if camber else 0.0)
+    )
     assert np.allclose(out["FY [N]"], fy, rtol=1e-9, atol=1e-6)
     assert np.allclose(out["MZ [N*m]"], mz, rtol=1e-9, atol=1e-7)

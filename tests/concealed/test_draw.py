@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.concealed import controls, draw, files
+from tests.concealed import controls, draw, files, inventory, outside
 from tests.concealed import size as sizing
 from tests.concealed.catalogue import CONFOUNDED, FAMILIES
 from tests.concealed.draw import draw_case, mix
@@ -33,6 +33,9 @@ QUICK: list[tuple[str, tuple[str, tuple[str, ...]] | None]] = [
     ("confounded", ("pull by load", ("conicity",))),
     ("two", ("tire-columns", ("zero_offset", "turn_slip"))),
     ("control", None),
+    ("single", ("tire-machine", ("load_lag",))),
+    ("single", ("labview", ("wrong_calibration",))),
+    ("outside", ("labview", ("hidden_tare",))),
 ]
 
 
@@ -44,6 +47,23 @@ def test_the_mix_of_a_batch_is_the_contracts() -> None:
 def test_a_small_mix_still_adds_up() -> None:
     for n in (1, 7, 33):
         assert sum(v for k, v in Counter(mix(n, np.random.default_rng(2))).items() if k != "control") == n
+
+
+def test_every_effect_of_the_catalogue_can_be_put_in() -> None:
+    assert set(inventory.CATALOGUE) == CATALOGUE
+    assert [name for name, families in inventory.hosts().items() if not families] == []
+    # what has no share alone is always one class by the contract
+    alone = inventory.mean_share(draw.MIX["single"])
+    assert {name for name, share in alone.items() if share == 0} == {"steer_offset", "plysteer"}
+    assert sum(alone.values()) == pytest.approx(draw.MIX["single"])
+    assert min(share for share in alone.values() if share) * 400 > 0.7
+
+
+def test_what_is_outside_says_why_and_is_of_six_kinds_or_more() -> None:
+    kinds = {name for family in FAMILIES.values() for name in family.outside}
+    assert kinds == set(outside.REASONS)
+    assert len(kinds) >= 6
+    assert all(family.outside for family in FAMILIES.values())
 
 
 def test_names_are_the_contracts_and_what_is_outside_is_not() -> None:
@@ -67,7 +87,7 @@ def test_a_case_is_drawn_the_same_again_and_tells_nothing(
     words = set(re.findall(r"[a-z_]+", text.lower()))
     assert not words & (CATALOGUE | {"hidden", "effect", "concealed", "truth"})
     assert "seed" not in text
-    for run in case["recording"]["run"]:
+    for run in case["recording"]["run"] if first.scenario.family != "labview" else ():
         with (tmp_path / "a" / run["file"]).open(encoding="utf-8", newline="") as stream:
             head = next(csv.reader(stream))
         assert set(case["recording"]["channels"]) <= set(head)
@@ -134,3 +154,45 @@ def test_every_effect_of_a_family_is_in_its_recording(family: str) -> None:
         )
         # noise alone moves a run by about 1; the effect adds its own square
         assert moved > 0.8 * np.hypot(min(drawn.answer["size"], 50), 0.5), name
+
+
+@pytest.mark.parametrize("name", ["conicity", "camber_offset"])
+def test_a_pull_stands_alone_only_where_the_tire_was_turned_round(name: str) -> None:
+    alone = draw_case(5, 3, "single", compare=False, picked=("tire-machine", (name,)))
+    assert {run.conditions["mounting"] for run in alone.scenario.runs} == {"normal", "turned"}
+    assert alone.answer["class"] == []
+    group = draw_case(5, 3, "confounded", picked=("pull by load", (name,)))
+    assert all("mounting" not in run.conditions for run in group.scenario.runs)
+    assert name in group.answer["class"]
+    assert len(group.answer["reason"]) > 20
+
+
+def test_a_late_load_is_seen_in_the_load_and_not_in_the_tire_that_it_drives() -> None:
+    for index in range(40):
+        drawn = draw_case(6, index, "single", compare=False, picked=("tire-machine", ("load_lag",)))
+        if "FZ" in drawn.scenario.outputs:
+            break
+    s, run = drawn.scenario, drawn.scenario.runs[3]
+    assert drawn.answer["by_output"]["FZ"] > 0.05
+    assert drawn.answer["by_output"]["FY"] == pytest.approx(0, abs=1e-9)
+    # the tire carries what the load was, not what was commanded
+    at_load = s.nominal(s.inputs(run), run, s.true_parameters())
+    truth = s.truth(run, s.true_parameters(), drawn.effects)
+    assert np.abs(truth["FY"] - at_load["FY"]).max() < 0.3 * s.noise["FY"].sd
+    # files to predict have the command alone
+    assert "FZ" not in s.inputs(s.predict[0])
+
+
+def test_an_effect_from_outside_is_far_from_every_effect_inside() -> None:
+    drawn = draw_case(3, 11, "outside", picked=("beam-python", ("hidden_slip",)))
+    nearest = drawn.answer["nearest_inside"]
+    assert 0 < nearest["share"] <= outside.LARGEST_SHARE
+    assert drawn.answer["reason"] == outside.REASONS["hidden_slip"]
+
+
+def test_an_effect_of_the_catalogue_would_not_pass_as_one_from_outside() -> None:
+    s = FAMILIES["beam-python"].build(np.random.default_rng(3), frozenset())
+    p, slopes = s.true_parameters(), sizing.jacobian(s, s.runs)
+    without = sizing.truth_of(s, s.runs, p, {})
+    found = sizing.change(s, p, {"zero_drift": s.effects["zero_drift"].at(2.0)}, without)
+    assert draw.nearest_inside(s, found, without, slopes)[1] > 0.99

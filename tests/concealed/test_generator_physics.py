@@ -81,6 +81,56 @@ def test_a_carcass_spring_never_overshoots_and_settles() -> None:
     assert out[-1] == pytest.approx(slip[-1], rel=1e-6)
 
 
+def test_a_slow_actuator_follows_a_ramp_late_by_its_time_constant_at_nominal_load() -> None:
+    t = np.arange(4000) / 200
+    force = tire_truth.actuator(t, 3990 + 1.0 * t, 0.4, 4000.0)
+    assert 3990 + t[2000] - force[2000] == pytest.approx(0.4, rel=1e-3)
+    # a progressive spring answers faster under load
+    loaded = tire_truth.actuator(t, 7990 + 1.0 * t, 0.4, 4000.0)
+    assert 7990 + t[2000] - loaded[2000] == pytest.approx(0.4 / 1.04, rel=1e-3)
+    # and an actuator without lag gives what was commanded
+    assert np.abs(tire_truth.actuator(t, force, 1e-6, 4000.0) - force).max() < 1e-4
+
+
+def test_a_wheel_leans_and_pulls_to_the_same_side_whichever_way_the_drum_turns() -> None:
+    tire = tire_steady.draw_magic_formula(RNG, pressure=False, camber=True, symmetric=True)
+    t = np.arange(200) / 160
+    still = {"t": t, "SA": np.zeros(200), "FZ": np.full(200, 4000.0), "V": np.full(200, 2.0)}
+    found = {}
+    for rotation in ("forward", "reverse"):
+        run = Run(name="run01.csv", fine=still, rows=t, conditions={"rotation": rotation})
+        found[rotation] = tire_truth.lateral(run, tire, ONE, {"camber_offset": {"angle": 1.0}})
+    assert 30 < found["forward"]["FY"][0] < 90  # some 55 N/deg, to the right for a lean to the right
+    assert found["reverse"]["FY"] == pytest.approx(found["forward"]["FY"])
+    # mirrored in the plane across the motion: the moment about the vertical changes its sign
+    assert found["reverse"]["MZ"] == pytest.approx(-found["forward"]["MZ"])
+    assert abs(found["forward"]["MZ"][0]) > 0.1
+
+
+def test_conicity_follows_the_tire_when_it_is_turned_round_and_camber_stays_with_the_machine() -> None:
+    tire = tire_steady.draw_magic_formula(RNG, pressure=False, camber=True, symmetric=True)
+    t = np.arange(50) / 160
+    still = {"t": t, "SA": np.zeros(50), "FZ": np.full(50, 4000.0), "V": np.full(50, 2.0)}
+
+    def force(mounting: str, e: dict[str, dict[str, float]]) -> float:
+        run = Run(name="r", fine=still, rows=t, conditions={"rotation": "forward", "mounting": mounting})
+        return float(tire_truth.lateral(run, tire, ONE, e)["FY"][0])
+
+    cone, lean = {"conicity": {"force_at_nominal_load": 40.0}}, {"camber_offset": {"angle": 1.0}}
+    assert force("turned", cone) == pytest.approx(-force("normal", cone))
+    assert force("normal", cone) == pytest.approx(40.0)
+    assert force("turned", lean) == pytest.approx(force("normal", lean))
+
+
+def test_a_resonance_leaves_slow_changes_alone_and_rings_at_its_frequency() -> None:
+    t = np.arange(0, 20, 1 / 160)
+    slow = tire_truth._resonance(t, np.sin(2 * math.pi * 0.02 * t), 2.0)
+    assert np.abs(slow[1600:]).max() < 0.02
+    struck = tire_truth._resonance(t, (t > 1.0).astype(float), 2.0)
+    power = np.abs(np.fft.rfft(struck[160:]))
+    assert np.fft.rfftfreq(struck.size - 160, 1 / 160)[int(power.argmax())] == pytest.approx(2.0, abs=0.1)
+
+
 def test_a_gap_stays_within_its_flanks_and_rests_inside() -> None:
     sa = 2 * np.sin(np.linspace(0, 12, 5000))
     wheel = tire_truth.gap_with_contact(sa, 0.3)

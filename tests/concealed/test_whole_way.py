@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import dataclasses
+import gzip
+import hashlib
 import json
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
-from tests.concealed import real_cases
+from tests.concealed import proof_file, real_cases
 from tests.concealed.__main__ import main
+from tests.concealed.judge import judge
 from tests.concealed.real import right, run_real
 from tests.concealed.running import answer_of
 from tests.conftest import SHARED_DATA
@@ -85,8 +90,115 @@ def test_the_score_and_its_page(batch: Path, tmp_path: Path, capsys: pytest.Capt
     html = (tmp_path / "proof.html").read_text(encoding="utf-8")
     assert "<script" not in html
     assert "http" not in html
-    assert html.count("<svg") == 2
+    assert html.count("<svg") == 3
     assert len((tmp_path / "log").read_text().splitlines()) == 1
+    for part in ("Never put in", "pressure_change", "Outside the catalogue", "why it is outside", "verify"):
+        assert part in text
+        assert part in html
+
+
+def _small(batch: Path, folder: Path) -> Path:
+    """Score the batch and return the file that stands for it."""
+    log = folder / "batches.jsonl"
+    given = ["score", "--out", str(batch), "--workers", "1", "--proof", str(folder), "--log", str(log)]
+    assert main(given) == 0
+    head = json.loads((batch / "batch.json").read_text())["answers_sha256"][:16]
+    return folder / f"proof-{head}.jsonl.gz"
+
+
+def test_a_scored_batch_is_scored_again_from_its_small_file(
+    batch: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = _small(batch, tmp_path)
+    bars = [x for x in capsys.readouterr().out.splitlines() if "(at " in x or "(90" in x]
+    assert len(bars) == 5
+    assert main(["verify", "--answers", str(path)]) == 0
+    shown = capsys.readouterr().out
+    assert all(line in shown for line in bars)
+    assert json.loads((batch / "batch.json").read_text())["answers_sha256"] in shown
+    first = path.read_bytes()
+    assert _small(batch, tmp_path).read_bytes() == first
+
+
+def test_the_seed_in_the_small_file_draws_the_sealed_data_again(batch: Path, tmp_path: Path) -> None:
+    path = _small(batch, tmp_path)
+    given = ["verify", "--answers", str(path), "--out", str(tmp_path / "again"), "--workers", "1"]
+    assert main(given) == 0
+    made = json.loads((tmp_path / "again" / "batch.json").read_text())
+    assert made["data_sha256"] == json.loads((batch / "batch.json").read_text())["data_sha256"]
+    assert made["generator_sha256"] == proof_file.read(path).batch["generator_sha256"]
+
+
+def test_another_seed_is_not_the_sealed_batch(
+    batch: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    proof = proof_file.read(_small(batch, tmp_path))
+    text = proof.answers.replace('"seed": "0x6a"', '"seed": "0x6b"')
+    assert text != proof.answers
+    other = dataclasses.replace(
+        proof, answers=text, batch=proof.batch | {"answers_sha256": hashlib.sha256(text.encode()).hexdigest()}
+    )
+    proof_file.write(tmp_path / "other.gz", other)
+    given = ["verify", "--answers", str(tmp_path / "other.gz"), "--out", str(tmp_path / "b")]
+    assert main([*given, "--workers", "1"]) == 1
+    assert "does not give the data" in capsys.readouterr().err
+
+
+def _cut(data: bytes) -> bytes:
+    return data[: len(data) // 2]
+
+
+def _reworded(data: bytes) -> bytes:
+    return gzip.compress(gzip.decompress(data).replace(b"null", b"nulk", 1))
+
+
+def _without_a_case(data: bytes) -> bytes:
+    return gzip.compress(b"".join(gzip.decompress(data).splitlines(keepends=True)[:-1]))
+
+
+def _a_case_twice(data: bytes) -> bytes:
+    lines = gzip.decompress(data).splitlines(keepends=True)
+    return gzip.compress(b"".join([*lines, lines[-1]]))
+
+
+@pytest.mark.parametrize("damage", [_cut, _reworded, _without_a_case, _a_case_twice, lambda _: b""])
+def test_a_small_file_that_was_changed_breaks_the_seal(
+    damage: Callable[[bytes], bytes], batch: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = _small(batch, tmp_path)
+    path.write_bytes(damage(path.read_bytes()))
+    assert main(["verify", "--answers", str(path)]) == 1
+    assert "seal broken" in capsys.readouterr().err
+
+
+def test_verify_asks_what_to_verify(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["verify"]) == 1
+    assert "nothing to verify" in capsys.readouterr().err
+
+
+def test_a_small_file_keeps_all_that_the_judge_reads() -> None:
+    answer = {
+        "verdict": "named", "remaining": "nothing", "fit": {"held_out": [1]},
+        "mismatch": [{"channel": "F", "share_of_variance": 0.5, "where": []}],
+        "effects": [{"name": "a", "statement": "..", "equivalent_to": ["b"],
+                     "parameters": [{"name": "x", "value": 1.0, "ci95": [0.5, 1.5], "runs": None}]}],
+        "not_found": [{"name": "c", "minimum_detectable": 0.1, "observable": True, "unit": "N"}],
+    }  # fmt: skip
+    sealed = {
+        "bucket": "single", "size": 2.0, "distance": 9.0, "alike": {}, "by_output": {"F": 2.0, "G": 0.1},
+        "effects": [{"name": "a", "parameters": {"x": 1.2}, "either_sign": False}],
+    }  # fmt: skip
+    assert judge("c", sealed, answer) == judge("c", sealed, proof_file.judged_part(answer))
+    assert judge("c", sealed, answer).covered == {"a.x": True}
+
+
+def test_a_file_that_no_repository_should_hold_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(proof_file, "LARGEST_BYTES", 10)
+    with pytest.raises(ValueError, match="at most 10"):
+        proof_file.write(tmp_path / "p.gz", proof_file.Proof(batch={}, answers="{}", cases={}))
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_a_broken_seal_ends_with_one(batch: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -24,12 +24,16 @@ class Scales:
     trail: Array | float = 1.0
     pressure: Array | float = NOMINAL_PRESSURE
     """Inflation pressure [kPa]."""
+    camber: float = 0.0
+    """Inclination [rad], positive towards the vehicle's right, of a drum that turns forward."""
 
 
 @dataclass(frozen=True, slots=True)
 class MagicFormulaTire:
-    """Pure slip, no camber. MF 5.2: Pacejka (2006) eqs 4.E19-4.E49; 6.1: Besselink, Schmeitz, Pacejka
-    (2010)."""
+    """Pure slip. MF 5.2: Pacejka (2006) eqs 4.E19-4.E49; 6.1: Besselink, Schmeitz, Pacejka (2010).
+
+    Camber as 5.2 has it, in the terms PHY3, PVY3, PVY4 and QHZ3, whose coefficients few files lack.
+    """
 
     c: Mapping[str, float]
 
@@ -49,13 +53,14 @@ class MagicFormulaTire:
         K = c["PKY1"] * F0 * (1 + c.get("PPY1", 0.0) * dp)
         K = K * np.sin(2 * np.arctan(Fz / (c["PKY2"] * F0 * (1 + c.get("PPY2", 0.0) * dp)))) * s.stiffness
         mu = (c["PDY1"] + c["PDY2"] * df) * (1 + c.get("PPY3", 0.0) * dp) * s.mu
-        D, C = mu * Fz, c["PCY1"]
-        x = a + c["PHY1"] + c["PHY2"] * df
+        D, C, lean = mu * Fz, c["PCY1"], np.sin(s.camber)  # 4.E4
+        x = a + c["PHY1"] + c["PHY2"] * df + c.get("PHY3", 0.0) * lean
         E = np.minimum((c["PEY1"] + c["PEY2"] * df) * (1 - c["PEY3"] * np.sign(x)), 1.0)
         B = K / (C * D)
         Fy = D * np.sin(C * np.arctan(B * x - E * (B * x - np.arctan(B * x))))
-        Fy = Fy + Fz * (c["PVY1"] + c["PVY2"] * df) * s.mu
-        xt = a + c["QHZ1"] + c["QHZ2"] * df
+        thrust = (c.get("PVY3", 0.0) + c.get("PVY4", 0.0) * df) * lean
+        Fy = Fy + Fz * (c["PVY1"] + c["PVY2"] * df + thrust) * s.mu
+        xt = a + c["QHZ1"] + c["QHZ2"] * df + c.get("QHZ3", 0.0) * lean
         Bt = (c["QBZ1"] + c["QBZ2"] * df) * s.stiffness / s.mu
         Ct = c["QCZ1"]
         Dt = Fz * (c["R0"] / F0) * (c["QDZ1"] + c["QDZ2"] * df) * (1 - c.get("PPZ1", 0.0) * dp) * s.trail
@@ -109,8 +114,13 @@ def slope_table(tire: MagicFormulaTire | BristleTire, points: int = 200) -> tupl
     return float(step), np.asarray(slope / slope[0])
 
 
-def draw_magic_formula(rng: np.random.Generator, *, pressure: bool) -> MagicFormulaTire:
-    """Return coefficients of a passenger-car tire, each moved by some per cent."""
+def draw_magic_formula(
+    rng: np.random.Generator, *, pressure: bool, camber: bool = False, symmetric: bool = False
+) -> MagicFormulaTire:
+    """Return coefficients of a passenger-car tire, each moved by some per cent.
+
+    `symmetric`: no shifts; such a tire is the same when it is turned round on its hub.
+    """
     near = lambda value, share=0.1: float(value * rng.uniform(1 - share, 1 + share))  # noqa: E731
     c = {
         "FNOMIN": 4000.0, "R0": 0.313, "PCY1": near(1.35, 0.05), "PDY1": near(0.95), "PDY2": near(-0.12),
@@ -122,6 +132,10 @@ def draw_magic_formula(rng: np.random.Generator, *, pressure: bool) -> MagicForm
     }  # fmt: skip
     if pressure:
         c |= {"PPY1": near(-0.45), "PPY2": near(0.9), "PPY3": near(-0.15), "PPZ1": near(-0.35)}
+    if symmetric:
+        c |= dict.fromkeys(("PHY1", "PHY2", "PVY1", "PVY2", "QHZ1", "QHZ2"), 0.0)
+    if camber:  # about 55 N/deg at nominal load, towards the side to which the wheel leans
+        c |= {"PHY3": near(0.03), "PVY3": near(-0.35), "PVY4": near(0.04), "QHZ3": near(0.1)}
     return MagicFormulaTire(c)
 
 

@@ -60,6 +60,24 @@ def carcass(slip: Array, load: Array, distance_step: Array, length0: float, tire
     return out
 
 
+def actuator(t: Array, command: Array, time_constant: float, nominal_load: float) -> Array:
+    """Return the force [N] of a screw that is driven at a speed in proportion to the force's error.
+
+    The tire is its spring, 4 % stiffer at twice the nominal load: the time constant is that at nominal load.
+    Exact from row to row for a command that is linear between rows and a spring that is constant there.
+    """
+    out = np.empty_like(command)
+    force = out[0] = float(command[0])
+    for i in range(1, command.size):
+        h = float(t[i] - t[i - 1])
+        tau = max(time_constant / (1 + 0.04 * (force / nominal_load - 1)), 1e-9)
+        rise = (float(command[i]) - float(command[i - 1])) / h
+        lagged = float(command[i - 1]) - tau * rise
+        force = float(command[i]) - tau * rise + (force - lagged) * math.exp(-h / tau)
+        out[i] = force
+    return out
+
+
 def _scales(base: Scales, run: Run, e: Effects, fz0: float, power: Array) -> Scales:
     """Return the factors on friction, stiffness and trail along the run."""
     f = run.fine
@@ -87,8 +105,12 @@ def _scales(base: Scales, run: Run, e: Effects, fz0: float, power: Array) -> Sca
         pressure = pressure + e["pressure_change"]["pressure_error"]
     if "hidden_ambient" in e:  # outside the catalogue: a bump of the friction over a covariate
         p = e["hidden_ambient"]
-        mu = mu * (1 + p["bump"] * np.exp(-(((f["T_AMBIENT"] - p["at"]) / 1.2) ** 2)))
-    return Scales(mu=mu, stiffness=stiff, trail=trail, pressure=pressure)
+        mu = mu * (1 + p["bump"] * np.exp(-(((f["T_AMBIENT"] - p["at"]) / 0.7) ** 2)))
+    lean = 0.0
+    if "camber_offset" in e:  # the machine leans, whichever way its drum turns: mirrored with the motion
+        turned = -1.0 if run.conditions.get("rotation") == "reverse" else 1.0
+        lean = turned * math.radians(e["camber_offset"]["angle"])
+    return Scales(mu=mu, stiffness=stiff, trail=trail, pressure=pressure, camber=lean)
 
 
 def _revolving(angle_deg: Array, p: Mapping[str, Any]) -> Array:
@@ -98,16 +120,17 @@ def _revolving(angle_deg: Array, p: Mapping[str, Any]) -> Array:
 
 
 def _resonance(t: Array, y: Array, frequency: float) -> Array:
-    """Return a lightly damped oscillator driven by `y`: velocity over natural frequency (symplectic
-    Euler)."""
+    """Return what a lightly damped oscillator driven by `y` adds to it: its motion over the static one.
+
+    Symplectic Euler. Slow changes are followed, so that nothing is left of them but the ringing.
+    """
     w, h = 2 * math.pi * frequency, float(t[1] - t[0])
-    q, v = 0.0, 0.0
+    q, v = float(y[0]), 0.0
     out = np.empty_like(y)
-    rate = np.gradient(y, t)
-    for i, r in enumerate(rate):
-        v += h * (r * w - 2 * 0.03 * w * v - w * w * q)
+    for i, force in enumerate(y):
+        v += h * (w * w * (force - q) - 2 * 0.03 * w * v)
         q += h * v
-        out[i] = v / w
+        out[i] = q - force
     return out
 
 
@@ -142,7 +165,8 @@ def lateral(run: Run, tire: Tire, base: Scales, e: Effects) -> dict[str, Array]:
     fy, mz = tire.forces(slip, fz, s)
     fy = sign * fy
     if "conicity" in e:
-        fy = fy + e["conicity"]["force_at_nominal_load"] * fz / tire.nominal_load
+        side = -1.0 if run.conditions.get("mounting") == "turned" else 1.0
+        fy = fy + side * e["conicity"]["force_at_nominal_load"] * fz / tire.nominal_load
     if "nonuniformity" in e:
         fy = fy + _revolving(f["TIRE_ANGLE"], e["nonuniformity"])
     if "drum_runout" in e:
@@ -154,9 +178,9 @@ def lateral(run: Run, tire: Tire, base: Scales, e: Effects) -> dict[str, Array]:
     if "hidden_line" in e:  # locked to time, not to any revolution, and slowly detuned
         p = e["hidden_line"]
         fy = fy + p["amplitude"] * np.sin(2 * math.pi * p["frequency"] * f["t"] + 0.4 * np.sin(f["t"] / 7))
-    if "hidden_pulse" in e:  # something lay on the frame for a while
+    if "hidden_pulse" in e:  # something touched the frame, now and then
         p = e["hidden_pulse"]
-        inside = (f["t"] > p["from"]) & (f["t"] < p["to"])
+        inside = sum((f["t"] > at) & (f["t"] < at + p["seconds"]) for at in p["at"])
         fy = fy + p["force"] * inside
     return {"FY": fy, "MZ": mz}
 
