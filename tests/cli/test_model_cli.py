@@ -106,3 +106,26 @@ def test_inputs_belong_to_a_model_file(run, tmp_path):
     found = run("simulate", tmp_path / "plan.toml", "--inputs", tmp_path / "in.csv", "--out", tmp_path / "o")
     assert isinstance(found.exception, ConfigError)
     assert found.exception.rule == "model-file"
+
+
+@pytest.mark.skipif(
+    not (shutil.which("soffice") and shutil.which("pdftotext")), reason="LibreOffice and poppler make the PDF"
+)
+def test_the_answer_as_a_verified_document(run, answered, tmp_path):
+    found = run(
+        "diagnose", answered / "CASE.toml", "--out", tmp_path / "out", "--pdf", "--by", "J. Doe", "--json"
+    )
+    made = json.loads(found.stdout)["document"]
+    assert made["verified"] is True
+    assert made["warnings"] == []
+    assert (tmp_path / "out" / "diagnosis.pdf").read_bytes()[:5] == b"%PDF-"
+    assert next(one["tag"] for one in made["figures"]) == "tk:figure.diagnosis_errors"
+
+
+def test_a_template_that_cannot_be_used_ends_before_the_search(run, answered, tmp_path):
+    (tmp_path / "bad.docx").write_text("no Word file")
+    found = run(
+        "diagnose", answered / "CASE.toml", "--out", tmp_path / "out", "--template", tmp_path / "bad.docx"
+    )
+    assert found.exception is not None
+    assert not (tmp_path / "out").exists()

@@ -13,6 +13,7 @@ from toolkit.cli.home import calibrations_folder
 
 if TYPE_CHECKING:
     from toolkit.diagnosis.answer import Diagnosis
+    from toolkit.report.template.package import Template
 
 NAME = "diagnose"
 
@@ -27,6 +28,19 @@ def command(
         Path | None,
         typer.Option(
             "--model", help="Model file (model.toml of an earlier answer) in place of the case's simulation."
+        ),
+    ] = None,
+    pdf: Annotated[
+        bool, typer.Option("--pdf", help="Also diagnosis.docx and its verified diagnosis.pdf.")
+    ] = False,
+    template: Annotated[
+        Path | None,
+        typer.Option("--template", help="Word template of --pdf; default: report_templates/diagnosis.docx."),
+    ] = None,
+    by: Annotated[
+        str | None,
+        typer.Option(
+            "--by", help="Who releases the opinion on the cause (ISO/IEC 17025, 7.8.7); else a draft."
         ),
     ] = None,
     calibrations: Calibrations = None,
@@ -60,6 +74,7 @@ def command(
     started = time.perf_counter()
     read = read_case(case, model=model)
     _writable(out)
+    opened = _template(template, home) if pdf or template else None
     _apart(model or read.model, out / MODEL)
     registry = registry_of(calibrations, home) if read.simulation.kind == "machine" else None
     tell = _teller(show=not quiet and not json)
@@ -76,8 +91,26 @@ def command(
     _write_model(out / MODEL, augmented)
     write_atomic(out / "diagnosis.html", drawn)
     write_atomic(out / "diagnosis.json", text)
-    answer({**payload, "out": str(out)}, _text(made, out), as_json=json, quiet=quiet)
-    return 0 if made.verdict == "nothing" else 1
+    said = _text(made, out)
+    warned = False
+    if opened is not None:
+        from toolkit.cli.diagnose_document import write_document
+
+        document = write_document(read, result, opened, out, augmented=augmented, registry=registry, by=by)
+        payload["document"] = document
+        warned = bool(document["warnings"])
+        said += f"\n{document['pdf']}\n{document['docx']}\n{document['pages']} pages, verified"
+        said += "".join(f"\n  warning {one}" for one in document["warnings"])
+    answer({**payload, "out": str(out)}, said, as_json=json, quiet=quiet)
+    return 0 if made.verdict == "nothing" and not warned else 1
+
+
+def _template(template: Path | None, home: Path | None) -> Template:
+    """Return the template of the document, judged before anything is searched."""
+    from toolkit.cli.delivery import home_template
+    from toolkit.report.template.package import read_template
+
+    return read_template(template or home_template("diagnosis.docx", home))
 
 
 def _apart(model: Path | None, target: Path) -> None:

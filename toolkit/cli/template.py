@@ -60,11 +60,12 @@ def tags(
     from toolkit.report.build import build_content
     from toolkit.report.certificate.vocabulary import CERTIFICATE
     from toolkit.report.comparison.vocabulary import COMPARISON
+    from toolkit.report.diagnosis.vocabulary import DIAGNOSIS
     from toolkit.report.listing import list_tags
     from toolkit.report.style import read_style, style_file
     from toolkit.report.vocabulary import REPORT
 
-    kinds = {one.name: one for one in (REPORT, CERTIFICATE, COMPARISON, AUDIT)}
+    kinds = {one.name: one for one in (REPORT, CERTIFICATE, COMPARISON, DIAGNOSIS, AUDIT)}
     if kind not in kinds or (kind != "report" and test is not None):
         raise typer.BadParameter(f"{', '.join(kinds)}; only report with --test", param_hint="--kind")
     style = read_style(style_file(template)) if template else read_style(None)
@@ -85,7 +86,8 @@ def new(
     like: Annotated[
         str,
         typer.Option(
-            "--like", help="Which to copy: org, summary, pruefbericht, certificate, comparison, audit."
+            "--like",
+            help="Which to copy: org, summary, pruefbericht, certificate, comparison, diagnosis, audit.",
         ),
     ] = "org",
     force: Annotated[bool, typer.Option("--force", help="Overwrite an existing file.")] = False,

@@ -74,7 +74,7 @@ class Vocabulary:
         return tag.startswith(own) if own else not tag.startswith(tuple(_KINDS.values()))
 
 
-_KINDS = {"certificate": "tk:certificate.", "audit": "tk:audit.", "comparison": "tk:comparison."}
+_KINDS = {name: f"tk:{name}." for name in ("certificate", "audit", "comparison", "diagnosis")}
 
 REPORT = Vocabulary(
     name="report",

@@ -65,7 +65,7 @@ def error_bars(made: Diagnosis) -> bytes:
 def mismatch_map(found: Search, channel: str, place: Place, *, after: bool) -> bytes | None:
     """Return an output's residual over the variable that holds its mismatch, before and after."""
     problem = found.problem
-    x = _variable(found, place.variable)
+    x = variable_of(found, place.variable)
     if x is None:
         return None
     kept = problem.kept[channel]
@@ -80,7 +80,7 @@ def mismatch_map(found: Search, channel: str, place: Place, *, after: bool) -> b
             some = np.flatnonzero(kept)
             some = some[:: max(1, len(some) // _MOST)]
             axes.plot(x[some], residual[some], ".", markersize=2.2, alpha=0.25, color=colour)
-            centre, mean = _binned(x[kept], residual[kept])
+            centre, mean = binned(x[kept], residual[kept])
             axes.plot(centre, mean, "-", linewidth=2.0, color=colour, label=f"{label} (mean)")
         if isinstance(place.start, float) and isinstance(place.end, float):
             axes.axvspan(place.start, place.end, color="#f6e7c8", alpha=0.5, zorder=0)
@@ -92,11 +92,17 @@ def mismatch_map(found: Search, channel: str, place: Place, *, after: bool) -> b
     return _svg((8.6, 3.6), draw)
 
 
+def worst_run(found: Search, channel: str) -> int:
+    """Return the number of the run with the largest mismatch of an output."""
+    problem = found.problem
+    residual = np.where(problem.kept[channel], found.refitted.residual[channel], 0.0)
+    return int(np.argmax([float(np.sum(residual[one] ** 2)) for one in problem.slices]))
+
+
 def run_in_time(found: Search, channel: str, *, after: bool) -> bytes:
     """Return the run with the largest mismatch of an output: recorded and simulated, residuals beneath."""
     problem = found.problem
-    residual = np.where(problem.kept[channel], found.refitted.residual[channel], 0.0)
-    which = int(np.argmax([float(np.sum(residual[one] ** 2)) for one in problem.slices]))
+    which = worst_run(found, channel)
     rows, run = problem.slices[which], problem.runs[which]
     unit = next(one.unit for one in problem.model.outputs if one.name == channel)
 
@@ -173,7 +179,8 @@ def _short(name: str) -> str:
     return name.removesuffix(".csv").removesuffix(".xlsx")
 
 
-def _variable(found: Search, name: str) -> NDArray[np.float64] | None:
+def variable_of(found: Search, name: str) -> NDArray[np.float64] | None:
+    """Return the values of a place's variable over all runs (n,), None where it has no numbers."""
     problem = found.problem
     if name in problem.names:
         return found.refitted.simulated[name]
@@ -184,9 +191,8 @@ def _variable(found: Search, name: str) -> NDArray[np.float64] | None:
     return None
 
 
-def _binned(
-    x: NDArray[np.float64], y: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def binned(x: NDArray[np.float64], y: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return means of x and y in bins of equal counts."""
     edges = np.unique(np.quantile(x, np.linspace(0, 1, _BINS + 1)))
     if len(edges) < 3:
         return np.array([float(np.mean(x))]), np.array([float(np.mean(y))])

@@ -12,6 +12,7 @@ from collections.abc import Iterator, Mapping
 from toolkit.report.audit.vocabulary import AUDIT
 from toolkit.report.certificate.vocabulary import CERTIFICATE
 from toolkit.report.comparison.vocabulary import COMPARISON
+from toolkit.report.diagnosis.vocabulary import DIAGNOSIS
 from toolkit.report.style import Style
 from toolkit.report.tags import format_problem, parse_tag
 from toolkit.report.template.check_around import surroundings
@@ -107,7 +108,7 @@ def check_stories(
 
 def vocabulary_of(sites: list[Site]) -> Vocabulary:
     """Return the vocabulary that a template was made for, by its own tags."""
-    for words in (CERTIFICATE, AUDIT, COMPARISON):
+    for words in (CERTIFICATE, AUDIT, COMPARISON, DIAGNOSIS):
         if any(site.tag.path.startswith(f"{words.name}.") for site in sites):
             return words
     return REPORT

@@ -1,0 +1,240 @@
+"""A diagnosis to the content of its document: texts, tables and figures of its vocabulary.
+
+What was measured and fitted is a result; what is taken for the cause is an opinion, and stands apart as one
+(ISO/IEC 17025, 7.8.7).
+"""
+
+from __future__ import annotations
+
+import datetime as dt
+from typing import TYPE_CHECKING
+
+from toolkit import __version__
+from toolkit.report.content import Cell, ReportContent, Table, Value
+from toolkit.report.diagnosis.page import HEADLINES
+from toolkit.report.diagnosis.plots import diagnosis_plots
+from toolkit.report.diagnosis.vocabulary import DIAGNOSIS, TABLES
+
+if TYPE_CHECKING:
+    from toolkit.calibration.records.record import CalibrationRecord
+    from toolkit.diagnosis.answer import Diagnosis, FoundEffect
+    from toolkit.diagnosis.case import Case
+    from toolkit.diagnosis.diagnose import Result
+    from toolkit.report.style import Style
+
+_BASIS = (
+    "Joint fits of the simulation's parameters and the effect's by free simulation of whole runs; evidence "
+    "is the log score of rows that no fit has seen, the chance is that of the whole search. Other causes "
+    "with the same signature in these recordings, outside the catalogue of effects, are not excluded."
+)
+
+
+def build_diagnosis_content(
+    case: Case,
+    result: Result,
+    style: Style,
+    *,
+    issued: dt.date,
+    record: CalibrationRecord | None = None,
+    model_sha256: str | None = None,
+    by: str | None = None,
+) -> ReportContent:
+    """Return everything that a template of a diagnosis can ask for.
+
+    Parameters
+    ----------
+    record : the calibration that the case names
+    model_sha256 : of the answer's model file
+    by : who has released the opinion on the cause; without a name the document says that nobody has
+    """
+    made = result.diagnosis
+    plots = diagnosis_plots(result, style)
+    tables = {
+        name: Table(name=name, columns=TABLES[name][1], rows=tuple(rows))
+        for name, rows in _tables(case, made, style).items()
+    }
+    texts = _texts(case, made, style, record=record, model_sha256=model_sha256, by=by)
+    values = {f"diagnosis.{name}": Value(kind="text", value=text) for name, text in texts.items()}
+    values["diagnosis.issued"] = Value(kind="date", value=issued.isoformat())
+    values |= {f"caption.{name}": Value(kind="text", value=plot.caption) for name, plot in plots.items()}
+    unverified = record is not None and not record.verified
+    conditions = dict.fromkeys(DIAGNOSIS.conditions, False)
+    conditions |= {path: not value.missing for path, value in values.items()}
+    conditions |= {name: bool(table.rows) for name, table in tables.items()} | dict.fromkeys(plots, True)
+    conditions |= {
+        "unverified": unverified, "effects": bool(made.effects), "no_effects": not made.effects,
+        "incomplete": not made.complete,
+    }  # fmt: skip
+    marks = (("unverified", "UNVERIFIED: the calibration is a legacy import."),) if unverified else ()
+    return ReportContent(
+        values=values,
+        tables=tables,
+        plots=plots,
+        conditions=conditions,
+        calibrations=() if record is None else ((record.id, record.sha256, unverified),),
+        title=made.title,
+        author=style.laboratory or "toolkit",
+        identity=str(texts["id"]),
+        subject="Diagnosis: simulation against recording",
+        issued=issued.isoformat(),
+        marks=marks,
+        style=style,
+        vocabulary=DIAGNOSIS,
+    )
+
+
+def _texts(
+    case: Case,
+    made: Diagnosis,
+    style: Style,
+    *,
+    record: CalibrationRecord | None,
+    model_sha256: str | None,
+    by: str | None,
+) -> dict[str, str | None]:
+    released = f"released by {by}" if by else "draft: nobody authorised has released it"
+    return {
+        "id": f"DIA-{made.case_sha256[:8].upper()}",
+        "title": made.title,
+        "verdict": HEADLINES[made.verdict],
+        "summary": _summary(made, style),
+        "opinion": _opinion(made),
+        "opinion_by": released if made.effects else None,
+        "basis": _BASIS if made.effects else None,
+        "where": _where(made, style),
+        "held_out_by": f"Held out by {made.held_out_by}; each in turn, the fits made on the rest.",
+        "remains": _remains(made),
+        "not_observable": _not_observable(made),
+        "case": f"{case.path.name}, SHA-256 {made.case_sha256}",
+        "calibrations": "none" if record is None else f"{record.id} ({record.sha256})"
+        + ("" if record.verified else " UNVERIFIED"),
+        "model": None if model_sha256 is None else f"model.toml, SHA-256 {model_sha256}",
+        "complete": None if made.complete else f"The budget was spent at: {', '.join(made.skipped)}.",
+        "software": f"toolkit {__version__}",
+    }  # fmt: skip
+
+
+def _summary(made: Diagnosis, style: Style) -> str:
+    told = []
+    for one in made.held_out:
+        if made.effects:
+            ends = f"from {_n(one.refitted_rmse, style)} to {_n(one.augmented_rmse, style)} {_unit(one.unit)}"
+        else:
+            ends = f"is {_n(one.refitted_rmse, style)} {_unit(one.unit)}"
+        told.append(f"{one.channel} {ends} (noise {_n(one.noise_floor, style)})")
+    if not told:
+        return "Nothing was fitted."
+    what = (
+        "With the effects the error on held-out rows falls: " if made.effects else "Error on held-out rows: "
+    )
+    return f"{what}{'; '.join(told)}."
+
+
+def _opinion(made: Diagnosis) -> str | None:
+    if not made.effects:
+        return None
+    return " ".join(
+        f"{_label(one)}" + (f", or {', '.join(one.equivalent_to)}" if one.equivalent_to else "")
+        + f": {one.statement}"
+        for one in made.effects
+    )  # fmt: skip
+
+
+def _where(made: Diagnosis, style: Style) -> str | None:
+    told = []
+    for one in made.mismatch:
+        share = _n(100 * one.share_of_variance, style)
+        text = f"{one.channel}: {share} % of the residual's variance is structure"
+        for at in one.where[:1]:
+            numbers = isinstance(at.start, float) and isinstance(at.end, float)
+            ends = f"{_n(at.start, style)} to {_n(at.end, style)}" if numbers else str(at.start)  # type: ignore[arg-type]
+            text += f", most of it where {at.variable} is {ends} {at.unit}".rstrip()
+        told.append(f"{text} (p = {_n(one.p_value, style)}).")
+    return " ".join(told) or None
+
+
+def _remains(made: Diagnosis) -> str:
+    if made.depends_on:
+        listed = "; ".join(f"{channel} over {' and '.join(names)}" for channel, names in made.depends_on[:6])
+        return f"Structure that no named effect explains, a description and not physics: {listed}."
+    if made.remaining == "unknown":
+        return "Not judged: no search was made, or none to its end."
+    return "Nothing that stands out of the noise, down to the sizes of the last table."
+
+
+def _not_observable(made: Diagnosis) -> str | None:
+    why: dict[str, list[str]] = {}
+    for one in made.not_found:
+        if not one.observable:
+            why.setdefault(one.why or "not told by these recordings", []).append(one.name)
+    return " ".join(f"{reason.capitalize()}: {', '.join(names)}." for reason, names in why.items()) or None
+
+
+def _tables(case: Case, made: Diagnosis, style: Style) -> dict[str, list[tuple[Cell, ...]]]:
+    return {
+        "found": [
+            (_label(one), ", ".join(one.equivalent_to) or "-", one.statement, one.equation)
+            for one in made.effects
+        ],
+        "found_parameters": [row for one in made.effects for row in _parameters(one, style)],
+        "errors": [
+            (
+                one.channel, _unit(one.unit), _n(one.nominal_rmse, style), _n(one.refitted_rmse, style),
+                _n(one.augmented_rmse, style) if made.effects else "-", _n(one.noise_floor, style),
+            )
+            for one in made.held_out
+        ],
+        "rejected": [
+            (_label(one), name, _n(-less, style)) for one in made.effects for name, less in one.rejected[:6]
+        ],
+        "nominal": [
+            (
+                one.name, _unit(one.unit), _n(one.before, style, 6), _n(one.after, style, 6),
+                "known exactly" if one.prior_sd is None else _n(one.prior_sd, style),
+                "-" if one.shift_in_sd is None else _n(one.shift_in_sd, style, 2),
+            )
+            for one in made.nominal_parameters
+        ],
+        "not_found": [
+            (
+                one.name, "-" if one.minimum_detectable is None else _n(one.minimum_detectable, style),
+                _unit(one.unit) or "-",
+            )
+            for one in made.not_found
+            if one.observable
+        ],
+        "next": [(text,) for text in made.next_measurements],
+        "recorded": [
+            (
+                run.name, ", ".join(f"{key} {value}" for key, value in run.conditions.items()) or "-",
+                str(run.rows), run.sha256[:16],
+            )
+            for run in case.runs
+        ],
+        "diagnosis_findings": [(one.rule, one.level, one.where, one.message) for one in made.findings],
+    }  # fmt: skip
+
+
+def _parameters(one: FoundEffect, style: Style) -> list[tuple[Cell, ...]]:
+    return [
+        (
+            one.name, each.name,
+            each.value if isinstance(each.value, str) else _n(each.value, style, 4), _unit(each.unit) or "-",
+            "-" if each.ci95 is None else f"{_n(each.ci95[0], style, 4)} to {_n(each.ci95[1], style, 4)}",
+            "all" if each.runs is None else ", ".join(each.runs),
+        )
+        for each in one.parameters
+    ]  # fmt: skip
+
+
+def _label(one: FoundEffect) -> str:
+    return f"{one.name} on {one.channel}" if one.channel else one.name
+
+
+def _unit(text: str) -> str:
+    return text.replace("*", "·")
+
+
+def _n(value: float, style: Style, digits: int = 3) -> str:
+    text = f"{value:.{digits}g}"
+    return text.replace(".", ",") if style.decimal_comma else text

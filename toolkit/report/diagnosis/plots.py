@@ -1,0 +1,157 @@
+"""A diagnosis' figures as data for Word: errors over noise, places of mismatch, one run in time."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from toolkit.report.content import Curve, Plot
+from toolkit.report.diagnosis.figures import binned, variable_of, worst_run
+from toolkit.report.diagnosis.vocabulary import WHERE
+from toolkit.report.tags import format_number
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from toolkit.diagnosis.answer import Diagnosis, Mismatch
+    from toolkit.diagnosis.diagnose import Result
+    from toolkit.diagnosis.search import Search
+    from toolkit.report.style import Style
+
+_STEPS = ("as declared", "refitted", "with the effects")
+_MOST = 300  # points of a curve in print
+
+
+def diagnosis_plots(result: Result, style: Style) -> dict[str, Plot]:
+    """Return the figures by name; none where nothing was searched."""
+    found, made = result.search, result.diagnosis
+    if found is None:
+        return {}
+    plots = [_errors(made, style)] if made.held_out else []
+    wheres = (_where(found, one, made, style) for one in made.mismatch)
+    for i, plot in enumerate([one for one in wheres if one is not None][:WHERE], start=1):
+        plots.append(_named(plot, f"diagnosis_where_{i}"))
+    if made.mismatch:
+        plots.append(_run(found, made, style))
+    return {plot.name: plot for plot in plots}
+
+
+def _errors(made: Diagnosis, style: Style) -> Plot:
+    steps = _STEPS if made.effects else _STEPS[:2]
+    names: list[str] = []
+    bars: list[tuple[list[float], list[float]]] = [([], []) for _ in steps]
+    said = []
+    for one in made.held_out:
+        errors = (one.nominal_rmse, one.refitted_rmse, one.augmented_rmse)
+        over = [value / max(one.noise_floor, 1e-300) for value in errors][: len(steps)]
+        for i, value in enumerate(over):
+            bars[i][0].append(float(len(names)))
+            bars[i][1].append(value)
+            names.append(one.channel if i == len(steps) // 2 else "")
+        names.append("")
+        listed = ", ".join(f"{s} {_number(v, style)}" for s, v in zip(steps, over, strict=True))
+        said.append(f"{one.channel}: {listed}")
+    names.pop()
+    curves = [
+        Curve(
+            label=label, x=tuple(x), y=tuple(y), group=(6, 1, 0)[i], style="bars",
+            notes=tuple(_number(value, style) for value in y),
+        )
+        for i, (label, (x, y)) in enumerate(zip(steps, bars, strict=True))
+    ]  # fmt: skip
+    ends = (-0.6, len(names) - 0.4)
+    curves.append(Curve(label="noise", x=ends, y=(1.0, 1.0), group=2, style="line"))
+    return Plot(
+        name="diagnosis_errors",
+        x_label="output",
+        y_label="error over noise [1]",
+        curves=tuple(curves),
+        caption="Root mean square error on rows that no fit has seen, over the noise of the output. A "
+        "simulation that misses nothing stands at 1.",
+        alt="Error over noise: " + "; ".join(said) + ".",
+        legend_title="simulation",
+        decimal_comma=style.decimal_comma,
+        names=tuple(names),
+    )
+
+
+def _where(found: Search, one: Mismatch, made: Diagnosis, style: Style) -> Plot | None:
+    """Return an output's residual over the first variable that has numbers, in means of equal counts."""
+    problem = found.problem
+    kept = problem.kept[one.channel]
+    for place in one.where:
+        x = variable_of(found, place.variable)
+        if x is None or not isinstance(place.start, float) or not isinstance(place.end, float):
+            continue
+        unit = _unit(found, one.channel)
+        series = [("refitted", 1, found.refitted.residual[one.channel])]
+        if made.effects:
+            series.append(("with the effects", 0, found.augmented.residual[one.channel]))
+        curves = []
+        for label, group, residual in series:
+            at, mean = binned(x[kept], residual[kept])
+            curves.append(
+                Curve(label=label, x=tuple(at.tolist()), y=tuple(mean.tolist()), group=group, style="both")
+            )
+        span = f"{_number(place.start, style)} to {_number(place.end, style)} {place.unit}".rstrip()
+        return Plot(
+            name="",
+            x_label=f"{place.variable} [{place.unit}]" if place.unit else place.variable,
+            y_label=f"recorded − simulated {one.channel} [{unit}]",
+            curves=tuple(curves),
+            caption=f"{one.channel}: mean residual over {place.variable}; the mismatch is mostly at {span}.",
+            alt=f"Mean of recorded less simulated {one.channel} over {place.variable}, mostly at {span}.",
+            legend_title="simulation",
+            decimal_comma=style.decimal_comma,
+        )
+    return None
+
+
+def _run(found: Search, made: Diagnosis, style: Style) -> Plot:
+    problem, channel = found.problem, made.mismatch[0].channel
+    which = worst_run(found, channel)
+    rows, run = problem.slices[which], problem.runs[which]
+    some = slice(None, None, max(1, -(-run.rows // _MOST)))
+    good = np.isfinite(problem.observed[channel][rows][some])
+    t = run.t[some]
+
+    def curve(label: str, group: int, y: NDArray[np.float64], *, points: bool = False) -> Curve:
+        chosen = good if points else np.ones(len(t), dtype=bool)
+        return Curve(
+            label=label, x=tuple(t[chosen].tolist()), y=tuple(y[chosen].tolist()), group=group,
+            style="points" if points else "line", open=points,
+        )  # fmt: skip
+
+    curves = [
+        curve("recorded", 6, problem.observed[channel][rows][some], points=True),
+        curve("refitted", 1, found.refitted.simulated[channel][rows][some]),
+    ]
+    if made.effects:
+        curves.append(curve("with the effects", 0, found.augmented.simulated[channel][rows][some]))
+    timed = problem.case.has_time
+    return Plot(
+        name="diagnosis_run",
+        x_label="time [s]" if timed else "row",
+        y_label=f"{channel} [{_unit(found, channel)}]",
+        curves=tuple(curves),
+        caption=f"{channel} in {run.name}, the run with the largest mismatch.",
+        alt=f"{channel} in {run.name}: recorded and simulated over {'time' if timed else 'rows'}.",
+        legend_title="simulation",
+        decimal_comma=style.decimal_comma,
+    )
+
+
+def _named(plot: Plot, name: str) -> Plot:
+    from dataclasses import replace
+
+    return replace(plot, name=name)
+
+
+def _unit(found: Search, channel: str) -> str:
+    text = next(one.unit for one in found.problem.model.outputs if one.name == channel)
+    return text.replace("*", "·")
+
+
+def _number(value: float, style: Style) -> str:
+    return format_number(value, ".3g", decimal_comma=style.decimal_comma)

@@ -1,0 +1,186 @@
+"""The vocabulary of a diagnosis: every ``tk:diagnosis.`` tag, its tables, figures and conditions."""
+
+from __future__ import annotations
+
+from toolkit.report.columns import Column
+from toolkit.report.tags import Spec
+from toolkit.report.vocabulary import Tables, Vocabulary
+
+WHERE = 3  # figures of places at most
+FIGURES = {
+    "diagnosis_errors": "error on held-out rows over the noise, before and after: the chart of ten seconds",
+    **{f"diagnosis_where_{i}": f"where the mismatch is, output {i}" for i in range(1, WHERE + 1)},
+    "diagnosis_run": "the run with the largest mismatch, recorded and simulated",
+}
+
+_VALUES = """
+id|text|identification of the diagnosis, made from its case
+title|text|title of the case
+verdict|text|verdict in one sentence
+summary|text|what was found, in one sentence with numbers; a result
+opinion|text|what is taken for the cause: an opinion, not a result (ISO/IEC 17025, 7.8.7)
+opinion_by|text|who has released the opinion
+basis|text|what the opinion rests on
+where|text|where the mismatch is
+held_out_by|text|what was held out
+remains|text|what remains unexplained
+not_observable|text|effects of which these recordings can tell nothing, and why
+case|text|case file and its hash, which covers the recordings
+calibrations|text|calibration records of the case, with their hashes
+model|text|model file with what was found, and its hash
+complete|text|what a spent budget left out
+issued|date|day of the diagnosis
+software|text|program and version that made it
+"""
+
+
+def _columns(lines: str) -> tuple[Column, ...]:
+    return tuple(
+        Column(name=name.strip(), kind="text", description=text)
+        for name, text in (line.split("|") for line in lines.strip().splitlines())
+    )
+
+
+TABLES: Tables = {
+    "found": (
+        "effects that were found: statement and equation",
+        _columns(
+            """
+            effect|effect and the channel it acts on
+            class|effects that this recording cannot tell it from
+            statement|what it says, in words
+            equation|its equation
+            """
+        ),
+    ),
+    "found_parameters": (
+        "fitted parameters of the effects",
+        _columns(
+            """
+            effect|effect
+            parameter|parameter
+            value|fitted value
+            unit|unit
+            interval|95 % interval
+            runs|runs in which it acts
+            """
+        ),
+    ),
+    "errors": (
+        "root mean square errors on rows that no fit has seen",
+        _columns(
+            """
+            output|output
+            unit|unit
+            nominal|simulation as declared
+            refitted|its parameters refitted, no new physics
+            augmented|with the effects
+            noise|noise floor
+            """
+        ),
+    ),
+    "rejected": (
+        "alternatives that explain the recordings worse",
+        _columns(
+            """
+            effect|effect that was found
+            alternative|effect that was tried in its place
+            less|log-likelihood less than with the effect
+            """
+        ),
+    ),
+    "nominal": (
+        "parameters of the simulation before and after",
+        _columns(
+            """
+            parameter|parameter
+            unit|unit
+            before|as declared
+            after|with the effects
+            prior|prior standard deviation
+            shift|change over the prior standard deviation
+            """
+        ),
+    ),
+    "not_found": (
+        "effects that were not found, and how large each would have had to be",
+        _columns(
+            """
+            effect|effect
+            size|smallest size seen with 80 % power
+            unit|unit
+            """
+        ),
+    ),
+    "next": ("what to measure next", _columns("measure|measurement")),
+    "recorded": (
+        "recordings of the case",
+        _columns(
+            """
+            run|file
+            conditions|its conditions
+            rows|rows
+            sha256|beginning of the file's hash
+            """
+        ),
+    ),
+    "diagnosis_findings": (
+        "departures from what was expected",
+        _columns(
+            """
+            rule|rule, for 'toolkit explain'
+            level|error, warning or note
+            where|file or channel
+            message|what was found
+            """
+        ),
+    ),
+}
+
+_TEXTS = [line.split("|") for line in _VALUES.strip().splitlines()]
+CONDITIONS = {
+    "unverified": "a calibration of the case is not verified",
+    "effects": "an effect was found",
+    "no_effects": "no effect was found",
+    "incomplete": "the budget was spent before the search was at its end",
+    **{name: f"there is a figure: {text}" for name, text in FIGURES.items()},
+    **{name: f"the table has rows: {text}" for name, (text, _) in TABLES.items()},
+    **{f"diagnosis.{name}": f"there is a value: {text}" for name, _, text in _TEXTS},
+}
+
+DIAGNOSIS = Vocabulary(
+    name="diagnosis",
+    catalogue=(
+        *(
+            Spec(path=f"diagnosis.{name}", kind=kind, description=text)  # type: ignore[arg-type]
+            for name, kind, text in _TEXTS
+        ),
+        *(Spec(path=f"figure.{name}", kind="figure", description=text) for name, text in FIGURES.items()),
+        *(
+            Spec(path=f"caption.{name}", kind="text", description=f"caption of the figure: {text}")
+            for name, text in FIGURES.items()
+        ),
+        *(
+            Spec(path=f"table.{name}", kind="table", description=text, columns=columns)
+            for name, (text, columns) in TABLES.items()
+        ),
+        *(
+            Spec(path=f"if.{name}", kind="if", description=f"kept when {text}")
+            for name, text in CONDITIONS.items()
+        ),
+        *(
+            Spec(
+                path=f"row.{column.name}",
+                kind="row",
+                description=f"{column.description} (in the prototype row of tk:table.{name})",
+            )
+            for name, (_, columns) in TABLES.items()
+            for column in columns
+        ),
+    ),
+    figures=FIGURES,
+    tables=TABLES,
+    conditions=CONDITIONS,
+    required=("tk:diagnosis.case", "tk:diagnosis.id"),
+    marks={"unverified": frozenset({"if.unverified", "diagnosis.calibrations"})},
+)
