@@ -95,12 +95,13 @@ def enter(sessions: list[Path], registry: Path, tool: list[str]) -> Path:
     path = registry
     for session in sessions:
         ran = subprocess.run(
-            [*tool, "calibrate", "SESSION.toml", "--calibrations", str(registry.resolve()), "--json"],
-            cwd=session, capture_output=True, text=True, check=False,
+            [*tool, "calibrate", str(session / "SESSION.toml"), "--json",
+             "--calibrations", str(registry.resolve())],
+            capture_output=True, text=True, check=False,
         )  # fmt: skip
         if ran.returncode not in (0, 1):
             raise RuntimeError(f"no record of the session: {ran.stderr or ran.stdout}")
-        path = session / json.loads(ran.stdout)["record"]["path"]
+        path = Path(json.loads(ran.stdout)["record"]["path"])
     return path
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -68,3 +69,14 @@ def test_the_same_numbers_give_the_same_bytes(tmp_path: Path) -> None:
             files.table(case.scenario, case.scenario.runs[0], case.measured[0]), tmp_path / f"{name}.xlsx"
         )
     assert (tmp_path / "a.xlsx").read_bytes() == (tmp_path / "b.xlsx").read_bytes()
+
+
+def test_the_older_record_stands_in_the_registry_and_the_case_names_the_newer(tmp_path: Path) -> None:
+    case = drawn("wrong_calibration")
+    files.write_case(case.scenario, case.measured, tmp_path / "case")
+    sessions = sorted((tmp_path / "case" / files.SESSIONS).iterdir())
+    tool = [str(Path(sys.executable).with_name("toolkit"))]
+    newest = files.enter(sessions, tmp_path / "calibrations", tool)
+    assert newest.name == "m15-r2.json"
+    assert newest.read_bytes() == (tmp_path / "case" / "record.json").read_bytes()
+    assert (newest.parent / "m15-r1.json").exists()
