@@ -78,15 +78,26 @@ def test_creep_goes_on_after_a_step():
     np.testing.assert_allclose(made[1:], 1 + 0.02 * (1 - np.exp(-(T[1:] - 0.0025) / 4.0)), atol=1e-6)
 
 
-def test_hysteresis_is_a_loop_of_its_full_height_at_any_rate():
-    for rate in (0.5, 5.0):
-        y = np.sin(rate * T)
-        made = act("hysteresis", y, width=0.1)
-        later = T > 2 * np.pi / rate
-        up = later & (np.cos(rate * T) > 0.5) & (np.abs(y) < 0.05)
-        down = later & (np.cos(rate * T) < -0.5) & (np.abs(y) < 0.05)
-        assert (y - made)[up] == pytest.approx(0.05, abs=1e-9)
-        assert (y - made)[down] == pytest.approx(-0.05, abs=1e-9)
+@pytest.mark.parametrize("rate", [0.5, 5.0])
+def test_a_sharp_hysteresis_is_a_band_of_its_full_height_at_any_rate(rate):
+    y = np.sin(rate * T)
+    made = act("hysteresis", y, width=0.1, reach=0.02, gain=0.0)
+    later = (T > 2 * np.pi / rate) & (np.abs(y) < 0.5)
+    up, down = later & (np.cos(rate * T) > 0), later & (np.cos(rate * T) < 0)
+    # all gaps are wound up at once: a parallelogram whose branches are as far apart everywhere
+    assert np.mean((y - made)[up]) - np.mean((y - made)[down]) == pytest.approx(0.1, rel=0.03)
+    assert (y - made)[up] == pytest.approx(0.05, abs=0.004)
+    assert (y - made)[down] == pytest.approx(-0.05, abs=0.004)
+
+
+def test_a_hysteresis_that_reaches_over_the_whole_range_is_the_lens_of_Rayleigh():
+    y = 3.0 * np.sin(T)
+    made = act("hysteresis", y, width=0.1, reach=1.0, gain=0.0)
+    later = T > 2 * np.pi
+    up = later & (np.cos(T) > 0)
+    # Rayleigh's loop: parabolas, here half their height apart from the chord
+    parabola = 0.05 * (1 - (y / 3.0) ** 2)
+    np.testing.assert_allclose((y - made)[up], parabola[up], atol=0.004)
 
 
 def test_flat_stepped_and_dead():

@@ -20,6 +20,8 @@ from toolkit.errors import UnitError
 from toolkit.units import unit
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from toolkit.diagnosis.problem import Problem
 
 # Effects in which time passes: nothing can be said of them where rows have no time.
@@ -82,7 +84,7 @@ def _starts(problem: Problem, active: Active) -> tuple[Start, ...]:
         return (Start(values={}, directions=({},), amplitudes=()),)
     scales = {one.name: _scale(problem, active, one) for one in effect.parameters}
     extra = {f"_size_{one.name}": scales[one.name] * _middle(one) for one in effect.parameters}
-    extra |= _smoothing(problem, active)
+    extra |= _smoothing(problem, active) | _span(problem, active)
     shapes = [one for one in effect.parameters if one.off is None]
     amplitudes = [one for one in effect.parameters if one.off is not None]
     made = []
@@ -195,16 +197,32 @@ def _smoothing(problem: Problem, active: Active) -> dict[str, float]:
     return {"smooth": 1e-3 * _motion_scales(problem, active)[1]}
 
 
+def _span(problem: Problem, active: Active) -> dict[str, float]:
+    """Return half the range of a channel and its middle, over all runs: its loops have one shape."""
+    if active.effect.name != "hysteresis":
+        return {}
+    values = _values(problem, active.channel)
+    if not len(values):
+        return {}
+    low, high = float(values.min()), float(values.max())
+    return {"_span": 0.5 * (high - low), "_middle": 0.5 * (high + low)}
+
+
 def _spread(problem: Problem, name: str | None) -> float:
     if name is None:
         return 1.0
-    if name in problem.observed:
+    values = np.abs(_values(problem, name))
+    return float(values.max()) if len(values) and values.max() > 0 else 1.0
+
+
+def _values(problem: Problem, name: str | None) -> NDArray[np.float64]:
+    """Return what was recorded of a channel over all runs, nothing where it was not."""
+    if name is not None and name in problem.observed:
         values = problem.observed[name]
     else:
-        columns = [run.columns[name] for run in problem.runs if name in run.columns]
-        values = np.concatenate(columns) if columns else np.ones(1)
-    values = np.abs(values[np.isfinite(values)])
-    return float(values.max()) if len(values) and values.max() > 0 else 1.0
+        columns = [run.columns[str(name)] for run in problem.runs if name in run.columns]
+        values = np.concatenate(columns) if columns else np.zeros(0)
+    return values[np.isfinite(values)]
 
 
 def _temperature_range(problem: Problem) -> float:

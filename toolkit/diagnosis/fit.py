@@ -198,12 +198,18 @@ def _solve(
         except FitError:
             return np.full(sum(one.n for one in layouts.values()) + len(problem.free), 1e6)
 
+    def slope(v: NDArray[np.float64]) -> NDArray[np.float64]:
+        points = _moved(space, v)
+        _prepare(space, [v, *points])
+        here = cost(v)
+        return np.stack([(cost(w) - here) / (w[i] - v[i]) for i, w in enumerate(points)], axis=1)
+
     if len(x):
         x = least_squares(
             cost,
             x,
+            slope,
             bounds=(space.low, space.high),
-            diff_step=_STEP,  # type: ignore[arg-type]
             x_scale=1.0,
             max_nfev=_INNER,
             ftol=1e-7,
@@ -341,18 +347,33 @@ def _score(
 
 def _differences(space: _Space, x: NDArray[np.float64], base: Stacked) -> dict[str, NDArray[np.float64]]:
     made = {name: np.empty((len(column), len(x))) for name, column in base.items()}
-    for i in range(len(x)):
-        step = _STEP * max(abs(x[i]), 1.0)
-        step = -step if x[i] + step > space.high[i] else step
-        moved = x.copy()
-        moved[i] += step
+    points = _moved(space, x)
+    _prepare(space, [x, *points])
+    for i, moved in enumerate(points):
         try:
             simulated, _ = _run(space, moved)
         except FitError:
             simulated = base
         for name, column in simulated.items():
-            made[name][:, i] = (column - base[name]) / step
+            made[name][:, i] = (column - base[name]) / (moved[i] - x[i])
     return made
+
+
+def _moved(space: _Space, x: NDArray[np.float64]) -> list[NDArray[np.float64]]:
+    """Return the points of one-sided differences, within the bounds."""
+    points = []
+    for i in range(len(x)):
+        step = _STEP * max(abs(x[i]), 1.0)
+        step = -step if x[i] + step > space.high[i] else step
+        moved = x.copy()
+        moved[i] += step
+        points.append(moved)
+    return points
+
+
+def _prepare(space: _Space, points: Sequence[NDArray[np.float64]]) -> None:
+    """Have the simulations of several points made at once."""
+    space.problem.prepare([space.split(one) for one in points])
 
 
 def _covariance(

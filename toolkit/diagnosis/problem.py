@@ -62,6 +62,16 @@ class Problem:
         made = [self.model.simulate(run, values, active) for run in self.runs]
         return {name: np.concatenate([one[name] for one in made]) for name in self.names}
 
+    def prepare(self, wanted: Sequence[tuple[Sequence[float], Sequence[Active]]]) -> None:
+        """Have several simulations made at once where the model can; `simulate` then finds them."""
+        prepare = getattr(self.model, "prepare", None)
+        if prepare is None:
+            return
+        names = [one.name for one in self.free]
+        sets = [(self.known | dict(zip(names, map(float, p), strict=True)), active) for p, active in wanted]
+        for run in self.runs:
+            prepare(run, sets)
+
     def sd_of(self, name: str) -> float | None:
         """Return the stated noise of an output."""
         return next(one.sd for one in self.model.outputs if one.name == name)

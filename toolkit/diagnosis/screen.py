@@ -102,6 +102,17 @@ class Screen:
         """Number of values that count."""
         return sum(where.n for where in self.layouts.values())
 
+    def prepare(self, candidates: Sequence[Candidate]) -> None:
+        """Have the simulations made at once that scoring the candidates asks for."""
+        base = self.base
+        listed = [
+            replace(one.active, values=values)
+            for one in candidates
+            for start in one.starts
+            for values in start.directions
+        ]
+        self.problem.prepare([(base.p, base.active), *((base.p, (*base.active, one)) for one in listed)])
+
     def score(self, candidate: Candidate) -> list[Scored]:
         """Return a candidate with its quick gains, one for each start that the simulation can run."""
         made = []

@@ -120,6 +120,7 @@ def search(problem: Problem, *, seed: int, budget: Budget) -> Search:
             screen = Screen.of(problem, base)
             taken = {_place(one) for one in base.active}
             left = [each for each in listed if _place(each.active) not in taken and _is_sought(each, turn)]
+            screen.prepare(left)
             scored = screen.sharpened([one for each in left for one in screen.score(each)], _SHARPENED)
             ranked = best_of(scored)
             p_values = search_p_values(
@@ -171,13 +172,18 @@ def search(problem: Problem, *, seed: int, budget: Budget) -> Search:
 
 
 def _is_nuisance(step: Step, steps: Sequence[Step]) -> bool:
-    """Tell whether a step is no physics: input noise, or the point from which a drift is counted."""
+    """Tell whether a step is no physics: input noise, or the point from which a drift or a loop starts."""
     if step.active.effect.name == INPUT_NOISE.name:
         return True
-    return step.active.effect.name == "zero_offset" and any(
-        one.active.effect.name in ("thermal_drift", "zero_drift")
-        and one.active.channel == step.active.channel
-        for one in steps
+    if step.active.effect.name != "zero_offset":
+        return False
+    beside = [one.active for one in steps if one.active.channel == step.active.channel]
+    offset = abs(step.active.values["offset"])
+    return any(
+        one.effect.name in ("thermal_drift", "zero_drift")
+        # Where in its loop a channel stands at first depends on what came before the recording.
+        or (one.effect.name == "hysteresis" and offset <= 0.5 * one.values["width"])
+        for one in beside
     )
 
 

@@ -59,3 +59,13 @@ def play(x: NDArray[np.float64], width: float) -> NDArray[np.float64]:
         last = min(max(last, value - half), value + half)
         y[i] = last
     return y
+
+
+def plays(x: NDArray[np.float64], halves: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the mean of play operators with several half gaps, each starting in the middle of its gap."""
+    state = np.full(len(halves), float(x[0]) if len(x) else 0.0)
+    made = np.empty((len(x), len(halves)))
+    for i, value in enumerate(x.tolist()):
+        state = np.minimum(np.maximum(state, value - halves), value + halves)
+        made[i] = state
+    return np.asarray(made.mean(axis=1))

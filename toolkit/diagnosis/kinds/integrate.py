@@ -20,11 +20,11 @@ if TYPE_CHECKING:
 
 RTOL = 1e-6
 _MOST = 20_000  # rates that the stiff solver may ask for between two rows
-_OFF = 1e100  # in no unit is a state of any plant as large
-_MANY = 60  # steps within one interval: the equation is stiff there
+OFF = 1e100  # in no unit is a state of any plant as large
+MANY = 60  # steps within one interval: the equation is stiff there
 
-_C = (0.2, 0.3, 0.8, 8 / 9, 1.0)
-_A = tuple(
+C = (0.2, 0.3, 0.8, 8 / 9, 1.0)
+A = tuple(
     np.array(row)
     for row in (
         (0.2,),
@@ -34,8 +34,8 @@ _A = tuple(
         (9017 / 3168, -355 / 33, 46732 / 5247, 49 / 176, -5103 / 18656),
     )
 )
-_B = np.array([35 / 384, 0.0, 500 / 1113, 125 / 192, -2187 / 6784, 11 / 84])
-_E = np.array([71 / 57600, 0.0, -71 / 16695, 71 / 1920, -17253 / 339200, 22 / 525, -1 / 40])
+B = np.array([35 / 384, 0.0, 500 / 1113, 125 / 192, -2187 / 6784, 11 / 84])
+E = np.array([71 / 57600, 0.0, -71 / 16695, 71 / 1920, -17253 / 339200, 22 / 525, -1 / 40])
 
 
 class IntegrationError(Exception):
@@ -64,7 +64,7 @@ def integrate(
     step = float(t[1] - t[0]) if len(t) > 1 else 1.0
     for i in range(len(t) - 1):
         x, step = _interval(rate, float(t[i]), float(t[i + 1]), x, atol, step)
-        if not (np.abs(x) < _OFF).all():
+        if not (np.abs(x) < OFF).all():
             raise IntegrationError(f"the state has run off at {t[i + 1]:g} s")
         made[:, i + 1] = x
     return made
@@ -76,16 +76,16 @@ def _interval(
     k = np.empty((7, len(x)))
     k[0] = rate(t, x)
     h = min(step, end - t)
-    for _ in range(_MANY):
+    for _ in range(MANY):
         last = t + h >= end - 1e-12 * max(abs(end), h)
         if last:
             h = end - t
-        for j, (c, row) in enumerate(zip(_C, _A, strict=True), start=1):
+        for j, (c, row) in enumerate(zip(C, A, strict=True), start=1):
             k[j] = rate(t + c * h, x + h * (row @ k[:j]))
-        y = x + h * (_B @ k[:6])
+        y = x + h * (B @ k[:6])
         k[6] = rate(t + h, y)
         size = atol + RTOL * np.maximum(np.abs(x), np.abs(y))
-        error = float(np.sqrt(np.mean((h * (_E @ k) / size) ** 2)))
+        error = float(np.sqrt(np.mean((h * (E @ k) / size) ** 2)))
         if not np.isfinite(error):
             h *= 0.2
             continue

@@ -12,6 +12,7 @@ from toolkit.diagnosis.kinds.channels import channel_places, through_channels
 from toolkit.diagnosis.kinds.integrate import IntegrationError, integrate
 from toolkit.diagnosis.kinds.python import silenced
 from toolkit.diagnosis.kinds.setting import nominal_load, setting
+from toolkit.diagnosis.kinds.together import NotTogetherError, columns_of, integrate_together, takes_columns
 from toolkit.diagnosis.model import Active, Output
 from toolkit.effects.effect import Effect
 from toolkit.effects.signals import Setting
@@ -37,7 +38,7 @@ class OdeModel:
         self.outputs = tuple(Output(name=one.name, unit=one.unit, sd=one.sd) for one in case.outputs)
         self._drivers = tuple(one.name for one in case.drivers)
         self._settings: dict[Run, Setting] = {}
-        self._kept: dict[Any, dict[str, NDArray[np.float64]]] = {}
+        self._kept: dict[Any, dict[str, NDArray[np.float64]] | FitError] = {}
         p = {one.name: one.value for one in case.parameters}
         start = self._start(case.runs[0], p)
         names = case.simulation.states or tuple(f"x{i}" for i in range(len(start)))
@@ -68,6 +69,14 @@ class OdeModel:
         }
         self.scale: dict[str, tuple[float, float]] = {}
         self.scale = self._sizes(p)
+        self._takes_columns = self._tried(p)
+
+    def _tried(self, p: Mapping[str, float]) -> bool:
+        run = self.case.runs[0]
+        u = _Inputs(run, self._drivers).row(run.rows // 2)
+        size = np.array([self.scale[name][1] for name in self.states])
+        with silenced():
+            return takes_columns(self._rhs, float(run.t[0]), self._start(run, p), size, u, p)
 
     def _start(self, run: Run, p: Mapping[str, float]) -> NDArray[np.float64]:
         import inspect
@@ -131,17 +140,64 @@ class OdeModel:
         self, run: Run, p: Mapping[str, float], active: Sequence[Active]
     ) -> dict[str, NDArray[np.float64]]:
         """Return every output of a free simulation over the whole run."""
-        forces = [one for one in active if one.effect.stage == "dynamics" and one.acts_in(run)]
-        key = (
-            run,
-            tuple(p.values()),
-            tuple((one.effect.name, one.channel, tuple(one.values.values())) for one in forces),
-        )
+        key, forces = self._key(run, p, active)
         if key not in self._kept:
-            if len(self._kept) > 400:
-                self._kept.clear()
-            self._kept[key] = self._made(run, p, self._integrate(run, p, forces))
-        return through_channels(self._kept[key], active, run, self.setting(run), run.columns)
+            self._keep(key, self._made(run, p, self._integrate(run, p, forces)))
+        kept = self._kept[key]
+        if isinstance(kept, FitError):
+            raise kept
+        return through_channels(kept, active, run, self.setting(run), run.columns)
+
+    def prepare(self, run: Run, wanted: Sequence[tuple[Mapping[str, float], Sequence[Active]]]) -> None:
+        """Integrate several sets of parameters and effects at once, for `simulate` to find."""
+        if not self._takes_columns or run.rows < 2:
+            return
+        listed = {}
+        for p, active in wanted:
+            key, forces = self._key(run, p, active)
+            listed[key] = (p, forces)
+        # Those that are known already are done again with the others: their steps are then the same, and
+        # differences between them are free of what the steps leave.
+        if sum(key not in self._kept for key in listed) < 2:
+            return
+        self._together(run, [(key, *one) for key, one in listed.items()])
+
+    def _together(self, run: Run, listed: list[tuple[Any, Mapping[str, float], list[Active]]]) -> None:
+        """Integrate sets together; in halves where one of them stands in the way, and that one not at all."""
+        if len(listed) < 2:
+            return
+        sets = [p for _, p, _ in listed]
+        try:
+            starts = np.stack([self._start(run, p) for p in sets], axis=1)
+            rates = self._with_columns(
+                [forces for *_, forces in listed], columns_of(sets), _Inputs(run, self._drivers)
+            )
+            with silenced():
+                made = integrate_together(rates, run.t, starts, self._tolerance(starts[:, 0]))
+        except NotTogetherError:
+            middle = len(listed) // 2
+            self._together(run, listed[:middle])
+            self._together(run, listed[middle:])
+            return
+        except (Exception, SystemExit):  # noqa: BLE001 - whatever it is, the same set alone raises it by name
+            return
+        for k, (key, p, _) in enumerate(listed):
+            try:
+                self._keep(key, self._made(run, p, np.ascontiguousarray(made[:, :, k].T)))
+            except FitError as error:
+                self._keep(key, error)
+
+    def _key(
+        self, run: Run, p: Mapping[str, float], active: Sequence[Active]
+    ) -> tuple[tuple[Any, ...], list[Active]]:
+        forces = [one for one in active if one.effect.stage == "dynamics" and one.acts_in(run)]
+        told = tuple((one.effect.name, one.channel, tuple(one.values.values())) for one in forces)
+        return (run, tuple(p.values()), told), forces
+
+    def _keep(self, key: tuple[Any, ...], made: dict[str, NDArray[np.float64]] | FitError) -> None:
+        if len(self._kept) > 400:
+            self._kept.clear()
+        self._kept[key] = made
 
     def _integrate(self, run: Run, p: Mapping[str, float], forces: Sequence[Active]) -> NDArray[np.float64]:
         values = dict(p)
@@ -166,23 +222,45 @@ class OdeModel:
         plain = self._rhs
         if not forces:
             return lambda t, x: np.asarray(plain(t, x, u(t), p), dtype=np.float64)
-        terms = []
-        for one in forces:
-            i = self.states.index(str(one.channel))
-            terms.append((i, self._derivative_of.get(i, i), one))
+        terms = self._terms(forces)
 
         def rhs(t: float, x: NDArray[np.float64]) -> NDArray[np.float64]:
             rate = np.array(plain(t, x, u(t), p), dtype=np.float64)
-            for i, j, one in terms:
-                if one.effect.name == "overflow":
-                    width = 1e-3 * self.scale[self.states[i]][1]
-                    if rate[i] > 0:
-                        rate[i] *= min(max((one.values["level"] - x[i]) / width, 0.0), 1.0)
-                elif one.effect.force is not None:
-                    rate[i] -= one.effect.force(float(x[j]), float(x[i]), one.values)
+            self._add(terms, x, rate)
             return rate
 
         return rhs
+
+    def _with_columns(
+        self, forces: Sequence[Sequence[Active]], p: Mapping[str, Any], u: _Inputs
+    ) -> Callable[..., Any]:
+        plain, terms = self._rhs, [self._terms(one) for one in forces]
+        with_terms = [k for k, one in enumerate(terms) if one]
+
+        def rhs(t: float, x: NDArray[np.float64]) -> NDArray[np.float64]:
+            rate = np.array(plain(t, x, u(t), p), dtype=np.float64)
+            for k in with_terms:
+                self._add(terms[k], x[:, k], rate[:, k])
+            return rate
+
+        return rhs
+
+    def _terms(self, forces: Sequence[Active]) -> list[tuple[int, int, Active]]:
+        """Return for every force the state whose equation it enters, and that state's position."""
+        places = [(self.states.index(str(one.channel)), one) for one in forces]
+        return [(i, self._derivative_of.get(i, i), one) for i, one in places]
+
+    def _add(
+        self, terms: Sequence[tuple[int, int, Active]], x: NDArray[np.float64], rate: NDArray[np.float64]
+    ) -> None:
+        """Add forces to the rates of one state, in place."""
+        for i, j, one in terms:
+            if one.effect.name == "overflow":
+                width = 1e-3 * self.scale[self.states[i]][1]
+                if rate[i] > 0:
+                    rate[i] *= min(max((one.values["level"] - x[i]) / width, 0.0), 1.0)
+            elif one.effect.force is not None:
+                rate[i] -= one.effect.force(float(x[j]), float(x[i]), one.values)
 
     def _made(
         self, run: Run, p: Mapping[str, float], x: NDArray[np.float64]

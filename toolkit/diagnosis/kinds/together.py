@@ -1,0 +1,121 @@
+"""Many free simulations of one equation at a time: a column for each set of parameters, steps in common.
+
+A right-hand side that is written with numpy takes columns of states as it takes one state, and the price of
+a call hardly grows with their number. Whether it does is tried before it is trusted: the same rates must come
+out one by one. One that branches on a value, or calls `math`, refuses or differs there, and is integrated
+alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from toolkit.diagnosis.kinds.integrate import MANY, OFF, RTOL, A, B, C, E
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    Array = NDArray[np.float64]
+    Rates = Callable[[float, Array], Array]
+
+_TRIALS = 4
+_SAME = 1e-12
+
+
+class NotTogetherError(Exception):
+    """The columns cannot be integrated together; alone each of them may."""
+
+
+def columns_of(sets: Sequence[Mapping[str, float]]) -> dict[str, Array]:
+    """Return sets of parameters as one, each value a row of columns (m,)."""
+    return {name: np.array([one[name] for one in sets], dtype=np.float64) for name in sets[0]}
+
+
+def takes_columns(
+    rhs: Callable[..., Any],
+    t: float,
+    start: Array,
+    size: Array,
+    u: Mapping[str, float],
+    p: Mapping[str, float],
+) -> bool:
+    """Tell whether a right-hand side gives for columns of states and parameters what it gives for each.
+
+    Parameters
+    ----------
+    start, size : a state and how far to stray from it, (states,)
+    u, p : inputs of one row, parameters as declared
+    """
+    rng = np.random.default_rng(0)
+    for _ in range(_TRIALS):
+        states = start[:, None] + size[:, None] * rng.normal(size=(len(start), 3))
+        sets = [
+            {name: value * (1 + 0.1 * float(rng.normal())) for name, value in p.items()} for _ in range(3)
+        ]
+        try:
+            alone = [np.asarray(rhs(t, states[:, k].copy(), dict(u), dict(sets[k])), float) for k in range(3)]
+            made = np.asarray(rhs(t, states.copy(), dict(u), columns_of(sets)), dtype=np.float64)
+        except Exception:  # noqa: BLE001 - whatever a user's code raises: it does not take columns
+            return False
+        wanted = np.stack(alone, axis=1)
+        if made.shape != wanted.shape or not np.allclose(made, wanted, rtol=_SAME, atol=0, equal_nan=True):
+            return False
+    return True
+
+
+def integrate_together(rates: Rates, t: Array, starts: Array, atol: Array) -> Array:
+    """Return the states at every row, (rows, states, columns).
+
+    Parameters
+    ----------
+    rates : (time, states (states, columns)) -> their rates, as an array of its own
+    t : rising times of the rows [s]
+    starts : states at the first row, (states, columns)
+    atol : absolute tolerance of each state; the relative one is that of `integrate`
+
+    Raises
+    ------
+    NotTogetherError
+        the equation turns stiff in some column, or runs off
+    """
+    x = starts.copy()
+    made = np.empty((len(t), *x.shape))
+    made[0] = x
+    h = float(t[1] - t[0]) if len(t) > 1 else 1.0
+    for i in range(len(t) - 1):
+        x, h = _interval(rates, float(t[i]), float(t[i + 1]), x, atol[:, None], h)
+        if not (np.abs(x) < OFF).all():
+            raise NotTogetherError
+        made[i + 1] = x
+    return made
+
+
+def _interval(rates: Rates, t: float, end: float, x: Array, atol: Array, step: float) -> tuple[Array, float]:
+    k = np.empty((7, x.size))
+    k[0] = rates(t, x).ravel()
+    h = min(step, end - t)
+    for _ in range(MANY):
+        last = t + h >= end - 1e-12 * max(abs(end), h)
+        if last:
+            h = end - t
+        for j, (c, row) in enumerate(zip(C, A, strict=True), start=1):
+            k[j] = rates(t + c * h, x + h * (row @ k[:j]).reshape(x.shape)).ravel()
+        y = x + h * (B @ k[:6]).reshape(x.shape)
+        k[6] = rates(t + h, y).ravel()
+        size = atol + RTOL * np.maximum(np.abs(x), np.abs(y))
+        # The worst column rules: its error is that of its states together, as where it is alone.
+        error = float(np.sqrt(np.mean((h * (E @ k).reshape(x.shape) / size) ** 2, axis=0)).max())
+        if not np.isfinite(error):
+            h *= 0.2
+            continue
+        grow = min(5.0, max(0.2, 0.9 * error**-0.2)) if error > 0 else 5.0
+        if error <= 1.0:
+            if last:
+                return y, h * grow
+            t, x = t + h, y
+            k[0] = k[6]
+        h *= grow
+    raise NotTogetherError
