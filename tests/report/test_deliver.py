@@ -147,6 +147,42 @@ def test_a_failed_conversion_leaves_nothing(tmp_path: Path, monkeypatch, script:
     assert not office.folder.exists()
 
 
+# A LibreOffice that makes a PDF of each document but those named bad*, and notes who converted what.
+_NOTING = """
+case "$*" in *--convert-to*) ;; *) exit 0;; esac
+for a in "$@"; do case "$a" in
+    -env:*) profile=$a ;;
+    *bad*.docx) ;;
+    *.docx) printf '%%PDF-1.7 %%%%EOF' > "${a%.docx}.pdf"; echo "$profile ${a##*/}" >> "$NOTES" ;;
+esac; done
+"""
+
+
+def test_many_documents_are_shared_out_and_come_back_in_their_order(tmp_path: Path, monkeypatch) -> None:
+    monkeypatch.setenv("TOOLKIT_SOFFICE", str(fake(tmp_path, _NOTING)))
+    monkeypatch.setenv("NOTES", str(tmp_path / "notes"))
+    monkeypatch.setattr("os.cpu_count", lambda: 2)
+    names = ["a", "bad1", "b", "c", "d"]
+    sources = [tmp_path / f"{name}.docx" for name in names]
+    for source in sources:
+        source.write_bytes(b"")
+    with Office() as office:
+        office.expect(3)
+        assert office._beside == []  # not worth a second start
+        office.expect(len(sources))
+        (beside,) = office._beside
+        made = office.convert_each(sources, tmp_path)
+    assert [one.name if isinstance(one, Path) else one.rule for one in made] == [
+        "a.pdf", "render-failed", "b.pdf", "c.pdf", "d.pdf",
+    ]  # fmt: skip
+    notes = [line.split() for line in (tmp_path / "notes").read_text().splitlines()]
+    profiles = {name: profile for profile, name in notes}
+    # A profile is never shared: LibreOffice would hand one job over to the other, and lose it.
+    assert profiles["a.docx"] == profiles["b.docx"] == profiles["d.docx"] != profiles["c.docx"]
+    assert not office.folder.exists()
+    assert not beside.folder.exists()
+
+
 def test_keep_puts_what_was_made_into_rejected(tmp_path: Path, monkeypatch) -> None:
     monkeypatch.setenv("TOOLKIT_SOFFICE", str(fake(tmp_path, "exit 0")))
     out = tmp_path / "out"

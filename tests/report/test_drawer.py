@@ -1,10 +1,11 @@
 from __future__ import annotations
 
+import pytest
 from report_factory import make_record, make_result
 
 from toolkit.report.build import build_content
 from toolkit.report.drawer import Drawer
-from toolkit.report.figures import draw
+from toolkit.report.figures import Picture, draw
 
 
 def test_workers_draw_what_one_process_draws() -> None:
@@ -19,3 +20,25 @@ def test_a_worker_that_died_costs_no_report() -> None:
     with Drawer(workers=1) as drawer:
         drawer._workers[0].kill()
         assert drawer.pictures(plots)[next(iter(plots))].png.startswith(b"\x89PNG")
+
+
+def test_what_a_dying_worker_left_is_drawn_and_nobody_waits_for_it() -> None:
+    plots = dict(list(build_content(make_result(), make_record()).plots.items())[:3])
+    with Drawer(workers=1) as drawer:
+        drawn = drawer.pictures(plots)
+        first, *rest = plots
+        assert drawn[first].png.startswith(b"\x89PNG")
+        drawer._workers[0].kill()
+        assert all(drawn[name].png.startswith(b"\x89PNG") for name in rest)
+
+
+def test_an_error_of_a_figure_is_raised_where_it_is_asked_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    def broken(_plot: object) -> Picture:
+        raise ArithmeticError("a figure that cannot be drawn")
+
+    monkeypatch.setattr("toolkit.report.drawer.draw", broken)
+    plots = dict(list(build_content(make_result(), make_record()).plots.items())[:1])
+    with Drawer(workers=1) as drawer:
+        drawer._workers[0].kill()
+        with pytest.raises(ArithmeticError, match="cannot be drawn"):
+            drawer.pictures(plots)[next(iter(plots))]

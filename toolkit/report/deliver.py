@@ -125,7 +125,7 @@ def deliver_all(
     keep: bool = False,
     step: Step = lambda _text: None,
 ) -> list[Delivered | ToolkitError]:
-    """Make several reports, converted in one call; return each report or why there is none.
+    """Make several reports, converted together; return each report or why there is none.
 
     Parameters
     ----------
@@ -139,6 +139,7 @@ def deliver_all(
         # In the office's own folder, which goes away even after a kill -9.
         work = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="print-", dir=office.folder)))
         runs = [_Run(job=job, keep=keep) for job in jobs]
+        office.expect(len(jobs))
         for run in runs:
             stack.callback(run.close)
             run.attempt(run.open)

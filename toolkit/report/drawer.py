@@ -6,11 +6,12 @@ beside the reduction of the test and the preparation of LibreOffice.
 
 from __future__ import annotations
 
+import contextlib
 import os
 import pickle
 import subprocess
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 from types import TracebackType
 
@@ -33,6 +34,7 @@ class Drawer:
             for _ in range(count)
         ]
         self._pool = ThreadPoolExecutor(max_workers=max(1, count))
+        self._closed = False
 
     def __enter__(self) -> Drawer:
         return self
@@ -44,6 +46,7 @@ class Drawer:
 
     def close(self) -> None:
         """End the workers."""
+        self._closed = True
         for worker in self._workers:
             worker.kill()
         self._pool.shutdown()
@@ -51,25 +54,25 @@ class Drawer:
             worker.wait()
             for stream in (worker.stdin, worker.stdout):
                 if stream is not None and not stream.closed:
-                    stream.close()
+                    with contextlib.suppress(OSError):  # an order that the killed worker did not take
+                        stream.close()
         self._workers = []
 
     def pictures(self, plots: Mapping[str, Plot]) -> Mapping[str, Picture]:
         """Return the drawn figures by name; a look-up waits until its figure is there."""
-        waiting: dict[str, Future[dict[str, Picture]]] = {}
+        waiting: dict[str, Future[Picture]] = {name: Future() for name in plots}
         shares = [dict(list(plots.items())[i :: len(self._workers)]) for i in range(len(self._workers))]
         for worker, share in zip(self._workers, shares, strict=True):
-            job = self._pool.submit(_ask, worker, share)
-            waiting |= dict.fromkeys(share, job)
+            self._pool.submit(_ask, worker, share, waiting, lambda: self._closed)
         return _Waiting(waiting)
 
 
 class _Waiting(Mapping[str, Picture]):
-    def __init__(self, jobs: dict[str, Future[dict[str, Picture]]]) -> None:
+    def __init__(self, jobs: dict[str, Future[Picture]]) -> None:
         self._jobs = jobs
 
     def __getitem__(self, name: str) -> Picture:
-        return self._jobs[name].result()[name]
+        return self._jobs[name].result()
 
     def __contains__(self, name: object) -> bool:
         return name in self._jobs
@@ -81,13 +84,32 @@ class _Waiting(Mapping[str, Picture]):
         return len(self._jobs)
 
 
-def _ask(worker: subprocess.Popen[bytes], share: dict[str, Plot]) -> dict[str, Picture]:
-    out, _ = worker.communicate(pickle.dumps(share))
-    if worker.returncode == 0 and out:
-        drawn: dict[str, Picture] = pickle.loads(out)  # noqa: S301  our own child wrote it
-        return drawn
-    # A worker that could not start or was killed costs time, not the report.
-    return {name: draw(plot) for name, plot in share.items()}
+def _ask(
+    worker: subprocess.Popen[bytes],
+    share: dict[str, Plot],
+    waiting: Mapping[str, Future[Picture]],
+    closed: Callable[[], bool],
+) -> None:
+    """Give a worker its share; each figure is there as soon as it is drawn: filling goes on beside."""
+    assert worker.stdin is not None  # noqa: S101  both are pipes
+    assert worker.stdout is not None  # noqa: S101
+    # A worker that could not start or was killed costs time, not the report: what is left is drawn here.
+    with contextlib.suppress(Exception):
+        worker.stdin.write(pickle.dumps(share))
+        worker.stdin.close()
+        for _ in share:
+            name, picture = pickle.load(worker.stdout)  # noqa: S301  our own child wrote it
+            waiting[name].set_result(picture)
+    for name, plot in share.items():
+        if waiting[name].done():
+            continue
+        if closed():
+            waiting[name].cancel()
+            continue
+        try:
+            waiting[name].set_result(draw(plot))
+        except Exception as error:  # noqa: BLE001  raised again where the figure is asked for
+            waiting[name].set_exception(error)
 
 
 def _work() -> None:
@@ -98,7 +120,9 @@ def _work() -> None:
     order = sys.stdin.buffer.read()
     if order:
         share: dict[str, Plot] = pickle.loads(order)  # noqa: S301  our own parent wrote it
-        sys.stdout.buffer.write(pickle.dumps({name: draw(plot) for name, plot in share.items()}))
+        for name, plot in share.items():
+            sys.stdout.buffer.write(pickle.dumps((name, draw(plot))))
+            sys.stdout.buffer.flush()
 
 
 if __name__ == "__main__":
