@@ -10,9 +10,10 @@ from toolkit.estimate import coverage_factor
 from toolkit.pipeline import process, read_test
 from toolkit.recording.folder import read_test_folder
 from toolkit.tires import Curve, fit_curves
+from toolkit.tires.colour import noise_of
 from toolkit.tires.fit import _normalise
 from toolkit.tires.solver import solve
-from toolkit.tires.uncertainty import spread
+from toolkit.tires.uncertainty import curve_columns, spread
 
 NAMES = ("B", "C", "D", "E", "Sh", "Sv")
 # B [1/rad], C, D [N, N·m], E, Sh [rad], Sv [N, N·m] of a car tire at 2, 4 and 6 kN, in SAE axes.
@@ -136,15 +137,11 @@ def test_what_another_minimum_leaves_open_is_not_determined():
     problems, scale = _normalise([one])
     solution = solve([problems])[0]
     variance = solution.state.cost / 55
+    columns, rows = curve_columns(solution, problems), np.array([61])
+    noise = noise_of(np.zeros_like(problems.y), columns, rows, solution.state.cost, np.array([np.nan]))
 
     def determined(solution):
-        found = spread(
-            solution,
-            problems,
-            zero=-scale.middle / scale.half,
-            variance=variance,
-            dof=np.array([55.0]),
-        )
+        found = spread(solution, problems, zero=-scale.middle / scale.half, noise=noise)
         return dict(zip(NAMES, found.determined[0].tolist(), strict=True)), found
 
     alone, found = determined(solution)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -34,7 +35,11 @@ def payload(fitted: Fitted) -> dict[str, Any]:
 
 def curve_payload(fit: CurveFit, rotation: str | None = None) -> dict[str, Any]:
     """Return the fit of one load as the JSON answer of the files contract."""
-    return {**_common(fit, rotation), "units": {p.name: p.unit for p in fit.parameters}}
+    return {
+        **_common(fit, rotation),
+        "standard_error_dof": {p.name: _finite(p.dof) for p in fit.parameters},
+        "units": {p.name: p.unit for p in fit.parameters},
+    }
 
 
 def global_payload(fit: GlobalFit) -> dict[str, Any]:
@@ -87,12 +92,17 @@ def _common(fit: CurveFit | GlobalFit, rotation: str | None) -> dict[str, Any]:
     }
 
 
-def _estimate(slope: Estimate | None, fit: CurveFit | GlobalFit) -> dict[str, float] | None:
+def _estimate(slope: Estimate | None, fit: CurveFit | GlobalFit) -> dict[str, float | None] | None:
     # Both stiffnesses are positive for a tire in every axis system.
     if slope is None:
         return None
     sign = slope_sign(fit.axes, fit.channel)  # type: ignore[arg-type]
-    return {"value": sign * slope.value, "standard_error": slope.u}
+    return {"value": sign * slope.value, "standard_error": slope.u, "dof": _finite(slope.dof)}
+
+
+def _finite(dof: float | None) -> float | None:
+    # Infinite where the noise was known beforehand: JSON has no such number.
+    return dof if dof is not None and math.isfinite(dof) else None
 
 
 def text(fitted: Fitted, findings: Sequence[Finding]) -> str:

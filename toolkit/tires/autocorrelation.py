@@ -16,9 +16,9 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-_ROWS = 40  # fewer rows give noise for an estimate
+ROWS = 40  # fewer rows give noise for an estimate
 _SHARE = 8.0  # rows that an estimate of so many repeated rows takes at least
-_RHO = np.linspace(0.0, 0.98, 50)
+RHO = np.linspace(0.0, 0.98, 50)
 
 
 def autocorrelation_time(residual: Array, columns: Array | None = None) -> float:
@@ -38,20 +38,24 @@ def autocorrelation_time(residual: Array, columns: Array | None = None) -> float
     1.0
     """
     n = len(residual)
-    if n < _ROWS:
+    if n < ROWS:
         return 1.0
     r = residual - residual.mean()
     total = float(r @ r)
     if total <= 0:
         return 1.0
     first = float(r[1:] @ r[:-1]) / total
-    time = _summed(r, n) if first >= 2.0 / np.sqrt(n) else 1.0
+    time = summed_time(r) if first >= 2.0 / np.sqrt(n) else 1.0
     if columns is not None and first >= 1.0 / np.sqrt(n) - len(columns) / n:
-        time = max(time, _restricted(residual, columns))
+        likelihood = restricted_likelihood(residual[None], columns[None], np.array([n]))
+        best = float(RHO[int(np.argmax(likelihood[0]))])
+        time = max(time, (1 + best) / (1 - best))
     return float(np.clip(time, 1.0, n / _SHARE))
 
 
-def _summed(r: Array, n: int) -> float:
+def summed_time(r: Array) -> float:
+    """Return 1 + 2 sum of the autocorrelations of (rows,) about zero, to where a pair is not positive."""
+    n = len(r)
     size = 1 << (2 * n - 1).bit_length()
     spectrum = np.fft.rfft(r, size)
     acov = np.fft.irfft(spectrum * np.conj(spectrum), size)[:n]
@@ -61,22 +65,33 @@ def _summed(r: Array, n: int) -> float:
     return 2.0 * float(np.minimum.accumulate(pairs[:end]).sum()) - 1.0
 
 
-def _restricted(residual: Array, columns: Array) -> float:
+def restricted_likelihood(residual: Array, columns: Array, lengths: NDArray[np.intp]) -> Array:
+    """Return the restricted log-likelihood (curves, 50) of the coefficients ``RHO`` of an autoregression.
+
+    Parameters
+    ----------
+    residual : (curves, points), zero beyond a curve's own ``lengths`` (curves,)
+    columns : (curves, p, points) derivatives of the model in the same weights, zero there too
+    """
     # Whitened by x_t - rho x_(t-1), every product of rows is a parabola in rho: three matrices serve all.
-    rows = np.concatenate([columns, residual[None]])
-    size = np.sqrt(np.sum(rows * rows, axis=1))
-    rows = rows[size > 0] / size[size > 0, None]
-    p = len(rows) - 1
-    later, earlier, head = rows[:, 1:], rows[:, :-1], rows[:, :1]
-    lag = later @ earlier.T
-    rho = _RHO[:, None, None]
-    M = later @ later.T - rho * (lag + lag.T) + rho**2 * (earlier @ earlier.T)
-    M = M + (1 - rho**2) * (head @ head.T)
-    A = M[:, :p, :p] + 1e-9 * np.eye(p)
-    b = M[:, :p, p]
-    rss = M[:, p, p] - np.vecdot(b, np.linalg.solve(A, b[..., None])[..., 0])
-    n = rows.shape[1]
+    rows = np.concatenate([columns, residual[:, None]], axis=1)
+    size = np.sqrt(np.vecdot(rows, rows))
+    rows = rows / np.where(size > 0, size, 1.0)[..., None]
+    p = rows.shape[1] - 1
+    earlier = rows[..., :-1].copy()
+    # The last row of a padded curve has none after it.
+    last = np.arange(earlier.shape[-1]) >= (lengths - 1)[:, None]
+    earlier *= ~last[:, None, :]
+    later, head = rows[..., 1:], rows[..., :1]
+    lag = later @ earlier.transpose(0, 2, 1)
+    squares = [one @ one.transpose(0, 2, 1) for one in (later, earlier, head)]
+    rho = RHO[:, None, None]
+    M = squares[0][:, None] - rho * (lag + lag.transpose(0, 2, 1))[:, None]
+    M = M + rho**2 * squares[1][:, None] + (1 - rho**2) * squares[2][:, None]
+    A = M[..., :p, :p] + 1e-9 * np.eye(p)
+    b = M[..., :p, p]
+    rss = M[..., p, p] - np.vecdot(b, np.linalg.solve(A, b[..., None])[..., 0])
     _, logdet = np.linalg.slogdet(A)
-    likelihood = -(n - p) * np.log(np.maximum(rss, 1e-300)) - logdet + np.log(1 - _RHO**2)
-    best = float(_RHO[int(np.argmax(likelihood))])
-    return (1 + best) / (1 - best)
+    left = (lengths - p)[:, None]
+    likelihood = -left * np.log(np.maximum(rss, 1e-300)) - logdet + np.log(1 - RHO**2)
+    return np.asarray(0.5 * likelihood)

@@ -10,7 +10,7 @@ import numpy as np
 
 from toolkit.errors import FitError
 from toolkit.estimate import Estimate
-from toolkit.tires.autocorrelation import autocorrelation_time
+from toolkit.tires.colour import noise_of
 from toolkit.tires.evaluate import estimate_at, slope_at, slope_estimate_at, value_at, zero_crossing
 from toolkit.tires.kernel import (
     C_HIGH,
@@ -208,17 +208,10 @@ def _fit_group(
     residual = problems.y - linear[:, :1] * sine(solution.state.p, problems.u) - linear[:, 1:]
     lengths = np.array([len(curve.y) for curve in curves])
     columns = curve_columns(solution, problems)
-    times = np.array([
-        autocorrelation_time(row[:n] * weight[:n], own[:, :n])
-        for row, weight, own, n in zip(residual, problems.sw, columns, lengths, strict=True)
-    ])  # fmt: skip
     # Known uncertainties are a floor: scatter or misfit beyond them widens the intervals (Birge).
-    variance = inflation * solution.state.cost / (lengths - 6)
-    variance = np.fmax(variance, scale.known)
-    known = np.nan_to_num(scale.known) >= variance
-    dof = np.where(known, np.inf, np.maximum(lengths / times - 6, 1.0))
-    variance = np.maximum(variance, _TINY_VARIANCE) * times
-    found = spread(solution, problems, zero=-scale.middle / scale.half, variance=variance, dof=dof)
+    cost = np.maximum(inflation * solution.state.cost, _TINY_VARIANCE * (lengths - 6))
+    noise = noise_of(residual * problems.sw, columns, lengths, cost, scale.known)
+    found = spread(solution, problems, zero=-scale.middle / scale.half, noise=noise)
     return [
         _result(
             curve,
@@ -227,8 +220,7 @@ def _fit_group(
             found,
             scale,
             residual[i, : len(curve.y)],
-            float(dof[i]),
-            float(times[i]),
+            float(noise.time[i]),
             loss,
         )
         for i, curve in enumerate(curves)
@@ -242,7 +234,6 @@ def _result(
     found: Spread,
     scale: _Scale,
     residual: Array,
-    dof: float,
     time: float,
     loss: Loss,
 ) -> CurveFit:
@@ -256,7 +247,9 @@ def _result(
     determined, bound = found.determined[i], found.at_bound[i]
     unit = CHANNEL_UNIT[curve.channel]
 
-    def estimate(value: float, u: float, factor: float, unit: str) -> Estimate | None:
+    dof = [float(one) for one in found.dof[i]]
+
+    def estimate(value: float, u: float, factor: float, unit: str, dof: float) -> Estimate | None:
         if not np.isfinite(u):
             return None
         return Estimate(value=float(value) * factor, u=float(u) * factor, unit=unit, dof=dof)
@@ -277,16 +270,19 @@ def _result(
                 value=float(value),
                 unit=spec.unit_of(curve.channel),
                 standard_error=float(error) if ok else None,
+                dof=own if ok else None,
             )
-            for spec, value, error, ok in zip(MODEL.parameters, values, errors, determined, strict=True)
+            for spec, value, error, ok, own in zip(
+                MODEL.parameters, values, errors, determined, dof[:6], strict=True
+            )
         ),
         covariance=tuple(tuple(row) for row in covariance.tolist()),
         not_determined=not_determined,
         at_bound=at_bound,
         error_percent=error_percent(residual * top, curve.y),
         scatter_floor_percent=scatter_floor_percent(curve.SA, curve.y),
-        slope_at_zero=estimate(found.slope[i], found.slope_se[i], top / half, f"{unit}/rad"),
-        value_at_zero=estimate(found.value[i], found.value_se[i], top, unit),
+        slope_at_zero=estimate(found.slope[i], found.slope_se[i], top / half, f"{unit}/rad", dof[6]),
+        value_at_zero=estimate(found.value[i], found.value_se[i], top, unit, dof[7]),
         loss=loss,
         converged=converged,
         message=_message(curve, values, converged, not_determined, at_bound, time),
@@ -316,5 +312,7 @@ def _message(
     if curve.sigma is not None:
         parts.append("weighted by the stated standard uncertainties")
     if time > 1:
-        parts.append(f"residuals are autocorrelated: standard errors times {np.sqrt(time):.1f}")
+        parts.append(
+            f"residuals are autocorrelated, {time:.1f} rows say as much as one: standard errors allow for it"
+        )
     return "; ".join(parts)

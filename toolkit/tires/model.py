@@ -49,12 +49,17 @@ class ParameterSpec:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Parameter:
-    """A fitted parameter. ``standard_error`` is None where the data do not determine it."""
+    """A fitted parameter. ``standard_error`` is None where the data do not determine it.
+
+    ``dof`` are the degrees of freedom of the error, infinite where the noise was known: an interval of 95 %
+    is Student's t for them times the error. None where there is no error.
+    """
 
     name: str
     value: float
     unit: str
     standard_error: float | None
+    dof: float | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

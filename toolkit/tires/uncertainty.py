@@ -10,8 +10,7 @@ All is asked of the 95 % interval that a standard error stands for. A parameter 
 - no other minimum that the noise cannot tell from the lowest lies outside it.
 
 Only the model, the places of the rows and the size of the noise are asked, never the residuals: less noise
-determines more. Rows of a 100 Hz sweep repeat themselves: the covariance is multiplied by the
-residual's integrated autocorrelation time.
+determines more. Rows of a 100 Hz sweep repeat themselves: `colour` says what information that leaves.
 """
 
 from __future__ import annotations
@@ -41,6 +40,7 @@ from toolkit.tires.solver import compress
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from toolkit.tires.colour import Noise
     from toolkit.tires.kernel import Array
     from toolkit.tires.solver import Solution
 
@@ -56,7 +56,8 @@ class Spread:
     """Per curve, in normalised parameters (B, C, D, E, h, Sv): what the data say about each.
 
     ``theta`` (curves, 6); ``covariance`` (curves, 6, 6); ``determined`` ``at_bound`` (curves, 6);
-    ``slope`` ``value`` at SA = 0 with their standard errors, NaN where not determined (curves,).
+    ``slope`` ``value`` at SA = 0 with their standard errors, NaN where not determined (curves,); ``dof``
+    (curves, 8) degrees of freedom of the errors of the six, of slope and of value.
     """
 
     theta: Array
@@ -67,47 +68,59 @@ class Spread:
     slope_se: Array
     value: Array
     value_se: Array
+    dof: Array
 
 
-def spread(solution: Solution, problems: Problems, *, zero: Array, variance: Array, dof: Array) -> Spread:
+def spread(solution: Solution, problems: Problems, *, zero: Array, noise: Noise) -> Spread:
     """Return what the data say about the parameters at a minimum.
 
     Parameters
     ----------
     zero : normalised slip angle of SA = 0 (curves,)
-    variance : variance of a row of weight one, autocorrelation included (curves,)
-    dof : degrees of freedom of that variance, infinite where it is known (curves,)
+    noise : of the curves, with what autocorrelation leaves of their information
     """
     theta = theta_of(solution.state)
     low, high, width = _box(theta, problems)
     margin = 1e-6 * (high - low)
     at_bound = (theta <= low + margin) | (theta >= high - margin)
     columns = _columns(theta, problems)
-    information = columns @ columns.transpose(0, 2, 1) / variance[:, None, None]
+    information = columns @ columns.transpose(0, 2, 1) / noise.variance[:, None, None]
     # What the bounds alone say keeps the inverse finite; it is negligible for what the data determine.
-    information += np.eye(6) / (width * width)[:, :, None]
+    bounds = np.eye(6) / (width * width)[:, :, None]
     # A parameter at its bound stays free here: the others would else look better known than they are.
-    covariance = _inverse(information)
+    plain = _inverse(information + bounds)
+    covariance, largest = plain, noise.variance
+    if len(noise.coloured):
+        covariance, largest = plain.copy(), largest.copy()
+        covariance[noise.coloured] = _inverse(noise.information + bounds[noise.coloured])
+        largest[noise.coloured] = noise.largest
     at_zero, level = slope(theta.T, zero), value(theta.T, zero)
     gradients = np.stack([slope_jacobian(theta.T, zero).T, jacobian(theta.T, zero).T])
     slope_se, value_se = np.sqrt(np.maximum(np.vecdot(gradients, np.matvec(covariance, gradients)), 0.0))
-    factor = np.array([coverage_factor(float(one)) for one in dof])
-    half = factor[:, None] * np.sqrt(np.maximum(np.einsum("pii->pi", covariance), 0.0))
+    dof = np.repeat(noise.dof[:, None], 8, axis=1)
+    common = np.array([coverage_factor(float(one)) for one in noise.dof])
+    factor = np.repeat(common[:, None], 8, axis=1)
+    if len(noise.coloured):
+        asked = np.concatenate(
+            [np.broadcast_to(np.eye(6), (len(theta), 6, 6)), gradients.transpose(1, 0, 2)], 1
+        )
+        dof[noise.coloured] = noise.dof_of(asked[noise.coloured])
+        factor[noise.coloured] = np.vectorize(coverage_factor)(dof[noise.coloured])
+    half = factor[:, :6] * np.sqrt(np.maximum(np.einsum("pii->pi", covariance), 0.0))
     inside = (theta - half >= low) & (theta + half <= high)
     natural = np.ones_like(theta)
     natural[:, :3], natural[:, 3] = np.abs(theta[:, :3]), E_TOP - theta[:, 3]
-    allowed = (factor * factor * variance)[:, None]
-    rival = (solution.excess <= allowed)[..., None]
+    rival = (solution.excess <= (common * common * largest)[:, None])[..., None]
     outside = np.abs(solution.rivals - theta[:, None, :]) > half[:, None, :] + _SAME
     determined = ~at_bound & inside & (half <= _WIDE * natural) & ~(rival & outside).any(axis=1)
-    determined &= _straight(theta, covariance, half, compress(problems), allowed[:, 0], low, high)
+    determined &= _straight(theta, plain / noise.variance[:, None, None], half, compress(problems), low, high)
     # Rows of one sign leave the shifts to the model, and all else moves with them: of the few intervals that
     # would pass three quarters cover.
     determined &= (np.abs(zero) <= _INSIDE)[:, None]
     # Beyond the data a curve is an extrapolation of the model, whatever its covariance says.
     # Slope and value need rows on both sides: at their end the linear interval covers 85 % and not 95 %.
-    slope_ok = (np.abs(zero) <= 0.95) & (factor * slope_se <= _WIDE * np.abs(at_zero))
-    value_ok = (np.abs(zero) <= _INSIDE) & (factor * value_se <= _WIDE)
+    slope_ok = (np.abs(zero) <= 0.95) & (factor[:, 6] * slope_se <= _WIDE * np.abs(at_zero))
+    value_ok = (np.abs(zero) <= _INSIDE) & (factor[:, 7] * value_se <= _WIDE)
     return Spread(
         theta=theta,
         covariance=covariance,
@@ -117,6 +130,7 @@ def spread(solution: Solution, problems: Problems, *, zero: Array, variance: Arr
         slope_se=np.where(slope_ok, slope_se, np.nan),
         value=level,
         value_se=np.where(value_ok, value_se, np.nan),
+        dof=dof,
     )
 
 
@@ -142,15 +156,18 @@ def _box(theta: Array, problems: Problems) -> tuple[Array, Array, Array]:
 
 
 def _straight(
-    theta: Array, covariance: Array, half: Array, problems: Problems, expected: Array, low: Array, high: Array
+    theta: Array, inverse: Array, half: Array, problems: Problems, low: Array, high: Array
 ) -> NDArray[np.bool_]:
     # Has the curve moved as far as the linear propagation says, at both ends of every parameter's interval,
     # all else fitted again? (curves, 6). Bin means serve for long curves: their rows' places count, not
     # their values, for the curve is held against itself.
     curves = len(theta)
-    variances = np.maximum(np.einsum("pii->pi", covariance), 1e-300)
-    # Along its own row of the covariance a parameter moves with all else where the parabola wants it.
-    step = covariance * (half / variances)[:, :, None]
+    own = np.maximum(np.einsum("pii->pi", inverse), 1e-300)
+    # Along its own row of the inverse normal matrix a parameter moves with all else where the parabola wants
+    # it, and the cost rises by the square of its move over its own entry.
+    step = inverse * (half / own)[:, :, None]
+    # Where rounding leaves no interval the cost cannot rise as it should: not determined.
+    expected = np.where(half > 0, half * half / own, np.inf)
     moved = np.stack([theta[:, None] + step, theta[:, None] - step])  # (ends, curves, held, 6)
     moved = np.clip(moved, low[:, None], high[:, None]).reshape(-1, 6)
     repeat = np.tile(np.repeat(np.arange(curves), 6), 2)
@@ -175,7 +192,7 @@ def _straight(
         new_cost = np.vecdot(new, new)
         better = new_cost < cost
         moved[better], residual[better], cost[better] = trial[better], new[better], new_cost[better]
-    rise = cost.reshape(2, curves, 6) / expected[:, None]
+    rise = cost.reshape(2, curves, 6) / expected
     fair: NDArray[np.bool_] = ((rise >= _PARABOLA[0]) & (rise <= _PARABOLA[1])).all(axis=0)
     return fair
 

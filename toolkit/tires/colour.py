@@ -1,0 +1,180 @@
+"""What coloured noise does to fits of single curves: their covariance, and how well that is known.
+
+The rows of a sweep repeat themselves. Least squares then has the covariance (Gauss-Markov, unweighted)
+
+    s^2 (X'X)^-1 X'R X (X'X)^-1,    s^2 = r'r / tr(M R),    M = 1 - X (X'X)^-1 X'
+
+with R the correlation of the rows: a fit takes slow noise for a part of its curve, so that its residuals r
+are smaller than the noise, and tr(M R) says by how much. R is that of a first-order autoregression. Its
+coefficient is not known either: its restricted likelihood (Patterson and Thompson, Biometrika 58 (1971) 545),
+which unlike the residuals' own correlation allows for the fit, is a weight for each value, and the
+covariance is the mean over them. Degrees of freedom are Satterthwaite's (Biometrics Bulletin 2 (1946) 110):
+twice the squared mean of a variance over its own variance, from s^2 (tr(M R)^2 / tr(M R M R) degrees) and
+from the coefficient, for each quantity by itself: a level depends on it more than a slope does. Three nodes
+of Gauss and Hermite in arctanh of the coefficient stand for its weights. Residuals whose summed correlations
+go beyond what these weights allow are slower than an autoregression of first order: the nodes move there.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from toolkit.tires.autocorrelation import RHO, ROWS, restricted_likelihood, summed_time
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    Array = NDArray[np.float64]
+
+_NODES = np.array([-np.sqrt(3.0), 0.0, np.sqrt(3.0)])
+_WEIGHTS = np.array([1.0, 4.0, 1.0]) / 6.0
+_Z = np.arctanh(RHO)
+_BEYOND = 2.0  # standard deviations
+_RIDGE = 1e-12
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Noise:
+    """The noise of (curves,): ``variance`` of a row of weight one and its ``dof``, infinite where known.
+
+    ``time`` rows that repeat each other, 1 for white noise; ``coloured`` (k,) the curves where it is more,
+    with ``information`` (k, p, p) that their rows hold of the parameters, and ``largest`` (k,) the variance
+    along the worst direction of parameters. ``factor`` (k, p, p), ``nodes`` (3, k, p, p) and ``own_dof``
+    (3, k) are what `dof_of` needs.
+    """
+
+    variance: Array
+    dof: Array
+    time: Array
+    coloured: NDArray[np.intp]
+    information: Array
+    largest: Array
+    factor: Array
+    nodes: Array
+    own_dof: Array
+
+    def dof_of(self, gradients: Array) -> Array:
+        """Return degrees of freedom (k, m) of m quantities of the coloured curves by gradients (k, m, p)."""
+        a = np.linalg.solve(self.factor, gradients.transpose(0, 2, 1))
+        V = np.einsum("kpm,nkpq,kqm->nkm", a, self.nodes, a)
+        return np.where(np.isinf(self.dof[self.coloured])[:, None], np.inf, _satterthwaite(V, self.own_dof))
+
+
+def noise_of(residual: Array, columns: Array, lengths: NDArray[np.intp], cost: Array, known: Array) -> Noise:
+    """Return the noise of fits.
+
+    Parameters
+    ----------
+    residual : (curves, points) weighted, in the order of recording, zero beyond a curve's own ``lengths``
+    columns : (curves, p, points) weighted derivatives of the model, zero there too
+    cost : (curves,) sum of squares that stands for the noise
+    known : (curves,) variance known beforehand, a floor; NaN for none
+    """
+    p = columns.shape[1]
+    variance = np.fmax(cost / (lengths - p), known)
+    # A variance that scatter does not raise is known; else it rests on the rows.
+    dof = np.where(np.nan_to_num(known) >= variance, np.inf, lengths - p + 0.0)
+    time = np.ones(len(lengths))
+    inside = np.arange(residual.shape[1]) < lengths[:, None]
+    r = (residual - (residual.sum(axis=1) / lengths)[:, None]) * inside
+    total = np.vecdot(r, r)
+    first = np.vecdot(r[:, 1:], r[:, :-1]) / np.where(total > 0, total, 1.0)
+    root = 1.0 / np.sqrt(lengths)
+    coloured = np.flatnonzero((lengths >= ROWS) & (total > 0) & (first >= root - p / lengths))
+    if not len(coloured):
+        return Noise(
+            variance=variance, dof=dof, time=time, coloured=coloured,
+            information=np.zeros((0, p, p)), largest=np.zeros(0), factor=np.zeros((0, p, p)),
+            nodes=np.zeros((3, 0, p, p)), own_dof=np.zeros((3, 0)),
+        )  # fmt: skip
+    slow = np.array([
+        summed_time(r[i, : lengths[i]]) if first[i] >= 2 * root[i] else 1.0 for i in coloured
+    ])  # fmt: skip
+    part = _Part(residual[coloured], columns[coloured], lengths[coloured])
+    rho = part.nodes(slow)
+    nodes, s2, own_dof = part.spread(rho, cost[coloured], known[coloured])
+    mean = np.einsum("n,nkpq->kpq", _WEIGHTS, nodes)
+    worst = _satterthwaite(np.einsum("nkpp->nk", nodes)[..., None], own_dof)[:, 0]
+    time[coloured] = _WEIGHTS @ ((1 + rho) / (1 - rho))
+    variance[coloured] = _WEIGHTS @ s2
+    dof[coloured] = np.where(np.isinf(dof[coloured]), np.inf, worst)
+    return Noise(
+        variance=variance,
+        dof=dof,
+        time=time,
+        coloured=coloured,
+        information=part.factor @ np.linalg.solve(mean, part.factor.transpose(0, 2, 1)),
+        largest=np.linalg.eigvalsh(mean)[:, -1],
+        factor=part.factor,
+        nodes=nodes,
+        own_dof=own_dof,
+    )
+
+
+def _satterthwaite(V: Array, own_dof: Array) -> Array:
+    # Degrees of freedom (k, m) of variances (nodes, k, m) that have `own_dof` (nodes, k) each.
+    mean = np.einsum("n,nkm->km", _WEIGHTS, V)
+    apart = (V - mean) ** 2 + 2 * V**2 / own_dof[..., None]
+    return np.asarray(np.maximum(2 * mean**2 / np.einsum("n,nkm->km", _WEIGHTS, apart), 1.0))
+
+
+class _Part:
+    # The coloured curves with an orthonormal basis of their columns: columns = factor @ basis.
+    def __init__(self, residual: Array, columns: Array, lengths: NDArray[np.intp]) -> None:
+        self.residual, self.lengths = residual, lengths
+        normal = columns @ columns.transpose(0, 2, 1)
+        size = np.sqrt(np.einsum("cpp->cp", normal)) + 1e-300
+        unit = normal / (size[:, :, None] * size[:, None, :])
+        np.einsum("cpp->cp", unit)[...] += _RIDGE
+        lower = np.linalg.cholesky(unit)
+        self.factor = size[:, :, None] * lower
+        self.basis = np.linalg.solve(lower, columns / size[:, :, None])
+
+    def nodes(self, slow: Array) -> Array:
+        """Return coefficients (3, curves); ``slow`` is the time of the summed correlations."""
+        likelihood = restricted_likelihood(self.residual, self.basis, self.lengths)
+        weight = np.exp(likelihood - likelihood.max(axis=1, keepdims=True))
+        weight /= weight.sum(axis=1, keepdims=True)
+        middle = weight @ _Z
+        width = np.sqrt(np.maximum(weight @ _Z**2 - middle**2, 0.0))
+        # The arctanh of the coefficient that has this time.
+        slower = 0.5 * np.log(slow)
+        middle = np.where(slower > middle + _BEYOND * width, slower, middle)
+        return np.asarray(np.tanh(np.maximum(middle + _NODES[:, None] * width, 0.0)))
+
+    def spread(self, rho: Array, cost: Array, known: Array) -> tuple[Array, Array, Array]:
+        """Return of each node the covariance of basis @ noise, a row's variance, its degrees of freedom."""
+        moved = _correlated(self.basis, rho, self.lengths)
+        G = moved @ self.basis.transpose(0, 2, 1)  # (nodes, curves, p, p)
+        n = self.lengths
+        trace = np.einsum("kcpp->kc", G)
+        left = np.maximum(n - trace, 1.0)
+        square = _sum_of_squares(rho, n) - 2 * np.einsum("kcpn,kcpn->kc", moved, moved)
+        square = np.maximum(square + np.einsum("kcpq,kcqp->kc", G, G), 1e-300)
+        s2 = np.fmax(cost / left, known)
+        return s2[..., None, None] * G, s2, left**2 / square
+
+
+def _correlated(rows: Array, rho: Array, lengths: NDArray[np.intp]) -> Array:
+    # The product with the correlation matrix rho^|i - j|: (nodes, curves, p, points), zero beyond a curve's
+    # length. Its inverse is tridiagonal, over 1 - rho^2: 1 + rho^2 (1 at both ends) and -rho beside.
+    from scipy.linalg.lapack import dptsv
+
+    made = np.zeros((len(rho), *rows.shape))
+    for curve, n in enumerate(lengths):
+        right = rows[curve, :, :n].T
+        for node, one in enumerate(rho[:, curve].tolist()):
+            diagonal = np.full(n, 1.0 + one * one)
+            diagonal[0] = diagonal[-1] = 1.0
+            product = dptsv(diagonal, np.full(n - 1, -one), right)[2]
+            made[node, curve, :, :n] = (1.0 - one * one) * product.T
+    return made
+
+
+def _sum_of_squares(rho: Array, n: NDArray[np.intp]) -> Array:
+    # tr(R R) = n + 2 sum_k (n - k) rho^2k, k = 1 to n - 1.
+    a = rho**2
+    return np.asarray(n + 2 * a * (n * (1 - a) - (1 - a**n)) / (1 - a) ** 2)
