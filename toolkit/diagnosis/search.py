@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from toolkit.diagnosis.absorbed import Key, absorbed
 from toolkit.diagnosis.candidates import Candidate, candidates
 from toolkit.diagnosis.fit import Fit, fit, replace_effects
 from toolkit.diagnosis.folds import Folds, HeldOut, folds_of, hold_out
@@ -134,7 +135,9 @@ def search(problem: Problem, *, seed: int, budget: Budget) -> Search:
             if turn == MOST_EFFECTS:
                 break
             found = None
-            for promising, least in _groups([one for one in ranked if p_of[id(one)] < ALPHA]):
+            significant = [one for one in ranked if p_of[id(one)] < ALPHA]
+            hidden = absorbed(problem, base, left) if significant else frozenset()
+            for promising, least in _groups(significant, hidden):
                 told = ", ".join(dict.fromkeys(one.candidate.name for one in promising))
                 budget.check(f"step {turn + 1}: joint fits of {told}")
                 found = _best_step(problem, folds, base, held_base, promising, p_of, least)
@@ -211,7 +214,9 @@ def _is_sought(one: Candidate, turn: int) -> bool:
     return one.name != "quantisation" and not (one.discrete and turn > 1)
 
 
-def _groups(ranked: Sequence[Scored]) -> list[tuple[Sequence[Scored], float]]:
+def _groups(
+    ranked: Sequence[Scored], hidden: frozenset[Key] = frozenset()
+) -> list[tuple[Sequence[Scored], float]]:
     """Return candidates in the order of joint fits, with the least share of the error that each must take.
 
     Those far behind the first cannot win against it; where none of the first can be fitted, they stand for
@@ -221,6 +226,8 @@ def _groups(ranked: Sequence[Scored]) -> list[tuple[Sequence[Scored], float]]:
         return []
     near = min(_FAR_BEHIND * ranked[0].gain, ranked[0].gain - 40)
     first = [one for one in ranked if one.gain > near][:_REFINED]
+    # What the refit may have absorbed is fitted with the first, however small it looks from there.
+    first += [one for one in ranked if one.candidate.key in hidden and all(one is not each for each in first)]
     behind = [one for one in ranked if all(one is not each for each in first)][:_REFINED]
     return [(first, 2 * NOTICED), *([(behind, _MOST)] if behind else [])]
 
