@@ -258,16 +258,16 @@ def test_pictures_take_the_width_asked_or_of_their_place(tmp_path: Path) -> None
     assert {tag for tag, _ in result.figures} == {"tk:figure.gough", "tk:figure.crat", "tk:figure.prat"}
 
 
-def test_a_figure_in_a_footnote_and_in_a_header(tmp_path: Path) -> None:
-    result = filled(
-        tmp_path,
-        p("x"),
-        header=p("{{tk:figure.gough|width=20mm}}"),
-        footnote=p("{{tk:figure.prat|width=2cm}}"),
-    )
-    assert extents(result, "word/footnotes.xml") == [20.0]
+def test_a_figure_in_a_header_and_none_in_a_footnote(tmp_path: Path) -> None:
+    result = filled(tmp_path, p("{{tk:figure.prat}}"), header=p("{{tk:figure.gough|width=20mm}}"))
+    with zipfile.ZipFile(io.BytesIO(result.docx)) as archive:
+        (header,) = [name for name in archive.namelist() if re.fullmatch(r"word/header\d*\.xml", name)]
+    assert extents(result, header) == [20.0]
     assert len(result.figures) == 2
     assert result.in_margins == {"tk:figure.gough"}
+    with pytest.raises(TemplateError, match="in a note would be missing") as caught:
+        filled(tmp_path, p("x"), footnote=p("{{tk:figure.prat|width=2cm}}"))
+    assert caught.value.rule == "wrong-place"
 
 
 def test_captions_are_numbered_over_removed_blocks(tmp_path: Path) -> None:
