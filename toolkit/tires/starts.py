@@ -28,6 +28,7 @@ _C = (0.35, 0.7, 1.1, 1.6, 2.2, 2.9, 3.6)
 _E = (-19.0, -6.0, -2.0, -0.3, 0.5, 0.9)
 _H = (-3.0, -1.8, -1.2, -0.9, -0.6, -0.3, 0.0, 0.3, 0.6, 0.9, 1.2, 1.8, 3.0)
 _BLOCK = (16, 378)  # curves and shapes: 16 x 378 x 40 nodes is under 2^18, below which OpenBLAS stays alone
+_AT_ONCE = 16
 _GRID = (len(_B), len(_C), len(_E), len(_H))
 
 
@@ -45,6 +46,13 @@ def library() -> tuple[Array, Array32, Array32]:
 
 def pick(problems: Problems, count: int) -> Array:
     """Return the ``count`` best start shapes of every curve (curves, count, 4), best first."""
+    # A few curves at a time: their scores by every shape then stay in the cache.
+    each = np.arange(len(problems.u))
+    parts = [each[first : first + _AT_ONCE] for first in range(0, len(each), _AT_ONCE)]
+    return np.concatenate([_pick(problems.take(part), count) for part in parts])
+
+
+def _pick(problems: Problems, count: int) -> Array:
     shapes, sines, squares = library()
     weight, moment = _deposit(problems)
     total = weight.sum(axis=1)[:, None]
