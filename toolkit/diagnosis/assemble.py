@@ -137,6 +137,9 @@ def _parameters(found: Search, active: Active, runs: tuple[str, ...] | None) -> 
         if turned < 0:
             value, ci = -value, None if ci is None else (-ci[1], -ci[0])
         unit = unit_of(problem.case, problem.model, active, one.name)
+        if unit == "deg" and one.name.startswith("phase"):
+            turns = 360.0 * math.floor(value / 360.0)
+            value, ci = value - turns, None if ci is None else (ci[0] - turns, ci[1] - turns)
         result.append(FoundParameter(name=one.name, value=value, unit=unit, ci95=ci, runs=runs))
     return tuple(result)
 

@@ -71,7 +71,8 @@ def _beyond_noise(problem: Problem, base: Fit, name: str) -> StructureFound | No
     sd, kept = problem.sd_of(name), problem.kept[name]
     if sd is None or kept.sum() < 10:
         return None
-    ratio = float(np.mean(base.residual[name][kept] ** 2)) / sd**2
+    # Coarse steps add their own to what the sensor is stated to have.
+    ratio = float(np.mean(base.residual[name][kept] ** 2)) / (sd**2 + problem.floor[name] ** 2)
     worth = max(kept.sum() / base.noise[name].correlation_rows, 3.0)
     p = float(chi2.sf(ratio / _STATED**2 * worth, worth))
     if p >= ALPHA_STRUCTURE:

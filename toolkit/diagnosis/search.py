@@ -28,6 +28,7 @@ ALPHA = 0.003  # of the whole search, a step
 MOST_EFFECTS = 4
 _SHARPENED = 30  # starts whose gain is computed with the noise estimated anew
 _FAR_BEHIND = 0.25  # of the best gain: a candidate below cannot win a joint fit
+_LATER = 0.05  # of the held-out mean square: what an effect beside others must take away
 _MOST = 0.5  # of the held-out mean square: what a candidate far behind must take away
 _REFINED = 8  # candidates that are fitted jointly, of those that screening ranks first
 _BOUND = 1e-3
@@ -137,7 +138,7 @@ def search(problem: Problem, *, seed: int, budget: Budget) -> Search:
             found = None
             significant = [one for one in ranked if p_of[id(one)] < ALPHA]
             hidden = absorbed(problem, base, left) if significant else frozenset()
-            for promising, least in _groups(significant, hidden):
+            for promising, least in _groups(significant, hidden, _LATER if turn else 2 * NOTICED):
                 told = ", ".join(dict.fromkeys(one.candidate.name for one in promising))
                 budget.check(f"step {turn + 1}: joint fits of {told}")
                 found = _best_step(problem, folds, base, held_base, promising, p_of, least)
@@ -215,12 +216,13 @@ def _is_sought(one: Candidate, turn: int) -> bool:
 
 
 def _groups(
-    ranked: Sequence[Scored], hidden: frozenset[Key] = frozenset()
+    ranked: Sequence[Scored], hidden: frozenset[Key], least: float
 ) -> list[tuple[Sequence[Scored], float]]:
     """Return candidates in the order of joint fits, with the least share of the error that each must take.
 
     Those far behind the first cannot win against it; where none of the first can be fitted, they stand for
-    themselves, and have to explain most of what is left.
+    themselves, and have to explain most of what is left. A later effect has to be seen beside the first,
+    whose own model is never exact.
     """
     if not ranked:
         return []
@@ -229,7 +231,7 @@ def _groups(
     # What the refit may have absorbed is fitted with the first, however small it looks from there.
     first += [one for one in ranked if one.candidate.key in hidden and all(one is not each for each in first)]
     behind = [one for one in ranked if all(one is not each for each in first)][:_REFINED]
-    return [(first, 2 * NOTICED), *([(behind, _MOST)] if behind else [])]
+    return [(first, least), *([(behind, _MOST)] if behind else [])]
 
 
 def _best_step(
@@ -310,13 +312,14 @@ def _rounded(values: NDArray[np.float64], step: float) -> NDArray[np.float64]:
 
 
 def _matters(problem: Problem, before: HeldOut, after: HeldOut, least: float) -> bool:
-    """Tell whether some output's held-out mean square falls by a share that a user would notice."""
+    """Tell whether some output's held-out error falls by a share that a user would notice.
+
+    By its mean square or by its variance: where a drift starts is found in a later step.
+    """
     for name, kept in problem.kept.items():
-        observed = problem.observed[name]
-        one, other = (
-            float(np.mean((observed[kept] - each.simulated[name][kept]) ** 2)) for each in (before, after)
-        )
-        if other < one * (1 - least):
+        observed = problem.observed[name][kept]
+        one, other = (observed - each.simulated[name][kept] for each in (before, after))
+        if np.mean(other**2) < np.mean(one**2) * (1 - least) or np.var(other) < np.var(one) * (1 - least):
             return True
     return False
 
