@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import datetime as dt
+import os
 from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -10,7 +11,9 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from toolkit import __version__
 from toolkit.audit.across import Across
+from toolkit.audit.cluster import run_on_cluster
 from toolkit.audit.inventory import inventory
 from toolkit.audit.lines import Lines
 from toolkit.audit.model import GRADES, TELLS, Grade
@@ -57,16 +60,19 @@ def audit_archive(
     *,
     known_at: dt.date | None = None,
     workers: int = 1,
+    scheduler: str | None = None,
     step: Callable[[str], None] = lambda _: None,
     names: tuple[str, ...] | None = None,
     out: Path | None = None,
 ) -> ArchiveAudit:
-    """Audit every file of an archive; the result does not depend on the number of workers.
+    """Audit every file of an archive; the result does not depend on who reads it, nor on how many do.
 
     Parameters
     ----------
     known_at : the day of knowledge; default today
     workers : processes; each file is read in one, behind the gate, with a memory limit and a timeout
+    scheduler : address of a dask cluster whose workers read the files instead; they see the archive and the
+        registry under the same paths
     step : called with each path that is done
     names : the inventory where the caller has made it already
     out : folder in which results are kept as they come; those that still hold are used again
@@ -74,7 +80,8 @@ def audit_archive(
     Raises
     ------
     ConfigError
-        the archive is no folder, or ``workers`` is no count
+        the archive is no folder, or ``workers`` is no count; ``cluster missing-extra``: see
+        `toolkit.audit.cluster`
     OutputError
         ``out`` cannot be written to, or another audit writes there
     """
@@ -87,14 +94,19 @@ def audit_archive(
         )  # fmt: skip
     day = known_at or today()
     todo = inventory(archive) if names is None else names
-    make = partial(_Worker, archive, registry, day)
-    with Results(out, archive=archive, registry_hash=_hash(registry, day)) as kept:
+    digest = _hash(registry, day)
+    make: Callable[[], Callable[[str], Done]] = partial(_Worker, archive, registry, day)
+    if scheduler is None:
+        run = partial(run_isolated, make, workers=workers)
+    else:
+        run = partial(run_on_cluster, _remote(archive, registry, day, digest), address=scheduler)
+    with Results(out, archive=archive, registry_hash=digest) as kept:
         reused: set[str] = set()
         for name in kept.known(todo):
             reused.add(name)
             step(name)
         new = tuple(name for name in todo if name not in reused)
-        for name, result in run_isolated(make, new, workers=workers):
+        for name, result in run(new):
             kept.put(name, done(unreadable(name, result.reason)) if isinstance(result, Lost) else result)
             step(name)
         return _summed(archive, registry, day, kept.files(todo), reused=len(reused))
@@ -107,6 +119,37 @@ class _Worker:
 
     def __call__(self, name: str) -> Done:
         return done(self.audit(name))
+
+
+def _remote(
+    archive: Path, registry: Registry, day: dt.date, digest: str
+) -> Callable[[], Callable[[str], Done]]:
+    # Another machine has another working folder; links are kept, as the names in the archive have them.
+    there = Path(os.path.abspath(archive))  # noqa: PTH100
+    records = Registry(Path(os.path.abspath(registry.folder)))  # noqa: PTH100
+    return partial(_same, there, records, day, digest, __version__)
+
+
+def _same(archive: Path, registry: Registry, day: dt.date, digest: str, version: str) -> _Worker:
+    """Return a worker on another machine, where everything that results depend on is the same.
+
+    Raises
+    ------
+    ConfigError
+        ``cluster``: another version of the toolkit, another registry, or no such archive
+    """
+    for what, got, expected in (
+        ("toolkit", __version__, version),
+        ("archive", str(archive) if archive.is_dir() else "nothing", str(archive)),
+        ("registry", _hash(registry, day), digest),
+    ):
+        if got != expected:
+            raise ConfigError(
+                f"a worker of the cluster has another {what}", where=registry.folder, got=got,
+                expected=expected, next_step="let all workers see the same installation and the same folders",
+                rule="cluster",
+            )  # fmt: skip
+    return _Worker(archive, registry, day)
 
 
 def _summed(archive: Path, registry: Registry, day: dt.date, files: Files, *, reused: int) -> ArchiveAudit:

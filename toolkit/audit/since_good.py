@@ -9,6 +9,7 @@ of a nonconformity is evaluated; the interpolation is ours, not the standard's).
 from __future__ import annotations
 
 import datetime as dt
+import os
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import partial
@@ -19,6 +20,7 @@ import numpy as np
 
 from toolkit.audit.candidates import unfit
 from toolkit.audit.choices import Choices
+from toolkit.audit.cluster import run_on_cluster
 from toolkit.audit.columns import columns_of
 from toolkit.audit.context import context_of
 from toolkit.audit.identify import recompute
@@ -134,6 +136,7 @@ def drifted_files(
     drift: Drift,
     *,
     workers: int = 1,
+    scheduler: str | None = None,
     step: Callable[[str], None] = lambda _: None,
 ) -> Iterator[DriftedFile]:
     """Yield the recordings of the stretch, in the order in which they are done."""
@@ -143,8 +146,15 @@ def drifted_files(
             day = dt.date.fromisoformat(plain["date"])
             if drift.share(day) is not None:
                 days[plain["path"]] = day
-    make = partial(_Drifted, made.archive, registry, made.known_at, drift)
-    for name, result in run_isolated(make, tuple(days), workers=workers):
+    # A worker may have another working folder.
+    archive, records = (Path(os.path.abspath(one)) for one in (made.archive, registry.folder))  # noqa: PTH100
+    make = partial(_Drifted, archive, Registry(records), made.known_at, drift)
+    names = tuple(days)
+    for name, result in (
+        run_isolated(make, names, workers=workers)
+        if scheduler is None
+        else run_on_cluster(make, names, address=scheduler)
+    ):
         if isinstance(result, Lost):
             share = drift.share(days[name]) or 0.0
             yield DriftedFile(path=name, date=days[name], share=share, reason=result.reason)

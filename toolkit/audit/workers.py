@@ -24,6 +24,7 @@ from toolkit.errors import ConfigError
 Result = TypeVar("Result")
 
 TIMEOUT_S = 120.0
+DIED = "worker-died: the reader's process ended without an answer"
 MEMORY_BYTES = 4 << 30
 _THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
 _TRIES = 3
@@ -135,7 +136,7 @@ def run_isolated(
                                 raise _no_workers() from None
                             continue
                         name = worker.waiting[0]
-                        lost = bury(worker, "worker-died: the reader's process ended without an answer")
+                        lost = bury(worker, DIED)
                         if lost is not None:
                             yield name, lost
                         continue

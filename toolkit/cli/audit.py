@@ -19,7 +19,13 @@ NAME = "audit"
 
 def command(
     archive: Annotated[Path, typer.Argument(help="A folder of recordings, in any depth.")],
-    workers: Annotated[int, typer.Option("--workers", help="Processes that read files.")] = 1,
+    workers: Annotated[
+        int | None, typer.Option("--workers", help="Processes that read files; default 1.")
+    ] = None,
+    scheduler: Annotated[
+        str | None,
+        typer.Option("--scheduler", help="A dask cluster instead, by its scheduler: tcp://host:8786."),
+    ] = None,
     out: Annotated[
         Path | None,
         typer.Option("--out", help="Folder that keeps the results: an audit goes on where it was ended."),
@@ -67,6 +73,9 @@ def command(
     from toolkit.calibration.registry.registry import Registry
     from toolkit.cli.audit_answer import Answer, payload_of, text_of, write_folder, write_table
 
+    if workers is not None and scheduler is not None:
+        raise typer.BadParameter("either workers here or those of a cluster", param_hint="--scheduler")
+    count = 1 if workers is None else workers
     registry = Registry(calibrations_folder(calibrations, home))
     names = inventory(archive)
     # What cannot be used is told before hours of work, not after.
@@ -87,14 +96,24 @@ def command(
     show = not quiet and not json
     with progress(len(names), "audit", show=show) as step:
         made = audit_archive(
-            archive, registry, known_at=day(known_at), workers=workers, step=step, names=names, out=out
+            archive,
+            registry,
+            known_at=day(known_at),
+            workers=count,
+            scheduler=scheduler,
+            step=step,
+            names=names,
+            out=out,
         )
     with progress(None, "since the last good one", show=show and drift is not None) as step:
         drifted = (
             ()
             if drift is None
             else tuple(
-                sorted(drifted_files(made, registry, drift, workers=workers, step=step), key=lambda f: f.path)
+                sorted(
+                    drifted_files(made, registry, drift, workers=count, scheduler=scheduler, step=step),
+                    key=lambda f: f.path,
+                )
             )
         )
     with progress(None, "corrected copies", show=show and repair is not None) as step:

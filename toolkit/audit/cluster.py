@@ -1,0 +1,270 @@
+"""Workers of a dask.distributed cluster, for archives that one machine would read for days.
+
+Files travel by name, in batches; what the workers read and answer is what a worker here would. A file that
+ends its worker ends the batch with it: the worker's nanny starts another, and the names of that batch are
+given out one at a time, with nothing else at work, so that only the one that is to blame is set aside. The
+memory of a worker is limited by its nanny.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import gc
+import os
+import socket
+import threading
+import time
+import uuid
+from collections.abc import Callable, Iterator, Sequence
+from itertools import islice
+from typing import Any, TypeVar
+from urllib.parse import urlsplit
+
+from toolkit.audit.workers import DIED, TIMEOUT_S, Lost
+from toolkit.errors import ConfigError
+from toolkit.recording.extras import needed
+
+Result = TypeVar("Result")
+
+BATCH = 16
+CONNECT_S = 10.0
+EMPTY_S = 60.0  # without any worker, for so long a cluster is waited for
+_GRACE_S = 30.0  # for a new worker to import what it needs
+_AHEAD = 4  # batches a thread of the cluster has waiting
+_TICK_S = 1.0
+_made = threading.local()
+
+
+def run_on_cluster(
+    make: Callable[[], Callable[[str], Result]],
+    names: Sequence[str],
+    *,
+    address: str,
+    timeout_s: float = TIMEOUT_S,
+    batch: int = BATCH,
+    empty_s: float = EMPTY_S,
+) -> Iterator[tuple[str, Result | Lost]]:
+    """Yield (name, result) of every name, in the order in which they are done.
+
+    Parameters
+    ----------
+    make : called once in each thread of a worker, returns what is called with each name; both must pickle
+    names : what there is to do
+    address : of the scheduler, ``tcp://host:8786``
+    timeout_s : of one name; its worker is ended beyond, for its nanny to start again
+    batch : names a task
+    empty_s : how long a cluster without workers is waited for
+
+    Raises
+    ------
+    ConfigError
+        ``missing-extra``; ``cluster``: the scheduler cannot be reached or goes away, it has no workers, or
+        they do not have this toolkit; and what ``make`` raises
+    """
+    distributed: Any = needed("distributed", extra="cluster", to="use a cluster", where=address)
+    if not names:
+        return
+    client = _client(distributed, address)
+    try:
+        doubtful: list[str] = []
+        yield from _batches(client, distributed, make, names, doubtful, timeout_s, batch, empty_s, address)
+        for name in doubtful:
+            yield name, _alone(client, distributed, make, name, timeout_s, empty_s, address)
+    finally:
+        client.close(timeout=CONNECT_S)
+
+
+def _client(distributed: Any, address: str) -> Any:
+    told = _unreachable(distributed, address)
+    if told is None:
+        try:
+            return distributed.Client(address, timeout=CONNECT_S, set_as_default=False, name="toolkit-audit")
+        except (OSError, ValueError, TypeError) as error:
+            told = str(error) or type(error).__name__
+        gc.collect()  # a client that failed, found later while another one starts, would wait for it for ever
+    raise _trouble(
+        address,
+        told[:300],
+        "a scheduler at an address such as tcp://host:8786",
+        "start it with 'dask scheduler', and workers with 'dask worker ADDRESS'",
+    )
+
+
+def _unreachable(distributed: Any, address: str) -> str | None:
+    """Return why no scheduler answers at an address, None where one does.
+
+    A client asks whoever is there, and would wait for an answer without end.
+    """
+    try:
+        parts = urlsplit(address)
+        host, port = parts.hostname, parts.port
+        if parts.scheme not in ("tcp", "tls") or not host or port is None:
+            return f"{address!r}, which is no address of a scheduler"
+        socket.create_connection((host, port), timeout=CONNECT_S).close()
+        if parts.scheme == "tcp":
+            asyncio.run(asyncio.wait_for(_greeted(distributed, address), CONNECT_S))
+    except TimeoutError:
+        return f"no answer within {CONNECT_S:g} s"
+    except (OSError, ValueError) as error:
+        return str(error)
+    return None
+
+
+async def _greeted(distributed: Any, address: str) -> None:
+    comm = await distributed.core.connect(address, timeout=CONNECT_S)
+    await comm.close()
+
+
+def _batches(
+    client: Any,
+    distributed: Any,
+    make: Callable[[], Callable[[str], Result]],
+    names: Sequence[str],
+    doubtful: list[str],
+    timeout_s: float,
+    batch: int,
+    empty_s: float,
+    address: str,
+) -> Iterator[tuple[str, Result | Lost]]:
+    token = uuid.uuid4().hex
+    todo = (names[i : i + batch] for i in range(0, len(names), batch))
+    flying: dict[Any, Sequence[str]] = {}
+    seen = time.monotonic()  # when there was a worker
+    while True:
+        threads = _threads(client, address)
+        if threads:
+            seen = time.monotonic()
+        elif time.monotonic() - seen > empty_s:
+            raise _no_workers(address, empty_s)
+        for part in islice(todo, max(_AHEAD * max(threads, 1) - len(flying), 0)):
+            task = client.submit(_several, make, tuple(part), token, timeout_s, pure=False, retries=0)
+            flying[task] = part
+        if not flying:
+            return
+        ready = _wait(client, distributed, list(flying))
+        for task in ready:
+            part = flying.pop(task)
+            found = _result(distributed, task, address)
+            if found is None:
+                doubtful.extend(part)
+            else:
+                yield from zip(part, found, strict=True)
+            task.release()
+
+
+def _alone(
+    client: Any,
+    distributed: Any,
+    make: Callable[[], Callable[[str], Result]],
+    name: str,
+    timeout_s: float,
+    empty_s: float,
+    address: str,
+) -> Result | Lost:
+    token = uuid.uuid4().hex
+    task = client.submit(_several, make, (name,), token, timeout_s, pure=False, retries=0)
+    began = seen = time.monotonic()
+    started = False
+    late = f"timeout: no answer within {timeout_s:g} s"
+    try:
+        while not _wait(client, distributed, [task]):
+            now = time.monotonic()
+            if _threads(client, address):
+                seen = now
+            elif now - seen > empty_s:
+                raise _no_workers(address, empty_s)
+            if not started and any(client.processing().values()):
+                started = True
+            elif not started:
+                began = now  # a little before it starts
+            if started and now - began > timeout_s + _GRACE_S:
+                return Lost(reason=late)
+        found = _result(distributed, task, address)
+        if found is not None:
+            result: Result = found[0]
+            return result
+        # The worker ends itself where the time is up.
+        return Lost(reason=late if started and time.monotonic() - began >= timeout_s else DIED)
+    finally:
+        task.cancel(force=True)
+
+
+def _wait(client: Any, distributed: Any, tasks: list[Any]) -> list[Any]:
+    # By hand: an iterator over what is done would wait for ever where no worker is left.
+    try:
+        with client.as_current():
+            return list(distributed.wait(tasks, timeout=_TICK_S, return_when="FIRST_COMPLETED").done)
+    except TimeoutError:
+        return []
+
+
+def _result(distributed: Any, task: Any, address: str) -> list[Any] | None:
+    """Return the results of a task; None where its worker died of it."""
+    if task.status in ("cancelled", "lost"):
+        raise _gone(address)
+    try:
+        found: list[Any] = task.result(timeout=CONNECT_S)
+    except distributed.KilledWorker:
+        return None
+    except (ImportError, AttributeError) as error:
+        raise _trouble(
+            address,
+            f"a worker has not this toolkit: {error}",
+            "the same installation on every worker",
+            "install the toolkit for the workers, in the version that runs here",
+        ) from error
+    except (OSError, TimeoutError) as error:
+        raise _gone(address) from error
+    return found
+
+
+def _threads(client: Any, address: str) -> int:
+    try:
+        return sum(client.nthreads().values())
+    except (OSError, TimeoutError) as error:
+        raise _gone(address) from error
+
+
+def _several(
+    make: Callable[[], Callable[[str], Result]], names: tuple[str, ...], token: str, timeout_s: float
+) -> list[Result]:
+    """Do some names in a worker's thread, whose state is made once a run."""
+    if getattr(_made, "token", None) != token:
+        _made.work, _made.token = make(), token
+    return [_timed(_made.work, name, timeout_s) for name in names]
+
+
+def _timed(work: Callable[[str], Result], name: str, timeout_s: float) -> Result:
+    # A thread cannot be ended from outside: the worker is, and its nanny starts another.
+    watch = threading.Timer(timeout_s, os._exit, (3,))
+    watch.daemon = True
+    watch.start()
+    try:
+        return work(name)
+    finally:
+        watch.cancel()
+
+
+def _gone(address: str) -> ConfigError:
+    return _trouble(
+        address,
+        "the connection was lost",
+        "a scheduler that is there until the audit ends",
+        "start it again and repeat the command; with --out what is done is used again",
+    )
+
+
+def _no_workers(address: str, seconds: float) -> ConfigError:
+    return _trouble(
+        address,
+        f"no worker for {seconds:g} s",
+        "workers, with nannies that start them again",
+        f"start some with 'dask worker {address}'; with --out what is done is used again",
+    )
+
+
+def _trouble(address: str, got: str, expected: str, next_step: str) -> ConfigError:
+    return ConfigError(
+        "the cluster cannot be used", where=f"--scheduler {address}", got=got, expected=expected,
+        next_step=next_step, rule="cluster",
+    )  # fmt: skip
