@@ -16,6 +16,7 @@ from pathlib import Path
 from tests.benchmarks import (
     audit_rate,
     diagnose_nulls,
+    diagnose_time,
     fit_rows,
     help_time,
     monte_carlo,
@@ -36,7 +37,8 @@ BENCHES: dict[str, Callable[[Path, int], list[dict[str, object]]]] = {
     "monte-carlo": monte_carlo.run,
     "audit": audit_rate.run,
     "tires": tire_fits.run,
-    "diagnose": diagnose_nulls.run,
+    "diagnose": diagnose_time.run,
+    "diagnose-nulls": diagnose_nulls.run,
 }
 
 

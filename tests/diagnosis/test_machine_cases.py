@@ -202,3 +202,26 @@ def test_a_programs_arithmetic_has_no_free_parameter(tmp_path):
     text = FIGURE.replace("[recording.channels]\n", free)
     with pytest.raises(ConfigError, match="no free parameter"):
         model_of(read_case(write_case(tmp_path, text, simulator=None, run__xlsx=book)), REGISTRY)
+
+
+def test_an_effect_on_a_cell_is_predicted_for_inputs_without_cells(tmp_path):
+    # cells of least norm that the published calibration turns into the recorded loads
+    spread = np.linalg.pinv(np.stack([FY * LBF, MZ * LBF * 0.3048]))
+    constant = np.array([0.6473 * LBF, 0.68759 * LBF * 0.3048])
+
+    def cells(frame):
+        made = spread @ (np.stack([frame["FY"], frame["MZ"]]) - constant[:, None])
+        return dict(zip(("D51", "D52", "E5"), made, strict=True))
+
+    frames = {f"r{i}__csv": (one := sweep("machine", seed=i)).assign(**cells(one)) for i in range(2)}
+    frames["more__csv"] = sweep("machine", seed=5)[["t", "SA", "FZ"]]
+    runs = "".join(f'[[recording.{key}]]\nfile = "{name}.csv"\n' for key, name in
+                   (("run", "r0"), ("run", "r1"), ("predict", "more")))  # fmt: skip
+    case = machine(tmp_path, simulation='calibration = "m15-r2"\n', channels=CELLS, frames=frames, runs=runs)
+    model = model_of(case, REGISTRY)
+    gain = Active(effect=effects()["sensitivity_error"], channel="E5", values={"gain_error": 0.1})
+    (run,) = case.predict
+    plain, more = (model.simulate(run, {"LMUY": 1.0}, active) for active in ((), (gain,)))
+    # a cell that shows 1.1 of what it carries adds a part in 11 of what it shows, by its coefficient
+    added = FY[2] * LBF * cells(plain)["E5"] / 11
+    np.testing.assert_allclose(more["FY"] - plain["FY"], added, rtol=1e-6, atol=1e-6)

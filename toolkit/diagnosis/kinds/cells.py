@@ -95,6 +95,38 @@ class Cells:
             total += (known[name] * sd * factor) ** 2
         return float(np.sqrt(total)) * unit(fit.unit).factor
 
+    def _foretold(
+        self, values: dict[str, NDArray[np.float64]], outputs: Sequence[Output]
+    ) -> dict[str, NDArray[np.float64]]:
+        """Return cells of inputs that were not recorded: as they went with the loads in the recordings.
+
+        Three cells carry more than two loads say; least squares over the case's runs give what went with
+        FY and MZ there, a constant included.
+        """
+        known = [one for one in outputs if one.name in self.loads]
+        runs = [run for run in self.case.runs if all(name in run.columns for name in self.names)]
+        if not runs:
+            raise ConfigError(
+                "an effect acts on cells that the inputs do not have",
+                where=self.case.path,
+                got="no cells",
+                expected=", ".join(self.names),
+                next_step="add the cells' columns to the inputs",
+                rule="model-place",
+            )
+        shown = {name: np.concatenate([self._cell(run, name) for run in runs]) for name in self.names}
+        loads = self.loads_of(shown)
+        there = np.column_stack([loads[one.name] for one in known] + [np.ones(len(shown[self.names[0]]))])
+        good = np.isfinite(there).all(axis=1) & np.isfinite(np.stack(list(shown.values()))).all(axis=0)
+        here = np.column_stack(
+            [values[one.name] * unit(one.unit).factor for one in known]
+            + [np.ones(len(next(iter(values.values()))))]
+        )
+        return {
+            name: here @ np.linalg.lstsq(there[good], column[good], rcond=None)[0]
+            for name, column in shown.items()
+        }
+
     def places(self, effect: Effect, drivers: set[str]) -> list[tuple[str | None, str | None]]:
         """Return the cells on which an effect could act."""
         if effect.name in ("crosstalk", "channel_swap", "unit_error"):
@@ -117,7 +149,10 @@ class Cells:
         here = [one for one in active if one.channel in self.names and one.acts_in(run)]
         if not here:
             return values
-        recorded = {name: self._cell(run, name) for name in self.names}
+        if all(name in run.columns for name in self.names):
+            recorded = {name: self._cell(run, name) for name in self.names}
+        else:
+            recorded = self._foretold(values, outputs)
         true = dict(recorded)
         tare = None if self._tare is None else dict(self._tare)
         for one in reversed(here):
