@@ -207,3 +207,18 @@ def test_bad_tables_end_with_two_and_write_nothing(tire, tmp_path, change, rule)
     assert error.next_step
     assert not (tmp_path / "x.tir").exists()
     assert not (tmp_path / "figures").exists()
+
+
+def test_times_stand_apart_from_the_answer_and_errors_carry_their_degrees_of_freedom(answer):
+    told = answer[1]
+    assert set(told["timing"]["models"]) == {"magic_formula", *FAST}
+    assert all("seconds" not in row for row in told["comparison"]["rows"])
+    for one in told["fits"]:
+        if one["load_N"] is None:
+            continue
+        # Eleven rows of white noise, six parameters.
+        for name, error in one["standard_errors"].items():
+            assert one["standard_error_dof"][name] == (None if error is None else 5)
+        stiffness = one["cornering_stiffness_N_per_rad"] or one["aligning_stiffness_Nm_per_rad"]
+        if stiffness is not None:
+            assert stiffness["dof"] == 5
