@@ -198,6 +198,7 @@ def _fit(row: Row, parameters: list[Row], covariances: dict[tuple[str, str], flo
                 value=number(one["value"]),
                 unit=str(one["unit"]),
                 standard_error=optional(one["standard_error"]),
+                dof=optional(one["dof"]),
             )
             for one in parameters
         ),

@@ -178,10 +178,10 @@ def _parts(estimate: Estimate | None) -> list[Any]:
 
 
 def _parameters(result: TestResult) -> Rows:
-    yield ("fit", "parameter", "value", "standard_error", "unit")
+    yield ("fit", "parameter", "value", "standard_error", "dof", "unit")
     for index, (_, _, fit) in enumerate(_all_fits(result)):
         for one in fit.parameters:
-            yield (index, one.name, one.value, one.standard_error, one.unit)
+            yield (index, one.name, one.value, one.standard_error, one.dof, one.unit)
 
 
 def _covariances(result: TestResult) -> Rows:
