@@ -21,10 +21,10 @@ if TYPE_CHECKING:
 RTOL = 1e-6
 _MOST = 20_000  # rates that the stiff solver may ask for between two rows
 OFF = 1e100  # in no unit is a state of any plant as large
-MANY = 60  # steps within one interval: the equation is stiff there
+_MANY = 60  # steps within one interval: the equation is stiff there
 
-C = (0.2, 0.3, 0.8, 8 / 9, 1.0)
-A = tuple(
+_C = (0.2, 0.3, 0.8, 8 / 9, 1.0)
+_A = tuple(
     np.array(row)
     for row in (
         (0.2,),
@@ -34,8 +34,8 @@ A = tuple(
         (9017 / 3168, -355 / 33, 46732 / 5247, 49 / 176, -5103 / 18656),
     )
 )
-B = np.array([35 / 384, 0.0, 500 / 1113, 125 / 192, -2187 / 6784, 11 / 84])
-E = np.array([71 / 57600, 0.0, -71 / 16695, 71 / 1920, -17253 / 339200, 22 / 525, -1 / 40])
+_B = np.array([35 / 384, 0.0, 500 / 1113, 125 / 192, -2187 / 6784, 11 / 84])
+_E = np.array([71 / 57600, 0.0, -71 / 16695, 71 / 1920, -17253 / 339200, 22 / 525, -1 / 40])
 
 
 class IntegrationError(Exception):
@@ -63,40 +63,52 @@ def integrate(
     made[:, 0] = x = start
     step = float(t[1] - t[0]) if len(t) > 1 else 1.0
     for i in range(len(t) - 1):
-        x, step = _interval(rate, float(t[i]), float(t[i + 1]), x, atol, step)
+        x, step, at = advance(rate, float(t[i]), float(t[i + 1]), x, atol, step)
+        if at < t[i + 1]:
+            x = _stiff(rate, at, float(t[i + 1]), x, atol)
         if not (np.abs(x) < OFF).all():
             raise IntegrationError(f"the state has run off at {t[i + 1]:g} s")
         made[:, i + 1] = x
     return made
 
 
-def _interval(
+def advance(
     rate: Rate, t: float, end: float, x: NDArray[np.float64], atol: NDArray[np.float64], step: float
-) -> tuple[NDArray[np.float64], float]:
-    k = np.empty((7, len(x)))
-    k[0] = rate(t, x)
+) -> tuple[NDArray[np.float64], float, float]:
+    """Go from one row to the next; return the state, the step to go on with, and the time that was reached.
+
+    Parameters
+    ----------
+    x : a state (states,), or columns of states (states, columns): then the worst column rules the step
+    atol : absolute tolerance, of a shape that goes with ``x``
+    step : to begin with [s]
+
+    A time before ``end`` says that the equation is stiff there.
+    """
+    k = np.empty((7, x.size))
+    k[0] = rate(t, x).ravel()
     h = min(step, end - t)
-    for _ in range(MANY):
+    for _ in range(_MANY):
         last = t + h >= end - 1e-12 * max(abs(end), h)
         if last:
             h = end - t
-        for j, (c, row) in enumerate(zip(C, A, strict=True), start=1):
-            k[j] = rate(t + c * h, x + h * (row @ k[:j]))
-        y = x + h * (B @ k[:6])
-        k[6] = rate(t + h, y)
+        for j, (c, row) in enumerate(zip(_C, _A, strict=True), start=1):
+            k[j] = rate(t + c * h, x + h * (row @ k[:j]).reshape(x.shape)).ravel()
+        y = x + h * (_B @ k[:6]).reshape(x.shape)
+        k[6] = rate(t + h, y).ravel()
         size = atol + RTOL * np.maximum(np.abs(x), np.abs(y))
-        error = float(np.sqrt(np.mean((h * (E @ k) / size) ** 2)))
+        error = float(np.sqrt(np.mean((h * (_E @ k).reshape(x.shape) / size) ** 2, axis=0)).max())
         if not np.isfinite(error):
             h *= 0.2
             continue
         grow = min(5.0, max(0.2, 0.9 * error**-0.2)) if error > 0 else 5.0
         if error <= 1.0:
             if last:
-                return y, h * grow
+                return y, h * grow, end
             t, x = t + h, y
             k[0] = k[6]
         h *= grow
-    return _stiff(rate, t, end, x, atol), end - t
+    return x, end - t, t
 
 
 def _stiff(
