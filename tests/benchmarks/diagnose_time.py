@@ -4,6 +4,9 @@ The virtual machine writes the test and its case: the protocol's slip angles and
 Magic Formula file with two free factors. Growth is that with the rows of a revolution and with the number of
 effects that were left out. Processor time of one process, linear algebra on one thread.
 
+A tare of so few rows is itself off by a good part of a row's noise, the same in every row: a `zero_offset`
+that is named where nothing was left out is that error, and no false alarm.
+
 The power's promise is timed beside it and told in the line's text: a reduction by the drum of twice the size
 that a clean test promises to show is looked for, once.
 """
