@@ -15,7 +15,8 @@ from toolkit.report.build import build_content, report_id
 from toolkit.report.columns import TABLES
 from toolkit.report.figures import draw
 from toolkit.report.style import Style, read_style
-from toolkit.report.tags import catalogue, format_number, format_problem, known_value, parse_tag
+from toolkit.report.tags import catalogue, format_number, format_problem, parse_tag
+from toolkit.report.vocabulary import REPORT
 
 DAY = dt.date(2026, 11, 21)
 
@@ -38,7 +39,7 @@ def test_title_page_values_of_the_source_document() -> None:
 
 def test_every_value_and_table_is_in_the_catalogue_and_the_other_way_round() -> None:
     made, listed = content(), {one.path: one for one in catalogue()}
-    assert all(known_value(path) for path in made.values)
+    assert all(REPORT.knows(path) for path in made.values)
     assert {path for path, one in listed.items() if one.kind in ("text", "number", "date")} <= set(
         made.values
     )

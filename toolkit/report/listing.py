@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 from toolkit.report.content import ReportContent, Value
+from toolkit.report.entries import Spec
 from toolkit.report.style import Style
-from toolkit.report.tags import Spec
 from toolkit.report.vocabulary import REPORT, Vocabulary
 
 

@@ -9,12 +9,10 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
-from typing import Literal
 
 from toolkit.errors import TemplateError
-from toolkit.report.columns import TABLES, UNITS, Column
-
-Kind = Literal["text", "number", "date", "figure", "table", "if", "row"]
+from toolkit.report.columns import TABLES, UNITS
+from toolkit.report.entries import Spec, catalogue_of, conditions_of
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -58,18 +56,6 @@ def parse_tag(text: str) -> Tag | None:
 def _canonical(path: str) -> str:
     # practice and thesis write Fy and Mz; the channels are FY and MZ.
     return re.sub(r"^calibration\.([FM])([xyz])\.", lambda m: f"calibration.{m[1]}{m[2].upper()}.", path)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Spec:
-    """One entry of the catalogue."""
-
-    path: str
-    kind: Kind
-    description: str
-    unit: str | None = None
-    spec: str = "g"
-    columns: tuple[Column, ...] = ()
 
 
 def _texts() -> list[Spec]:
@@ -213,55 +199,13 @@ def catalogue() -> tuple[Spec, ...]:
         )
         for name, _, _, text in _SUMMARY[1:]
     ]
-    captions = [
-        Spec(path=f"caption.{name}", kind="text", description=f"caption of the figure: {text}")
-        for name, text in FIGURES.items()
-    ]
-    figures = [Spec(path=f"figure.{name}", kind="figure", description=t) for name, t in FIGURES.items()]
-    tables = [
-        Spec(path=f"table.{name}", kind="table", description=text, columns=columns)
-        for name, (text, columns) in TABLES.items()
-    ]
-    rows = [
-        Spec(
-            path=f"row.{column.name}",
-            kind="row",
-            unit=column.unit,
-            spec=column.spec,
-            description=f"{column.description} (in the prototype row of tk:table.{name})",
-        )
-        for name, (_, columns) in TABLES.items()
-        for column in columns
-    ]
-    conditions = [
-        Spec(path=f"if.{name}", kind="if", description=f"kept when {text}")
-        for name, text in condition_names().items()
-    ]
-    return (*_VALUES, *summary, *coefficients, *captions, *figures, *tables, *conditions, *rows)
+    return catalogue_of([*_VALUES, *summary, *coefficients], FIGURES, TABLES, condition_names())
 
 
 def condition_names() -> dict[str, str]:
     """Return every name that ``tk:if.<name>`` may have: conditions, figures, tables and values."""
-    names = dict(CONDITIONS)
-    names |= {name: f"there is a figure: {text}" for name, text in FIGURES.items()}
-    names |= {name: f"the table has rows: {text}" for name, (text, _) in TABLES.items() if name not in names}
-    names |= {one.path: f"there is a value: {one.description}" for one in _VALUES}
-    names |= {f"summary.{name}": f"there is a value: {text}" for name, _, _, text in _SUMMARY}
-    return names
-
-
-def known_value(path: str) -> bool:
-    """Tell whether a value of that path can exist for some test (coefficients of any cell included)."""
-    return path in _value_paths() or TERM.fullmatch(path) is not None
-
-
-def _value_paths() -> frozenset[str]:
-    return frozenset(
-        [one.path for one in _VALUES]
-        + [f"summary.{name}" for name, *_ in _SUMMARY]
-        + [f"summary.{name}.with_U" for name, *_ in _SUMMARY[1:]]
-        + [f"caption.{name}" for name in FIGURES]
-    )
+    names = conditions_of(CONDITIONS, FIGURES, TABLES, _VALUES)
+    return names | {f"summary.{name}": f"there is a value: {text}" for name, _, _, text in _SUMMARY}
 
 
 # A width or precision of three digits would be a denial of service, not a format.

@@ -10,10 +10,9 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from toolkit.report.columns import TABLES, Column
-from toolkit.report.tags import FIGURES, TERM, Spec, catalogue, condition_names
-
-Tables = Mapping[str, tuple[str, tuple[Column, ...]]]
+from toolkit.report.columns import TABLES
+from toolkit.report.entries import Spec, Tables
+from toolkit.report.tags import FIGURES, TERM, catalogue, condition_names
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -90,4 +89,4 @@ REPORT = Vocabulary(
     open_values=TERM,
 )
 
-__all__ = ["REPORT", "Tables", "Vocabulary"]
+__all__ = ["REPORT", "Vocabulary"]

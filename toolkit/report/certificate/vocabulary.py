@@ -6,87 +6,68 @@ Required of every template are the items without which a paper is no calibration
 
 from __future__ import annotations
 
-from toolkit.report.columns import Column
-from toolkit.report.tags import Kind, Spec
-from toolkit.report.vocabulary import Tables, Vocabulary
+from toolkit.report.entries import Tables, catalogue_of, conditions_of, text_columns, values_of
+from toolkit.report.vocabulary import Vocabulary
 
 MOST_FIGURES = 6
 
-_TEXTS = """
-id|unique identification of the certificate
-title|title
-laboratory|name of the laboratory
-address|its address
-place|where the calibration was done
-accreditation|accreditation, where one was stated
-customer|name and address of the customer
-item|what was calibrated
-instrument|instrument
-model|form of the calibration equation and method of its fit
-method|method of the calibration
-phase|state of the item: as found, as left, or not stated
-temperature|temperature during the calibration
-reference|reference standard
-reference_certificate|certificate of the reference standard
-traceability|statement of metrological traceability
-uncertainty|statement about the expanded uncertainty
-decision_rule|decision rule of the conformity statement, and its risk
-conformity|statement of conformity, or why there is none
-adjustment|results before and after adjustment, or what is known of them
-unverifiable|statement about the terms that the check loads could not verify
-opinions|opinions and interpretations, marked as such
-interval|calibration interval or due date; only where it was agreed
-replaces|the certificate that this one replaces
-amendment|why it was amended
-entered_by|who calibrated and entered the record
-checked_by|who checked the record
-approved_by|who approved it
-in_force_from|first day on which the record is in force
-status|status of the calibration record
-withdrawn|why and from when the record is void
-record|id of the calibration record
-record_hash|SHA-256 of the calibration record
-ledger_head|hash of the ledger's last line at the issue
-software|program and version that made the certificate
-record_software|programs and versions that made the record
-not_stated|what the session did not state
-"""
-
-_DATES = """
-issued|date of issue
-received|date of receipt of the item, where it was stated
-calibrated|date of the calibration
-approved_on|day of the approval
-"""
+_VALUES = values_of(
+    "certificate",
+    """
+    id|text|unique identification of the certificate
+    title|text|title
+    laboratory|text|name of the laboratory
+    address|text|its address
+    place|text|where the calibration was done
+    accreditation|text|accreditation, where one was stated
+    customer|text|name and address of the customer
+    item|text|what was calibrated
+    instrument|text|instrument
+    model|text|form of the calibration equation and method of its fit
+    method|text|method of the calibration
+    phase|text|state of the item: as found, as left, or not stated
+    temperature|text|temperature during the calibration
+    reference|text|reference standard
+    reference_certificate|text|certificate of the reference standard
+    traceability|text|statement of metrological traceability
+    uncertainty|text|statement about the expanded uncertainty
+    decision_rule|text|decision rule of the conformity statement, and its risk
+    conformity|text|statement of conformity, or why there is none
+    adjustment|text|results before and after adjustment, or what is known of them
+    unverifiable|text|statement about the terms that the check loads could not verify
+    opinions|text|opinions and interpretations, marked as such
+    interval|text|calibration interval or due date; only where it was agreed
+    replaces|text|the certificate that this one replaces
+    amendment|text|why it was amended
+    entered_by|text|who calibrated and entered the record
+    checked_by|text|who checked the record
+    approved_by|text|who approved it
+    in_force_from|text|first day on which the record is in force
+    status|text|status of the calibration record
+    withdrawn|text|why and from when the record is void
+    record|text|id of the calibration record
+    record_hash|text|SHA-256 of the calibration record
+    ledger_head|text|hash of the ledger's last line at the issue
+    software|text|program and version that made the certificate
+    record_software|text|programs and versions that made the record
+    not_stated|text|what the session did not state
+    issued|date|date of issue
+    received|date|date of receipt of the item, where it was stated
+    calibrated|date|date of the calibration
+    approved_on|date|day of the approval
+    """,
+)
 
 FIGURES = {
     f"residuals_{at}": f"residuals of load {at} over the load, with tolerance, uncertainty and check loads"
     for at in range(1, MOST_FIGURES + 1)
 }
 
-_CONDITIONS = {
-    "simulated": "the instrument is a virtual machine",
-    "draft": "the record is not approved, and the paper is no certificate",
-    "withdrawn": "the record is withdrawn",
-    "amended": "the certificate replaces another one",
-    "interval_agreed": "an interval was agreed with the customer and stated",
-    "gaps": "something that a certificate should say was not stated",
-    "conformity_stated": "conformity is stated",
-    "adjusted": "there are results before and after adjustment",
-}
-
-
-def _columns(lines: str) -> tuple[Column, ...]:
-    return tuple(
-        Column(name=name.strip(), kind="text", description=text)
-        for name, text in (line.split("|") for line in lines.strip().splitlines())
-    )
-
 
 TABLES: Tables = {
     "cells": (
         "the indications: one row a cell",
-        _columns(
+        text_columns(
             """
             cell|name
             serial|serial number
@@ -99,7 +80,7 @@ TABLES: Tables = {
     ),
     "coefficients": (
         "the equation of every load: one row a term",
-        _columns(
+        text_columns(
             """
             load|load
             term|term
@@ -112,7 +93,7 @@ TABLES: Tables = {
     ),
     "uncertainty": (
         "expanded uncertainty at full scale and over the range",
-        _columns(
+        text_columns(
             """
             load|load
             at|value of the load
@@ -127,7 +108,7 @@ TABLES: Tables = {
     ),
     "budget": (
         "components of the uncertainty at full scale",
-        _columns(
+        text_columns(
             """
             load|load
             component|component
@@ -143,7 +124,7 @@ TABLES: Tables = {
     ),
     "fit": (
         "the reference loads and the residuals of the fit: one row a load",
-        _columns(
+        text_columns(
             """
             load|load
             unit|unit
@@ -158,7 +139,7 @@ TABLES: Tables = {
     ),
     "check": (
         "the check loads: reference, result and deviation",
-        _columns(
+        text_columns(
             """
             load|load
             row|number of the check load
@@ -174,7 +155,7 @@ TABLES: Tables = {
     ),
     "adjustment": (
         "before and after adjustment",
-        _columns(
+        text_columns(
             """
             load|load
             found_by|record that was in force when the instrument came in
@@ -190,7 +171,7 @@ TABLES: Tables = {
     ),
     "unverifiable": (
         "terms that the check loads could not verify",
-        _columns(
+        text_columns(
             """
             load|load
             term|term
@@ -205,59 +186,33 @@ REQUIRED = (
 ).split()
 
 
-def _specs(lines: str, kind: Kind) -> list[Spec]:
-    return [
-        Spec(path=f"certificate.{name}", kind=kind, description=text)
-        for name, text in (line.split("|") for line in lines.strip().splitlines())
-    ]
+CONDITIONS = conditions_of(
+    {
+        "simulated": "the instrument is a virtual machine",
+        "draft": "the record is not approved, and the paper is no certificate",
+        "withdrawn": "the record is withdrawn",
+        "amended": "the certificate replaces another one",
+        "interval_agreed": "an interval was agreed with the customer and stated",
+        "gaps": "something that a certificate should say was not stated",
+        "conformity_stated": "conformity is stated",
+        "adjusted": "there are results before and after adjustment",
+    },
+    FIGURES,
+    TABLES,
+    _VALUES,
+)
 
-
-def _vocabulary() -> Vocabulary:
-    values = [*_specs(_TEXTS, "text"), *_specs(_DATES, "date")]
-    captions = [
-        Spec(path=f"caption.{name}", kind="text", description=f"caption of the figure: {text}")
-        for name, text in FIGURES.items()
-    ]
-    conditions = dict(_CONDITIONS)
-    conditions |= {name: f"there is a figure: {text}" for name, text in FIGURES.items()}
-    conditions |= {name: f"the table has rows: {text}" for name, (text, _) in TABLES.items()}
-    conditions |= {one.path: f"there is a value: {one.description}" for one in values}
-    listed = [
-        *values,
-        *captions,
-        *(Spec(path=f"figure.{name}", kind="figure", description=text) for name, text in FIGURES.items()),
-        *(
-            Spec(path=f"table.{name}", kind="table", description=text, columns=columns)
-            for name, (text, columns) in TABLES.items()
-        ),
-        *(
-            Spec(path=f"if.{name}", kind="if", description=f"kept when {text}")
-            for name, text in conditions.items()
-        ),
-        *(
-            Spec(
-                path=f"row.{column.name}",
-                kind="row",
-                description=f"{column.description} (in the prototype row of tk:table.{name})",
-            )
-            for name, (_, columns) in TABLES.items()
-            for column in columns
-        ),
-    ]
-    return Vocabulary(
-        name="certificate",
-        catalogue=tuple(listed),
-        figures=FIGURES,
-        tables=TABLES,
-        conditions=conditions,
-        required=tuple(f"tk:certificate.{name}" for name in REQUIRED),
-        marks={
-            "draft": frozenset({"if.draft"}),
-            "simulated": frozenset({"if.simulated"}),
-            "withdrawn": frozenset({"if.withdrawn", "certificate.withdrawn"}),
-            "amended": frozenset({"certificate.replaces"}),
-        },
-    )
-
-
-CERTIFICATE = _vocabulary()
+CERTIFICATE = Vocabulary(
+    name="certificate",
+    catalogue=catalogue_of(_VALUES, FIGURES, TABLES, CONDITIONS),
+    figures=FIGURES,
+    tables=TABLES,
+    conditions=CONDITIONS,
+    required=tuple(f"tk:certificate.{name}" for name in REQUIRED),
+    marks={
+        "draft": frozenset({"if.draft"}),
+        "simulated": frozenset({"if.simulated"}),
+        "withdrawn": frozenset({"if.withdrawn", "certificate.withdrawn"}),
+        "amended": frozenset({"certificate.replaces"}),
+    },
+)

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from toolkit.report.columns import Column
-from toolkit.report.tags import Spec
-from toolkit.report.vocabulary import Tables, Vocabulary
+from toolkit.report.entries import Tables, catalogue_of, conditions_of, text_columns, values_of
+from toolkit.report.vocabulary import Vocabulary
 
 WHERE = 3  # figures of places at most
 FIGURES = {
@@ -13,38 +12,34 @@ FIGURES = {
     "diagnosis_run": "the run with the largest mismatch, recorded and simulated",
 }
 
-_VALUES = """
-id|text|identification of the diagnosis, made from its case
-title|text|title of the case
-verdict|text|verdict in one sentence
-summary|text|what was found, in one sentence with numbers; a result
-opinion|text|what is taken for the cause: an opinion, not a result (ISO/IEC 17025, 7.8.7)
-opinion_by|text|who has released the opinion
-basis|text|what the opinion rests on
-where|text|where the mismatch is
-held_out_by|text|what was held out
-remains|text|what remains unexplained
-not_observable|text|effects of which these recordings can tell nothing, and why
-case|text|case file and its hash, which covers the recordings
-calibrations|text|calibration records of the case, with their hashes
-model|text|model file with what was found, and its hash
-complete|text|what a spent budget left out
-issued|date|day of the diagnosis
-software|text|program and version that made it
-"""
-
-
-def _columns(lines: str) -> tuple[Column, ...]:
-    return tuple(
-        Column(name=name.strip(), kind="text", description=text)
-        for name, text in (line.split("|") for line in lines.strip().splitlines())
-    )
+_VALUES = values_of(
+    "diagnosis",
+    """
+    id|text|identification of the diagnosis, made from its case
+    title|text|title of the case
+    verdict|text|verdict in one sentence
+    summary|text|what was found, in one sentence with numbers; a result
+    opinion|text|what is taken for the cause: an opinion, not a result (ISO/IEC 17025, 7.8.7)
+    opinion_by|text|who has released the opinion
+    basis|text|what the opinion rests on
+    where|text|where the mismatch is
+    held_out_by|text|what was held out
+    remains|text|what remains unexplained
+    not_observable|text|effects of which these recordings can tell nothing, and why
+    case|text|case file and its hash, which covers the recordings
+    calibrations|text|calibration records of the case, with their hashes
+    model|text|model file with what was found, and its hash
+    complete|text|what a spent budget left out
+    issued|date|day of the diagnosis
+    software|text|program and version that made it
+    """,
+)
 
 
 TABLES: Tables = {
     "found": (
         "effects that were found: statement and equation",
-        _columns(
+        text_columns(
             """
             effect|effect and the channel it acts on
             class|effects that this recording cannot tell it from
@@ -55,7 +50,7 @@ TABLES: Tables = {
     ),
     "found_parameters": (
         "fitted parameters of the effects",
-        _columns(
+        text_columns(
             """
             effect|effect
             parameter|parameter
@@ -68,7 +63,7 @@ TABLES: Tables = {
     ),
     "errors": (
         "root mean square errors on rows that no fit has seen",
-        _columns(
+        text_columns(
             """
             output|output
             unit|unit
@@ -81,7 +76,7 @@ TABLES: Tables = {
     ),
     "rejected": (
         "alternatives that explain the recordings worse",
-        _columns(
+        text_columns(
             """
             effect|effect that was found
             alternative|effect that was tried in its place
@@ -91,7 +86,7 @@ TABLES: Tables = {
     ),
     "nominal": (
         "parameters of the simulation before and after",
-        _columns(
+        text_columns(
             """
             parameter|parameter
             unit|unit
@@ -104,7 +99,7 @@ TABLES: Tables = {
     ),
     "not_found": (
         "effects that were not found, and how large each would have had to be",
-        _columns(
+        text_columns(
             """
             effect|effect
             size|smallest size seen with 80 % power
@@ -112,10 +107,10 @@ TABLES: Tables = {
             """
         ),
     ),
-    "next": ("what to measure next", _columns("measure|measurement")),
+    "next": ("what to measure next", text_columns("measure|measurement")),
     "recorded": (
         "recordings of the case",
-        _columns(
+        text_columns(
             """
             run|file
             conditions|its conditions
@@ -126,7 +121,7 @@ TABLES: Tables = {
     ),
     "diagnosis_findings": (
         "departures from what was expected",
-        _columns(
+        text_columns(
             """
             rule|rule, for 'toolkit explain'
             level|error, warning or note
@@ -137,47 +132,21 @@ TABLES: Tables = {
     ),
 }
 
-_TEXTS = [line.split("|") for line in _VALUES.strip().splitlines()]
-CONDITIONS = {
-    "unverified": "a calibration of the case is not verified",
-    "effects": "an effect was found",
-    "no_effects": "no effect was found",
-    "incomplete": "the budget was spent before the search was at its end",
-    **{name: f"there is a figure: {text}" for name, text in FIGURES.items()},
-    **{name: f"the table has rows: {text}" for name, (text, _) in TABLES.items()},
-    **{f"diagnosis.{name}": f"there is a value: {text}" for name, _, text in _TEXTS},
-}
+CONDITIONS = conditions_of(
+    {
+        "unverified": "a calibration of the case is not verified",
+        "effects": "an effect was found",
+        "no_effects": "no effect was found",
+        "incomplete": "the budget was spent before the search was at its end",
+    },
+    FIGURES,
+    TABLES,
+    _VALUES,
+)
 
 DIAGNOSIS = Vocabulary(
     name="diagnosis",
-    catalogue=(
-        *(
-            Spec(path=f"diagnosis.{name}", kind=kind, description=text)  # type: ignore[arg-type]
-            for name, kind, text in _TEXTS
-        ),
-        *(Spec(path=f"figure.{name}", kind="figure", description=text) for name, text in FIGURES.items()),
-        *(
-            Spec(path=f"caption.{name}", kind="text", description=f"caption of the figure: {text}")
-            for name, text in FIGURES.items()
-        ),
-        *(
-            Spec(path=f"table.{name}", kind="table", description=text, columns=columns)
-            for name, (text, columns) in TABLES.items()
-        ),
-        *(
-            Spec(path=f"if.{name}", kind="if", description=f"kept when {text}")
-            for name, text in CONDITIONS.items()
-        ),
-        *(
-            Spec(
-                path=f"row.{column.name}",
-                kind="row",
-                description=f"{column.description} (in the prototype row of tk:table.{name})",
-            )
-            for name, (_, columns) in TABLES.items()
-            for column in columns
-        ),
-    ),
+    catalogue=catalogue_of(_VALUES, FIGURES, TABLES, CONDITIONS),
     figures=FIGURES,
     tables=TABLES,
     conditions=CONDITIONS,
