@@ -7,8 +7,9 @@ from pathlib import Path
 import pytest
 
 import toolkit
+from toolkit.audit.columns import columns_of
 from toolkit.audit.context import context_of
-from toolkit.audit.identify import identify
+from toolkit.audit.identify import identify_columns
 from toolkit.audit.inspection import inspect_file
 from toolkit.calibration.registry.candidate import calibrate
 from toolkit.calibration.registry.registry import Registry
@@ -49,7 +50,7 @@ def virtual(chain, name, **acquisition):
 
 def test_the_accident_is_seen_in_the_virtual_files(chain):
     _, recording = virtual(chain, "wrong")
-    found = identify(recording, (chain[2],), on=dt.date(2026, 3, 17), in_force=chain[2])
+    found = identify_columns(columns_of(recording), (chain[2],), on=dt.date(2026, 3, 17), in_force=chain[2])
     assert (found.grade, found.record, found.variant) == (
         "sign_variant",
         chain[2].id,
@@ -62,7 +63,7 @@ def test_the_accident_is_seen_in_the_virtual_files(chain):
 
 def test_without_the_accident_the_file_is_exact(chain):
     _, recording = virtual(chain, "right", negated=())
-    found = identify(recording, (chain[2],), on=dt.date(2026, 3, 17), in_force=chain[2])
+    found = identify_columns(columns_of(recording), (chain[2],), on=dt.date(2026, 3, 17), in_force=chain[2])
     assert (found.grade, found.issued) == ("exact", True)
     # The repair goes by the full coefficients, the program by the issued digits.
     assert found.repair.FY_max_abs_N < 0.1

@@ -24,6 +24,7 @@ from tire_factory import (
     curve,
     reduced_test,
 )
+from weighted_sums import calibration_u
 
 from toolkit.characteristics.characterise import characterise
 from toolkit.characteristics.groups import group
@@ -184,5 +185,5 @@ def test_a_common_zero_of_the_cells_is_certain_in_plysteer_and_not_in_conicity(
     forward = next(c for c in result.reduced.conditions if c.rotation == "forward")
     reverse = next(c for c in result.reduced.conditions if c.rotation == "reverse")
     # SAE axes that follow the travel: conicity is (F - R)/2 and plysteer (F + R)/2 there.
-    assert shared.calibration_u("FY", [(forward, 0.5), (reverse, -0.5)]) == pytest.approx(7.0)
-    assert shared.calibration_u("FY", [(forward, 0.5), (reverse, 0.5)]) == pytest.approx(0.0, abs=1e-9)
+    assert calibration_u(shared, "FY", [(forward, 0.5), (reverse, -0.5)]) == pytest.approx(7.0)
+    assert calibration_u(shared, "FY", [(forward, 0.5), (reverse, 0.5)]) == pytest.approx(0.0, abs=1e-9)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
+from weighted_sums import calibration_u
 
 from toolkit.calibration.registry.registry import Registry
 from toolkit.calibration.uncertainty.propagation import record_covariance
@@ -101,7 +102,7 @@ def test_a_weighted_sum_against_trials(channel: str, fitted: CalibrationRecord, 
 
     sign = np.array([signs(MACHINE.axes, "SAE", one.rotation)[channel] for one in conditions])
     sums = (loads * scale[:, None]) @ (weights * sign) * factor
-    found = shared_of(record).calibration_u(channel, list(zip(conditions, weights.tolist(), strict=True)))
+    found = calibration_u(shared_of(record), channel, list(zip(conditions, weights.tolist(), strict=True)))
     assert found == pytest.approx(float(sums.std(ddof=1)), rel=0.02)
 
 
@@ -113,7 +114,7 @@ def test_a_scale_error_stays_in_proportion(fitted: CalibrationRecord, result: Te
     for group in groups_of.values():
         parts = slope_weights(group)
         value = sum(w * c.FY for c, w in parts)
-        both, alone = (shared_of(r).calibration_u("FY", parts) for r in (record, bare))
+        both, alone = (calibration_u(shared_of(r), "FY", parts) for r in (record, bare))
         relative = 2.0 / record.load("FY").largest
         assert np.sqrt(both**2 - alone**2) == pytest.approx(abs(value) * relative, rel=1e-3)
 
@@ -126,10 +127,10 @@ def test_a_shift_cancels_in_a_slope_and_is_whole_at_zero(
     shift = 4.4482216152605 * float(np.hypot.reduce([c[0] * 1e-4, c[1] * 2e-4, c[2] * 1e-4]))
     group = _groups(result)[0]
     slope, zero = slope_weights(group), weights_at_zero(group)
-    assert shared_of(record).calibration_u("FY", slope) == pytest.approx(
-        shared_of(bare).calibration_u("FY", slope), rel=1e-9
+    assert calibration_u(shared_of(record), "FY", slope) == pytest.approx(
+        calibration_u(shared_of(bare), "FY", slope), rel=1e-9
     )
-    both, alone = (shared_of(r).calibration_u("FY", zero) for r in (record, bare))
+    both, alone = (calibration_u(shared_of(r), "FY", zero) for r in (record, bare))
     assert np.sqrt(both**2 - alone**2) == pytest.approx(shift, rel=1e-6)
 
 

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from toolkit.audit.candidates import Group, describe, unfit
-from toolkit.audit.columns import Columns, columns_of
+from toolkit.audit.columns import Columns
 from toolkit.audit.model import Grade, Identification, Repair, Segment, Skipped, worst
 from toolkit.audit.screen import Key, Screen, screen_of
 from toolkit.audit.segments import Hit, Run, distinct_rivals, partition, whole_file, without_chance
@@ -26,7 +26,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from toolkit.calibration.records.record import CalibrationRecord
-    from toolkit.recording.model import Recording
 
 _ALIKE = "{:.12g}"
 
@@ -41,27 +40,6 @@ class _Answer:
     slack: bool
 
 
-def identify(
-    recording: Recording,
-    records: Sequence[CalibrationRecord],
-    *,
-    on: date | None,
-    in_force: CalibrationRecord | None,
-    void: Collection[str] = (),
-) -> Identification:
-    """Identify which of the records computed a recording.
-
-    Parameters
-    ----------
-    recording : the file; its columns are taken as the header names them
-    records : those of its instrument that the registry lets be used
-    on : the test's date, None where it is not known
-    in_force : the record in force on that date, None where there is none
-    void : ids of records that are void on every day
-    """
-    return identify_columns(columns_of(recording), records, on=on, in_force=in_force, void=void)
-
-
 def identify_columns(
     columns: Columns,
     records: Sequence[CalibrationRecord],
@@ -72,10 +50,17 @@ def identify_columns(
     screen: Screen | None = None,
     new: Mapping[str, NDArray[np.float64]] | None = None,
 ) -> Identification:
-    """Identify from plain columns; see `identify`.
+    """Identify which of the records computed a recording.
 
-    ``screen`` is that of the records for files of this layout, where the caller keeps it for many files;
-    ``new`` what `recompute` gives by the record in force, where the caller has it.
+    Parameters
+    ----------
+    columns : those of the file, as its header names them
+    records : those of its instrument that the registry lets be used
+    on : the test's date, None where it is not known
+    in_force : the record in force on that date, None where there is none
+    void : ids of records that are void on every day
+    screen : that of the records for files of this layout, where the caller keeps it for many files
+    new : what `recompute` gives by the record in force, where the caller has it
     """
     judge = _Judge(
         columns=columns,

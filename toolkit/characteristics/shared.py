@@ -39,7 +39,6 @@ if TYPE_CHECKING:
     from toolkit.machine import Correction, Machine
     from toolkit.reduction.model import Condition, ReducedTest
 
-Weighted = Sequence[tuple["Condition", float]]
 # A pivot of a correlation matrix below this is rounding.
 _NO_PIVOT = 1e-14
 
@@ -189,17 +188,6 @@ class Shared:
             return None
         relative = float(np.hypot(self.P.u / self.pressure_Pa, self.P.relative))
         return Part(source="pressure", key=f"P/{self.owner(self.P)}", u=value * self.P.effect * relative)
-
-    def calibration_u(self, channel: str, parts: Weighted) -> float:
-        """Return the standard uncertainty [SI] that the record gives a weighted sum: fit and statements.
-
-        Parameters
-        ----------
-        channel : ``FY`` or ``MZ``
-        parts : (condition, weight) of the sum, the conditions' values in SAE axes
-        """
-        rows = self.calibration_rows(channel, [condition for condition, _ in parts])
-        return float(np.linalg.norm(rows @ np.array([weight for _, weight in parts])))
 
 
 def shared_of(reduced: ReducedTest, *, machine: Machine, record: CalibrationRecord | None) -> Shared:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -64,16 +63,6 @@ class Condition:
     u_MZ_zero: float
     used: bool
     calibration_sha256: str
-
-    @property
-    def u_FY_total(self) -> float:
-        """Standard uncertainty of FY [N] from the file alone: repeatability and the zero of the cells."""
-        return math.hypot(self.u_FY, self.u_FY_zero)
-
-    @property
-    def u_MZ_total(self) -> float:
-        """Standard uncertainty of MZ [N·m] from the file alone: repeatability and the zero of the cells."""
-        return math.hypot(self.u_MZ, self.u_MZ_zero)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
