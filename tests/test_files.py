@@ -9,6 +9,8 @@ from toolkit.errors import ConfigError, OutputError
 from toolkit.files import (
     atomic_path,
     check_keys,
+    is_number,
+    parse_toml,
     read_regular,
     read_toml,
     sha256_bytes,
@@ -95,3 +97,16 @@ def test_only_a_regular_file_is_read(tmp_path: Path) -> None:
     with pytest.raises(ConfigError) as caught:
         read_toml(tmp_path / "pipe")
     assert (caught.value.rule, str(caught.value.got)) == ("no-file", "not a regular file")
+
+
+@pytest.mark.parametrize("text", ["a = 1" + "0" * 5000, "a = " + "[" * 5000 + "]" * 5000])
+def test_toml_that_no_parser_can_hold_is_an_error_with_a_next_step(text: str) -> None:
+    with pytest.raises(ConfigError) as caught:
+        parse_toml(text.encode(), where="session.toml")
+    assert (caught.value.rule, caught.value.where) == ("not-toml", "session.toml")
+
+
+def test_a_whole_number_beyond_every_float_is_no_number() -> None:
+    largest = parse_toml(f"a = {'9' * 308}\nb = {'9' * 309}".encode(), where="")
+    # The largest double is 1.797...e308 (IEEE 754 binary64).
+    assert (is_number(largest["a"]), is_number(largest["b"])) == (True, False)

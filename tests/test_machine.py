@@ -57,6 +57,10 @@ def test_unknown_machine_lists_the_known() -> None:
         ('circumference = { value = 8.5, unit = "m" }', "circumference = 8.5"),
         ('circumference = { value = 8.5, unit = "m" }', 'circumference = { value = 8.5, unit = "kg" }'),
         ('circumference = { value = 8.5, unit = "m" }', 'circumference = { value = "8.5", unit = "m" }'),
+        (
+            'circumference = { value = 8.5, unit = "m" }',
+            f"circumference = {{ value = {10**400}, unit = 'm' }}",
+        ),
         ("settle_revolutions = 2.5", ""),
         ("[type_b]\n", "[type_b]\nFX = { uu = 1 }\n"),
     ],

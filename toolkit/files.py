@@ -8,11 +8,12 @@ import errno
 import hashlib
 import os
 import stat
+import sys
 import tempfile
 import tomllib
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeGuard
 
 from toolkit.errors import ConfigError, OutputError
 
@@ -141,7 +142,7 @@ def parse_toml(data: bytes, *, where: object) -> dict[str, Any]:
     """
     try:
         return tomllib.loads(data.decode("utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+    except (ValueError, RecursionError) as error:  # a number of thousands of digits, arrays without end
         twice = "Cannot overwrite" in str(error) or "Cannot declare" in str(error)
         raise ConfigError(
             "a settings file is not TOML",
@@ -151,6 +152,16 @@ def parse_toml(data: bytes, *, where: object) -> dict[str, Any]:
             next_step="mend the line that is named",
             rule="not-toml",
         ) from error
+
+
+def is_number(value: object) -> TypeGuard[int | float]:
+    """Tell whether an entry of a settings file is a finite number that a float can hold.
+
+    >>> [is_number(one) for one in (1, -2.5, True, "1", float("nan"), 10**400)]
+    [True, True, False, False, False, False]
+    """
+    # Not math.isfinite: TOML has whole numbers of any length, and one past a float's reach raises there.
+    return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) <= sys.float_info.max
 
 
 def check_keys(table: Mapping[str, Any], known: Iterable[str], *, where: object) -> None:

@@ -199,6 +199,7 @@ def test_the_same_correction_twice_needs_an_answer_of_the_corrected_machine(tmp_
         ('parameter = "offset"', 'parameter = "ofset"'),
         ("value = 0.3", "value = nan"),
         ("value = 0.3", "value = true"),
+        ("value = 0.3", "value = 1" + "0" * 400),
         ("value = 0.3", 'value = "0.3"'),
         ('unit = "deg"', 'unit = "N"'),
         ('unit = "deg"', 'unit = "furlong"'),

@@ -7,12 +7,11 @@ definition that it was made from stays as it is.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Any
 
 from toolkit.errors import ConfigError
-from toolkit.files import check_keys
+from toolkit.files import check_keys, is_number
 from toolkit.units import unit
 
 _LOADS = ("FY", "MZ")
@@ -146,7 +145,7 @@ def check_correction(one: Correction, where: str) -> None:
 
 
 def _number(entry: object, where: str) -> float:
-    if isinstance(entry, bool) or not isinstance(entry, int | float) or not math.isfinite(entry):
+    if not is_number(entry):
         raise _wrong("a correction has no number", where, entry, "a finite number")
     return float(entry)
 

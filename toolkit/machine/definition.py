@@ -10,7 +10,7 @@ from typing import Any, Literal, cast
 
 from toolkit.channels import AXES, ROTATIONS, Axes, Rotation
 from toolkit.errors import ConfigError
-from toolkit.files import check_keys, read_toml
+from toolkit.files import check_keys, is_number, read_toml
 from toolkit.machine.correction import Correction, read_corrections
 from toolkit.machine.protocol import KEYS as PROTOCOL_KEYS
 from toolkit.machine.protocol import Protocol, build_protocol
@@ -267,8 +267,7 @@ def _type_b(symbol: str, entry: dict[str, Any], where: Path) -> TypeB:
     check_keys(entry, (*_STATED[symbol], "unit", "source", "common"), where=here)
     for key in ("u", "relative", "effect"):
         value = entry.get(key, 0.0)
-        number = not isinstance(value, bool) and isinstance(value, int | float) and math.isfinite(value)
-        if not number or (value < 0 and key != "effect"):
+        if not is_number(value) or (value < 0 and key != "effect"):
             raise ConfigError(
                 f"a stated uncertainty has a wrong {key!r}", where=here, got=value,
                 expected="a number" if key == "effect" else "a number from 0",

@@ -30,7 +30,7 @@ from typing import Any, Literal, cast
 
 from toolkit.channels import ROTATIONS, Rotation
 from toolkit.errors import ConfigError
-from toolkit.files import check_keys, read_toml
+from toolkit.files import check_keys, is_number, read_toml
 from toolkit.machine.quantity import one_of, quantities, quantity
 
 Acquisition = Literal["after_settling", "continuous"]
@@ -146,8 +146,7 @@ def build_protocol(table: dict[str, Any], where: Path) -> Protocol:
 
 
 def _positive(value: Any, key: str, where: Path, *, zero: bool = False) -> float:
-    number = not isinstance(value, bool) and isinstance(value, int | float) and math.isfinite(value)
-    if not number or value < 0 or (value == 0 and not zero):
+    if not is_number(value) or value < 0 or (value == 0 and not zero):
         raise _wrong(where, key, value, "a number from 0" if zero else "a positive number")
     return float(value)
 

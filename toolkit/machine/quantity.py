@@ -6,6 +6,7 @@ import math
 from typing import Any
 
 from toolkit.errors import ConfigError
+from toolkit.files import is_number
 from toolkit.units import si_scale, unit
 
 
@@ -20,7 +21,8 @@ def quantity(entry: dict[str, Any], dimension: str, where: object) -> float:
             next_step="write value and unit",
             rule="no-unit",
         )
-    if isinstance(entry["value"], bool) or not isinstance(entry["value"], int | float):
+    # A float that is not finite is refused by the caller, who knows what the number is for.
+    if not is_number(entry["value"]) and not isinstance(entry["value"], float):
         raise ConfigError(
             "a quantity's value is not a number", where=where, got=entry["value"], expected="a number",
             next_step="write value as a plain number", rule="wrong-value",

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -10,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from toolkit.errors import ConfigError, ToolkitError
-from toolkit.files import read_toml, sha256_bytes, sha256_file
+from toolkit.files import is_number, read_toml, sha256_bytes, sha256_file
 from toolkit.qualification.model import Check
 
 if TYPE_CHECKING:
@@ -77,7 +76,7 @@ def read_set(name: str, folder: Path) -> CertifiedSet:
 
 def number(value: Any, where: Path) -> float:
     """Return a finite number, or refuse what stands in its place."""
-    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+    if not is_number(value):
         raise damaged(where, repr(value))
     return float(value)
 

@@ -13,7 +13,7 @@ from typing import Any, cast
 
 from toolkit.channels import REVERSALS, ROTATIONS, Reversal, Rotation
 from toolkit.errors import ConfigError, RecordingError
-from toolkit.files import check_keys, read_toml
+from toolkit.files import check_keys, is_number, read_toml
 from toolkit.machine import Machine, Protocol, load_machine, read_protocol
 from toolkit.machine.quantity import quantity
 from toolkit.recording.details import read_details
@@ -309,7 +309,7 @@ def _tare_value(name: str, entry: Any, machine: Machine, toml: Path) -> tuple[st
         entry = {"value": entry, "unit": own}
     check_keys(entry, ("value", "unit"), where=f"{toml}, [tare] values.{name}")
     value, printed = entry.get("value"), entry.get("unit", own)
-    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+    if not is_number(value):
         raise _wrong(toml, f"tare.values.{name}", value, "a number")
     if not isinstance(printed, str):
         raise _wrong(toml, f"tare.values.{name}.unit", printed, "a unit as text")

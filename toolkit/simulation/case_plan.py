@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Any, Literal, cast, get_args
 
 from toolkit.errors import ConfigError
-from toolkit.files import check_keys
+from toolkit.files import check_keys, is_number
 from toolkit.machine.quantity import one_of
 from toolkit.units import unit
 
@@ -95,7 +94,7 @@ def _free(name: str, table: Any, where: str) -> Free:
 
 
 def _number(value: object, where: str) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+    if not is_number(value):
         raise _wrong("an entry is no number", where, value, "a finite number")
     return float(value)
 

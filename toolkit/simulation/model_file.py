@@ -8,7 +8,6 @@ a file that it names and that has changed since is refused, because the fit is n
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
@@ -17,7 +16,7 @@ from toolkit.channels import AXES, Axes
 from toolkit.effects.catalogue import effect as find_effect
 from toolkit.effects.effect import Effect
 from toolkit.errors import ConfigError
-from toolkit.files import check_keys, parse_toml, read_bytes, sha256_bytes
+from toolkit.files import check_keys, is_number, parse_toml, read_bytes, sha256_bytes
 from toolkit.units import unit
 
 if TYPE_CHECKING:
@@ -297,7 +296,7 @@ def _texts(entry: object, where: str) -> tuple[str, ...]:
 
 
 def _number(entry: object, where: str) -> float:
-    if isinstance(entry, bool) or not isinstance(entry, int | float) or not math.isfinite(entry):
+    if not is_number(entry):
         raise _wrong("an entry is no number", where, entry, "a finite number")
     return float(entry)
 

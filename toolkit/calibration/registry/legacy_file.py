@@ -15,7 +15,7 @@ from toolkit.calibration.session.settings import INSTRUMENT, wrong
 from toolkit.calibration.session.statement_checks import check_load_unit
 from toolkit.calibration.terms import INTERCEPT, NAME, parse_term
 from toolkit.errors import ConfigError, ToolkitError, UnitError
-from toolkit.files import check_keys, parse_toml, sha256_bytes
+from toolkit.files import check_keys, is_number, parse_toml, sha256_bytes
 from toolkit.units import si_scale, unit
 
 _KEYS = "schema instrument date entered_by zero indications source loads".split()
@@ -142,7 +142,7 @@ def _load(entry: Any, cells: tuple[Indication, ...], where: object) -> LoadFit:
         named = {n for n, _ in parsed.powers} | set(parsed.absolutes)
         if not named <= known:
             raise _wrong(where, f"{name}.{term}", term, ", ".join((*sorted(known), INTERCEPT)))
-        if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) < 1e300:
+        if not is_number(value) or abs(value) >= 1e300:
             raise _wrong(where, f"{name}.{term}", value, "a number")
     terms = tuple(typed)
     if INTERCEPT in terms and terms[-1] != INTERCEPT:

@@ -15,14 +15,13 @@ back, so that a record is refitted from the raw bytes.
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from toolkit.calibration.session.settings import wrong
-from toolkit.files import check_keys
+from toolkit.files import check_keys, is_number
 from toolkit.machine.definition import quantity
 from toolkit.units import si_scale, unit
 
@@ -92,7 +91,7 @@ class Bridge:
             # For its checks alone: the number must keep its last digit where no unit is changed.
             quantity(entry, unit(told, where=place).dimension if isinstance(told, str) else "", place)
             text, value = str(told), entry["value"]
-        if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+        if not is_number(value):
             raise wrong(self.where, key, entry, f"a finite number in {column}, or {{ value, unit }}")
         return value * self.factor(text, target, where=place)
 
@@ -179,7 +178,7 @@ def _scale(entry: object, key: str, where: object) -> tuple[float, str] | None:
 
 
 def _positive(value: object, entry: object, key: str, where: object, expected: str) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float) or not 0 < value < math.inf:
+    if not is_number(value) or not value > 0:
         raise wrong(where, key, entry, expected)
     return float(value)
 

@@ -18,7 +18,6 @@ reading, is what an indicator showed of the load that ``load`` names.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -26,7 +25,7 @@ from typing import Any
 from toolkit.calibration.session.bridge import RATIO, RATIO_DIMENSION, Bridge
 from toolkit.calibration.session.settings import wrong
 from toolkit.errors import UnitError
-from toolkit.files import check_keys
+from toolkit.files import check_keys, is_number
 from toolkit.machine.definition import quantity
 from toolkit.units import unit
 
@@ -134,7 +133,7 @@ def creep_entries(entries: object, scope: Scope) -> tuple[CreepEntry, ...]:
         seconds = entry.get("seconds")
         if isinstance(seconds, dict):
             seconds = quantity(seconds, "time", f"{scope.where}: {place}.seconds")
-        if isinstance(seconds, bool) or not isinstance(seconds, int | float) or not 0 <= seconds < math.inf:
+        if not is_number(seconds) or not seconds >= 0:
             raise wrong(scope.where, f"{place}.seconds", entry.get("seconds"), "seconds, zero or more")
         if entry.get("value") is None:
             raise wrong(scope.where, f"{place}.value", None, f"{{ {scope.indications[0]} = number }}")
@@ -185,7 +184,7 @@ def shunt_entry(name: str, cell: Mapping[str, Any], scope: Scope) -> ShuntEntry 
     tolerance = cell.get("shunt_tolerance", SHUNT_TOLERANCE_PERCENT)
     if isinstance(tolerance, dict):
         tolerance = 100 * quantity(tolerance, "ratio", f"{scope.where}: cells.{name}.shunt_tolerance")
-    if isinstance(tolerance, bool) or not isinstance(tolerance, int | float) or not 0 < tolerance < math.inf:
+    if not is_number(tolerance) or not tolerance > 0:
         raise wrong(scope.where, f"cells.{name}.shunt_tolerance", tolerance, "per cent, above zero")
     return ShuntEntry(
         name=name, unit=text, expected=expected, measured=measured, tolerance_percent=float(tolerance)
@@ -231,7 +230,7 @@ def _shown(value: object, load: object, key: str, scope: Scope) -> tuple[str, fl
         value = quantity(value, told, f"{scope.where}: {key}") / found.factor
     elif isinstance(value, dict | list) or len(scope.indications) == 1:
         return None
-    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+    if not is_number(value):
         raise wrong(scope.where, key, value, "a finite number")
     return name, float(value)
 
@@ -248,7 +247,7 @@ def _load(entry: object, key: str, scope: Scope) -> tuple[str, bool]:
             # Says what is wrong: no unit, no number, or a unit of none of the loads.
             quantity(entry, sorted(dimensions)[0], f"{scope.where}: {key}")
         value = entry.get("value")
-    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+    if not is_number(value):
         expected = f"{', '.join(scope.loads)}, a number, or {{ value, unit }}"
         raise wrong(scope.where, key, entry, expected)
     return f"{value:.12g}" + ("" if text is None else f" {text}"), value == 0

@@ -6,7 +6,6 @@ certificates: a number whose unit is of another dimension is refused, never kept
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
@@ -20,7 +19,7 @@ from toolkit.calibration.session.reading_entries import (
 )
 from toolkit.calibration.session.settings import wrong, zero_readings
 from toolkit.errors import SessionError
-from toolkit.files import check_keys
+from toolkit.files import check_keys, is_number
 from toolkit.machine.definition import quantity
 from toolkit.units import si_scale, unit
 
@@ -161,7 +160,7 @@ def stated(entry: object, text: str, place: str, where: object) -> float:
     value = quantity(entry, found.dimension, f"{where}: {place}") / found.factor if isinstance(
         entry, dict
     ) else entry  # fmt: skip
-    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+    if not is_number(value):
         raise wrong(where, place, entry, f"a number in {text}, or {{ value, unit }}")
     return float(value)
 
@@ -185,7 +184,7 @@ def _check_reference(
         check_keys(entry, ("U", "k", "unit"), where=f"{where}: {place}")
         for key, least in (("U", "a number, zero or more"), ("k", "a positive number")):
             value = entry.get(key)
-            if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+            if not is_number(value):
                 raise wrong(where, f"{place}.{key}", value, least)
             if value < 0 or (key == "k" and value == 0):
                 raise wrong(where, f"{place}.{key}", value, least)
