@@ -212,8 +212,8 @@ def _solve(
             bounds=(space.low, space.high),
             x_scale=1.0,
             max_nfev=_INNER,
-            ftol=1e-7,
-            xtol=1e-7,
+            ftol=1e-6,
+            xtol=1e-5,  # of a parameter's size: the step after it would be smaller by orders
             gtol=1e-9,
         ).x
     simulated, residual = _run(space, x)

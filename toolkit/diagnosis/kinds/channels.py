@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
 _FORCE_LIKE = ("force", "moment", "bridge_ratio", "count")
 _STEPS = 8
+_EXACT = 1e-9  # of the largest value: no digit that a recording has
 
 
 def channel_places(
@@ -105,6 +106,10 @@ def undone(
     if one.source is not None:
         seen = dataclasses.replace(setting, channels={**setting.channels, "from": others[one.source]})
     guess = recorded
+    enough = _EXACT * float(np.max(np.abs(recorded), initial=0.0))
     for _ in range(_STEPS):
-        guess = guess + (recorded - hook(guess, one.values, seen))
+        missed = recorded - hook(guess, one.values, seen)
+        guess = guess + missed
+        if np.max(np.abs(missed), initial=0.0) <= enough:
+            break
     return np.where(np.isfinite(guess), guess, recorded)
