@@ -20,7 +20,7 @@ from toolkit.cli.console import (
     finding_lines,
     progress,
 )
-from toolkit.cli.delivery import file_name, home_template
+from toolkit.cli.delivery import delivered_payload, file_name, home_template
 from toolkit.cli.home import calibrations_folder
 
 if TYPE_CHECKING:
@@ -110,20 +110,13 @@ def _payload(made: Certificate, done: Delivered) -> dict[str, Any]:
         "draft": made.draft,
         "withdrawn": made.withdrawn,
         "replaces": made.replaces,
-        "docx": done.docx,
-        "pdf": done.pdf,
+        **delivered_payload(done),
         "dcc": done.companions[0] if done.companions else None,
-        "pages": done.pages,
-        "verified": True,
-        "checks": [check.as_dict() for check in done.checks],
-        "template_sha256": done.template_sha256,
         "decision_rule": made.rule,
         "loads": {one.load: _load(one) for one in made.loads},
         "unverifiable": [f"{load}: {term}" for load, term in made.unverifiable],
         "not_stated": list(made.gaps),
-        "figures": [{"tag": tag, "alt": alt} for tag, alt in done.filled.figures],
         "manifest": [entry.as_dict() for entry in done.filled.manifest],
-        "warnings": list(done.warnings),
         "findings": [finding.as_dict() for finding in made.findings],
     }
 

@@ -23,6 +23,7 @@ from toolkit.cli.console import (
     progress,
 )
 from toolkit.cli.console import reader as choose_reader
+from toolkit.cli.delivery import delivered_payload, home_template
 
 if TYPE_CHECKING:
     from datetime import date
@@ -121,7 +122,7 @@ def command(
     )
     payload: dict[str, Any] = comparison_payload(found) | {
         "figures": drawn,
-        "document": None if made is None else _document_payload(made),
+        "document": None if made is None else delivered_payload(made),
         "findings": [finding.as_dict() for finding in every],
         "timing": {"seconds": time.perf_counter() - started},
     }
@@ -135,7 +136,6 @@ def command(
 
 def _template(template: Path | None, out: Path | None, home: Path | None) -> Template | None:
     """Return the template of a comparison's document, judged before anything is read; None without one."""
-    from toolkit.cli.delivery import home_template
     from toolkit.errors import ConfigError
     from toolkit.report.template.package import read_template
 
@@ -169,20 +169,6 @@ def _document(
         style = replace(style, force=units.force, moment=units.moment)
     content = build_comparison_content(found, style, findings, issued=known_at or date.today())  # noqa: DTZ011
     return deliver(opened, content, out, name="comparison")
-
-
-def _document_payload(made: Delivered) -> dict[str, Any]:
-    return {
-        "docx": made.docx,
-        "pdf": made.pdf,
-        "pages": made.pages,
-        "verified": True,
-        "checks": [check.as_dict() for check in made.checks],
-        "template_sha256": made.template_sha256,
-        "content_sha256": made.content_sha256,
-        "figures": [{"tag": tag, "alt": alt} for tag, alt in made.filled.figures],
-        "warnings": list(made.warnings),
-    }
 
 
 def read_entries(sources: Sequence[Path], *, axes: str, **options: Any) -> tuple[list[Entry], list[Finding]]:

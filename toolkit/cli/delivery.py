@@ -1,12 +1,16 @@
-"""What the commands that fill a Word template share: where the template lies, how the files are called."""
+"""What the commands that fill a Word template share: where it lies, names of files, the answer in JSON."""
 
 from __future__ import annotations
 
 import re
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from toolkit.cli.home import find_home, packaged_home
 from toolkit.errors import ConfigError
+
+if TYPE_CHECKING:
+    from toolkit.report.deliver import Delivered
 
 
 def home_template(name: str, home: Path | None = None) -> Path:
@@ -34,3 +38,18 @@ def file_name(text: str, *, otherwise: str) -> str:
     ('CAL-2026-017', 'test')
     """
     return re.sub(r"[^\w.-]+", "-", text).strip("-.")[:100] or otherwise
+
+
+def delivered_payload(done: Delivered) -> dict[str, Any]:
+    """Return what the JSON answer says of any delivered document: files, pages, checks, hashes, warnings."""
+    return {
+        "docx": done.docx,
+        "pdf": done.pdf,
+        "pages": done.pages,
+        "verified": True,
+        "checks": [check.as_dict() for check in done.checks],
+        "template_sha256": done.template_sha256,
+        "content_sha256": done.content_sha256,
+        "figures": [{"tag": tag, "alt": alt} for tag, alt in done.filled.figures],
+        "warnings": list(done.warnings),
+    }

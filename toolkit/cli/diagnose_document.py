@@ -30,6 +30,7 @@ def write_document(
     """
     from datetime import date
 
+    from toolkit.cli.delivery import delivered_payload
     from toolkit.diagnosis.load import record_of
     from toolkit.files import sha256_bytes
     from toolkit.report.deliver import deliver
@@ -45,15 +46,4 @@ def write_document(
         model_sha256=None if augmented is None else sha256_bytes(augmented.encode()),
         by=by,
     )
-    made = deliver(opened, content, out, name="diagnosis")
-    return {
-        "docx": str(made.docx),
-        "pdf": str(made.pdf),
-        "pages": made.pages,
-        "verified": True,
-        "checks": [check.as_dict() for check in made.checks],
-        "template_sha256": made.template_sha256,
-        "content_sha256": made.content_sha256,
-        "figures": [{"tag": tag, "alt": alt} for tag, alt in made.filled.figures],
-        "warnings": list(made.warnings),
-    }
+    return delivered_payload(deliver(opened, content, out, name="diagnosis"))

@@ -24,7 +24,7 @@ from toolkit.cli.console import (
     progress,
 )
 from toolkit.cli.console import reader as choose_reader
-from toolkit.cli.delivery import file_name, home_template
+from toolkit.cli.delivery import delivered_payload, file_name, home_template
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -296,20 +296,12 @@ def report_payload(made: Made) -> dict[str, Any]:
         return {"verified": False, "error": done.as_dict() if isinstance(done, Exception) else None}
     use = resolved.result.reduced.calibration
     return {
-        "docx": done.docx,
-        "pdf": done.pdf,
-        "pages": done.pages,
-        "verified": True,
-        "checks": [check.as_dict() for check in done.checks],
-        "template_sha256": done.template_sha256,
-        "content_sha256": done.content_sha256,
+        **delivered_payload(done),
         "calibrations": [{"id": use.id, "sha256": use.sha256, "unverified": use.unverified}],
-        "figures": [{"tag": tag, "alt": alt} for tag, alt in done.filled.figures],
         "manifest": [entry.as_dict() for entry in done.filled.manifest],
         "manifest_file": done.manifest,
         "handed_over": list(done.extras),
         "simulated": resolved.result.reduced.info.simulated,
-        "warnings": list(done.warnings),
         "findings": [finding.as_dict() for finding in resolved.findings],
     }
 
