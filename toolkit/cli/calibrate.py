@@ -32,6 +32,8 @@ def command(
 
     A class of ISO 376 is granted to a session of one indication and one load that states its preloads to
     the largest load, "[standard] preloads = 3", and has runs at rotated mountings; rows are in time order.
+
+    Example: toolkit calibrate sessions/2026-03.toml --figures fit
     """
     from toolkit.calibration.control.calibrate import calibrate
     from toolkit.calibration.registry.registry import Registry

@@ -45,7 +45,10 @@ def list_records(
     as_json: Json = False,
     quiet: Quiet = False,
 ) -> int:
-    """List the records with their state, and the head of each ledger."""
+    """List the records with their state, and the head of each ledger.
+
+    Example: toolkit calibration list m15 --known-at 2026-03-02
+    """
     registry = _registry(calibrations, home)
     known = _day(known_at, "--known-at")
     rows, heads, bad = [], {}, 0
@@ -81,7 +84,10 @@ def show(
     as_json: Json = False,
     quiet: Quiet = False,
 ) -> int:
-    """Show one record: its state, cells, ranges, coefficients, issued digits, check loads and files."""
+    """Show one record: its state, cells, ranges, coefficients, issued digits, check loads and files.
+
+    Example: toolkit calibration show m15-r2
+    """
     from toolkit.cli.calibration_show import described
 
     registry = _registry(calibrations, home)
@@ -104,7 +110,10 @@ def verify(
     as_json: Json = False,
     quiet: Quiet = False,
 ) -> int:
-    """Refit every record from its stored data, and name every file that is not as it was entered."""
+    """Refit every record from its stored data, and name every file that is not as it was entered.
+
+    Example: toolkit calibration verify --head HASH
+    """
     from toolkit.calibration.registry.verify import verify_registry
 
     rows = verify_registry(_registry(calibrations, home), head)
@@ -126,7 +135,10 @@ def history(
     as_json: Json = False,
     quiet: Quiet = False,
 ) -> int:
-    """Tell what happened to an instrument's records, from its ledger."""
+    """Tell what happened to an instrument's records, from its ledger.
+
+    Example: toolkit calibration history m15
+    """
     registry = _registry(calibrations, home)
     instrument = name if name in registry.instruments() else _instrument_of(name)
     ledger = registry.ledger(instrument)
@@ -164,7 +176,10 @@ def import_record(
     as_json: Json = False,
     quiet: Quiet = False,
 ) -> int:
-    """Enter a legacy record: coefficients without their data, marked unverified for ever."""
+    """Enter a legacy record: coefficients without their data, marked unverified for ever.
+
+    Example: toolkit calibration import coefficients-2004.toml
+    """
     from toolkit.calibration.registry.legacy import import_legacy
     from toolkit.calibration.registry.registry import Registry
 
@@ -200,7 +215,10 @@ def approve(
     as_json: Json = False,
     quiet: Quiet = False,
 ) -> int:
-    """Put a record in force; a failed sign, span or check load blocks and changes nothing."""
+    """Put a record in force; a failed sign, span or check load blocks and changes nothing.
+
+    Example: toolkit calibration approve m15-r2 --in-force-from 2026-03-02 --checked-by "J. Doe"
+    """
     from toolkit.calibration.registry.approval import approve as decide
 
     registry = _registry(calibrations, home)
@@ -242,7 +260,10 @@ def withdraw(
     as_json: Json = False,
     quiet: Quiet = False,
 ) -> int:
-    """Withdraw a record; the ledger keeps it and says why."""
+    """Withdraw a record; the ledger keeps it and says why.
+
+    Example: toolkit calibration withdraw m15-r2 --on 2026-04-01 --reason "reference out of tolerance"
+    """
     from toolkit.calibration.registry.approval import withdraw as decide
 
     registry = _registry(calibrations, home)

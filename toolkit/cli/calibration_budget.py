@@ -55,7 +55,10 @@ def command(
     as_json: Json = False,
     quiet: Quiet = False,
 ) -> int:
-    """Tell the uncertainty of a record's loads: components with shares, U with k, U over the range."""
+    """Tell the uncertainty of a record's loads: components with shares, U with k, U over the range.
+
+    Example: toolkit calibration budget m15-r2 --load FY --at 4000N
+    """
     from toolkit.calibration.registry.registry import Registry
     from toolkit.calibration.registry.stored import stored_check, stored_loads
 

@@ -30,7 +30,10 @@ def command(
     as_json: Json = False,
     quiet: Quiet = False,
 ) -> int:
-    """Chart the error of each check load over the sessions; exit code 1 where the newest breaks a rule."""
+    """Chart the error of each check load over the sessions; exit code 1 where the newest breaks a rule.
+
+    Example: toolkit calibration chart m15 --out chart.png
+    """
     from toolkit.calibration.control.chart import chart_findings, control_chart
     from toolkit.calibration.registry.registry import Registry
 

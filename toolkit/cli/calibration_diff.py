@@ -21,7 +21,10 @@ def command(
     as_json: Json = False,
     quiet: Quiet = False,
 ) -> int:
-    """Compare two records term by term; exit code 1 where they differ."""
+    """Compare two records term by term; exit code 1 where they differ.
+
+    Example: toolkit calibration diff m15-r1 m15-r2
+    """
     from toolkit.calibration.registry.difference import differences
     from toolkit.calibration.registry.registry import Registry
 

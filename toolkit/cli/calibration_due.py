@@ -32,7 +32,10 @@ def command(
     as_json: Json = False,
     quiet: Quiet = False,
 ) -> int:
-    """Tell when each instrument is due, as the ledger says; exit code 1 where one is overdue."""
+    """Tell when each instrument is due, as the ledger says; exit code 1 where one is overdue.
+
+    Example: toolkit calibration due --on 2026-12-01
+    """
     from toolkit.calibration.control.recall import due_findings, due_of
     from toolkit.calibration.registry.registry import Registry, today
     from toolkit.errors import ToolkitError

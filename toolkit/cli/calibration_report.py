@@ -19,7 +19,10 @@ def command(
     as_json: Json = False,
     quiet: Quiet = False,
 ) -> int:
-    """Fit a record's stored data again and print the whole report; exit code 1 where it has findings."""
+    """Fit a record's stored data again and print the whole report; exit code 1 where it has findings.
+
+    Example: toolkit calibration report m15-r2 --figures fit
+    """
     from toolkit.calibration.fit.findings import session_findings
     from toolkit.calibration.fit.session_fit import fit_session
     from toolkit.calibration.registry.registry import Registry

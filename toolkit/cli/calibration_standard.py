@@ -38,7 +38,10 @@ def command(
     as_json: Json = False,
     quiet: Quiet = False,
 ) -> int:
-    """Evaluate one indication under one load by a standard: figures, class, reasons."""
+    """Evaluate one indication under one load by a standard: figures, class, reasons.
+
+    Example: toolkit calibration standard cell-r1 --standard iso376 --preloads 3
+    """
     from toolkit.calibration.control.standard import evaluate_record
     from toolkit.calibration.registry.registry import Registry
 

@@ -48,6 +48,8 @@ def command(
 
     From strain gauges to a Word and PDF report. Makes report.docx, report.pdf, test.xlsx (the whole test
     in one file), tire.tir, figures/ and certificate/, the certificate of the load cells' calibration.
+
+    Example: toolkit demo --out demo
     """
     started = time.perf_counter()
     say = _silent if json or quiet else typer.echo

@@ -29,7 +29,10 @@ class Check:
 
 
 def command(json: Json = False, quiet: Quiet = False) -> int:
-    """Tell what this machine lacks, and what mends it."""
+    """Tell what this machine lacks, and what mends it.
+
+    Example: toolkit doctor
+    """
     checks = [_python(), *_programs(), *_fonts()]
     mend = None if all(check.ok for check in checks) else mending_command()
     rows = [["ok" if c.ok else "MISSING", c.name, c.found, c.needed_for] for c in checks]

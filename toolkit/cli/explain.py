@@ -20,7 +20,10 @@ def command(
     json: Json = False,
     quiet: Quiet = False,
 ) -> int:
-    """Explain a finding's rule and what to do."""
+    """Explain a finding's rule and what to do.
+
+    Example: toolkit explain no-tare
+    """
     import difflib
 
     from toolkit.errors import ConfigError

@@ -22,6 +22,8 @@ def command(
     """Make a laboratory's home folder.
 
     An empty calibrations/ and the default report_templates/. What is there already is left as it is.
+
+    Example: toolkit init lab
     """
     from toolkit.errors import OutputError
 

@@ -25,7 +25,10 @@ def command(
     json: Json = False,
     quiet: Quiet = False,
 ) -> int:
-    """Qualify this installation against certified sets, published examples and golden vectors."""
+    """Qualify this installation against certified sets, published examples and golden vectors.
+
+    Example: toolkit qualify --out qualification.json
+    """
     from toolkit.cli.home import packaged_home
     from toolkit.files import write_atomic
     from toolkit.qualification.run import qualify
