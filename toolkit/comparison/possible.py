@@ -18,6 +18,11 @@ _SHOWN = {"rad": "90 deg"}
 def demand_possible(value: float, unit: str, *, where: str, U: bool = False) -> None:
     """Refuse a value [SI] that no tire has; an uncertainty ``U`` that is negative too.
 
+    Raises
+    ------
+    CellError
+        ``wrong-value``
+
     >>> demand_possible(4000.0, "N", where="maker.csv, row 2, column FZ")
     """
     limit = _LARGEST[unit]

@@ -62,7 +62,13 @@ def with_numbers(tir: TirFile, numbers: dict[str, float]) -> TirFile:
 
 
 def effect_text(one: ModelEffect, model: ModelFile, *, where: str) -> str:
-    """Return an effect of a model as a plan writes it: ``steer_offset=offset:0.3deg``, machine axes."""
+    """Return an effect of a model as a plan writes it: ``steer_offset=offset:0.3deg``, machine axes.
+
+    Raises
+    ------
+    ConfigError
+        ``model-file``: the effect is in some runs only, by their names
+    """
     head = ".".join(part for part in (one.effect.name, one.source, one.channel) if part)
     if one.effect.name == "wrong_calibration":
         return f"wrong_calibration={one.source}"
