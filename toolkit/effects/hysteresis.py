@@ -66,7 +66,7 @@ EFFECT = Effect(
             unit="1",
             text="by which the loop's mean line is too steep",
             typical=(-0.01, 0.01),
-            bounds=(-0.9, 0.9),
+            bounds=(-0.1, 0.1),
         ),
         EffectParameter(
             name="reach",

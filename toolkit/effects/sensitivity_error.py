@@ -31,7 +31,7 @@ EFFECT = Effect(
             unit="1",
             text="relative error, 0.02 for 2 %",
             typical=(0.002, 0.1),
-            bounds=(-0.95, 20.0),
+            bounds=(-0.6, 1.0),
         ),
     ),
     channel=_scaled,
