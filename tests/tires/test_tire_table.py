@@ -133,3 +133,42 @@ def test_a_missing_load_is_an_error_and_a_block_without_one_a_finding(tmp_path):
     result = fit_table(read_table(write(tmp_path, airborne[:21] + lines[21:])), (model("magic_formula"),))
     assert [f.rule for f in result.findings if f.level != "note"] == ["no-load-block"] * 2
     assert [fit.load_N for fit in result.fits] == [4000.0, 4000.0]
+
+
+@pytest.mark.parametrize(
+    ("header", "cell", "column"),
+    [
+        ("SA [deg],FZ [N],FY [N]", "1e300", "FY [N]"),
+        ("SA [deg],FZ [N],FY [kN]", "1e307", "FY [kN]"),  # infinite in SI
+        ("SA [deg],FZ [N],MZ [N*m]", "-3e7", "MZ [N*m]"),
+        ("FY [N],FZ [N],SA [deg]", "1e6", "SA [deg]"),
+        ("FY [N],FZ [N],SA [rad]", "-4.0", "SA [rad]"),  # degrees under a header of radians
+        ("FY [N],SA [deg],FZ [kN]", "-1e5", "FZ [kN]"),
+        ("SA [deg],FZ [N],FY [N],P [kPa]", "2e6", "P [kPa]"),
+        ("SA [deg],FZ [N],FY [N],V [km/h]", "1e6", "V [km/h]"),
+        ("SA [deg],FZ [N],FY [N],T [degC]", "-300", "T [degC]"),
+    ],
+)
+def test_a_value_that_no_tire_can_have_is_an_error_that_names_row_and_column(tmp_path, header, cell, column):
+    width = header.count(",")
+    good = ",".join(["1.0"] * (width + 1))
+    path = tmp_path / "tire.csv"
+    path.write_text("\n".join([header, good, ",".join(["1.0"] * width + [cell]), good]) + "\n")
+    with pytest.raises(CellError) as caught:
+        read_table(path, measured=False)
+    assert caught.value.rule == "impossible-value"
+    assert f"row 3, column '{column}'" in caught.value.where
+    assert float(caught.value.got) == float(cell)
+    assert caught.value.next_step
+    assert caught.value.expected
+
+
+def test_what_large_machines_measure_is_read(tmp_path):
+    path = tmp_path / "tire.csv"
+    path.write_text(
+        "SA [deg],FZ [kN],FY [kN],MZ [kN*m],TIRE_ANGLE [deg],V [km/h],P [bar],t [s]\n"
+        "-180,-500,450,80,1e6,400,25,1.7e9\n90,600,0,0,0,0,0,0\n"
+    )
+    table = read_table(path)
+    assert table["FZ"].tolist() == pytest.approx([5e5, 6e5])
+    assert table["SA"].tolist() == pytest.approx([-np.pi, np.pi / 2])

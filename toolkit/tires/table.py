@@ -28,6 +28,13 @@ if TYPE_CHECKING:
 _HEADER = re.compile(r"\s*([A-Za-z_]+)\s*\[([^\]]*)\]\s*")
 _NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]{1,4})?")
 _AXES: dict[str, Axes] = {axes: axes for axes in get_args(Axes)}
+# What no tire and no rig can be, by symbol or dimension [SI]: a spike, a unit or a shifted column, to be
+# mended before a fit follows it. An aircraft tire carries 5e5 N.
+_LIMITS = {
+    "TIRE_ANGLE": math.inf, "DRUM_ANGLE": math.inf, "angle": math.pi, "force": 1e7, "moment": 1e7,
+    "pressure": 1e8, "speed": 1e3, "ratio": 1e3, "temperature": 5e3, "time": 1e12,
+}  # fmt: skip
+_EDGE = 1 + 1e-9
 _SHAPE = "a header such as 'SA [deg],FZ [N],FY [N],MZ [N*m]' and rows of numbers"
 
 
@@ -75,7 +82,7 @@ def read_table(
     UnitError
         a unit is unknown or of another dimension
     CellError
-        text, an empty cell, NaN or infinity in a number's place
+        text, an empty cell, NaN or infinity in a number's place, or a value that no tire can have
     """
     if axes not in AXES:
         raise ConfigError(
@@ -115,8 +122,12 @@ def read_table(
         )  # fmt: skip
     values = np.array([_numbers(cells, header, path, row) for row, cells in lines[1:]], dtype=np.float64).T
     columns = []
-    for (symbol, factor, offset), column in zip(names, values, strict=True):
-        si = column * factor + offset
+    for (symbol, factor, offset), cell, column in zip(names, header, values, strict=True):
+        with np.errstate(over="ignore"):
+            si = column * factor + offset
+        _refuse_impossible(
+            symbol, cell.strip(), column, si, (factor, offset), path, [one for one, _ in lines[1:]]
+        )
         columns.append((symbol, np.abs(si) if symbol == "FZ" else si))
     return TireTable(
         path=path,
@@ -206,6 +217,32 @@ def _numbers(cells: list[str], header: list[str], path: Path, row: int) -> list[
             )
         numbers.append(number)
     return numbers
+
+
+def _refuse_impossible(
+    symbol: str,
+    cell: str,
+    column: NDArray[np.float64],
+    si: NDArray[np.float64],
+    scale: tuple[float, float],
+    path: Path,
+    rows: list[int],
+) -> None:
+    limit = _LIMITS.get(symbol, _LIMITS[CHANNELS[symbol].dimension])
+    lowest = 0.0 if CHANNELS[symbol].dimension == "temperature" else -limit
+    bad = np.flatnonzero(~((si >= lowest * _EDGE) & (si <= limit * _EDGE)))
+    if not len(bad):
+        return
+    row, (factor, offset) = rows[bad[0]], scale
+    low, high = (lowest - offset) / factor, (limit - offset) / factor
+    raise CellError(
+        f"row {row}, column {cell!r}: no tire has such a value",
+        where=f"{path}, row {row}, column {cell!r}",
+        got=f"{column[bad[0]]:.6g}" + (f", and {len(bad) - 1} more rows" if len(bad) > 1 else ""),
+        expected=f"a value from {low:.6g} to {high:.6g} in the unit of the header",
+        next_step="check the unit in the header, remove or mend that row",
+        rule="impossible-value",
+    )
 
 
 def _refuse(path: Path, rule: str, what: str, got: str, expected: str) -> NoReturn:
