@@ -8,6 +8,7 @@ from toolkit.report.design.default import build_document
 from toolkit.report.design.opening import (
     QUARTER,
     WIDE,
+    findings_section,
     heading,
     mark,
     page_footer,
@@ -116,18 +117,7 @@ def _results(p: Pieces) -> list[str]:
             "tk:if.curve_differences",
             _differences(p, "curve_differences", "FY and MZ at slip angles: the significant differences."),
         ),
-        p.block(
-            "tk:if.comparison_findings",
-            heading("Findings")
-            + p.table(
-                "comparison_findings",
-                "What departs from what was expected; 'toolkit explain RULE' tells more.",
-                ["rule", "level", "where", "message"],
-                ["rule", "level", "where", "message"],
-                [34, 18, 40, 76],
-                "llll",
-            ),
-        ),
+        findings_section(p, "comparison_findings", message_mm=76),
         p.block("tk:if.no_findings", paragraph(run("No findings."))),
         paragraph(run("End of the comparison"), style="Caption"),
     ]

@@ -6,14 +6,12 @@ from __future__ import annotations
 from toolkit.report.design.blocks import Pieces, literal, paragraph, run
 from toolkit.report.design.budget import budget_table
 from toolkit.report.design.models import models_section
+from toolkit.report.design.opening import WIDE, heading
 from toolkit.report.design.pieces import contents
 
 
 def chapters(p: Pieces) -> list[str]:
     """Return the chapters, from the test's facts to the end mark."""
-
-    def heading(text: str) -> str:
-        return paragraph(run(text), style="Heading1")
 
     def text(words: str, *, keep: bool = False) -> str:
         return paragraph(literal(words), keep=keep)
@@ -40,7 +38,7 @@ def chapters(p: Pieces) -> list[str]:
                 [("CONFORMITY?", "report.conformity")],
                 [("EXTERNAL?", "report.external")],
             ],
-            (38.0, 128.0),
+            WIDE,
         ),
         heading("2  Test"),
         p.facts(
@@ -56,7 +54,7 @@ def chapters(p: Pieces) -> list[str]:
                 [("TARE", "test.tare")],
                 [("AXES", "test.axes")],
             ],
-            (38.0, 128.0),
+            WIDE,
         ),
         paragraph("", style="Gap"),
         p.block("tk:if.test.speed", text("The drum's surface ran at {{tk:test.speed}} km/h.")),

@@ -7,6 +7,7 @@ from typing import Any
 
 from toolkit.report.design.blocks import Pieces, cell, field, paragraph, row, run, table
 from toolkit.report.design.default import build_document
+from toolkit.report.design.opening import heading
 from toolkit.report.design.pieces import across, contents, logo, logo_png, section_break
 from toolkit.report.design.styles import make_styles
 from toolkit.report.template.xml import q
@@ -154,9 +155,6 @@ def _styles(document: Any) -> None:
 def _body(p: Pieces) -> list[str]:
     force, moment = "{{tk:unit.force}}", "{{tk:unit.moment}}"
     wide = (42.0, 123.0)
-
-    def heading(text: str) -> str:
-        return paragraph(run(text), style="Heading1")
 
     def figure(name: str, caption: str) -> str:
         return p.figure(name, 140, kind="Abbildung", caption=caption)

@@ -1,4 +1,4 @@
-"""What every English template opens with: lines at head and foot of a page, marks, title, widths of facts.
+"""What templates share: lines at head and foot of a page, marks, title, widths of facts, findings.
 
 Report, summary, certificate, comparison and audit are one house: what they share stands here once.
 """
@@ -40,3 +40,19 @@ def title_and_conclusion(p: Pieces, kind: str) -> list[str]:
         paragraph(p.inline(f"tk:{kind}.id", "id"), style="Subtitle"),
         paragraph(p.inline(f"tk:{kind}.conclusion", "conclusion")),
     ]
+
+
+def findings_section(p: Pieces, name: str, *, message_mm: float) -> str:
+    """Return heading and table of a document's findings, kept only where there are some."""
+    return p.block(
+        f"tk:if.{name}",
+        heading("Findings")
+        + p.table(
+            name,
+            "What departs from what was expected; 'toolkit explain RULE' tells more.",
+            ["rule", "level", "where", "message"],
+            ["rule", "level", "where", "message"],
+            [34, 18, 40, message_mm],
+            "llll",
+        ),
+    )

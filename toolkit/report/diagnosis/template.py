@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from toolkit.report.design.blocks import Pieces, paragraph, run
 from toolkit.report.design.default import build_document
-from toolkit.report.design.opening import WIDE, heading, mark, page_footer, page_header
+from toolkit.report.design.opening import WIDE, findings_section, heading, mark, page_footer, page_header
 from toolkit.report.diagnosis.vocabulary import WHERE
 
 
@@ -151,17 +151,6 @@ def _rest(p: Pieces) -> list[str]:
             [48, 58, 18, 42],
             "llrl",
         ),
-        p.block(
-            "tk:if.diagnosis_findings",
-            heading("Findings")
-            + p.table(
-                "diagnosis_findings",
-                "What departs from what was expected; 'toolkit explain RULE' tells more.",
-                ["rule", "level", "where", "message"],
-                ["rule", "level", "where", "message"],
-                [34, 18, 40, 74],
-                "llll",
-            ),
-        ),
+        findings_section(p, "diagnosis_findings", message_mm=74),
         paragraph(run("End of the diagnosis"), style="Caption"),
     ]
