@@ -42,6 +42,7 @@ def test_a_word_that_is_not_known_names_the_nearest_one(tmp_path, old, new, what
         ('unit = "kg"\n', 'unit = "kgg"\n', "unit is unknown", "parameters.mass.unit"),
         ("value = 94.0", 'value = "94"', "no number", "parameters.mass.value"),
         ("value = 94.0", "value = inf", "no number", "parameters.mass.value"),
+        ("value = 94.0", f"value = {10**400}", "no number", "parameters.mass.value"),
         ("value = 94.0", "", "no number", "parameters.mass.value"),
         ("sd = 5.0", "sd = 0.0", "no width", "parameters.mass.sd"),
         ("[80.0, 110.0]", "[110.0, 80.0]", "bounds", "parameters.mass.bounds"),

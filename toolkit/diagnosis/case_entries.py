@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import difflib
-import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from toolkit.errors import ConfigError, UnitError
+from toolkit.files import is_number
 from toolkit.units import unit
 
 if TYPE_CHECKING:
@@ -31,7 +31,7 @@ def text_of(entry: object, where: str) -> str:
 
 def number_of(entry: object, where: str) -> float:
     """Return a finite number."""
-    if isinstance(entry, bool) or not isinstance(entry, int | float) or not math.isfinite(entry):
+    if not is_number(entry):
         raise wrong("an entry is no number", where, entry, "a finite number")
     return float(np.float64(entry))
 
