@@ -160,3 +160,56 @@ def test_the_carcass_is_in_balance_at_every_state():
     made = across(tread, np.tan(SA), slopes)
     np.testing.assert_allclose(made[1] * F0, o.FY, atol=1e3 * _TOLERANCE * 18 * F0)
     np.testing.assert_allclose(made[2] * F0 * 0.07, o.MZ, atol=1e3 * _TOLERANCE * 18 * F0)
+
+
+FREE = ("C", "A", "N", "SKEW", "MU", "MU_V", "YAW", "BEND", "EPS", "SH", "SV", "LAT")
+
+
+@pytest.mark.parametrize("IA", [0.0, 0.03])
+@pytest.mark.parametrize("change", [1e-6, 1e-4, 1.0])
+def test_copies_that_are_asked_together_give_what_each_gives_alone(IA, change):
+    # Near copies start from the balance of the first; it must not show in what they come to.
+    base = MODEL.values({**PLAIN, "N": 4.0, "YAW": 0.4, "BEND": 0.3, "MU_V": 0.03, "LAT": 0.01})
+    copies = np.repeat(base[None], len(FREE) + 2, axis=0)
+    for row, name in enumerate(FREE, start=1):
+        place = MODEL.names.index(name)
+        copies[row, place] += change * MODEL.parameters[place].size
+    rows = make_rows(SA, np.linspace(1500.0, 6000.0, len(SA)), IA=IA, FNOMIN=F0)
+    together = forces([column[:, None] for column in copies.T], rows)
+    assert together.FY.shape == (len(copies), len(SA))
+    for row, values in enumerate(copies):
+        alone = forces(values.tolist(), rows)
+        for channel, size in (("FX", F0), ("FY", F0), ("MZ", 0.07 * F0)):
+            np.testing.assert_allclose(together[channel][row], alone[channel], atol=2e-9 * size)
+
+
+def test_lines_left_of_the_middle_are_the_image_of_those_right_of_it():
+    # A slip along of 1e-30 is none, yet every line is then followed by itself.
+    given = {"B": 0.09, "YAW": 0.3, "BEND": 0.2, "MU_V": 0.05, "SKEW": 0.3}
+    for lines in (1, 4, 5):
+        half, every = (at(given, IA=0.05, KAPPA=k, lines=lines) for k in (0.0, 1e-30))
+        np.testing.assert_allclose(half.FX, every.FX, atol=1e-9 * F0)
+        np.testing.assert_allclose(half.FY, every.FY, atol=1e-9 * F0)
+        np.testing.assert_allclose(half.MZ, every.MZ, atol=1e-9 * 0.07 * F0)
+
+
+def test_a_sharpened_balance_answers_with_the_derivative_of_its_forces():
+    from toolkit.tires.bristles import Tread, balance, middles, sharpened, summed
+
+    q = shape(middles(BRISTLES), 4.0, 0.3)
+    ones = np.ones(len(SA))
+    tread = Tread(
+        limit=0.95 * (q / summed(q))[:, None] * ones, half_C=9.0 * ones, fade=0.2 * ones, yaw=0.02 * ones,
+        bend=0.03 * ones, curve=0.0 * ones, cone=0.0 * ones, edge=ones,
+    )  # fmt: skip
+    sx, sy = 0.0 * ones, np.tan(SA)
+    found = sharpened(tread, sx, sy, balance(tread, sx, sy))
+    # Out of balance by slopes of the contact line that are put in from outside, the answer is theirs.
+    h = 1e-5
+    moved = [balance(tread, sx, sy + side * h) for side in (-1, 1)]
+    direct = (moved[1].slopes - moved[0].slopes) / (2 * h)
+    # d slopes/d sy = inverse F_sy, and slipping by sy is turning by -yaw: F_sy = -(1 - inverse^-1).
+    inverse = np.moveaxis(found.inverse, 2, 0)
+    expected = -(inverse @ (np.eye(2) - np.linalg.inv(inverse)))[:, :, 0].T
+    smooth = np.abs(np.degrees(SA)) < 3.0
+    np.testing.assert_allclose(direct[:, smooth], expected[:, smooth], atol=2e-3)

@@ -24,7 +24,8 @@ _DAMPED = 0.15
 _FEWER = 0.8  # of the cases are left: only then are they copied apart
 _END = -1 / 12  # weight of the first and last middle beyond 1, by the slopes at the edges (Euler-Maclaurin)
 _TINY = 1e-300
-_AT_ONCE = 3000  # cases, so that a step's arrays stay in the cache
+_AT_ONCE = 1500  # cases x lines, so that the bristles' arrays stay in the cache
+_NUDGE = 1e-7  # rad, of the slopes to see how the forces answer
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -80,8 +81,32 @@ def middles(bristles: int) -> Array:
     return np.asarray(1.0 - (np.arange(bristles) + 0.5) * (2.0 / bristles))
 
 
-def balance(tread: Tread, sx: Array, sy: Array, *, lines: int = 1) -> Array:
-    """Return FX/FZ, FY/FZ, MZ/(FZ a) (3, cases) in balance with the carcass that they turn and bend.
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Balance:
+    """Forces in balance with the carcass: ``sums`` FX/FZ, FY/FZ, MZ/(FZ a) (3, cases).
+
+    ``slopes`` [rad] (2, cases) of the contact line by yaw and bending, ``inverse`` (2, 2, cases) how they
+    answer to what is out of balance: from both a state nearby starts. ``settled`` (cases,) is False where
+    the slopes ended beside a jump of the sums, at which no balance is exact.
+    """
+
+    sums: Array
+    slopes: Array
+    inverse: Array
+    settled: NDArray[np.bool_]
+
+    def take(self, index: NDArray[np.intp]) -> Balance:
+        """Return some of the cases."""
+        return Balance(
+            sums=self.sums[:, index],
+            slopes=self.slopes[:, index],
+            inverse=self.inverse[..., index],
+            settled=self.settled[index],
+        )
+
+
+def balance(tread: Tread, sx: Array, sy: Array, *, lines: int = 1, near: Balance | None = None) -> Balance:
+    """Return the forces in balance with the carcass that they turn and bend.
 
     The two slopes of the contact line are found by Broyden's method from the tire that adheres everywhere,
     and by damped steps where that wanders: a carcass so soft that it has several balances comes to a stable
@@ -91,107 +116,198 @@ def balance(tread: Tread, sx: Array, sy: Array, *, lines: int = 1) -> Array:
     ----------
     sx, sy : (cases,) theoretical slips
     lines : lines of bristles over the width; more than one only matters with camber
+    near : the balance of a state near each case, to start from; where that did not settle its slopes stand,
+        for what is searched again there is another side of the same jump
     """
-    parts = [np.arange(at, min(at + _AT_ONCE, len(sy))) for at in range(0, len(sy), _AT_ONCE)]
-    return np.concatenate(
-        [np.zeros((3, 0)), *(_balance(tread.take(one), sx[one], sy[one], lines) for one in parts)], axis=1
+    made = [
+        _balance(tread.take(one), sx[one], sy[one], lines, None if near is None else near.take(one))
+        for one in _parts(tread, sx, lines)
+    ]
+    none = Balance(
+        sums=np.zeros((3, 0)), slopes=np.zeros((2, 0)), inverse=np.zeros((2, 2, 0)), settled=np.zeros(0, bool)
+    )
+    return Balance(
+        sums=np.concatenate([none.sums, *(one.sums for one in made)], axis=1),
+        slopes=np.concatenate([none.slopes, *(one.slopes for one in made)], axis=1),
+        inverse=np.concatenate([none.inverse, *(one.inverse for one in made)], axis=2),
+        settled=np.concatenate([none.settled, *(one.settled for one in made)]),
     )
 
 
-def _balance(tread: Tread, sx: Array, sy: Array, lines: int) -> Array:
-    done = np.zeros((3, len(sy)))
+def sharpened(tread: Tread, sx: Array, sy: Array, found: Balance, *, lines: int = 1) -> Balance:
+    """Return a balance with the ``inverse`` of differences: worth it where many states start from one."""
+    inverse = found.inverse.copy()
+    for one in _parts(tread, sx, lines):
+        part, here = tread.take(one), found.take(one)
+        made = [here.sums]
+        for nudge in np.eye(2) * _NUDGE:
+            moved = here.slopes + nudge[:, None]
+            made.append(_forces(part, sx[one], sy[one], moved, lines))
+        back = np.stack([_slopes(part, sums) for sums in made])
+        (a, c), (b, d) = np.eye(2)[:, :, None] - (back[1:] - back[0]) / _NUDGE
+        det = a * d - b * c
+        good = np.abs(det) > 1e-3
+        sharp = np.array([[d, -b], [-c, a]]) / np.where(good, det, 1.0)
+        inverse[..., one] = np.where(good, sharp, here.inverse)
+    return Balance(sums=found.sums, slopes=found.slopes, inverse=inverse, settled=found.settled)
+
+
+def _parts(tread: Tread, sx: Array, lines: int) -> list[NDArray[np.intp]]:
+    most = _AT_ONCE // (1 if _plain(tread, sx) else lines)
+    return [np.arange(at, min(at + most, len(sx))) for at in range(0, len(sx), most)]
+
+
+def _plain(tread: Tread, sx: Array) -> bool:
+    return not (np.any(sx) or np.any(tread.cone))
+
+
+def _forces(tread: Tread, sx: Array, sy: Array, slopes: Array, lines: int) -> Array:
+    return across(tread, sy, slopes) if _plain(tread, sx) else both(tread, sx, sy, slopes, lines)
+
+
+def _slopes(tread: Tread, sums: Array) -> Array:
+    # (2, cases) of the contact line under these forces.
+    return np.stack([tread.yaw * sums[2], -tread.bend * sums[1]])
+
+
+def _balance(tread: Tread, sx: Array, sy: Array, lines: int, near: Balance | None) -> Balance:
+    sums, at = np.zeros((3, len(sy))), np.zeros((2, len(sy)))
     todo = np.arange(len(sy))
-    slopes = np.zeros((2, len(sy)))
-    inverse = _adhering(tread)
+    slopes, inverse = (at.copy(), _adhering(tread)) if near is None else (near.slopes, near.inverse)
+    answers, settled = inverse.copy(), np.ones(len(sy), dtype=np.bool_)
+    searched = np.ones_like(settled) if near is None else near.settled
     last: tuple[Array, Array] | None = None
-    plain = not (np.any(sx) or np.any(tread.cone))
     part = tread
     for round_ in range(_ROUNDS + _PATIENCE):
-        made = across(part, sy, slopes) if plain else both(part, sx, sy, slopes, lines)
-        done[:, todo] = made
-        residual = np.stack([part.yaw * made[2], -part.bend * made[1]]) - slopes
+        made = _forces(part, sx, sy, slopes, lines)
+        residual = _slopes(part, made) - slopes
         if last is not None:
             inverse = _broyden(inverse, slopes - last[0], residual - last[1])
-        far = np.flatnonzero(np.abs(residual).max(axis=0) > _TOLERANCE)
+        sums[:, todo], at[:, todo], answers[..., todo] = made, slopes, inverse
+        open_ = np.abs(residual).max(axis=0) > _TOLERANCE
+        settled[todo] = ~open_
+        far = np.flatnonzero(open_ & searched)
         if not len(far):
             break
         if len(far) < _FEWER * len(todo):
-            part, todo, sx, sy = part.take(far), todo[far], sx[far], sy[far]
+            part, todo, sx, sy, searched = part.take(far), todo[far], sx[far], sy[far], searched[far]
             slopes, residual, inverse = slopes[:, far], residual[:, far], inverse[..., far]
         last = slopes, residual
-        searching = round_ < _ROUNDS
-        slopes = slopes + (np.einsum("ijn,jn->in", inverse, residual) if searching else _DAMPED * residual)
-    return done
+        step = np.einsum("ijn,jn->in", inverse, residual) if round_ < _ROUNDS else _DAMPED * residual
+        slopes = slopes + np.where(searched, step, 0.0)
+    return Balance(sums=sums, slopes=at, inverse=answers, settled=settled)
 
 
 def across(tread: Tread, sy: Array, slopes: Array) -> Array:
     """Return the sums (3, cases) of bristles that move across only: no longitudinal slip, no camber."""
     u = middles(len(tread.limit))
-    step = 2.0 / len(u)
+    step, between, weight, lever = _quadrature(u)
     level, tilt = sy - slopes[0], slopes[1] + tread.curve
     gain, lean = tread.half_C * step * level, tread.half_C * step * tilt
-    w, total, moment, spare = (np.zeros_like(sy) for _ in range(4))
-    path, part = u[0] + 0.5 * step, 0.5  # the first middle lies half a step behind the edge
-    for here, limit in zip(u, tread.limit, strict=True):
-        between = 0.5 * (path + here)
-        w = w - part * gain + (part * between) * lean
-        most = limit / (1.0 + tread.fade * np.abs(level - tilt * here))
-        size = np.abs(w)
-        edge = _turn(spare, size - most) * np.sign(w)
-        np.clip(w, -most, most, out=w)
-        if part < 1.0:
-            edge = edge + _END * w
-        total += w + edge
-        moment += w * here + edge * between
-        spare, path, part = np.maximum(most - size, 0.0), here, 1.0
-    edge = _end(spare, np.abs(w), np.abs(gain - path * lean)) * np.sign(w)
-    total += edge
-    moment -= edge
-    return np.stack([np.zeros_like(sy), total, moment]) * step
+    most = tread.limit / (1.0 + tread.fade * np.abs(level - tilt * u[:, None]))
+    rise = gain - lean * between[:, None]
+    rise[0] *= 0.5  # the first middle lies half a step behind the edge
+    tried, w, least = np.empty_like(most), np.empty_like(most), -most
+    held = np.zeros_like(sy)
+    for wanted, kept, grows, low, high in zip(tried, w, rise, least, most, strict=True):
+        np.subtract(held, grows, out=wanted)
+        np.maximum(wanted, low, out=kept)
+        np.minimum(kept, high, out=kept)
+        held = kept
+    turns, edge, spare = _turns(most - np.abs(tried))
+    edge *= np.sign(tried[turns])
+    total = weight @ w + _added(edge, turns, sy.shape)
+    moment = lever @ w + _added(edge * between[turns[0]], turns, sy.shape)
+    # The last path ends at the last middle.
+    edge = _end(spare, np.abs(held), np.abs(gain - u[-1] * lean)) * np.sign(held)
+    return np.stack([np.zeros_like(sy), total + edge, moment - edge]) * step
 
 
 def both(tread: Tread, sx: Array, sy: Array, slopes: Array, lines: int) -> Array:
     """Return the sums (3, cases) of bristles that move along and across, in ``lines`` over the width."""
     u = middles(len(tread.limit))
-    step = 2.0 / len(u)
+    step, between, weight, lever = _quadrature(u)
     side = -middles(lines)[:, None]  # from the left of the tread to the right
+    mirrored = not np.any(sx)
+    if mirrored:
+        # Without slip along, a line left of the middle is the image of the one right of it.
+        side = side[lines // 2 :]
     level, tilt = sy - slopes[0], slopes[1] + tread.curve
     along = sx + tread.cone * side
-    reach, path, part = tread.half_C * step, u[0] + 0.5 * step, 0.5
-    wx, wy, fx, fy, moment, spare = (np.zeros_like(along) for _ in range(6))
-    for here, limit in zip(u, tread.limit, strict=True):
-        between = 0.5 * (path + here)
-        wx = wx + part * reach * along
-        wy = wy - part * reach * (level - tilt * between)
-        most = limit / (1.0 + tread.fade * np.hypot(along, level - tilt * here))
-        size = np.hypot(wx, wy)
-        safe = np.where(size > 0, size, 1.0)
-        x, y = wx / safe, wy / safe
-        # What is beyond the limit slides back along its own deflection.
-        held = np.minimum(size, most)
-        edge = _turn(spare, size - most)
-        if part < 1.0:
-            edge = edge + _END * held
-        wx, wy = x * held, y * held
-        fx += wx + x * edge
-        fy += wy + y * edge
-        moment += wy * here + y * edge * between
-        spare, path, part = np.maximum(most - size, 0.0), here, 1.0
-    edge = _end(spare, held, reach * np.hypot(along, level - tilt * path))
-    fx += x * edge
-    fy += y * edge
-    moment -= y * edge
+    reach = tread.half_C * step
+    gain, lean, ahead = reach * level, reach * tilt, reach * along
+    rise = gain - lean * between[:, None]
+    rise[0] *= 0.5
+    most = np.broadcast_to(tread.limit[:, None], (len(u), *along.shape))
+    if np.any(tread.fade):
+        speed = along**2 + ((level - tilt * u[:, None]) ** 2)[:, None]
+        np.sqrt(speed, out=speed)
+        speed *= tread.fade
+        speed += 1.0
+        most = np.divide(most, speed, out=speed)
+    wx, wy, size = (np.empty(most.shape) for _ in range(3))
+    share, last_x, last_y = np.empty_like(along), np.zeros_like(along), np.zeros_like(along)
+    grows_x = 0.5 * ahead
+    with np.errstate(divide="ignore", invalid="ignore"):
+        for x, y, long, grows, high in zip(wx, wy, size, rise, most, strict=True):
+            np.add(last_x, grows_x, out=x)
+            np.subtract(last_y, grows, out=y)
+            np.multiply(x, x, out=long)
+            np.multiply(y, y, out=share)
+            long += share
+            np.sqrt(long, out=long)
+            # What is beyond the limit slides back along its own deflection; none has no direction.
+            np.divide(high, long, out=share)
+            np.fmin(share, 1.0, out=share)
+            x *= share
+            y *= share
+            last_x, last_y, grows_x = x, y, ahead
+    turns, edge, spare = _turns(most - size)
+    edge /= np.maximum(most[turns], _TINY)
+    edge_y = edge * wy[turns]
+    flat_x, flat_y = wx.reshape(len(u), -1), wy.reshape(len(u), -1)
+    fx = (weight @ flat_x).reshape(along.shape) + _added(edge * wx[turns], turns, along.shape)
+    fy = (weight @ flat_y).reshape(along.shape) + _added(edge_y, turns, along.shape)
+    moment = (lever @ flat_y).reshape(along.shape)
+    moment += _added(edge_y * between[turns[0]], turns, along.shape)
+    held = np.sqrt(last_x**2 + last_y**2)
+    end = _end(spare, held, reach * np.hypot(along, level - tilt * u[-1])) / np.maximum(held, _TINY)
+    fx += last_x * end
+    fy += last_y * end
+    moment -= last_y * end
     moment -= fx * side * tread.edge
+    if mirrored:
+        shares = np.where(side > 0, 2.0, 1.0) / lines
+        return np.stack([np.zeros_like(sy), (shares * fy).sum(axis=0), (shares * moment).sum(axis=0)]) * step
     return np.stack([fx.mean(axis=0), fy.mean(axis=0), moment.mean(axis=0)]) * step
 
 
-def _turn(spare: Array, excess: Array) -> Array:
-    # What a kink between two middles, where the bristle reaches its limit, adds to their sum: the triangle
-    # over the chord, less the share of the change of slope that a sum of middles makes too large
-    # (Euler-Maclaurin with a kink).
-    beyond = np.maximum(excess, 0.0)
-    product, change = spare * beyond, spare + beyond
-    return np.asarray((product > 0) * (0.5 * product / (change + _TINY) - change / 12))
+def _quadrature(u: Array) -> tuple[float, Array, Array, Array]:
+    # Step, the middle of each bristle's path, and the weights of force and moment at the bristles.
+    step = 2.0 / len(u)
+    between = 0.5 * (np.concatenate([[u[0] + 0.5 * step], u[:-1]]) + u)
+    weight, lever = np.ones(len(u)), u.copy()
+    weight[0] += _END
+    lever[0] += _END * between[0]
+    return step, between, weight, lever
+
+
+def _turns(free: Array) -> tuple[tuple[NDArray[np.intp], ...], Array, Array]:
+    # Where a bristle reaches its limit between two middles, what this kink adds to their sum, and what the
+    # last one has to spare. ``free`` is limit less deflection: the kink adds the triangle over the chord,
+    # less the share of the change of slope that a sum of middles makes too large (Euler-Maclaurin).
+    turns = np.nonzero((free[1:] < 0) & (free[:-1] > 0))
+    spare, beyond = free[:-1][turns], -free[1:][turns]
+    change = spare + beyond
+    edge = 0.5 * spare * beyond / change - change / 12
+    return (turns[0] + 1, *turns[1:]), edge, np.maximum(free[-1], 0.0)
+
+
+def _added(values: Array, turns: tuple[NDArray[np.intp], ...], shape: tuple[int, ...]) -> Array:
+    # Values at (bristle, ...) summed over the bristles.
+    size = int(np.prod(shape))
+    place = np.ravel_multi_index(turns[1:], shape)
+    return np.asarray(np.bincount(place, values, size), dtype=np.float64).reshape(shape)
 
 
 def _end(spare: Array, w: Array, rise: Array) -> Array:

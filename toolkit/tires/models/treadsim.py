@@ -28,7 +28,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from toolkit.tires.bristles import Tread, balance, middles, summed
+from toolkit.tires.bristles import Tread, balance, middles, sharpened, summed
 from toolkit.tires.contact import bulged, half_length, slips, with_load
 from toolkit.tires.global_model import GlobalModel, Responses, Rows, Seeds
 from toolkit.tires.parameter_table import OFFSETS, SHIFT, parameters
@@ -40,6 +40,9 @@ if TYPE_CHECKING:
 
 BRISTLES = 40
 LINES = 5
+_OUTSIDE = ("LAT", "SV", "SM")  # act on what the bristles sum to
+_NEAR = 1e-3  # of the parameters' sizes: so near is one tire's balance a start for another's
+_MANY = 3  # copies to one: then two more states to know its derivative are cheap
 _THIN = 1e-2  # of the mean pressure: friction does not grow without end where the pressure vanishes
 
 # name, unit, default, low, high, size, stage, needs, text
@@ -87,11 +90,49 @@ def forces(values: Sequence[Any], rows: Rows, *, bristles: int = BRISTLES, lines
     sx, sy = arrays.pop("sx"), arrays.pop("sy")
     limit = _limit(p, load, p["A_P"], shape, bristles)
     FX, FY, moment = (
-        one.reshape(shape) for one in balance(Tread(limit=limit, **arrays), sx, sy, lines=lines)
+        one.reshape(shape) for one in _sums(Tread(limit=limit, **arrays), sx, sy, lines, *_leaders(p, shape))
     )
     FX, FY = FX * rows.FZ, FY * rows.FZ
     MZ = moment * rows.FZ * a - FX * FY / rows.FNOMIN * p["LAT"]
     return Responses(FX=FX, FY=FY + rows.FZ * p["SV"], MZ=MZ + rows.FZ * p["SM"])
+
+
+def _leaders(p: Mapping[str, Any], shape: tuple[int, ...]) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
+    # (copies,) the first copy whose bristles are nearly those of each copy, and where they are the same: a
+    # derivative asks for copies of one tire that differ by a millionth, or in what acts on the sums alone.
+    copies = shape[0] if len(shape) == 2 else 1
+    searched = [one for one in MODEL.parameters if one.name not in _OUTSIDE and np.size(p[one.name]) > 1]
+    if copies == 1 or not searched:
+        return np.zeros(copies, dtype=np.intp), np.arange(copies) > 0
+    places = np.stack([np.ravel(p[one.name]) / one.size for one in searched], axis=1)
+    found = np.full(copies, -1)
+    for copy in range(copies):
+        if found[copy] < 0:
+            near = np.abs(places - places[copy]).max(axis=1) <= _NEAR
+            found[near & (found < 0)] = copy
+    return found, (places == places[found]).all(axis=1) & (found != np.arange(copies))
+
+
+def _sums(
+    tread: Tread, sx: Array, sy: Array, lines: int, leaders: NDArray[np.intp], same: NDArray[np.bool_]
+) -> Array:
+    # The sums (3, cases) of copies: those that lead are balanced first, the others start from there.
+    copies = len(leaders)
+    led = leaders != np.arange(copies)
+    if not led.any():
+        return balance(tread, sx, sy, lines=lines).sums
+    of_copy = np.arange(len(sy)).reshape(copies, -1)
+    first, rest = of_copy[~led].ravel(), of_copy[led & ~same].ravel()
+    leading = tread.take(first)
+    start = balance(leading, sx[first], sy[first], lines=lines)
+    if len(rest) > _MANY * len(first):
+        start = sharpened(leading, sx[first], sy[first], start, lines=lines)
+    # Of each copy, its leader's cases among those that lead.
+    begun = np.arange(len(first)).reshape(-1, of_copy.shape[1])[(np.cumsum(~led) - 1)[leaders]]
+    made = start.sums[:, begun.ravel()]
+    near = start.take(begun[led & ~same].ravel())
+    made[:, rest] = balance(tread.take(rest), sx[rest], sy[rest], lines=lines, near=near).sums
+    return made
 
 
 def _limit(p: Mapping[str, Any], load: Array, growth: Any, shape: tuple[int, ...], bristles: int) -> Array:
@@ -99,8 +140,9 @@ def _limit(p: Mapping[str, Any], load: Array, growth: Any, shape: tuple[int, ...
     u = middles(bristles).reshape(-1, *(1 for _ in shape))
     q = bulged(u, p["N"], p["SKEW"])
     q = q / summed(q)
-    pressure = np.maximum(2 * q, _THIN) * np.power(np.maximum(load, _THIN), 1 - growth)
-    limit = p["MU"] * np.power(pressure, -p["MU_P"]) * q
+    # The power of pressure by its two factors, over the patch and over the load: one has few rows.
+    mean = np.power(np.maximum(load, _THIN), 1 - growth)
+    limit = p["MU"] * np.power(np.maximum(2 * q, _THIN), -p["MU_P"]) * q * np.power(mean, -p["MU_P"])
     return np.ascontiguousarray(np.broadcast_to(limit, (bristles, *shape))).reshape(bristles, -1)
 
 
