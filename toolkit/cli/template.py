@@ -45,7 +45,9 @@ def tags(
     calibration: Annotated[str | None, typer.Option("--calibration", help="Record id.")] = None,
     kind: Annotated[
         str,
-        typer.Option("--kind", help="report, certificate, comparison, diagnosis or audit: tags of that document."),
+        typer.Option(
+            "--kind", help="report, certificate, comparison, diagnosis or audit: tags of that document."
+        ),
     ] = "report",
     calibrations: Calibrations = None,
     home: Home = None,
