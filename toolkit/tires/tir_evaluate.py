@@ -27,7 +27,11 @@ _RANGES = (
     ("P", "PRESMIN", "PRESMAX", "Pa"),
 )
 # Without these the Magic Formula gives nothing of that channel.
-_MAKES = {"FX": ("PCX1", "PDX1", "PKX1"), "FY": ("PCY1", "PDY1", "PKY1"), "MZ": ("QCZ1", "QDZ1", "QBZ1")}
+_MAKES = {
+    "FX": ("PCX1", "PDX1", "PKX1"),
+    "FY": ("PCY1", "PDY1", "PKY1", "PKY2"),
+    "MZ": ("QCZ1", "QDZ1", "QBZ1"),
+}
 _EDGE = 1e-6  # of the range: limits are printed with five or six digits
 
 
