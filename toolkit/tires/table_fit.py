@@ -15,6 +15,7 @@ from toolkit.tires.catalog import fit_model
 from toolkit.tires.evaluate import slope_estimate_at
 from toolkit.tires.fit import Curve, why_not
 from toolkit.tires.model import CurveFit, Loss, TireModel
+from toolkit.tires.outliers import gross_outliers
 from toolkit.tires.table import TireTable
 
 # Sign of dy/dSA at small angles of a tire, see `toolkit.channels`.
@@ -95,7 +96,10 @@ def fit_table(table: TireTable, models: tuple[TireModel, ...], *, loss: Loss = "
         )
         for one in refused
     ]
-    return TableFits(fits=tuple(fits), findings=(*findings, *fit_findings(fits), *axes_findings(table, fits)))
+    findings += fit_findings(fits)
+    if own := [fit for fit in fits if fit.model == "magic_formula"]:
+        findings += gross_outliers(good, own)
+    return TableFits(fits=tuple(fits), findings=(*findings, *axes_findings(table, fits)))
 
 
 def _no_load(curve: Curve) -> FitError | None:
