@@ -213,6 +213,7 @@ def test_only_the_file_that_kills_its_worker_is_lost(two):
 def test_a_worker_that_somebody_kills_in_mid_run_loses_nothing(two):
     names = [f"slow {n}" for n in range(40)]
     with distributed.Client(two, set_as_default=False) as client:
+        client.wait_for_workers(2, timeout=PATIENCE_S)
         victim = next(iter(client.run(os.getpid).values()))
     threading.Timer(0.7, os.kill, (victim, signal.SIGKILL)).start()
     found = dict(run_on_cluster(make, names, address=two, batch=4, empty_s=PATIENCE_S))

@@ -18,7 +18,8 @@ from audit_factory import (
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from toolkit.audit.identify import identify, identify_columns, recompute, repair
+from toolkit.audit.columns import columns_of
+from toolkit.audit.identify import identify_columns, recompute, repair
 from toolkit.examples.fig4_4 import packaged_fig4_4
 from toolkit.machine import load_machine
 from toolkit.recording.read import read_recording
@@ -33,20 +34,20 @@ def judged(file, records=BOTH, *, on=DAY, in_force=R2, void=()):
 
 @pytest.fixture(scope="module")
 def figure():
-    return read_recording(packaged_fig4_4()[0], load_machine("m15"))
+    return columns_of(read_recording(packaged_fig4_4()[0], load_machine("m15")))
 
 
 class TestFigure44:
     """The ten printed rows of the source document (Figure 4.4): the accident itself."""
 
     def test_old_record_is_found_and_stale_because_it_is_void_on_every_day(self, figure):
-        found = identify(figure, BOTH, on=None, in_force=None, void={"m15-r1"})
+        found = identify_columns(figure, BOTH, on=None, in_force=None, void={"m15-r1"})
         assert (found.grade, found.record, found.variant) == ("stale", "m15-r1", None)
         assert found.repair is None
         assert [(s.first_row, s.last_row) for s in found.segments] == [(1, 10)]
 
     def test_published_record_alone_explains_it_with_negative_E5(self, figure):
-        found = identify(figure, (R2,), on=None, in_force=None)
+        found = identify_columns(figure, (R2,), on=None, in_force=None)
         assert (found.grade, found.record, found.variant) == (
             "sign_variant",
             "m15-r2",
@@ -54,7 +55,7 @@ class TestFigure44:
         )
 
     def test_repair_by_the_published_record(self, figure):
-        found = identify(figure, BOTH, on=DAY, in_force=R2)
+        found = identify_columns(figure, BOTH, on=DAY, in_force=R2)
         # By hand from the last rows: 2 x 1.0228 x 497.591 lbf and 2 x 0.0026666 x 497.591 lbf·ft.
         assert found.repair.FY_max_abs_N == pytest.approx(2 * 1.0228 * 497.591 * 4.4482216152605, rel=1e-5)
         assert found.repair.MZ_max_abs_Nm == pytest.approx(
@@ -63,9 +64,7 @@ class TestFigure44:
         assert found.grade == "stale"
 
     def test_corrected_first_row(self, figure):
-        from toolkit.audit.columns import columns_of
-
-        FY_N = recompute(columns_of(figure), R2)["FY"]
+        FY_N = recompute(figure, R2)["FY"]
         # 0.99719 x 98.59261 + 0.99718 x 86.06072 - 1.0228 x 182.415 + 0.6473, to two decimals
         assert round(float(FY_N[0]) / 4.4482216152605, 2) == -1.79
 

@@ -79,21 +79,22 @@ def test_a_table_of_several_cambers_is_refused(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("old", "new"),
+    ("old", "new", "rule"),
     [
-        ("SA [deg]", "SA [rad]"),  # 12 rad: the unit is wrong
-        ("\n-12.0,-2000.0,", "\n-12.0,-1e300,"),
-        ("FY [N]", "FY [MN]"),
-        ("MZ [N*m]", "MZ [MN*m]"),
+        ("SA [deg]", "SA [rad]", "impossible-value"),  # 12 rad: the unit is wrong
+        ("\n-12.0,-2000.0,", "\n-12.0,-1e300,", "impossible-value"),
+        ("FY [N]", "FY [MN]", "impossible-value"),
+        ("FY [N]", "FY [kN]", "wrong-value"),  # 2 MN: no tire of a maker's table
+        ("MZ [N*m]", "MZ [MN*m]", "impossible-value"),
     ],
 )
-def test_what_no_tire_does_is_a_wrong_unit(tmp_path: Path, old: str, new: str) -> None:
+def test_what_no_tire_does_is_a_wrong_unit(tmp_path: Path, old: str, new: str, rule: str) -> None:
     path = table(tmp_path / "m.csv")
     assert old in path.read_text()
     path.write_text(path.read_text().replace(old, new, 1))
     with pytest.raises(ToolkitError) as caught:
         maker_rows(path, axes="SAE", angles_rad=DEFAULT_ANGLES, identity="m")
-    assert caught.value.rule == "wrong-value"
+    assert caught.value.rule == rule
     assert caught.value.next_step
 
 

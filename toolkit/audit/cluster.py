@@ -144,7 +144,10 @@ def _batches(
         ready = _wait(client, distributed, list(flying))
         for task in ready:
             part = flying.pop(task)
-            found = _result(distributed, task, address)
+            try:
+                found = _result(distributed, task, address)
+            except _LostResultError:
+                found = None
             if found is None:
                 doubtful.extend(part)
             else:
@@ -179,7 +182,11 @@ def _alone(
                 began = now  # a little before it starts
             if started and now - began > timeout_s + _GRACE_S:
                 return Lost(reason=late)
-        found = _result(distributed, task, address)
+        try:
+            found = _result(distributed, task, address)
+        except _LostResultError:
+            # It was done, and the worker that held it is no more: by what, nothing tells.
+            return _alone(client, distributed, make, name, timeout_s, empty_s, address)
         if found is not None:
             result: Result = found[0]
             return result
@@ -199,9 +206,17 @@ def _wait(client: Any, distributed: Any, tasks: list[Any]) -> list[Any]:
 
 
 def _result(distributed: Any, task: Any, address: str) -> list[Any] | None:
-    """Return the results of a task; None where its worker died of it."""
+    """Return the results of a task; None where its worker died of it.
+
+    Raises
+    ------
+    ConfigError
+        the scheduler is gone, or a worker has another installation
+    _LostResultError
+        the scheduler is there, but whoever held the results is not
+    """
     if task.status in ("cancelled", "lost"):
-        raise _gone(address)
+        raise _lost(distributed, address)
     try:
         found: list[Any] = task.result(timeout=CONNECT_S)
     except distributed.KilledWorker:
@@ -214,8 +229,16 @@ def _result(distributed: Any, task: Any, address: str) -> list[Any] | None:
             "install the toolkit for the workers, in the version that runs here",
         ) from error
     except (OSError, TimeoutError) as error:
-        raise _gone(address) from error
+        raise _lost(distributed, address) from error
     return found
+
+
+class _LostResultError(Exception):
+    """Results are gone with the worker that held them."""
+
+
+def _lost(distributed: Any, address: str) -> Exception:
+    return _LostResultError() if _unreachable(distributed, address) is None else _gone(address)
 
 
 def _threads(client: Any, address: str) -> int:
