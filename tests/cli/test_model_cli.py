@@ -113,7 +113,14 @@ def test_inputs_belong_to_a_model_file(run, tmp_path):
 )
 def test_the_answer_as_a_verified_document(run, answered, tmp_path):
     found = run(
-        "diagnose", answered / "CASE.toml", "--out", tmp_path / "out", "--pdf", "--by", "J. Doe", "--json"
+        "diagnose",
+        answered / "CASE.toml",
+        "--out",
+        tmp_path / "out",
+        "--pdf",
+        "--by",
+        "second person",
+        "--json",
     )
     made = json.loads(found.stdout)["document"]
     assert made["verified"] is True

@@ -74,7 +74,7 @@ def test_a_tire_without_shifts_is_odd_in_slip_and_camber():
 
 def test_no_load_gives_no_force_and_every_bound_a_finite_one():
     rows = make_rows(np.tile(SA, 3), np.repeat([0.0, 300.0, 60e3], 25), IA=0.1, FNOMIN=4000.0)
-    assert not MODEL.forces(MODEL.defaults(), rows).FY[:25].any()
+    assert not MODEL.forces(MODEL.values({}), rows).FY[:25].any()
     rng = np.random.default_rng(0)
     low = np.array([one.low for one in MODEL.parameters])
     high = np.array([one.high for one in MODEL.parameters])

@@ -27,6 +27,7 @@ from toolkit.recording.extras import needed
 Result = TypeVar("Result")
 
 BATCH = 16
+_TRIES = 3  # of a file whose results are lost with a worker that had done it
 CONNECT_S = 10.0
 EMPTY_S = 60.0  # without any worker, for so long a cluster is waited for
 _GRACE_S = 30.0  # for a new worker to import what it needs
@@ -163,6 +164,7 @@ def _alone(
     timeout_s: float,
     empty_s: float,
     address: str,
+    tries: int = _TRIES,
 ) -> Result | Lost:
     token = uuid.uuid4().hex
     task = client.submit(_several, make, (name,), token, timeout_s, pure=False, retries=0)
@@ -185,8 +187,10 @@ def _alone(
         try:
             found = _result(distributed, task, address)
         except _LostResultError:
-            # It was done, and the worker that held it is no more: by what, nothing tells.
-            return _alone(client, distributed, make, name, timeout_s, empty_s, address)
+            # It was done, and the worker that held it is no more: by what, nothing tells the first time.
+            if tries <= 1:
+                return Lost(reason=DIED)
+            return _alone(client, distributed, make, name, timeout_s, empty_s, address, tries - 1)
         if found is not None:
             result: Result = found[0]
             return result

@@ -217,7 +217,7 @@ def approve(
 ) -> int:
     """Put a record in force; a failed sign, span or check load blocks and changes nothing.
 
-    Example: toolkit calibration approve m15-r2 --in-force-from 2026-03-02 --checked-by "J. Doe"
+    Example: toolkit calibration approve m15-r2 --in-force-from 2026-03-02 --checked-by "second person"
     """
     from toolkit.calibration.registry.approval import approve as decide
 

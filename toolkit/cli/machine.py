@@ -65,8 +65,8 @@ def correct(
     report name both. Where the answer could not tell the effect from others, the decision is yours: give the
     reason, such as a zero that was measured with the wheel at rest.
 
-    Example: toolkit machine correct answer --effect steer_offset --by "J. Doe" --reason "zero measured at
-    rest, 2026-03-02" --machine m15 --out m15-2.toml
+    Example: toolkit machine correct answer --effect steer_offset --by "second person" --reason "zero
+    measured at rest, 2026-03-02" --machine m15 --out m15-2.toml
     """
     from datetime import date
 

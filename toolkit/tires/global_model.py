@@ -229,10 +229,6 @@ class GlobalModel:
         """Parameter names in their order."""
         return tuple(one.name for one in self.parameters)
 
-    def defaults(self) -> Array:
-        """Return the default of every parameter."""
-        return np.array([one.default for one in self.parameters])
-
     def values(self, given: Mapping[str, float]) -> Array:
         """Return a parameter set from names and values, defaults for the rest.
 
