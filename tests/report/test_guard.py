@@ -7,17 +7,23 @@ import sys
 import time
 from pathlib import Path
 
+import pytest
+
 from toolkit.report.guard import Guard
 
 _PARENT = """
-import subprocess, sys, time
+import os, subprocess, sys, time
 from pathlib import Path
 from toolkit.report.guard import Guard
 folder = Path(sys.argv[1])
 guard = Guard(folder)
 # As LibreOffice is started: a session of its own, the folder's name among its words.
-child = subprocess.Popen([sys.executable, "-c", "import time; time.sleep(600)", f"file://{folder}/profile"],
-                         start_new_session=True)
+sleeper = [sys.executable, "-c", "import time; time.sleep(600)", f"file://{folder}/profile"]
+if sys.argv[2] == "late":
+    # Its own command line begins some time after the parent's death, as while a program is being loaded.
+    sleeper = ["/bin/sh", "-c", 'sleep 1; exec "$PYTHON" -c "import time; time.sleep(600)" "$PROFILE"']
+words = {"PYTHON": sys.executable, "PROFILE": f"file://{folder}/profile"}
+child = subprocess.Popen(sleeper, start_new_session=True, env={**os.environ, **words})
 print(child.pid, flush=True)
 time.sleep(600)
 """
@@ -39,12 +45,15 @@ def _runs(pid: int) -> bool:
         return False
 
 
-def test_what_a_killed_parent_leaves_is_taken_away(tmp_path: Path) -> None:
+@pytest.mark.parametrize("started", ["early", "late"])
+def test_what_a_killed_parent_leaves_is_taken_away(tmp_path: Path, started: str) -> None:
     folder = tmp_path / "office-x7q2 'of [this] test'"
     (folder / "profile").mkdir(parents=True)
     beside = tmp_path / "office-other"
     beside.mkdir()
-    parent = subprocess.Popen([sys.executable, "-c", _PARENT, folder], stdout=subprocess.PIPE, text=True)
+    parent = subprocess.Popen(
+        [sys.executable, "-c", _PARENT, folder, started], stdout=subprocess.PIPE, text=True
+    )
     assert parent.stdout is not None
     child = int(parent.stdout.readline())
     assert _runs(child)

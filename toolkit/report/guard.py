@@ -10,15 +10,22 @@ import contextlib
 import subprocess
 from pathlib import Path
 
-# The folder's random name is in the command line of everything that was started with the profile in it.
+# The folder's random name is in the command line of everything that was started with the profile in it. A
+# process that was started in the last moment has no command line until its program is loaded, so the guard
+# looks again for two seconds, and for as long as it finds something.
 _WAIT_AND_CLEAN = """
 read -r folder || exit
 cat >/dev/null
-for told in $(grep -lsF -- "${folder##*/}" /proc/[0-9]*/cmdline); do
-    one=${told#/proc/}
-    kill -KILL "${one%/cmdline}" 2>/dev/null
+quiet=0
+while [ "$quiet" -lt 20 ]; do
+    quiet=$((quiet + 1))
+    for told in $(grep -lsF -- "${folder##*/}" /proc/[0-9]*/cmdline); do
+        one=${told#/proc/}
+        kill -KILL "${one%/cmdline}" 2>/dev/null && quiet=0
+    done
+    rm -rf -- "$folder"
+    sleep 0.1
 done
-rm -rf -- "$folder"
 """
 
 
