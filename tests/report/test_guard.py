@@ -47,7 +47,7 @@ def _runs(pid: int) -> bool:
 
 @pytest.mark.parametrize("started", ["early", "late"])
 def test_what_a_killed_parent_leaves_is_taken_away(tmp_path: Path, started: str) -> None:
-    folder = tmp_path / "office-x7q2 'of [this] test'"
+    folder = tmp_path / f"office-{started} 'of [this] test'"
     (folder / "profile").mkdir(parents=True)
     beside = tmp_path / "office-other"
     beside.mkdir()
