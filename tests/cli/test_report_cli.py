@@ -213,6 +213,31 @@ def test_the_content_hash_follows_the_content(tmp_path: Path, monkeypatch, capsy
     assert len(told) == 2
 
 
+@office_needed
+def test_units_of_choice_go_through_values_and_tables(tmp_path: Path, resolved, capsys) -> None:
+    pull = resolved.result.characteristics.pull[0]
+    body = p("{{tk:unit.force}} {{tk:unit.moment}} {{tk:summary.load}}") + p("{{tk:figure.plysteer}}")
+    columns = ["{{tk:row.load}}", "{{tk:row.conicity}}", "{{tk:row.CRAT}}"]
+    template = make(tmp_path, body + p("{{tk:table.pull}}") + tbl(["a", "b", "c"], columns))
+    # The option goes before the style file.
+    (tmp_path / "org.toml").write_text('[units]\nforce = "kN"\nmoment = "N*m"\n')
+    assert command([Path("any")], template=template, out=tmp_path / "out", units="lbf", json=True) == 0
+    said = answer(capsys)
+    assert said["units"] == {"force": "lbf", "moment": "lbf*ft"}
+    texts = {one["tag"]: one["text"] for one in reversed(said["manifest"])}
+    assert (texts["tk:unit.force"], texts["tk:unit.moment"]) == ("lbf", "lbf·ft")
+    lbf, lbf_ft = 0.45359237 * 9.80665, 0.45359237 * 9.80665 * 0.3048  # exact by definition
+    assert float(texts["tk:table.pull.load"]) == pytest.approx(pull.load_N / lbf, abs=0.5)
+    assert float(texts["tk:table.pull.conicity"]) == pytest.approx(pull.conicity.value / lbf, abs=0.05)
+    assert float(texts["tk:table.pull.CRAT"]) == pytest.approx(pull.CRAT.value / lbf_ft, abs=0.005)
+    assert "lbf" in said["figures"][0]["alt"]
+    for units in ("psi", ""):
+        with pytest.raises(ConfigError) as caught:
+            command([Path("any")], template=template, out=tmp_path / "none", units=units)
+        assert caught.value.rule == "unknown-units"
+    assert not (tmp_path / "none").exists()
+
+
 def test_details_are_those_of_the_test_or_of_a_file(tmp_path: Path) -> None:
     (tmp_path / "test.toml").write_text('[report]\ncustomer = "Example Tyres"\nreceived = 2026-03-01\n')
     other = tmp_path / "other.toml"

@@ -157,7 +157,6 @@ def _document(
     known_at: date | None,
     units: Style | None,
 ) -> Delivered:
-    from dataclasses import replace
     from datetime import date
 
     from toolkit.report.comparison.content import build_comparison_content
@@ -166,7 +165,7 @@ def _document(
 
     style = read_style(style_file(opened.path))
     if units is not None:
-        style = replace(style, force=units.force, moment=units.moment)
+        style = style.in_units_of(units)
     content = build_comparison_content(found, style, findings, issued=known_at or date.today())  # noqa: DTZ011
     return deliver(opened, content, out, name="comparison")
 

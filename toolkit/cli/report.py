@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from toolkit.report.deliver import Delivered, Job
     from toolkit.report.drawer import Drawer
     from toolkit.report.pdf import Office
+    from toolkit.report.style import Style
     from toolkit.report.template.package import Template
     from toolkit.tires.comparison import Comparison
 
@@ -42,7 +43,10 @@ NAME = "report"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Options:
-    """What every report of a command has in common; ``None`` in ``details``: those of each ``test.toml``."""
+    """What every report of a command has in common.
+
+    ``None`` in ``details``: those of each ``test.toml``; in ``units``: those of the style file.
+    """
 
     template: Template
     resolve: Callable[[Path], Resolved]
@@ -51,6 +55,7 @@ class Options:
     tydex: bool = False
     tir: bool = False
     models: tuple[str, ...] = ()
+    units: Style | None = None
     allow_missing: bool = False
     keep: bool = False
 
@@ -102,6 +107,14 @@ def command(
             "every one. Fits take seconds.",
         ),
     ] = None,
+    units: Annotated[
+        str | None,
+        typer.Option(
+            "--units",
+            help="SI or lbf: N and N*m, or lbf and lbf*ft, in tables, figures and text of the report. "
+            "Default: the style file's. What is handed over beside it stays in SI.",
+        ),
+    ] = None,
     calibration: CalibrationId = None,
     known_at: KnownAt = None,
     reader: Reader = "calamine",
@@ -128,12 +141,14 @@ def command(
 
     from toolkit.cli.fit import model_choice
     from toolkit.cli.resolve import resolve_test
+    from toolkit.cli.units import unit_choice
     from toolkit.report.drawer import Drawer
     from toolkit.report.pdf import Office
     from toolkit.report.template.package import read_template
 
     chosen = choose_reader(reader)
     compared = model_choice(models or [])
+    shown = None if units is None else unit_choice(units)
     started = time.perf_counter()
     # The template is judged before anything is read: its error must not wait for a long reduction.
     opened = read_template(template or home_template("org.docx", home))
@@ -154,6 +169,7 @@ def command(
             tydex=tydex or hand_over,
             tir=tir or hand_over,
             models=compared,
+            units=shown,
             allow_missing=allow_missing,
             keep=keep,
         )
@@ -264,11 +280,14 @@ def _job(
     from toolkit.report.deliver import Job
     from toolkit.report.style import read_style, style_file
 
+    style = read_style(style_file(options.template.path))
+    if options.units is not None:
+        style = style.in_units_of(options.units)
     content = build_content(
         resolved.result,
         resolved.record,
         findings=resolved.findings,
-        style=read_style(style_file(options.template.path)),
+        style=style,
         details=details_of(test, options.details),
         comparison=comparison,
     )
@@ -298,6 +317,7 @@ def report_payload(made: Made) -> dict[str, Any]:
     return {
         **delivered_payload(done),
         "calibrations": [{"id": use.id, "sha256": use.sha256, "unverified": use.unverified}],
+        "units": dict(zip(("force", "moment"), done.units, strict=True)),
         "manifest": [entry.as_dict() for entry in done.filled.manifest],
         "manifest_file": done.manifest,
         "handed_over": list(done.extras),

@@ -64,7 +64,10 @@ class Job:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Delivered:
-    """A delivered report; ``content_sha256`` is the same for the same inputs, whatever the day or the run."""
+    """A delivered report; ``content_sha256`` is the same for the same inputs, whatever the day or the run.
+
+    ``units`` are those of forces and of moments as they are printed.
+    """
 
     docx: Path
     pdf: Path
@@ -76,6 +79,7 @@ class Delivered:
     filled: Filled
     template_sha256: str
     content_sha256: str
+    units: tuple[str, str]
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -273,6 +277,7 @@ class _Run:
             filled=self.filled,
             template_sha256=job.template.sha256,
             content_sha256=digest,
+            units=(job.content.style.force, job.content.style.moment),
         )
 
     def result(self) -> Delivered | ToolkitError:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import datetime as dt
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -63,6 +63,10 @@ class Style:
         """Return the decimals of the first name that the style file has."""
         table = dict(self.decimals)
         return next((table[name] for name in names if name in table), None)
+
+    def in_units_of(self, other: Style) -> Style:
+        """Return this style with the units of forces and moments of another one."""
+        return replace(self, force=other.force, moment=other.moment)
 
     def unit(self, unit: str | None) -> tuple[str | None, float]:
         """Return a report unit in the organisation's choice, and the factor from the SI-side one."""
