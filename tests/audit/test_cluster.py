@@ -1,4 +1,8 @@
-"""A dask cluster on loopback: the answer of the workers here, and nothing lost where a worker dies."""
+"""A dask cluster on loopback: the answer of the workers here, and nothing lost where a worker dies.
+
+One scheduler and one pair of workers, started as an operator starts them, serve all the tests of this file;
+those that kill workers come last. What is waited for is an event, never a time.
+"""
 
 from __future__ import annotations
 
@@ -6,14 +10,16 @@ import contextlib
 import datetime as dt
 import json
 import os
+import shutil
 import signal
 import socket
 import subprocess
 import sys
-import threading
 import time
 from pathlib import Path
+from types import SimpleNamespace
 
+import dask
 import distributed
 import pytest
 from archive_made import FY, dated, recording, write
@@ -21,9 +27,10 @@ from typer.testing import CliRunner
 
 from toolkit import __version__
 from toolkit.audit import archive as archive_module
+from toolkit.audit import cluster as cluster_module
 from toolkit.audit.archive import audit_archive
 from toolkit.audit.cluster import run_on_cluster
-from toolkit.audit.workers import Lost
+from toolkit.audit.workers import DIED, Lost
 from toolkit.calibration.registry.registry import Registry
 from toolkit.cli.main import _register, app
 from toolkit.errors import ConfigError
@@ -32,6 +39,7 @@ HOME = Path(__file__).resolve().parents[2]
 REGISTRY = Registry(HOME / "calibrations")
 KNOWN = dt.date(2026, 1, 1)
 PATIENCE_S = 300  # a loaded machine starts slowly
+FILES = 23
 
 
 def free_port():
@@ -49,9 +57,11 @@ class Cluster:
         port = self.address.rpartition(":")[2]
         self._run("dask_scheduler", "--host", "127.0.0.1", "--port", port, "--no-dashboard")
 
-    def add_worker(self):
+    def add_workers(self, count):
         place = ("--local-directory", str(self.folder))
-        self._run("dask_worker", self.address, "--nthreads", "1", "--no-dashboard", *place)
+        self._run(
+            "dask_worker", self.address, "--nworkers", str(count), "--nthreads", "1", "--no-dashboard", *place
+        )
 
     def wait_for(self, workers):
         deadline = time.monotonic() + PATIENCE_S
@@ -95,14 +105,8 @@ def cluster(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def one(cluster):
-    cluster.add_worker()
-    return cluster.wait_for(1)
-
-
-@pytest.fixture(scope="module")
-def two(cluster, one):
-    cluster.add_worker()
+def two(cluster):
+    cluster.add_workers(2)
     return cluster.wait_for(2)
 
 
@@ -110,7 +114,7 @@ def two(cluster, one):
 def archive(tmp_path_factory):
     root = tmp_path_factory.mktemp("cluster") / "archive"
     dated(root / "test", "2019-06-01")
-    for number in range(40):
+    for number in range(FILES - 3):
         own = FY if number % 3 else (*FY[:2], -FY[2], FY[3])
         write(root / "test" / f"{number:02d}.xlsx", recording(seed=number, FY=own))
     write(root / "undated.xlsx", recording(seed=90))
@@ -125,14 +129,21 @@ def lines(folder):
     return sorted(kept, key=lambda line: line["path"])
 
 
+def audit_command(archive, out, *words):
+    """The answer of the command, but for where it was written and how long it took."""
+    _register()
+    home = ("--calibrations", str(HOME / "calibrations"), "--known-at", "2026-01-01", "--json")
+    given = ["audit", str(archive), *home, "--out", str(out), *words]
+    answer = json.loads(CliRunner().invoke(app, given, standalone_mode=False).stdout)
+    del answer["timing"], answer["written"]
+    return answer
+
+
 @pytest.fixture(scope="module")
-def here(archive, tmp_path_factory):
-    """The answer of two workers here, and what they keep."""
-    out = tmp_path_factory.mktemp("here")
-    made = audit_archive(archive, REGISTRY, known_at=KNOWN, workers=2, out=out)
-    kept = lines(out)
-    assert len(kept) == 43
-    return made, kept
+def there(archive, two, tmp_path_factory):
+    """The command's answer by two workers of the cluster, and the folder of what they told."""
+    out = tmp_path_factory.mktemp("there")
+    return audit_command(archive, out, "--scheduler", two), out
 
 
 def make():
@@ -143,90 +154,77 @@ def work(name):
     if name.startswith("die"):
         os.kill(os.getpid(), signal.SIGKILL)
     if name.startswith("hang"):
-        time.sleep(60)
-    if name.startswith("slow"):
-        time.sleep(0.2)
-    return f"{name} by {os.getpid()}" if name.startswith("who") else name.upper()
+        time.sleep(600)
+    return os.getpid() if name.startswith("who") else name.upper()
 
 
 def refusing():
     raise ConfigError("no", where="here", got="a", expected="b", next_step="c", rule="cluster")
 
 
-def test_something_that_is_no_scheduler_answers(monkeypatch):
-    monkeypatch.setattr("toolkit.audit.cluster.CONNECT_S", 1.0)
-    with socket.create_server(("127.0.0.1", 0)) as other:
-        address = f"tcp://127.0.0.1:{other.getsockname()[1]}"
-        assert refused(lambda: list(run_on_cluster(make, ["a"], address=address))).rule == "cluster"
-
-
 def test_a_cluster_without_workers(cluster):
     cluster.wait_for(0)
-    error = refused(lambda: list(run_on_cluster(make, ["a"], address=cluster.address, empty_s=1.0)))
+    error = refused(lambda: list(run_on_cluster(make, ["a"], address=cluster.address, empty_s=0.5)))
     assert error.rule == "cluster"
     assert "no worker" in error.got
 
 
-def test_one_worker_of_a_cluster_gives_the_lines_of_the_workers_here(archive, here, tmp_path, one):
-    there = audit_archive(archive, REGISTRY, known_at=KNOWN, scheduler=one, out=tmp_path)
-    assert lines(tmp_path) == here[1]
-    assert there == here[0]
+def test_a_cluster_answers_as_the_workers_here_do(archive, there, tmp_path):
+    answer, out = there
+    assert audit_command(archive, tmp_path, "--workers", "2") == answer
+    assert len(lines(out)) == FILES
+    assert lines(tmp_path) == lines(out)
+    assert (tmp_path / "audit.jsonl").read_bytes() == (out / "audit.jsonl").read_bytes()
 
 
-def test_what_a_worker_refuses_ends_the_run(one):
-    assert refused(lambda: list(run_on_cluster(refusing, ["a"], address=one))).what == "no"
-
-
-def test_two_workers_of_a_cluster_give_the_same_lines(archive, here, tmp_path, two):
-    there = audit_archive(archive, REGISTRY, known_at=KNOWN, scheduler=two, out=tmp_path)
-    assert lines(tmp_path) == here[1]
-    assert there == here[0]
-
-
-def test_a_run_here_goes_on_from_what_a_cluster_did(archive, tmp_path, two, monkeypatch):
-    first = audit_archive(archive, REGISTRY, known_at=KNOWN, scheduler=two, out=tmp_path / "out")
+def test_a_run_here_goes_on_from_what_a_cluster_did(archive, there, monkeypatch):
+    answer, out = there
     monkeypatch.setattr(archive_module, "run_isolated", lambda *_, **__: iter([]))
-    again = audit_archive(archive, REGISTRY, known_at=KNOWN, out=tmp_path / "out")
-    assert again == first
-    assert again.reused == 43
+    again = audit_archive(archive, REGISTRY, known_at=KNOWN, out=out)
+    assert again.reused == FILES
+    assert [one.sha256 for one in again.files] == [one["sha256"] for one in answer["files"]]
 
 
-def test_the_work_is_done_by_the_workers_of_the_cluster(two):
-    done = [
-        result for _, result in run_on_cluster(make, [f"who {n}" for n in range(30)], address=two, batch=1)
-    ]
-    people = {text.rpartition(" ")[2] for text in done}
-    assert len(people) == 2
-    assert str(os.getpid()) not in people
-
-
-def test_only_the_file_that_kills_its_worker_is_lost(two):
-    names = [f"file {n}" for n in range(40)]
-    names[7], names[30] = "die 1", "die 2"
-    found = dict(run_on_cluster(make, names, address=two, batch=8, empty_s=PATIENCE_S))
-    assert sorted(found) == sorted(names)
-    assert {name for name, result in found.items() if isinstance(result, Lost)} == {"die 1", "die 2"}
-    assert found["die 1"].reason.startswith("worker-died")
-    assert all(result == name.upper() for name, result in found.items() if not isinstance(result, Lost))
+def test_what_a_worker_refuses_ends_the_run(two):
+    assert refused(lambda: list(run_on_cluster(refusing, ["a"], address=two))).what == "no"
 
 
 def test_a_worker_that_somebody_kills_in_mid_run_loses_nothing(two):
-    names = [f"slow {n}" for n in range(40)]
-    with distributed.Client(two, set_as_default=False) as client:
-        client.wait_for_workers(2, timeout=PATIENCE_S)
-        victim = next(iter(client.run(os.getpid).values()))
-    threading.Timer(0.7, os.kill, (victim, signal.SIGKILL)).start()
-    found = dict(run_on_cluster(make, names, address=two, batch=4, empty_s=PATIENCE_S))
-    assert found == {name: name.upper() for name in names}
+    names = [f"who {n}" for n in range(30)]
+    found = {}
+    for name, process in run_on_cluster(make, names, address=two, batch=2, empty_s=PATIENCE_S):
+        if not found:
+            os.kill(process, signal.SIGKILL)  # the one that answered first, results of its next tasks with it
+        found[name] = process
+    assert sorted(found) == sorted(names)
+    assert all(isinstance(process, int) for process in found.values())
+    assert len(set(found.values())) > 1
+    assert os.getpid() not in found.values()
 
 
-def test_a_file_that_hangs_is_given_up_and_the_others_go_on(two):
-    found = dict(
-        run_on_cluster(make, ["a", "hang", "b"], address=two, batch=3, timeout_s=8.0, empty_s=PATIENCE_S)
-    )
-    assert isinstance(found["hang"], Lost)
-    assert found["hang"].reason == "timeout: no answer within 8 s"
-    assert (found["a"], found["b"]) == ("A", "B")
+def test_only_the_files_that_end_or_block_their_workers_are_lost(two):
+    names = [f"file {n}" for n in range(12)]
+    names[3], names[9] = "die", "hang"
+    found = dict(run_on_cluster(make, names, address=two, batch=4, timeout_s=2.0, empty_s=PATIENCE_S))
+    lost = {name: result.reason for name, result in found.items() if isinstance(result, Lost)}
+    assert lost == {"die": DIED, "hang": "timeout: no answer within 2 s"}
+    assert sorted(found) == sorted(names)
+    assert all(result == name.upper() for name, result in found.items() if name not in lost)
+
+
+def test_a_file_whose_results_are_lost_time_after_time_is_set_aside(monkeypatch):
+    given = []
+    task = SimpleNamespace(cancel=lambda **_: None)
+    client = SimpleNamespace(submit=lambda *given_, **_: given.append(given_[2]) or task)
+
+    def lost(*_):
+        raise cluster_module._LostResultError
+
+    monkeypatch.setattr(cluster_module, "_wait", lambda *_: [task])
+    monkeypatch.setattr(cluster_module, "_result", lost)
+    result = cluster_module._alone(client, distributed, make, "a", 1.0, 1.0, "tcp://127.0.0.1:1")
+    assert result == Lost(reason=DIED)
+    assert given == [("a",)] * 3
 
 
 def test_nothing_to_do_asks_nobody():
@@ -248,11 +246,18 @@ def refused(action):
     "address", ["tcp://127.0.0.1:{port}", "nonsense://x:1", "tcp://", "tcp://127.0.0.1:not-a-port"]
 )
 def test_a_scheduler_that_cannot_be_reached(address, monkeypatch):
-    monkeypatch.setattr("toolkit.audit.cluster.CONNECT_S", 1.0)
+    monkeypatch.setattr("toolkit.audit.scheduler.CONNECT_S", 1.0)
     where = address.format(port=free_port())
     error = refused(lambda: list(run_on_cluster(make, ["a"], address=where)))
     assert error.rule == "cluster"
     assert where in error.where
+
+
+def test_something_that_is_no_scheduler_answers(monkeypatch):
+    monkeypatch.setattr("toolkit.audit.scheduler.CONNECT_S", 0.3)
+    with socket.create_server(("127.0.0.1", 0)) as other:
+        address = f"tcp://127.0.0.1:{other.getsockname()[1]}"
+        assert refused(lambda: list(run_on_cluster(make, ["a"], address=address))).rule == "cluster"
 
 
 def test_workers_with_another_registry_or_archive_are_refused(archive):
@@ -275,14 +280,64 @@ def test_an_absent_library_is_named_with_its_extra(monkeypatch):
     assert error.next_step == 'pip install "toolkit[cluster]"'
 
 
-def test_the_command_takes_workers_here_or_those_of_a_cluster(archive, two):
-    def run(*words):
-        _register()
-        home = ("--calibrations", str(HOME / "calibrations"), "--known-at", "2026-01-01", "--json")
-        return CliRunner().invoke(app, ["audit", str(archive), *home, *words], standalone_mode=False)
+def test_workers_are_here_or_of_a_cluster(archive):
+    _register()
+    both = ["audit", str(archive), "--scheduler", "tcp://127.0.0.1:1", "--workers", "2"]
+    done = CliRunner().invoke(app, both)
+    assert done.exit_code == 2
+    assert "--scheduler" in done.output
 
-    there, here = (json.loads(run(*words).stdout) for words in (("--scheduler", two), ("--workers", "2")))
-    for answer in (there, here):
-        del answer["timing"]
-    assert there == here
-    assert run("--scheduler", two, "--workers", "2").return_value != 0
+
+def tls(**files):
+    return dask.config.set({f"distributed.comm.tls.{key}": text for key, text in files.items()})
+
+
+def test_a_secured_scheduler_needs_the_certificates_of_dask_s_configuration():
+    with tls(**{"ca-file": None, "client.cert": None}):
+        error = refused(lambda: list(run_on_cluster(make, ["a"], address="tls://127.0.0.1:1")))
+    assert error.rule == "cluster"
+    assert "distributed.comm.tls.ca-file and distributed.comm.tls.client.cert" in error.got
+    assert "DASK_DISTRIBUTED__COMM__TLS__CA_FILE" in error.next_step
+
+
+def test_a_certificate_that_is_not_there_is_named(tmp_path):
+    absent, empty = tmp_path / "absent.pem", tmp_path / "empty.pem"
+    empty.write_text("")
+    with tls(**{"ca-file": str(absent), "client.cert": str(empty)}):
+        error = refused(lambda: list(run_on_cluster(make, ["a"], address="tls://127.0.0.1:1")))
+    assert error.got == f"no such file: ca-file {absent}"
+    with tls(**{"ca-file": str(empty), "client.cert": str(empty)}):
+        error = refused(lambda: list(run_on_cluster(make, ["a"], address="tls://127.0.0.1:1")))
+    assert error.got.startswith("certificates that cannot be used")
+
+
+@pytest.mark.skipif(shutil.which("openssl") is None, reason="openssl makes the certificates of this test")
+def test_a_cluster_behind_certificates(tmp_path):
+    ours, other = certificate(tmp_path, "ours"), certificate(tmp_path, "other")
+    security = distributed.Security(
+        tls_ca_file=ours["ca-file"], require_encryption=True,
+        **{f"tls_{role}_{kind}": ours[f"client.{kind}"] for role in ("scheduler", "worker", "client")
+           for kind in ("cert", "key")},
+    )  # fmt: skip
+    with distributed.LocalCluster(
+        n_workers=1, threads_per_worker=1, processes=False, protocol="tls", security=security,
+        dashboard_address=":0", host="127.0.0.1",
+    ) as secured:  # fmt: skip
+        address = secured.scheduler_address
+        with tls(**ours):
+            assert dict(run_on_cluster(make, ["a", "b"], address=address)) == {"a": "A", "b": "B"}
+        with tls(**other):
+            error = refused(lambda: list(run_on_cluster(make, ["a"], address=address)))
+        assert error.rule == "cluster"
+        assert "CERTIFICATE_VERIFY_FAILED" in error.got
+
+
+def certificate(folder, name):
+    """A certificate that vouches for itself, and its key, as dask's configuration names them."""
+    key, cert = folder / f"{name}.key", folder / f"{name}.pem"
+    subprocess.run(
+        ["openssl", "req", "-x509", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:prime256v1", "-nodes",
+         "-keyout", str(key), "-out", str(cert), "-days", "2", "-subj", f"/CN={name}"],
+        check=True, capture_output=True,
+    )  # fmt: skip
+    return {"ca-file": str(cert), "client.cert": str(cert), "client.key": str(key)}

@@ -8,18 +8,16 @@ memory of a worker is limited by its nanny.
 
 from __future__ import annotations
 
-import asyncio
 import gc
 import os
-import socket
 import threading
 import time
 import uuid
 from collections.abc import Callable, Iterator, Sequence
 from itertools import islice
 from typing import Any, TypeVar
-from urllib.parse import urlsplit
 
+from toolkit.audit.scheduler import CONNECT_S, security_of, trouble, unreachable
 from toolkit.audit.workers import DIED, TIMEOUT_S, Lost
 from toolkit.errors import ConfigError
 from toolkit.recording.extras import needed
@@ -28,7 +26,6 @@ Result = TypeVar("Result")
 
 BATCH = 16
 _TRIES = 3  # of a file whose results are lost with a worker that had done it
-CONNECT_S = 10.0
 EMPTY_S = 60.0  # without any worker, for so long a cluster is waited for
 _GRACE_S = 30.0  # for a new worker to import what it needs
 _AHEAD = 4  # batches a thread of the cluster has waiting
@@ -51,7 +48,7 @@ def run_on_cluster(
     ----------
     make : called once in each thread of a worker, returns what is called with each name; both must pickle
     names : what there is to do
-    address : of the scheduler, ``tcp://host:8786``
+    address : of the scheduler, ``tcp://host:8786``; ``tls://``: see `toolkit.audit.scheduler`
     timeout_s : of one name; its worker is ended beyond, for its nanny to start again
     batch : names a task
     empty_s : how long a cluster without workers is waited for
@@ -60,7 +57,7 @@ def run_on_cluster(
     ------
     ConfigError
         ``missing-extra``; ``cluster``: the scheduler cannot be reached or goes away, it has no workers, or
-        they do not have this toolkit; and what ``make`` raises
+        they do not have this toolkit, or a certificate is lacking; and what ``make`` raises
     """
     distributed: Any = needed("distributed", extra="cluster", to="use a cluster", where=address)
     if not names:
@@ -76,44 +73,22 @@ def run_on_cluster(
 
 
 def _client(distributed: Any, address: str) -> Any:
-    told = _unreachable(distributed, address)
+    security = security_of(distributed, address)
+    told = unreachable(distributed, address, security)
     if told is None:
         try:
-            return distributed.Client(address, timeout=CONNECT_S, set_as_default=False, name="toolkit-audit")
+            return distributed.Client(
+                address, timeout=CONNECT_S, set_as_default=False, name="toolkit-audit", security=security
+            )
         except (OSError, ValueError, TypeError) as error:
             told = str(error) or type(error).__name__
         gc.collect()  # a client that failed, found later while another one starts, would wait for it for ever
-    raise _trouble(
+    raise trouble(
         address,
         told[:300],
-        "a scheduler at an address such as tcp://host:8786",
+        "a scheduler at an address such as tcp://host:8786, or tls:// with dask's own certificates",
         "start it with 'dask scheduler', and workers with 'dask worker ADDRESS'",
     )
-
-
-def _unreachable(distributed: Any, address: str) -> str | None:
-    """Return why no scheduler answers at an address, None where one does.
-
-    A client asks whoever is there, and would wait for an answer without end.
-    """
-    try:
-        parts = urlsplit(address)
-        host, port = parts.hostname, parts.port
-        if parts.scheme not in ("tcp", "tls") or not host or port is None:
-            return f"{address!r}, which is no address of a scheduler"
-        socket.create_connection((host, port), timeout=CONNECT_S).close()
-        if parts.scheme == "tcp":
-            asyncio.run(asyncio.wait_for(_greeted(distributed, address), CONNECT_S))
-    except TimeoutError:
-        return f"no answer within {CONNECT_S:g} s"
-    except (OSError, ValueError) as error:
-        return str(error)
-    return None
-
-
-async def _greeted(distributed: Any, address: str) -> None:
-    comm = await distributed.core.connect(address, timeout=CONNECT_S)
-    await comm.close()
 
 
 def _batches(
@@ -226,7 +201,7 @@ def _result(distributed: Any, task: Any, address: str) -> list[Any] | None:
     except distributed.KilledWorker:
         return None
     except (ImportError, AttributeError) as error:
-        raise _trouble(
+        raise trouble(
             address,
             f"a worker has not this toolkit: {error}",
             "the same installation on every worker",
@@ -242,7 +217,8 @@ class _LostResultError(Exception):
 
 
 def _lost(distributed: Any, address: str) -> Exception:
-    return _LostResultError() if _unreachable(distributed, address) is None else _gone(address)
+    told = unreachable(distributed, address, security_of(distributed, address))
+    return _LostResultError() if told is None else _gone(address)
 
 
 def _threads(client: Any, address: str) -> int:
@@ -273,7 +249,7 @@ def _timed(work: Callable[[str], Result], name: str, timeout_s: float) -> Result
 
 
 def _gone(address: str) -> ConfigError:
-    return _trouble(
+    return trouble(
         address,
         "the connection was lost",
         "a scheduler that is there until the audit ends",
@@ -282,16 +258,9 @@ def _gone(address: str) -> ConfigError:
 
 
 def _no_workers(address: str, seconds: float) -> ConfigError:
-    return _trouble(
+    return trouble(
         address,
         f"no worker for {seconds:g} s",
         "workers, with nannies that start them again",
         f"start some with 'dask worker {address}'; with --out what is done is used again",
     )
-
-
-def _trouble(address: str, got: str, expected: str, next_step: str) -> ConfigError:
-    return ConfigError(
-        "the cluster cannot be used", where=f"--scheduler {address}", got=got, expected=expected,
-        next_step=next_step, rule="cluster",
-    )  # fmt: skip

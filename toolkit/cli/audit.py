@@ -24,7 +24,11 @@ def command(
     ] = None,
     scheduler: Annotated[
         str | None,
-        typer.Option("--scheduler", help="A dask cluster instead, by its scheduler: tcp://host:8786."),
+        typer.Option(
+            "--scheduler",
+            help="A dask cluster instead: tcp://host:8786, or tls:// with the certificates that dask's own "
+            "configuration names (distributed.comm.tls).",
+        ),
     ] = None,
     out: Annotated[
         Path | None,
