@@ -11,6 +11,7 @@ from pathlib import Path
 
 from lxml import etree
 
+from toolkit.report.template.bulk import with_rows, without_rows
 from toolkit.report.template.contents import ContentsEntry, contents_fields
 from toolkit.report.template.xml import SDT_PR, W_P, W_R, W_T, Element, ancestor, parser, q
 
@@ -141,9 +142,11 @@ def _edited(docx: bytes, part: str, edit: Edit) -> bytes:
         for item in source.infolist():
             data = source.read(item)
             if item.filename == part:
+                data, rows = without_rows(data)
                 root = etree.fromstring(data, parser())
                 edit(root)
                 data = etree.tostring(root, xml_declaration=True, encoding="UTF-8", standalone=True)
+                data = with_rows(data, rows)
             target.writestr(item, data)
     return stream.getvalue()
 

@@ -14,6 +14,7 @@ from toolkit.files import sha256_bytes
 from toolkit.report.content import ReportContent, Table
 from toolkit.report.figures import Picture
 from toolkit.report.tags import Tag
+from toolkit.report.template.bulk import Bulk, row_texts
 from toolkit.report.template.check import LintFinding, check_stories
 from toolkit.report.template.contents import write_contents
 from toolkit.report.template.controls import (
@@ -26,6 +27,7 @@ from toolkit.report.template.controls import (
 )
 from toolkit.report.template.fields import number_captions
 from toolkit.report.template.filled import Entry, Filled
+from toolkit.report.template.headings import levelled
 from toolkit.report.template.package import Template, open_package
 from toolkit.report.template.pages import drop_notes, headers_shown, notes_used
 from toolkit.report.template.pictures import Ids, free_height, insert_at_mark, picture_run
@@ -34,9 +36,6 @@ from toolkit.report.template.rows import fill_table
 from toolkit.report.template.scan import Site, row_in, scan, table_of
 from toolkit.report.template.xml import (
     W_P,
-    W_TBL,
-    W_TC,
-    W_TR,
     Element,
     Story,
     ancestor,
@@ -107,7 +106,7 @@ class _Log:
     manifest: list[Entry] = field(default_factory=list)
     figures: list[tuple[str, str]] = field(default_factory=list)
     missing: list[str] = field(default_factory=list)
-    rows: list[Element] = field(default_factory=list)
+    rows: list[Element | tuple[str, ...]] = field(default_factory=list)
     pictures: list[str] = field(default_factory=list)
     of_the_run: set[str] = field(default_factory=set)
     rows_of_the_run: set[int] = field(default_factory=set)
@@ -128,6 +127,7 @@ class _Filler:
         self.package, self.parts, self.template, self.content = package, parts, template, content
         self.pictures, self.allow_missing = pictures, allow_missing
         self.ids, self.log = Ids.of(parts), _Log()
+        self.bulk = Bulk.of(parts, lambda: levelled(package))
 
     def run(self, lint: tuple[LintFinding, ...]) -> Filled:
         used = {site.tag.path for site in scan(self.parts)}
@@ -165,17 +165,14 @@ class _Filler:
         added = self._marks(used)
         number_captions(body)
         contents = write_contents(self.package, body)
-        cells = tuple(
-            tuple(_cell_text(cell) for cell in row.iter(W_TC) if ancestor(cell, W_TR) is row)
-            for row in self.log.rows
-        )
+        cells = tuple(row if isinstance(row, tuple) else row_texts(row) for row in self.log.rows)
         for story in self.parts:
             write_back(story)
         set_properties(self.package, self.content)
         stream = io.BytesIO()
         self.package.save(stream)
         return Filled(
-            docx=stream.getvalue(),
+            docx=self.bulk.written(stream.getvalue()),
             manifest=tuple(self.log.manifest),
             figures=tuple(self.log.figures),
             cells=cells,
@@ -269,6 +266,7 @@ class _Filler:
             said,
             self.content.style,
             self.ids,
+            self.bulk,
         )
         if not site.fallback:
             passing = {f"tk:{site.tag.path}.{one.name}" for one in table.columns if one.of_the_run}
@@ -378,10 +376,6 @@ def _unprintable(table: Table | None) -> str:
             if isinstance(cell, float) and cell - cell != 0:
                 return f" ({column.name} is not finite)"
     return ""
-
-
-def _cell_text(cell: Element) -> str:
-    return "".join(paragraph_text(p) for p in cell.iter(W_P) if ancestor(p, W_TBL) is ancestor(cell, W_TBL))
 
 
 __all__ = ["Entry", "Filled", "fill", "needed_figures"]

@@ -55,6 +55,12 @@ class StyleSheet:
         return next((identity for identity, own in self.names.items() if own == name.lower()), None)
 
 
+def levelled(package: object) -> frozenset[str]:
+    """Return the ids of the paragraph styles that make a heading."""
+    sheet = StyleSheet.of(package)
+    return frozenset(identity for identity, level in sheet.levels.items() if level < _BODY)
+
+
 def level_of(paragraph: Element, sheet: StyleSheet) -> int:
     """Return a paragraph's outline level, 0 the highest, 9 that of body text."""
     own = paragraph.find(f"{_P_PR}/{_LEVEL}")

@@ -9,6 +9,7 @@ from copy import deepcopy
 from toolkit.report.content import Cell, Table
 from toolkit.report.style import Style
 from toolkit.report.tags import Tag, format_number, parse_tag
+from toolkit.report.template.bulk import MANY, Bulk, Mould, fresh_ids
 from toolkit.report.template.controls import fill_control, fill_literals, set_cell
 from toolkit.report.template.pictures import Ids, free_row
 from toolkit.report.template.scan import LITERAL, control_tag, own_rows, row_in, visible_texts
@@ -27,9 +28,15 @@ def cell_text(value: Cell, spec: str, style: Style) -> str:
 
 
 def fill_table(
-    element: Element, table: Table, resolve: Callable[[Tag], str], said: Said, style: Style, ids: Ids
-) -> list[Element]:
-    """Fill a w:tbl and return its new rows.
+    element: Element,
+    table: Table,
+    resolve: Callable[[Tag], str],
+    said: Said,
+    style: Style,
+    ids: Ids,
+    bulk: Bulk | None = None,
+) -> list[Element | tuple[str, ...]]:
+    """Fill a w:tbl and return its new rows, or of each row kept as bytes the texts of its cells.
 
     Parameters
     ----------
@@ -37,6 +44,7 @@ def fill_table(
     table : what to print
     resolve : text of a value tag that stands in the prototype row
     said : receives (column, text) of every cell value
+    bulk : takes the rows of a table that has very many
     """
     prototype = _prototype(element)
     tagged = _has_tags(prototype)
@@ -45,14 +53,9 @@ def fill_table(
     pattern = deepcopy(prototype)
     _forget_identity(pattern)
     literals, controls = _places(pattern)
-    made: list[Element] = []
-    last = prototype
-    for values in table.rows:
-        row = deepcopy(pattern)
-        last.addnext(row)
-        last = row
 
-        def text(tag: Tag, values: tuple[Cell, ...] = values) -> str:
+    def texts(values: tuple[Cell, ...]) -> Callable[[Tag], str]:
+        def text(tag: Tag) -> str:
             if tag.family != "row":
                 return resolve(tag)
             column = table.columns[index[tag.name]]
@@ -60,6 +63,9 @@ def fill_table(
             said(tag.name, shown)
             return shown
 
+        return text
+
+    def put(row: Element, text: Callable[[Tag], str]) -> None:
         if tagged:
             # Literals first: what a control then receives is never read as a literal.
             nodes = list(row.iter())
@@ -69,12 +75,26 @@ def fill_table(
                 fill_control(nodes[place], text(tag))
         else:
             cells = [cell for cell in row.iter(W_TC) if ancestor(cell, W_TR) is row]
-            for cell, column, value in zip(cells, table.columns, values, strict=True):
-                shown = cell_text(value, column.spec, style)
-                said(column.name, shown)
-                set_cell(cell, shown)
-        _fresh_ids(row, ids)
-        made.append(row)
+            for cell, column in zip(cells, table.columns, strict=True):
+                set_cell(cell, text(Tag(path=f"row.{column.name}")))
+
+    made: list[Element | tuple[str, ...]] = []
+    if bulk is not None and len(table.rows) > MANY and bulk.takes(element, pattern):
+        mould = Mould(pattern, put, ids, element.getroottree().getroot())
+        rows = []
+        for xml, cells in mould.cast(map(texts, table.rows)):
+            rows.append(xml)
+            made.append(cells)
+        bulk.add(prototype, rows)
+    else:
+        last = prototype
+        for values in table.rows:
+            row = deepcopy(pattern)
+            last.addnext(row)
+            last = row
+            put(row, texts(values))
+            fresh_ids(row, ids)
+            made.append(row)
     prototype.getparent().remove(prototype)
     return made
 
@@ -131,12 +151,3 @@ def _forget_identity(row: Element) -> None:
     for element in row.iter():
         for name in ("w14:paraId", "w14:textId"):
             element.attrib.pop(q(name), None)
-
-
-def _fresh_ids(row: Element, ids: Ids) -> None:
-    for element in row.iter(q("w:id")):
-        if element.getparent().tag == q("w:sdtPr"):
-            ids.control += 1
-            element.set(q("w:val"), str(ids.control))
-    for element in row.iter(q("wp:docPr")):
-        element.set("id", str(ids.next_drawing()))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import re
 import subprocess
 import tempfile
@@ -13,29 +12,30 @@ from toolkit.errors import RenderError
 from toolkit.report.template.filled import Filled
 from toolkit.report.template.scan import BROKEN, LITERAL, control_tag
 from toolkit.report.template.verify_text import Check, text_checks
-from toolkit.report.template.xml import SDT_PR, W_P, W_SDT, clean, in_fallback, paragraph_text, q, stories
+from toolkit.report.template.written import text_elements
+from toolkit.report.template.xml import SDT_PR, W_P, W_SDT, clean, in_fallback, paragraph_text, q
 
 
 def verify_docx(filled: Filled) -> tuple[Check, ...]:
     """Check the filled Word file itself: placeholders gone, every figure there with its text."""
-    from docx.package import Package
-
-    parts = stories(Package.open(io.BytesIO(filled.docx)))
     values = " ".join(entry.text for entry in filled.manifest)
     left, alts = [], []
-    for story in parts:
-        for paragraph in story.root.iter(W_P):
-            text = paragraph_text(paragraph)
+    for element in text_elements(filled.docx, filled.main_part):
+        if element.tag == W_P:
+            text = paragraph_text(element)
+            if "{{" not in text:
+                continue
             left += [m[0] for m in LITERAL.finditer(text) if m[0] not in values]
             if BROKEN.search(text) and "{{" not in values:
                 left.append(text[:40])
-        for sdt in story.root.iter(W_SDT):
-            tag = control_tag(sdt)
+        elif element.tag == W_SDT:
+            tag = control_tag(element)
             if tag is not None and (
-                tag.family == "if" or sdt.find(f"{SDT_PR}/{q('w:showingPlcHdr')}") is not None
+                tag.family == "if" or element.find(f"{SDT_PR}/{q('w:showingPlcHdr')}") is not None
             ):
                 left.append(str(tag))
-        alts += [p.get("descr") or "" for p in story.root.iter(q("wp:docPr")) if not in_fallback(p)]
+        elif not in_fallback(element):
+            alts.append(element.get("descr") or "")
     absent = [
         tag
         for tag, alt in filled.figures

@@ -64,7 +64,7 @@ class Story:
         return bool(self.root.tag == q("w:document"))
 
 
-_STORIES = ("header", "footer", "footnotes", "endnotes")
+STORIES = ("header", "footer", "footnotes", "endnotes")
 
 
 def stories(package: Any) -> list[Story]:
@@ -74,7 +74,7 @@ def stories(package: Any) -> list[Story]:
     seen = {_name(main)}
     for rel in sorted(main.rels.values(), key=lambda one: one.rId):
         kind = rel.reltype.rpartition("/")[2]
-        if rel.is_external or kind not in _STORIES or _name(rel.target_part) in seen:
+        if rel.is_external or kind not in STORIES or _name(rel.target_part) in seen:
             continue
         part = rel.target_part
         seen.add(_name(part))
