@@ -158,8 +158,15 @@ def _gaussian_process(s: Scenario, residual: dict[str, Array], nominal: Signals)
     """Return what a Gaussian process over inputs and covariates sees; its scales by held-out error on the
     last run."""
 
+    # A file to predict may lack a covariate that was recorded before, and the other way round.
+    shared = [
+        name
+        for name in s.inputs(s.runs[0]).columns
+        if name != "t" and all(name in s.inputs(run) for run in (*s.runs, *s.predict))
+    ]
+
     def table(runs: tuple[Run, ...]) -> Array:
-        wide = [s.inputs(run).drop(columns="t").to_numpy(float) for run in runs]
+        wide = [s.inputs(run)[shared].to_numpy(float) for run in runs]
         for i, run in enumerate(runs):
             wide[i] = np.column_stack([wide[i], np.gradient(wide[i][:, 0], run.rows)])
         return np.vstack(wide)
