@@ -238,6 +238,20 @@ def test_units_of_choice_go_through_values_and_tables(tmp_path: Path, resolved, 
     assert not (tmp_path / "none").exists()
 
 
+def test_a_diagnosis_is_of_one_test_and_a_release_needs_one(tmp_path: Path) -> None:
+    (tmp_path / "diagnosis.json").write_text("{}")
+    out = tmp_path / "out"
+    for tests, given, by, rule in (
+        ([Path("a"), Path("b")], tmp_path, None, "diagnosis-of-one-test"),
+        ([Path("a")], None, "second person", "diagnosis-of-one-test"),
+        ([Path("a")], tmp_path, None, "not-a-diagnosis"),
+    ):
+        with pytest.raises(ConfigError) as caught:
+            command(tests, diagnosis=given, by=by, out=out)
+        assert caught.value.rule == rule
+    assert not out.exists()
+
+
 def test_details_are_those_of_the_test_or_of_a_file(tmp_path: Path) -> None:
     (tmp_path / "test.toml").write_text('[report]\ncustomer = "Example Tyres"\nreceived = 2026-03-01\n')
     other = tmp_path / "other.toml"

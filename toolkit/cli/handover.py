@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import platform
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,6 +15,7 @@ from toolkit.recording.marks import OWN_OUTPUT
 if TYPE_CHECKING:
     from toolkit.cli.resolve import Resolved
     from toolkit.recording.details import ReportDetails
+    from toolkit.report.diagnosis.in_report import Told
 
 WHOLE, TYDEX, TIR = "test.xlsx", "test.tdx", "tire.tir"
 
@@ -52,8 +53,40 @@ def writers(
     return made
 
 
-def provenance(resolved: Resolved, test: Path) -> dict[str, Any]:
-    """Return inputs and software for the manifest: every recording with its hash, and the test's own file."""
+def diagnosis_of(given: Path | None, by: str | None, tests: Sequence[Path]) -> tuple[Told, Path] | None:
+    """Return the answer that a report tells, and its file.
+
+    Raises
+    ------
+    ConfigError
+        it is no answer; it is given for several tests; a name releases what is not given
+    """
+    from toolkit.diagnosis.answer_read import read_answer
+    from toolkit.errors import ConfigError
+    from toolkit.report.diagnosis.in_report import Told
+
+    if given is None and by is None:
+        return None
+    if given is None or len(tests) > 1:
+        raise ConfigError(
+            "there is no diagnosis to release"
+            if given is None
+            else "one diagnosis was given for several tests",
+            where="--by" if given is None else "--diagnosis",
+            got=by if given is None else f"{len(tests)} tests",
+            expected="--diagnosis DIR_OR_JSON beside it" if given is None else "one test",
+            next_step="make the report of the test that was diagnosed by itself",
+            rule="diagnosis-of-one-test",
+        )
+    answer, file = read_answer(given)
+    return Told(answer=answer, by=by), file
+
+
+def provenance(resolved: Resolved, test: Path, *, diagnosis: Path | None = None) -> dict[str, Any]:
+    """Return inputs and software for the manifest: every recording with its hash, and the test's own file.
+
+    ``diagnosis`` is the answer that the report tells, an input too.
+    """
     from toolkit.files import sha256_file
     from toolkit.recording.folder import TEST_FILE, read_test_folder
 
@@ -61,6 +94,8 @@ def provenance(resolved: Resolved, test: Path) -> dict[str, Any]:
     inputs = {one.file: one.file_sha256 for one in reduced.conditions}
     named = [test / TEST_FILE, read_test_folder(test).tare_file] if test.is_dir() else [test]
     inputs |= {one.name: sha256_file(one) for one in named if one is not None and one.is_file()}
+    if diagnosis is not None:
+        inputs[diagnosis.name] = sha256_file(diagnosis)
     return {
         "test": reduced.info.name,
         "simulated": reduced.info.simulated,

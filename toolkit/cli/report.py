@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from toolkit.cli.resolve import Resolved
     from toolkit.errors import ToolkitError
     from toolkit.report.deliver import Delivered, Job
+    from toolkit.report.diagnosis.in_report import Told
     from toolkit.report.drawer import Drawer
     from toolkit.report.pdf import Office
     from toolkit.report.style import Style
@@ -46,6 +47,7 @@ class Options:
     """What every report of a command has in common.
 
     ``None`` in ``details``: those of each ``test.toml``; in ``units``: those of the style file.
+    ``diagnosis`` is the answer that the report tells, with its file.
     """
 
     template: Template
@@ -56,6 +58,7 @@ class Options:
     tir: bool = False
     models: tuple[str, ...] = ()
     units: Style | None = None
+    diagnosis: tuple[Told, Path] | None = None
     allow_missing: bool = False
     keep: bool = False
 
@@ -115,6 +118,18 @@ def command(
             "Default: the style file's. What is handed over beside it stays in SI.",
         ),
     ] = None,
+    diagnosis: Annotated[
+        Path | None,
+        typer.Option(
+            "--diagnosis",
+            metavar="DIR_OR_JSON",
+            help="Tell the answer of 'toolkit diagnose' in a chapter of the report (tk:diagnosis.*).",
+        ),
+    ] = None,
+    by: Annotated[
+        str | None,
+        typer.Option("--by", help="Who releases the diagnosis' opinion on the cause; else a draft."),
+    ] = None,
     calibration: CalibrationId = None,
     known_at: KnownAt = None,
     reader: Reader = "calamine",
@@ -140,6 +155,7 @@ def command(
     from functools import partial
 
     from toolkit.cli.fit import model_choice
+    from toolkit.cli.handover import diagnosis_of
     from toolkit.cli.resolve import resolve_test
     from toolkit.cli.units import unit_choice
     from toolkit.report.drawer import Drawer
@@ -149,6 +165,7 @@ def command(
     chosen = choose_reader(reader)
     compared = model_choice(models or [])
     shown = None if units is None else unit_choice(units)
+    told = diagnosis_of(diagnosis, by, tests)
     started = time.perf_counter()
     # The template is judged before anything is read: its error must not wait for a long reduction.
     opened = read_template(template or home_template("org.docx", home))
@@ -170,6 +187,7 @@ def command(
             tir=tir or hand_over,
             models=compared,
             units=shown,
+            diagnosis=told,
             allow_missing=allow_missing,
             keep=keep,
         )
@@ -290,13 +308,14 @@ def _job(
         style=style,
         details=details_of(test, options.details),
         comparison=comparison,
+        diagnosis=options.diagnosis[0] if options.diagnosis else None,
     )
     return Job(
         template=options.template,
         content=content,
         out=folder,
         extras=writers(resolved, test, xlsx=options.xlsx, tydex=options.tydex, tir=options.tir),
-        provenance=provenance(resolved, test),
+        provenance=provenance(resolved, test, diagnosis=options.diagnosis and options.diagnosis[1]),
     )
 
 

@@ -14,6 +14,7 @@ from toolkit.recording.details import ReportDetails
 from toolkit.report.columns import UNITS
 from toolkit.report.content import Cell, ReportContent, Table, Value
 from toolkit.report.details import details_values
+from toolkit.report.diagnosis.in_report import Told, diagnosis_tables, diagnosis_values, told_plots
 from toolkit.report.models import model_plots
 from toolkit.report.plots import build_plots, load_groups
 from toolkit.report.style import Style
@@ -41,6 +42,7 @@ def build_content(
     issued: dt.date | None = None,
     details: ReportDetails | None = None,
     comparison: Comparison | None = None,
+    diagnosis: Told | None = None,
 ) -> ReportContent:
     """Return what a template can ask for.
 
@@ -53,6 +55,7 @@ def build_content(
     issued : date of issue; default today
     details : what the report says beyond the measurement: customer, item, method, opinions
     comparison : tire models fitted to the test; None leaves their table and figures out
+    diagnosis : the answer of a diagnosis and who releases it; None leaves its chapter out
     """
     style = style or Style()
     day = (issued or dt.datetime.now(tz=dt.UTC).date()).isoformat()
@@ -63,14 +66,17 @@ def build_content(
     watermark = SIMULATED if info.simulated else None
     drawn = build_plots(result, style, watermark)
     drawn |= model_plots(comparison, watermark=watermark, decimal_comma=style.decimal_comma)
+    drawn |= told_plots(diagnosis, style)
     plots = {
         name: replace(say_plot(plot, dict(style.words), dict(style.alt)), decimal_comma=style.decimal_comma)
         for name, plot in drawn.items()
     }
     details = details or ReportDetails()
     tables = build_tables(result, record, listed, style, details.opinions, comparison)
+    tables |= diagnosis_tables(diagnosis, style)
     values = _values(result, record, listed, style, day)
     values |= details_values(details, result, style, len(listed))
+    values |= diagnosis_values(diagnosis, style)
     values["report.id"] = Value(kind="text", value=report_id(result, details))
     values |= {
         f"caption.{name}": Value(kind="text", value=plots[name].caption) for name in FIGURES if name in plots

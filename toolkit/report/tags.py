@@ -12,7 +12,8 @@ from dataclasses import dataclass
 
 from toolkit.errors import TemplateError
 from toolkit.report.columns import TABLES, UNITS
-from toolkit.report.entries import Spec, catalogue_of, conditions_of
+from toolkit.report.diagnosis.entries import REPORT_FIGURES, REPORT_TABLES, REPORT_VALUES
+from toolkit.report.entries import Spec, Tables, catalogue_of, conditions_of
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -130,6 +131,7 @@ _VALUES = (
     Spec(path="test.files", kind="number", unit="1", spec="d", description="number of recordings"),
     Spec(path="test.conditions", kind="number", unit="1", spec="d", description="number of conditions used"),
     Spec(path="test.findings", kind="number", unit="1", spec="d", description="number of findings"),
+    *REPORT_VALUES,
 )
 
 _SUMMARY = (
@@ -157,7 +159,9 @@ FIGURES = {
     "aligning_stiffness": "aligning stiffness against load, secant and slope",
     "models_fy": "error of each tire model in lateral force, fitted and with each load left out",
     "models_mz": "error of each tire model in aligning moment, fitted and with each load left out",
+    **REPORT_FIGURES,
 }
+EVERY_TABLE: Tables = {**TABLES, **REPORT_TABLES}
 
 CONDITIONS = {
     "simulated": "the data are simulated",
@@ -199,12 +203,12 @@ def catalogue() -> tuple[Spec, ...]:
         )
         for name, _, _, text in _SUMMARY[1:]
     ]
-    return catalogue_of([*_VALUES, *summary, *coefficients], FIGURES, TABLES, condition_names())
+    return catalogue_of([*_VALUES, *summary, *coefficients], FIGURES, EVERY_TABLE, condition_names())
 
 
 def condition_names() -> dict[str, str]:
     """Return every name that ``tk:if.<name>`` may have: conditions, figures, tables and values."""
-    names = conditions_of(CONDITIONS, FIGURES, TABLES, _VALUES)
+    names = conditions_of(CONDITIONS, FIGURES, EVERY_TABLE, _VALUES)
     return names | {f"summary.{name}": f"there is a value: {text}" for name, _, _, text in _SUMMARY}
 
 

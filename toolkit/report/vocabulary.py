@@ -10,9 +10,8 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from toolkit.report.columns import TABLES
 from toolkit.report.entries import Spec, Tables
-from toolkit.report.tags import FIGURES, TERM, catalogue, condition_names
+from toolkit.report.tags import EVERY_TABLE, FIGURES, TERM, catalogue, condition_names
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -79,7 +78,7 @@ REPORT = Vocabulary(
     name="report",
     catalogue=catalogue(),
     figures=FIGURES,
-    tables=TABLES,
+    tables=EVERY_TABLE,
     conditions=condition_names(),
     required=("tk:calibration.hash",),
     marks={

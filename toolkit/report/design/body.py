@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from toolkit.report.design.blocks import Pieces, literal, paragraph, run
 from toolkit.report.design.budget import budget_table
+from toolkit.report.design.diagnosis import diagnosis_section
 from toolkit.report.design.models import models_section
 from toolkit.report.design.opening import WIDE, heading
 from toolkit.report.design.pieces import contents
@@ -268,6 +269,7 @@ def chapters(p: Pieces) -> list[str]:
             [36, 20, 110],
             "lll",
         ),
+        diagnosis_section(p),
         p.block(
             "tk:if.opinions",
             heading("Opinions and interpretations")

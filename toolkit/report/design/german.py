@@ -7,6 +7,7 @@ from typing import Any
 
 from toolkit.report.design.blocks import Pieces, cell, field, paragraph, row, run, table
 from toolkit.report.design.default import build_document
+from toolkit.report.design.diagnosis import GERMAN, diagnosis_section
 from toolkit.report.design.opening import heading
 from toolkit.report.design.pieces import across, contents, logo, logo_png, section_break
 from toolkit.report.design.styles import make_styles
@@ -284,6 +285,7 @@ def _body(p: Pieces) -> list[str]:
             "lll",
             kind="Tabelle",
         ),
+        diagnosis_section(p, GERMAN, width_mm=165),
         p.block(
             "tk:if.opinions",
             heading("Meinungen und Interpretationen")

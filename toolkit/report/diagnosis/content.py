@@ -92,6 +92,17 @@ def _texts(
     model_sha256: str | None,
     by: str | None,
 ) -> dict[str, str | None]:
+    return answer_texts(made, style, by=by) | {
+        "case": f"{case.path.name}, SHA-256 {made.case_sha256}",
+        "calibrations": "none" if record is None else f"{record.id} ({record.sha256})"
+        + ("" if record.verified else " UNVERIFIED"),
+        "model": None if model_sha256 is None else f"model.toml, SHA-256 {model_sha256}",
+        "software": f"toolkit {__version__}",
+    }  # fmt: skip
+
+
+def answer_texts(made: Diagnosis, style: Style, *, by: str | None) -> dict[str, str | None]:
+    """Return what an answer tells by itself, by the name of its tag."""
     released = f"released by {by}" if by else "draft: nobody authorised has released it"
     return {
         "id": f"DIA-{made.case_sha256[:8].upper()}",
@@ -105,13 +116,9 @@ def _texts(
         "held_out_by": f"Held out by {made.held_out_by}; each in turn, the fits made on the rest.",
         "remains": _remains(made),
         "not_observable": _not_observable(made),
-        "case": f"{case.path.name}, SHA-256 {made.case_sha256}",
-        "calibrations": "none" if record is None else f"{record.id} ({record.sha256})"
-        + ("" if record.verified else " UNVERIFIED"),
-        "model": None if model_sha256 is None else f"model.toml, SHA-256 {model_sha256}",
+        "case": f"SHA-256 {made.case_sha256}",
         "complete": None if made.complete else f"The budget was spent at: {', '.join(made.skipped)}.",
-        "software": f"toolkit {__version__}",
-    }  # fmt: skip
+    }
 
 
 def _summary(made: Diagnosis, style: Style) -> str:
@@ -171,6 +178,19 @@ def _not_observable(made: Diagnosis) -> str | None:
 
 
 def _tables(case: Case, made: Diagnosis, style: Style) -> dict[str, list[tuple[Cell, ...]]]:
+    return answer_tables(made, style) | {
+        "recorded": [
+            (
+                run.name, ", ".join(f"{key} {value}" for key, value in run.conditions.items()) or "-",
+                str(run.rows), run.sha256[:16],
+            )
+            for run in case.runs
+        ],
+    }  # fmt: skip
+
+
+def answer_tables(made: Diagnosis, style: Style) -> dict[str, list[tuple[Cell, ...]]]:
+    """Return the rows of every table that an answer fills by itself."""
     return {
         "found": [
             (_label(one), ", ".join(one.equivalent_to) or "-", one.statement, one.equation)
@@ -204,13 +224,6 @@ def _tables(case: Case, made: Diagnosis, style: Style) -> dict[str, list[tuple[C
             if one.observable
         ],
         "next": [(text,) for text in made.next_measurements],
-        "recorded": [
-            (
-                run.name, ", ".join(f"{key} {value}" for key, value in run.conditions.items()) or "-",
-                str(run.rows), run.sha256[:16],
-            )
-            for run in case.runs
-        ],
         "diagnosis_findings": [(one.rule, one.level, one.where, one.message) for one in made.findings],
     }  # fmt: skip
 

@@ -28,7 +28,7 @@ def diagnosis_plots(result: Result, style: Style) -> dict[str, Plot]:
     found, made = result.search, result.diagnosis
     if found is None:
         return {}
-    plots = [_errors(made, style)] if made.held_out else []
+    plots = [errors_plot(made, style)] if made.held_out else []
     wheres = (_where(found, one, made, style) for one in made.mismatch)
     for i, plot in enumerate([one for one in wheres if one is not None][:WHERE], start=1):
         plots.append(_named(plot, f"diagnosis_where_{i}"))
@@ -37,7 +37,8 @@ def diagnosis_plots(result: Result, style: Style) -> dict[str, Plot]:
     return {plot.name: plot for plot in plots}
 
 
-def _errors(made: Diagnosis, style: Style) -> Plot:
+def errors_plot(made: Diagnosis, style: Style) -> Plot:
+    """Return the errors on held-out rows over the noise, before and after: the chart of ten seconds."""
     steps = _STEPS if made.effects else _STEPS[:2]
     names: list[str] = []
     bars: list[tuple[list[float], list[float]]] = [([], []) for _ in steps]

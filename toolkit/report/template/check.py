@@ -110,8 +110,14 @@ def vocabulary_of(sites: list[Site]) -> Vocabulary:
     """Return the vocabulary that a template was made for, by its own tags."""
     for words in (CERTIFICATE, AUDIT, COMPARISON, DIAGNOSIS):
         if any(site.tag.path.startswith(f"{words.name}.") for site in sites):
-            return words
+            return REPORT if words is DIAGNOSIS and _of_a_test(sites) else words
     return REPORT
+
+
+def _of_a_test(sites: list[Site]) -> bool:
+    # A report may tell a diagnosis too, by the same tags; a diagnosis tells nothing of a test.
+    paths = {site.tag.path for site in sites if site.tag.family == "value"}
+    return any(REPORT.knows(path) and not DIAGNOSIS.knows(path) for path in paths)
 
 
 def _at(site: Site, rule: str, message: str) -> LintFinding:
