@@ -21,7 +21,7 @@ from toolkit.calibration.registry.registry import Registry
 from toolkit.cli.explain import rules_catalogue
 from toolkit.recording.marks import own_output
 from toolkit.report.audit.content import build_audit_content
-from toolkit.report.audit.page import AuditView, page, write_page
+from toolkit.report.audit.page import AuditView, _largest, page, write_page
 from toolkit.report.audit.svg import COLOURS, rows_of
 from toolkit.report.audit.template import build_audit
 
@@ -108,6 +108,13 @@ def test_pictures_are_well_formed_and_drawn_for_the_worst(view, text):
     repairs = [one["repair"]["FY_max_abs_N"] for one in view.made.files.plain()
                if one["repair"] and one["grade"] not in ("exact", "rounding")]  # fmt: skip
     assert [one["repair"]["FY_max_abs_N"] for one in worst] == sorted(repairs, reverse=True)[:3]
+
+
+def test_a_change_that_rounds_to_nothing_has_no_sign():
+    def told(change):
+        return _largest([{"name": "conicity", "change": change, "old": 5.0}], "conicity")
+
+    assert [told(change) for change in (-0.001, 0.001, -0.5, 1.25)] == ["0.00", "0.00", "-0.50", "+1.25"]
 
 
 def test_the_timeline_counts_every_dated_file(view):

@@ -13,7 +13,10 @@ function cell(row, value, kind) {
     td.append(tag);
   } else if (kind === "number") {
     td.className = "n"; td.textContent = value === null ? "" : Number(value).toFixed(value < 1 ? 4 : 1);
-  } else td.textContent = value === null ? "" : value;
+  } else {
+    if (kind === "date") td.className = "d";
+    td.textContent = value === null ? "" : value;
+  }
   row.append(td);
 }
 function draw() {

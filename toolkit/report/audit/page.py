@@ -36,7 +36,7 @@ _HEAD = (
     "ΔMz max [N·m]",
     "reports",
 )
-_KINDS = ("text", "grade", "text", "text", "text", "text", "number", "number", "text")
+_KINDS = ("text", "grade", "text", "text", "text", "date", "number", "number", "text")
 _NAMES = {
     "cornering_stiffness": "cornering stiffness", "aligning_stiffness": "aligning stiffness",
 }  # fmt: skip
@@ -84,7 +84,8 @@ def page(view: AuditView) -> Iterator[str]:
         yield f"<h2>Versions of {escape(one.instrument)}</h2>"
         yield "<p class=soft>Bars: the days on which a record is in force; dashed: void. Dots: files by "
         yield "month, "
-        yield f"in the lane of what computed them, in the colour of their grade.</p>{timeline(one)}"
+        yield "in the lane of what computed them, in the colour of their grade.</p>"
+        yield f"<div class=wide>{timeline(one)}</div>"
     yield from _files()
     yield from _worst(view.traces)
     yield from _effects(made)
@@ -162,7 +163,7 @@ def _worst(traces: Sequence[Trace]) -> Iterator[str]:
         yield f"<h3>{escape(plain['path'])}</h3><p class=soft>{_grade(plain['grade'])} "
         yield f"computed by {escape((plain['record'] or 'no record') + how)}; in force "
         yield f"{escape(plain['in_force'])}; "
-        yield f"largest change {plain['repair']['FY_max_abs_N']:.1f} N</p><div class=two>"
+        yield f"largest change {plain['repair']['FY_max_abs_N']:.1f}&nbsp;N</p><div class=two>"
         for load, unit in (("FY", "N"), ("MZ", "N·m")):
             if load in one.old:
                 yield rows_of(load, unit, one.old[load], one.new[load])
@@ -189,7 +190,7 @@ def _effects(made: ArchiveAudit) -> Iterator[str]:
         yield f"<th class=n>{_NAMES.get(name, name)} [{unit}]</th>"
     yield "</tr></thead><tbody>"
     for _, test in worst:
-        yield f"<tr><td>{escape(test['test'])}</td><td>{test['date']}</td>"
+        yield f"<tr><td>{escape(test['test'])}</td><td class=d>{test['date']}</td>"
         yield f"<td class=n>{test['not_clean']} of {test['files']}</td>"
         for name in names:
             yield f"<td class=n>{_largest(test['effects'], name)}</td>"
@@ -203,7 +204,8 @@ def _largest(effects: Sequence[Mapping[str, Any]], name: str) -> str:
         for one in effects
         if one["name"] == name
     ]
-    return f"{max(changes, key=abs):+.2f}" if changes else ""
+    text = f"{max(changes, key=abs):+.2f}" if changes else ""
+    return "0.00" if text in ("+0.00", "-0.00") else text
 
 
 def _unknown(made: ArchiveAudit) -> Iterator[str]:
@@ -276,7 +278,7 @@ def _drift(drift: Drift | None, files: Sequence[DriftedFile]) -> Iterator[str]:
     for one in sorted(files, key=lambda f: (f.date, f.path)):
         FY = one.reason or "" if one.FY_N is None else f"{one.FY_N:.2f}"
         MZ = "" if one.MZ_Nm is None else f"{one.MZ_Nm:.3f}"
-        yield f"<tr><td>{escape(one.path)}</td><td>{one.date}</td><td class=n>{one.share:.0%}</td>"
+        yield f"<tr><td>{escape(one.path)}</td><td class=d>{one.date}</td><td class=n>{one.share:.0%}</td>"
         yield f"<td class=n>{escape(FY)}</td><td class=n>{MZ}</td></tr>"
     yield "</tbody></table></div>"
 

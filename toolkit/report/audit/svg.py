@@ -91,14 +91,14 @@ def rows_of(
         at = f"{y(value):.1f}"
         parts.append(f'<line x1="{left}" y1="{at}" x2="{width - right}" y2="{at}" class="grid"/>')
         parts.append(f'<text x="{left - 6}" y="{y(value) + 4:.1f}" class="name">{value:g}</text>')
-    for values, colour in ((old, _OLD), (new, _NEW)):
+    for values, colour, stroke in ((old, _OLD, 2.6), (new, _NEW, 1.3)):  # both are seen where they agree
         points = " ".join(
             f"{left + i / span * (width - left - right):.1f},{y(float(values[i])):.1f}" for i in some.tolist()
         )
-        parts.append(f'<polyline points="{points}" fill="none" stroke="{colour}" stroke-width="1.4"/>')
+        parts.append(f'<polyline points="{points}" fill="none" stroke="{colour}" stroke-width="{stroke}"/>')
     foot = top + height + 26
     parts.append(f'<text x="{left}" y="{foot}" class="left">row 1 to {len(old)}; {load} [{unit}]</text>')
-    parts.append(f'<text x="{width - right}" y="{foot}" class="name"><tspan fill="{_OLD}">file</tspan> '
+    parts.append(f'<text x="{width - right}" y="{foot}" class="name"><tspan fill="{_OLD}">file</tspan> \u2003'
                  f'<tspan fill="{_NEW}">record in force</tspan></text>')  # fmt: skip
     return "".join([*parts, "</svg>"])
 
