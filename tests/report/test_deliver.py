@@ -15,13 +15,10 @@ from template_factory import opened, p, run, sdt, tbl
 from toolkit.errors import OutputError, RenderError, TemplateError
 from toolkit.recording.marks import is_own_output
 from toolkit.report.build import build_content
-from toolkit.report.deliver import deliver
-from toolkit.report.drawer import Drawer
+from toolkit.report.deliver import Delivered, deliver
 from toolkit.report.pdf import Office
-from toolkit.report.style import read_style
 from toolkit.report.template import verify, verify_text
 from toolkit.report.template.fill import Entry, Filled
-from toolkit.report.template.package import read_template
 
 CHECKOUT = Path(__file__).resolve().parents[2]
 DAY = dt.date(2026, 11, 21)
@@ -41,14 +38,11 @@ def pdf_text(pdf: Path) -> str:
 
 
 @office_needed
-def test_the_default_template_becomes_a_verified_report(tmp_path: Path) -> None:
-    path = CHECKOUT / "report_templates" / "org.docx"
-    style = read_style(path.with_suffix(".toml"))
-    made = build_content(make_result(simulated=True), make_record(), style=style, issued=DAY)
-    with Drawer() as drawer:
-        done = deliver(read_template(path), made, tmp_path / "out", drawer=drawer)
-    assert sorted(one.name for one in (tmp_path / "out").iterdir()) == ["report.docx", "report.pdf"]
-    assert [one.name for one in tmp_path.iterdir()] == ["out"]
+def test_the_default_template_becomes_a_verified_report(plain_report: Delivered) -> None:
+    done = plain_report
+    out = done.pdf.parent
+    assert sorted(one.name for one in out.iterdir()) == ["report.docx", "report.pdf"]
+    assert [one.name for one in out.parent.iterdir()] == ["out"]
     assert all(check.ok for check in done.checks)
     assert done.warnings == ()
     assert len(done.filled.figures) == 11

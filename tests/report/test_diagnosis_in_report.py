@@ -18,7 +18,7 @@ from toolkit.report.design.files import packaged_templates
 from toolkit.report.diagnosis.entries import REPORT_FIGURES, REPORT_TABLES, REPORT_VALUES
 from toolkit.report.diagnosis.in_report import Told
 from toolkit.report.diagnosis.vocabulary import DIAGNOSIS
-from toolkit.report.figures import Picture
+from toolkit.report.figures import Picture, _figure
 from toolkit.report.listing import list_tags
 from toolkit.report.style import Style
 from toolkit.report.template.check import check_template, vocabulary_of
@@ -116,6 +116,13 @@ def test_the_tags_are_those_of_the_diagnosis_own_document() -> None:
     available = {one["tag"]: one["available"] for one in list_tags(content(None), Style(), REPORT)}
     assert not [tag for tag, there in available.items() if "diagnosis" in tag and there]
     assert not available["tk:table.found"]
+
+
+def test_the_legend_of_the_chart_ends_inside_the_picture() -> None:
+    plot = content(Told(answer=ANSWER)).plots["diagnosis_errors"]
+    figure = _figure(plot)
+    figure.canvas.draw()
+    assert figure.legends[0].get_window_extent().x1 <= figure.bbox.x1
 
 
 def test_a_report_that_tells_a_diagnosis_is_still_a_report(tmp_path: Path) -> None:

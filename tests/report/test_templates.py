@@ -40,14 +40,14 @@ office_needed = pytest.mark.skipif(
 )
 
 
-def report(name: str, out: Path, details: dict | None = None, **changes: object) -> Delivered:
+def report(name: str, out: Path, **changes: object) -> Delivered:
     path = FOLDER / f"{name}.docx"
     content = build_content(
         make_result(**changes),
         make_record(),
         style=read_style(style_file(path)),
         issued=DAY,
-        details=read_details(DETAILS if details is None else details, where="test.toml"),
+        details=read_details(DETAILS, where="test.toml"),
     )
     return deliver(read_template(path), content, out)
 
@@ -95,10 +95,9 @@ def test_the_default_has_what_the_standard_asks_of_a_report(tmp_path: Path) -> N
 
 
 @office_needed
-def test_a_report_without_details_leaves_their_places_out(tmp_path: Path) -> None:
-    done = report("org", tmp_path / "out", {})
-    text = pdf_text(done.pdf)
-    assert done.warnings == ()
+def test_a_report_without_details_leaves_their_places_out(plain_report: Delivered) -> None:
+    text = pdf_text(plain_report.pdf)
+    assert plain_report.warnings == ()
     assert "Opinions" not in text
     assert "Authorised by" not in text
     assert "RECEIVED" not in text

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import textwrap
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -18,6 +19,7 @@ COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#0
 MARKERS = "os^Dvp*"
 SIZE_IN = (6.3, 3.7)
 DPI = 150
+_LINE = 15  # characters of a legend's line that fit beside the axes
 _GREY = "#8a8a8a"
 
 
@@ -191,6 +193,12 @@ def _curve(axes: Axes, curve: Curve) -> None:
     )
 
 
+def _in_lines(label: str) -> str:
+    """Return a legend's label in lines that end before the picture does."""
+    lines = label.replace(", ", ",\n").split("\n")
+    return "\n".join(textwrap.fill(line, _LINE, break_long_words=False) for line in lines)
+
+
 def _legend(figure: Figure, plot: Plot) -> None:
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
@@ -206,7 +214,7 @@ def _legend(figure: Figure, plot: Plot) -> None:
         colour = COLOURS[curve.group % len(COLOURS)]
         alone = curve.open and curve.style == "both" and not plot.legend_title
         if curve.style == "bars":
-            handles.append(Patch(color=colour, label=curve.label))
+            handles.append(Patch(color=colour, label=_in_lines(curve.label)))
             continue
         lines = {c.style for c in plot.curves if (c.label, c.group) == key} == {"line"}
         handles.append(
@@ -217,7 +225,7 @@ def _legend(figure: Figure, plot: Plot) -> None:
                 marker="" if lines else MARKERS[curve.group % len(MARKERS)],
                 markersize=5,
                 linewidth=1.2,
-                label=curve.label.replace(", ", ",\n"),
+                label=_in_lines(curve.label),
                 mfc="white" if alone else colour,
                 linestyle=(0, (4, 2)) if alone or (lines and curve.open) else "solid",
             )
