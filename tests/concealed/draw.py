@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,7 +14,7 @@ from tests.concealed import size as sizing
 from tests.concealed.catalogue import CONFOUNDED, FAMILIES, ONE_SIZE, Confounded, share_of
 from tests.concealed.files import missing
 from tests.concealed.instruments import DIGITAL, digital
-from tests.concealed.model import Array, Params, Scenario
+from tests.concealed.model import Array, EffectSpec, Params, Scenario
 from tests.concealed.noise import coloured, converter, spikes
 from tests.concealed.outside import LARGEST_SHARE, ONE_SIDED, REASONS
 
@@ -203,6 +204,21 @@ def _recorded(
     return out
 
 
+def _as_recorded(spec: EffectSpec, p: Mapping[str, Any], without: sizing.Signals) -> dict[str, float] | None:
+    """Return an effect's parameters as the recording has them; None where none is compared.
+
+    The full height of a loop is that of the largest cycle in the recording: a field of relays with uniform
+    thresholds makes it width * (half range / full scale)^2.
+    """
+    if not spec.reported:
+        return None
+    if spec.name == "hysteresis":
+        full = p["full_scale"]
+        half = max(0.5 * float(np.ptp(np.clip(one[p["channel"]], -full, full))) for one in without)
+        p = {**p, "width": p["width"] * (half / full) ** 2}
+    return spec.reported(p)
+
+
 def _as_control(drawn: Drawn, control: str, rng: np.random.Generator) -> Drawn:
     """Return the case with its trace destroyed; its answer holds no effect."""
     s, measured = drawn.scenario, drawn.measured
@@ -284,7 +300,7 @@ def _draw(
         rows.append({
             "name": name,
             "channel": spec.channel,
-            "parameters": spec.reported(effects[name]) if spec.reported else None,
+            "parameters": _as_recorded(spec, effects[name], without),
             "either_sign": spec.either_sign,
             "size": round(found.over_noise, 4),
             "distance": round(found.distance, 3),

@@ -74,6 +74,16 @@ def test_a_carcass_spring_relaxes_over_its_length_at_small_slip() -> None:
     assert reached == pytest.approx(1 - math.exp(-1), abs=0.01)
 
 
+@pytest.mark.parametrize("length", [0.02, 0.1, 0.5])
+def test_behind_a_carcass_spring_a_ramp_comes_late_by_the_relaxation_length(length: float) -> None:
+    """(sigma/V) a' + a = slip gives a ramp late by the distance sigma, however fine the steps are."""
+    step = 0.014
+    slip = np.radians(1e-3 * step * np.arange(1000))
+    out = tire_truth.carcass(slip, np.full(1000, 4000.0), np.full(1000, step), length, MAGIC)
+    late = float(slip[-1] - out[-1]) / (slip[1] - slip[0]) * step
+    assert late == pytest.approx(length, rel=0.03)
+
+
 def test_a_carcass_spring_never_overshoots_and_settles() -> None:
     slip = np.radians(np.concatenate([np.zeros(10), np.full(5000, 6.0)]))
     out = tire_truth.carcass(slip, np.full(slip.size, 4000.0), np.full(slip.size, 0.002), 0.4, MAGIC)

@@ -55,7 +55,9 @@ def carcass(slip: Array, load: Array, distance_step: Array, length0: float, tire
     for i in range(1, slip.size):
         k = min(int(abs(a) / step), table.size - 1)
         length = max(length0 * relative[i] * table[k], length0 / 20)
-        a += (1 - math.exp(-distance_step[i] / length)) * (float(slip[i]) - a)
+        # Exact for a slip that is linear over the step: its end value alone would answer half a step early.
+        behind = length * float(slip[i] - slip[i - 1]) / distance_step[i]
+        a = slip[i] - behind + (a - slip[i - 1] + behind) * math.exp(-distance_step[i] / length)
         out[i] = a
     return out
 

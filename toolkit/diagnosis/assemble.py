@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 _FAR = 3.0  # prior standard deviations that a parameter must not be moved by
+_TAKEN = 2 / 3  # of the held-out mean square above the noise, in one output at least
 _MOSTLY = 0.5  # of the log-likelihood that named effects must explain, beside the structure that stays
 
 
@@ -69,12 +70,23 @@ def answer_of(case: Case, found: Search, told: tuple[Finding, ...]) -> Diagnosis
 
 
 def mostly_unknown(found: Search) -> bool:
-    """Tell whether what stays after the named effects outweighs them: they then only imitate it."""
+    """Tell whether what stays after the named effects outweighs them: they then only imitate it.
+
+    By the log-likelihood, and by what they take of the held-out mean square that is above the noise.
+    """
     if not found.structure:
         return False
     left = found.structure[0].gain / 2
     explained = sum(one.gain for one in found.steps)
-    return explained < _MOSTLY * (explained + left)
+    if explained < _MOSTLY * (explained + left):
+        return True
+    if all(one.active.effect.name == "quantisation" for one in found.steps):
+        return False  # read off the digits: it does not imitate anything
+    return all(
+        one.refitted_rmse**2 - one.augmented_rmse**2
+        < _TAKEN * (one.refitted_rmse**2 - min(one.noise_floor or 0.0, one.refitted_rmse) ** 2)
+        for one in _held_out(found, unknown=False)
+    )
 
 
 def _verdict(
@@ -133,6 +145,10 @@ def _parameters(found: Search, active: Active, runs: tuple[str, ...] | None) -> 
             reach = quantile * math.sqrt(max(variance, 0.0))
             if math.isfinite(reach) and reach < 1e5 * max(abs(value), 1e-300):
                 ci = (max(value - reach, one.bounds[0]), min(value + reach, one.bounds[1]))
+        # Read off the recorded digits, not fitted: a bound, which covers more than 95 %.
+        half = active.values.get(f"_half_{one.name}")
+        if half is not None:
+            ci = (value - half, value + half)
         turned = sense(active, one.name, problem.case.axes)
         if turned < 0:
             value, ci = -value, None if ci is None else (-ci[1], -ci[0])

@@ -26,6 +26,7 @@ _INNER = 12
 _BETTER = 0.02  # of the log-likelihood: less is no step worth another round
 _SAME = 0.05  # by which the coloured fit's residual variance may exceed the plain one's
 _STEP = 1e-4  # of a parameter's size, for differences
+_WITHIN = 4.0  # prior standard deviations; further off a parameter is not uncertain but imitates an effect
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -279,8 +280,9 @@ def _space(problem: Problem, active: tuple[Active, ...]) -> _Space:
         size = one.sd or abs(one.value) or 1.0
         sizes.append(size)
         bounds = one.bounds or (-math.inf, math.inf)
-        low.append(bounds[0] / size)
-        high.append(bounds[1] / size)
+        reach = _WITHIN * one.sd if one.sd else math.inf
+        low.append(max(bounds[0], one.value - reach) / size)
+        high.append(min(bounds[1], one.value + reach) / size)
     for each in active:
         for parameter in each.searched:
             size = size_of(each, parameter.name)

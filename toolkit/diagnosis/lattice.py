@@ -24,9 +24,13 @@ _FINER = 10.0  # digits of the file: a step below ten of its last place is only 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Lattice:
-    """The step of a channel's values, and how much more probable they are on it than between its points."""
+    """The step of a channel's values, and how much more probable they are on it than between its points.
+
+    ``half_width``: by which the step may be off, because the file prints the values' ends rounded.
+    """
 
     step: float
+    half_width: float
     log_score_gain: float
 
 
@@ -49,11 +53,20 @@ def lattice_of(values: NDArray[np.float64], residual_sd: float) -> Lattice | Non
     counts = np.round(steps / least)
     if np.abs(steps / least - counts).max() > _EXACT * max(float(counts.max()), 1.0):
         return None
-    step = float(np.sum(steps) / np.sum(counts))
+    whole = float(np.sum(counts))
+    step = float(np.sum(steps)) / whole
     printed = _last_place(values)
     if step < _FINER * printed or step**2 / 12 < _COARSE * residual_sd**2:
         return None
-    return Lattice(step=step, log_score_gain=len(values) * math.log(step / printed))
+    ends = _rounding(values)
+    return Lattice(step=step, half_width=ends / whole, log_score_gain=len(values) * math.log(step / printed))
+
+
+def _rounding(values: NDArray[np.float64]) -> float:
+    """Return by how much the distance of the least and the largest value may be off: half a digit each."""
+    digits = max(len(f"{abs(v):.12g}".partition("e")[0].replace(".", "").strip("0")) for v in values.tolist())
+    ends = (abs(float(values.min())), abs(float(values.max())))
+    return sum(0.5 * 10.0 ** (math.floor(math.log10(one)) + 1 - digits) for one in ends if one > 0)
 
 
 def _last_place(values: NDArray[np.float64]) -> float:

@@ -255,7 +255,8 @@ def _best_step(
         gain = held.total - held_base.total
         if gain < _LEAST_GAIN or score - base.log_posterior < _LEAST_GAIN:
             continue
-        if _at_bound(made.active[-1]) or not _matters(problem, held_base, held, least):
+        # One that a later effect drives to its bound is no better than one that starts there.
+        if any(_at_bound(each) for each in made.active) or not _matters(problem, held_base, held, least):
             continue
         rivals = tuple(
             Rival(
@@ -289,7 +290,7 @@ def _stepped(
         found = lattice_of(problem.observed[name][np.isfinite(problem.observed[name])], sd)
         if found is None:
             continue
-        active = replace(candidate.active, values={"step": found.step})
+        active = replace(candidate.active, values={"step": found.step, "_half_step": found.half_width})
         gain = found.log_score_gain
         made = Step(
             active=active, p_value=math.exp(-min(gain, 700.0)), held_out_gain=gain, gain=gain, rivals=()

@@ -1,4 +1,4 @@
-"""First-order lag, delay and play of a sampled signal, linear between rows; time may be irregular."""
+"""First-order lag, delay and play of a sampled signal; time may be irregular."""
 
 from __future__ import annotations
 
@@ -8,6 +8,10 @@ import numpy as np
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
+
+
+_FAST = 4.0  # rows: a filter that is slower does not see how the signal goes between two rows
+_FINER = 4
 
 
 def lag(
@@ -46,8 +50,29 @@ def lag(
 
 
 def delayed(t: NDArray[np.float64], x: NDArray[np.float64], delay: float) -> NDArray[np.float64]:
-    """Return x(t - delay) by linear interpolation; beyond the ends the end value."""
-    return np.interp(t - delay, t, x)
+    """Return x(t - delay), cubic between rows; beyond the ends the end value.
+
+    Straight lines would take a tenth of what changes within a few rows, and the delay would be found too
+    short by as much.
+    """
+    return x.copy() if delay == 0 else _between(t, x, np.clip(t - delay, t[0], t[-1]))
+
+
+def filtered(t: NDArray[np.float64], x: NDArray[np.float64], time_constant: float) -> NDArray[np.float64]:
+    """Return a signal behind a first-order filter, cubic between rows where the filter is as fast as they."""
+    if len(t) < 3 or not 0 < time_constant < _FAST * float(np.median(np.diff(t))):
+        return lag(t, x, time_constant)
+    fine = np.interp(np.arange(_FINER * (len(t) - 1) + 1) / _FINER, np.arange(len(t)), t)
+    return lag(fine, _between(t, x, fine), time_constant)[::_FINER]
+
+
+def _between(t: NDArray[np.float64], x: NDArray[np.float64], at: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return x at other times by Hermite's cubics, their slopes from the rows on both sides."""
+    if len(t) < 3:
+        return np.interp(at, t, x)
+    from scipy.interpolate import CubicHermiteSpline
+
+    return np.asarray(CubicHermiteSpline(t, x, np.gradient(x, t))(at))
 
 
 def play(x: NDArray[np.float64], width: float) -> NDArray[np.float64]:

@@ -24,7 +24,6 @@ if TYPE_CHECKING:
     from toolkit.diagnosis.case import Case, Run
 
 ATOL = 1e-7  # of a state's spread over a run; before that is known, a hundredth of it of one
-_FEW = 8  # sets that are as quickly integrated one by one
 _POSITIONS = ("cubic_stiffness", "periodic_ripple")
 
 
@@ -159,7 +158,7 @@ class OdeModel:
             listed[key] = (p, forces)
         # Those that are known already are done again with the others: their steps are then the same, and
         # differences between them are free of what the steps leave.
-        if sum(key not in self._kept for key in listed) < _FEW:
+        if len(listed) < 2 or all(key in self._kept for key in listed):
             return
         self._together(run, [(key, *one) for key, one in listed.items()])
 
