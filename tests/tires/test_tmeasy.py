@@ -8,7 +8,7 @@ import pytest
 
 from tests.conftest import SHARED_DATA
 from toolkit.tires.global_model import make_rows
-from toolkit.tires.models.tmeasy import MODEL, curve, from_payload, lever
+from toolkit.tires.models.tmeasy import MODEL, curve, lever
 
 # Project Chrono, VW_microbus van_TMeasyTireFull.json (BSD-3): values at payload 1900 N and at twice that.
 VAN_N = 1900.0
@@ -20,6 +20,25 @@ VAN = {
     "nL0": (0.178, 0.19), "sy0": (0.16337, 0.20355), "syE": (0.96524, 1.0714),
 }  # fmt: skip
 SIMPLE = {"dF0": 20.0, "FM": 1.0, "sM": 0.15, "FS": 0.8, "sS": 0.65}
+
+
+def from_payload(one, two, payload_N, length_m):
+    """Turn values at payload and twice payload, as published, into the model's parameters (its docstring)."""
+    made = {}
+    for name, value in one.items():
+        base, own, change = name, value, two[name]
+        for sliding, peak, distance in (("S", "M", "D"), ("E", "0", "ED")):
+            if name.endswith(sliding):
+                before = name[:-1] + peak
+                sign = -1 if name[0] == "F" else 1
+                base = name[:-1] + distance
+                own, change = sign * (value - one[before]), sign * (two[name] - two[before])
+        if name == "nL0":
+            base, own, change = "n0", value * length_m, change * length_m
+        force = name[0] in "dF"
+        made[base] = own / payload_N if force else own
+        made[f"{base}_Z"] = change / (2 * own if force else own) - 1
+    return made
 
 
 def van():

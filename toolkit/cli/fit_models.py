@@ -57,6 +57,7 @@ def fit_table_models(
     """
     from toolkit.cli.fit_tir import STAND_IN_RADIUS
     from toolkit.tires.global_data import of_table
+    from toolkit.tires.possible import size_findings
     from toolkit.tires.table import read_table
     from toolkit.tires.table_fit import axes_findings, fit_table
 
@@ -74,7 +75,7 @@ def fit_table_models(
         findings += tuple(finding for finding in result.findings if finding not in findings)
     made, more, found = _global(data, every, loss, weights, str(table), seconds)
     if not single:
-        findings = tuple(axes_findings(measured, found))
+        findings = (*axes_findings(measured, found), *size_findings(found, table.name))
     return _fitted(data, curves, (None,) * len(curves), made, (*findings, *more), radius_m, seconds)
 
 

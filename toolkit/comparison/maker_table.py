@@ -19,13 +19,13 @@ from toolkit.characteristics.model import DirectionFit
 from toolkit.characteristics.reading import CHANNELS, Direction, Reader
 from toolkit.characteristics.rows import Row
 from toolkit.characteristics.shared import Shared
-from toolkit.comparison.possible import demand_possible
 from toolkit.errors import FitError
 from toolkit.findings import Finding
 from toolkit.machine import TypeB
 from toolkit.reduction.model import Condition
 from toolkit.tires.fit import fit_curves, why_not
 from toolkit.tires.model import Curve
+from toolkit.tires.possible import demand_possible
 from toolkit.tires.table import TireTable, read_table
 from toolkit.tires.table_fit import axes_findings, fit_findings, table_curves
 from toolkit.units import from_si

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolkit.tires.kernel import Problems, State, assess, sine, theta_of
+from toolkit.tires.kernel import Problems, State, assess, at_limit, sine, theta_of
 from toolkit.tires.starts import pick
 
 if TYPE_CHECKING:
@@ -78,7 +78,7 @@ def solve(groups: Sequence[Problems]) -> list[Solution]:
         agreeing = _agreeing(state.cost.reshape(-1, count), floor)
     # The best goes to its end on the bins, where steps are cheap: on the rows few are left to do.
     best = state.cost.reshape(-1, count).argmin(axis=1) + count * np.arange(len(coarse.u))
-    state.put_at(best, descend(state.p[best], coarse, steps=30, tolerance=_SETTLED))
+    state.put_at(best, descend(state.take(best), coarse, steps=30, tolerance=_SETTLED))
     cost, p = state.cost.reshape(-1, count), state.p.reshape(-1, count, 4)
     cuts = np.cumsum([0, *(len(one.u) for one in groups)])
     return [
@@ -118,7 +118,8 @@ def _finish(problems: Problems, p: Array, cost: Array, agreeing: NDArray[np.intp
     cost = np.full((len(curves), count), np.inf)
     cost[owner, place] = state.cost
     close = np.flatnonzero(state.cost <= _CLOSE * cost.min(axis=1)[owner] + floor[owner])
-    polished = descend(state.p[close], problems.take(owner[close]), steps=30, tolerance=_SETTLED)
+    part = problems.take(owner[close])
+    polished = descend(state.take(close), part, steps=30, tolerance=_SETTLED)
     state.put_at(close, polished)
     cost[owner, place] = state.cost
     rivals = np.zeros((len(curves), count, 6))
@@ -142,16 +143,17 @@ def _search(
     # Returns the starts that were left at the end, `count` a curve.
     count, stages, last = plan
     curves = np.arange(len(problems.u))
-    p = pick(problems, count).reshape(-1, 4)
+    part = problems.take(np.repeat(curves, count))
+    state = assess(pick(problems, count).reshape(-1, 4), part)
     for steps, keep in stages:
-        state = descend(p, problems.take(np.repeat(curves, count)), steps=steps, tolerance=1e-7)
-        p, count = _best(state, len(curves), count, keep).reshape(-1, 4), keep
-    state = assess(p, problems.take(np.repeat(curves, count)))
+        state = descend(state, part, steps=steps, tolerance=1e-7)
+        state, count = state.take(_best(state, len(curves), count, keep)), keep
+        part = problems.take(np.repeat(curves, count))
     agreeing = _agreeing(state.cost.reshape(-1, count), floor)
     if (open_ := np.flatnonzero(agreeing < _ENOUGH)).size:
         index = _rows(open_, count)
         part = problems.take(np.repeat(open_, count))
-        state.put_at(index, descend(state.p[index], part, steps=last, tolerance=_ENOUGH_TO_AGREE))
+        state.put_at(index, descend(state.take(index), part, steps=last, tolerance=_ENOUGH_TO_AGREE))
     return state, count
 
 
@@ -159,15 +161,16 @@ def _rows(curves: NDArray[np.intp], count: int) -> NDArray[np.intp]:
     return np.asarray((curves[:, None] * count + np.arange(count)).ravel())
 
 
-def _best(state: State, curves: int, count: int, keep: int) -> Array:
-    # The unknowns of the lowest starts (curves, keep, 4); one that follows its better neighbour closely ranks
+def _best(state: State, curves: int, count: int, keep: int) -> NDArray[np.intp]:
+    # The positions of the lowest starts (curves x keep,); one that follows its better neighbour closely ranks
     # lower, so that one basin cannot crowd out the others.
     cost = state.cost.reshape(curves, count)
     order = np.argsort(cost, axis=1)
     p = np.take_along_axis(state.p.reshape(curves, count, 4), order[..., None], axis=1)
     rank = np.take_along_axis(cost, order, axis=1)
     rank[:, 1:] *= np.where((np.abs(p[:, 1:] - p[:, :-1]) < _NEAR).all(axis=2), 1.5, 1.0)
-    return np.take_along_axis(p, np.argsort(rank, axis=1)[:, :keep, None], axis=1)
+    lowest = np.take_along_axis(order, np.argsort(rank, axis=1)[:, :keep], axis=1)
+    return np.asarray((lowest + count * np.arange(curves)[:, None]).ravel())
 
 
 def _agreeing(cost: Array, floor: Array) -> NDArray[np.intp]:
@@ -175,18 +178,23 @@ def _agreeing(cost: Array, floor: Array) -> NDArray[np.intp]:
     return np.asarray(np.sum(cost <= lowest[:, None] * (1 + _SAME) + floor[:, None], axis=1))
 
 
-def descend(p: Array, problems: Problems, *, steps: int, tolerance: float) -> State:
-    """Return where Levenberg-Marquardt ends from shapes ``p`` (problems, 4), one start a problem.
+def descend(start: Array | State, problems: Problems, *, steps: int, tolerance: float) -> State:
+    """Return where Levenberg-Marquardt ends from shapes (problems, 4), one start a problem.
+
+    ``start`` may be their state, where these problems were asked before; it is not kept.
 
     A problem leaves when the decrease that its step predicts falls below ``tolerance`` of its cost, or when
     a step succeeded and hardly lowered it: along a bound the prediction alone would never end.
     """
     low, high = problems.low, problems.high
-    final = assess(np.clip(p, low, high), problems)
-    alive = np.arange(len(p))
+    final = start if isinstance(start, State) else assess(np.clip(start, low, high), problems)
+    count = len(final.p)
+    # What ran into a bound in an earlier descent may be free again in this one.
+    final.held = at_limit(final.linear)
+    alive = np.arange(count)
     state, part = final, problems
-    damping, radius = np.full(len(p), 1e-2), np.ones(len(p))
-    settled = np.zeros(len(p), dtype=np.bool_)
+    damping, radius = np.full(count, 1e-2), np.ones(count)
+    settled = np.zeros(count, dtype=np.bool_)
     for step in range(steps):
         delta, length, predicted = _step(state, part, damping, radius)
         done = settled | (predicted <= tolerance * state.cost + 1e-30)
@@ -226,15 +234,12 @@ def _step(state: State, problems: Problems, damping: Array, radius: Array) -> tu
     free = (~frozen).astype(np.float64)
     gradient = gradient * free
     curvature = state.curvature() * (free[:, :, None] * free[:, None, :])
-    diagonal = np.einsum("pii->pi", curvature)
+    diagonal = np.einsum("pii->pi", curvature).copy()
     scale = diagonal + 1e-10 * diagonal.max(axis=1)[:, None] + 1e-300
-    matrix = curvature.copy()
-    np.einsum("pii->pi", matrix)[...] += damping[:, None] * scale + 1e-14 * scale
+    lifted = diagonal + damping[:, None] * scale + 1e-14 * scale
     # Scaled to a unit diagonal before it is solved: the unknowns differ by orders of magnitude.
-    unit = 1.0 / np.sqrt(np.einsum("pii->pi", matrix) + frozen)
-    matrix *= unit[:, :, None] * unit[:, None, :]
-    np.einsum("pii->pi", matrix)[...] += frozen
-    delta = -np.linalg.solve(matrix, (gradient * unit)[..., None])[..., 0] * unit * free
+    unit = 1.0 / np.sqrt(lifted + frozen)
+    delta = -solve_unit(curvature * (unit[:, :, None] * unit[:, None, :]), gradient * unit) * unit * free
     # Scaled back as a whole to the trust radius: more damping instead would stop all progress along the
     # flat valleys that these curves have.
     length = np.max(np.abs(delta) / _REACH, axis=1)
@@ -243,6 +248,35 @@ def _step(state: State, problems: Problems, damping: Array, radius: Array) -> tu
     return delta, np.minimum(length, radius), np.maximum(predicted, 0.0)
 
 
+def solve_unit(matrix: Array, right: Array) -> Array:
+    """Return the solutions (problems, 4) of positive definite systems whose diagonal is one.
+
+    Cholesky's factors written out, each entry of all problems at once: one call of LAPACK a problem
+    takes several times as long. Only the entries below the diagonal are read.
+
+    >>> solve_unit(np.full((1, 4, 4), 0.5) + 0.5 * np.eye(4), np.full((1, 4), 2.5)).round(12).tolist()
+    [[1.0, 1.0, 1.0, 1.0]]
+    """
+    a, b = np.ascontiguousarray(matrix.transpose(1, 2, 0)), right.T
+    m10, m20, m30 = a[1, 0], a[2, 0], a[3, 0]
+    # Rounding may take what is left of a singular matrix below zero.
+    r1 = 1.0 / np.sqrt(np.maximum(1.0 - m10 * m10, _LEFT))
+    m21, m31 = (a[2, 1] - m20 * m10) * r1, (a[3, 1] - m30 * m10) * r1
+    r2 = 1.0 / np.sqrt(np.maximum(1.0 - m20 * m20 - m21 * m21, _LEFT))
+    m32 = (a[3, 2] - m30 * m20 - m31 * m21) * r2
+    r3 = 1.0 / np.sqrt(np.maximum(1.0 - m30 * m30 - m31 * m31 - m32 * m32, _LEFT))
+    y0 = b[0]
+    y1 = (b[1] - m10 * y0) * r1
+    y2 = (b[2] - m20 * y0 - m21 * y1) * r2
+    x = np.empty_like(b)
+    x[3] = (b[3] - m30 * y0 - m31 * y1 - m32 * y2) * (r3 * r3)
+    x[2] = (y2 - m32 * x[3]) * r2
+    x[1] = (y1 - m21 * x[2] - m31 * x[3]) * r1
+    x[0] = y0 - m10 * x[1] - m20 * x[2] - m30 * x[3]
+    return np.asarray(x.T)
+
+
+_LEFT = 1e-15
 _SETTLED = 1e-8  # of the cost: a ten-thousandth of a standard error
 _REACH = np.array([1.5, 1.0, 1.5, 1.0])
 

@@ -20,6 +20,7 @@ import numpy as np
 
 from toolkit.channels import AXES, CHANNELS, Axes
 from toolkit.errors import CellError, ColumnError, ConfigError, UnreadableError
+from toolkit.tires.possible import LARGEST
 from toolkit.units import unit
 
 if TYPE_CHECKING:
@@ -28,12 +29,6 @@ if TYPE_CHECKING:
 _HEADER = re.compile(r"\s*([A-Za-z_]+)\s*\[([^\]]*)\]\s*")
 _NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]{1,4})?")
 _AXES: dict[str, Axes] = {axes: axes for axes in get_args(Axes)}
-# What no tire and no rig can be, by symbol or dimension [SI]: a spike, a unit or a shifted column, to be
-# mended before a fit follows it. An aircraft tire carries 5e5 N.
-_LIMITS = {
-    "TIRE_ANGLE": math.inf, "DRUM_ANGLE": math.inf, "angle": math.pi, "force": 1e7, "moment": 1e7,
-    "pressure": 1e8, "speed": 1e3, "ratio": 1e3, "temperature": 5e3, "time": 1e12,
-}  # fmt: skip
 _EDGE = 1 + 1e-9
 _SHAPE = "a header such as 'SA [deg],FZ [N],FY [N],MZ [N*m]' and rows of numbers"
 
@@ -228,7 +223,7 @@ def _refuse_impossible(
     path: Path,
     rows: list[int],
 ) -> None:
-    limit = _LIMITS.get(symbol, _LIMITS[CHANNELS[symbol].dimension])
+    limit = LARGEST.get(symbol, LARGEST[CHANNELS[symbol].dimension])
     lowest = 0.0 if CHANNELS[symbol].dimension == "temperature" else -limit
     bad = np.flatnonzero(~((si >= lowest * _EDGE) & (si <= limit * _EDGE)))
     if not len(bad):

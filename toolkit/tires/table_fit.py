@@ -16,6 +16,7 @@ from toolkit.tires.evaluate import slope_estimate_at
 from toolkit.tires.fit import Curve, why_not
 from toolkit.tires.model import CurveFit, Loss, TireModel
 from toolkit.tires.outliers import gross_outliers
+from toolkit.tires.possible import size_findings
 from toolkit.tires.table import TireTable
 
 # Sign of dy/dSA at small angles of a tire, see `toolkit.channels`.
@@ -99,7 +100,8 @@ def fit_table(table: TireTable, models: tuple[TireModel, ...], *, loss: Loss = "
     findings += fit_findings(fits)
     if own := [fit for fit in fits if fit.model == "magic_formula"]:
         findings += gross_outliers(good, own)
-    return TableFits(fits=tuple(fits), findings=(*findings, *axes_findings(table, fits)))
+    findings += (*axes_findings(table, fits), *size_findings(fits, table.path.name))
+    return TableFits(fits=tuple(fits), findings=tuple(findings))
 
 
 def _no_load(curve: Curve) -> FitError | None:

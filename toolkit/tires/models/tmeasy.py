@@ -119,44 +119,6 @@ def lever(sy: Any, *, s0: Any, sE: Any) -> Any:
     return np.where(q <= 1, near, np.where(size < sE, -(1 - w) * (q - 1) * to_end**2, 0.0))
 
 
-def from_payload(
-    at_payload: Mapping[str, float], at_double: Mapping[str, float], *, payload_N: float, length_m: float
-) -> dict[str, float]:
-    """Return parameters from the values at payload and twice payload as they are published.
-
-    Parameters
-    ----------
-    at_payload, at_double : dFx0, dFy0 [N], FxM, FxS, FyM, FyS [N], sxM, sxS, syM, syS, sy0, syE [1] and nL0
-        [1], the trail over the contact length; those that are absent are left out
-    payload_N : FNOMIN, to be given to the rows too
-    length_m : contact length at payload
-
-    >>> from_payload({"FyM": 4000.0}, {"FyM": 7200.0}, payload_N=4000.0, length_m=0.15)
-    {'FyM': 1.0, 'FyM_Z': -0.1}
-    """
-    one, two = (_distances(given, length_m) for given in (at_payload, at_double))
-    made = {}
-    for name, first in one.items():
-        force = name[0] in "dF"
-        made[name] = first / payload_N if force else first
-        change = two[name] / (2 * first if force else first) - 1 if first else 0.0
-        made[f"{name}_Z"] = round(change, 15)
-    return made
-
-
-def _distances(given: Mapping[str, float], length_m: float) -> dict[str, float]:
-    made = dict(given)
-    for sliding, peak, name, sign in (
-        ("FxS", "FxM", "FxD", -1), ("sxS", "sxM", "sxD", 1), ("FyS", "FyM", "FyD", -1),
-        ("syS", "syM", "syD", 1), ("syE", "sy0", "syED", 1),
-    ):  # fmt: skip
-        if sliding in made:
-            made[name] = sign * (made.pop(sliding) - made[peak])
-    if "nL0" in made:
-        made["n0"] = made.pop("nL0") * length_m
-    return made
-
-
 def starts(seeds: Seeds) -> tuple[Mapping[str, float], ...]:
     """Return start values: slope, peak and its slip from the Magic Formula, three ways to slide."""
     stiffness, slope = seeds.at_nominal(seeds.stiffness / seeds.load)

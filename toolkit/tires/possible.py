@@ -1,0 +1,118 @@
+"""What no tire does: values beyond it are a wrong unit or a slip of the pen, and would move a whole table.
+
+Single values are refused, generously: the largest aircraft tires carry some 300 kN. A unit that is wrong by
+a factor leaves every value possible, and shows only in what is fitted: such ratios are told, never refused.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from toolkit.errors import CellError
+from toolkit.findings import Finding
+
+if TYPE_CHECKING:
+    from toolkit.tires.model import CurveFit
+
+# The largest size [SI] by dimension; of a slip or inclination angle any, of the two angles that turn on none.
+LARGEST = {
+    "TIRE_ANGLE": math.inf, "DRUM_ANGLE": math.inf, "angle": math.pi, "force": 1e6, "moment": 1e5,
+    "pressure": 1e8, "speed": 1e3, "ratio": 1e3, "temperature": 5e3, "time": 1e12,
+}  # fmt: skip
+# Of a tire's characteristics, by SI unit: no residual angle is as large as a quarter turn.
+_CHARACTERISTIC = {
+    "N": LARGEST["force"], "N*m": LARGEST["moment"], "N/rad": 1e8, "N*m/rad": 1e7, "rad": math.pi / 2,
+}  # fmt: skip
+_SHOWN = {"rad": "90 deg"}
+# Cornering stiffness over load, 1/rad. Published: 0.08 to 0.19 per degree for car tires, to 0.30 for low ones
+# (Gillespie, Fundamentals of Vehicle Dynamics (1992), ch. 10), that is 5 to 17 per rad; truck tires at their
+# load and overloaded ones come down to 3, racing tires at small loads up to 40.
+_PER_LOAD = (1.0, 80.0)
+_TRAIL_M = 0.5  # aligning over cornering stiffness: a third of the contact length, and no patch is so long
+_LEAST_LOAD = 25.0  # N: kilonewtons named newtons; a bicycle tire is tested at some 300
+_SURE = 3.0  # standard errors
+
+
+def demand_possible(value: float, unit: str, *, where: str, U: bool = False) -> None:
+    """Refuse a characteristic [SI] that no tire has; an uncertainty ``U`` that is negative too.
+
+    Raises
+    ------
+    CellError
+        ``wrong-value``
+
+    >>> demand_possible(4000.0, "N", where="maker.csv, row 2, column FZ")
+    """
+    limit = _CHARACTERISTIC[unit]
+    if abs(value) <= limit and not (U and value < 0):
+        return
+    shown = _SHOWN.get(unit, f"{limit:g} {unit}")
+    raise CellError(
+        "an uncertainty is negative" if U and value < 0 else "a value is larger than any tire's",
+        where=where,
+        got=f"{value:g} {unit}",
+        expected=f"0 to {shown}" if U else f"at most {shown}",
+        next_step="correct the cell, or the unit in the header",
+        rule="wrong-value",
+    )
+
+
+def size_findings(fits: Sequence[CurveFit], where: str) -> tuple[Finding, ...]:
+    """Return a finding where fitted stiffnesses are of a size that no tire has: a unit may be wrong.
+
+    Judged are the slopes at zero that the data determine: cornering stiffness over load, and aligning over
+    cornering stiffness; and the loads themselves. A factor that leaves all within the range, as pounds for
+    newtons, cannot be seen in one table.
+    """
+    slopes: dict[tuple[str, float], tuple[float, float]] = {}
+    for fit in fits:
+        if fit.slope_at_zero is not None and fit.load_N:
+            slopes[fit.channel, fit.load_N] = abs(fit.slope_at_zero.value), fit.slope_at_zero.u
+    ratios = [(value / load, u / load) for (name, load), (value, u) in slopes.items() if name == "FY"]
+    found = []
+    low, high = _PER_LOAD
+    odd = [value for value, u in ratios if value + _SURE * u < low or value - _SURE * u > high]
+    if 2 * len(odd) > len(ratios):
+        found.append(
+            Finding(
+                rule="implausible-stiffness",
+                where=f"{where}, FY",
+                message=f"the cornering stiffness is {_range(odd)} times the load per rad in {len(odd)} of "
+                f"{len(ratios)} load blocks, that of tires {low:g} to {high:g}: is SA in another unit than "
+                "its header says, or FY in another than FZ?",
+            )
+        )
+    trails = [
+        (value / slopes["FY", load][0], u / slopes["FY", load][0])
+        for (name, load), (value, u) in slopes.items()
+        if name == "MZ" and slopes.get(("FY", load), (0.0, 0.0))[0] > 0
+    ]
+    long = [value for value, u in trails if value - _SURE * u > _TRAIL_M]
+    if 2 * len(long) > len(trails):
+        found.append(
+            Finding(
+                rule="implausible-stiffness",
+                where=f"{where}, MZ",
+                message=f"the aligning stiffness is {_range(long)} m times the cornering stiffness in "
+                f"{len(long)} of {len(trails)} load blocks, a trail that is longer than any tire's "
+                f"({_TRAIL_M:g} m): is MZ in another unit than its header says, or FY?",
+            )
+        )
+    loads = [load for _, load in slopes]
+    if loads and max(loads) < _LEAST_LOAD:
+        found.append(
+            Finding(
+                rule="implausible-load",
+                where=f"{where}, FZ",
+                message=f"the largest load is {max(loads):.3g} N, less than any vehicle's tire carries: are "
+                "forces in another unit than their headers say?",
+            )
+        )
+    return tuple(found)
+
+
+def _range(values: Sequence[float]) -> str:
+    low, high = (f"{one:.0f}" if one >= 100 else f"{one:.3g}" for one in (min(values), max(values)))
+    return low if low == high else f"{low} to {high}"
