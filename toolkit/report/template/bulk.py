@@ -33,7 +33,7 @@ from toolkit.report.template.xml import (
     right_to_left,
 )
 
-MANY = 200  # rows; fewer stay in the tree
+MANY = 20  # rows; fewer stay in the tree
 _PI = "toolkit-rows"
 _STANDIN = re.compile(rb"<\?toolkit-rows (\d+)\?>")
 _MARK = "\ufdd1"  # a noncharacter, as no template has it
@@ -41,6 +41,7 @@ _VALUE = re.compile(f"{_MARK}(\\d+){_MARK}")
 _PLACE = re.compile(f"{_MARK}([cd]|\\d+){_MARK}".encode())
 _ROW = re.compile(rb"<!--.*?-->|<w:tr(?:\s[^>]*)?(/?)>|</w:tr>", re.DOTALL)
 _FIELDS = (q("w:fldChar"), q("w:fldSimple"), q("w:instrText"))
+_AT_ONCE = 1000  # rows that are written together
 _LARGE = 2 * 2**20  # bytes of a part, below which its rows are parsed with the rest
 _LOOKED_FOR = (b"<w:fldChar", b"<w:instrText", b"<w:docPartObj")
 
@@ -106,7 +107,9 @@ class Bulk:
                     continue
                 with target.open(item, "w", force_zip64=True) as part:
                     for i, piece in enumerate(_STANDIN.split(data)):
-                        part.writelines(self.runs[int(piece)] if i % 2 else [piece])
+                        rows = self.runs[int(piece)] if i % 2 else [piece]
+                        for at in range(0, len(rows), _AT_ONCE):
+                            part.write(b"".join(rows[at : at + _AT_ONCE]))
         return stream.getvalue()
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cache
 from typing import Any
 
 from lxml import etree
@@ -36,6 +37,7 @@ from toolkit.report.template.rows import fill_table
 from toolkit.report.template.scan import Site, row_in, scan, table_of
 from toolkit.report.template.xml import (
     W_P,
+    W_TR,
     Element,
     Story,
     ancestor,
@@ -127,7 +129,7 @@ class _Filler:
         self.package, self.parts, self.template, self.content = package, parts, template, content
         self.pictures, self.allow_missing = pictures, allow_missing
         self.ids, self.log = Ids.of(parts), _Log()
-        self.bulk = Bulk.of(parts, lambda: levelled(package))
+        self.bulk = Bulk.of(parts, cache(lambda: levelled(package)))
 
     def run(self, lint: tuple[LintFinding, ...]) -> Filled:
         used = {site.tag.path for site in scan(self.parts)}
@@ -140,13 +142,13 @@ class _Filler:
         self._demand(sites)
         # Everything is located before anything is written: a value that reads like a tag stays a value.
         tables = [(site, table_of(site)) for site in sites if site.tag.family == "table"]
-        inside = [
-            site
+        patterns = [row for _, table in tables for row in _prototypes(table, sites)]
+        kept = {
+            id(site)
             for site in sites
-            for _, table in tables
-            if table is not None and site.tag.family != "table" and self._in_prototype(site, table, sites)
-        ]
-        kept = {id(site) for site in inside}
+            if site.tag.family != "table"
+            and any(one is row for one in site.element.iterancestors(W_TR) for row in patterns)
+        }
         outside = [site for site in sites if id(site) not in kept]
         for site, table in tables:
             self._table(site, table)
@@ -220,14 +222,6 @@ class _Filler:
             next_step="add it to test.toml or complete the test, put the place into a tk:if control, "
             "or print a visible mark with --allow-missing",
             rule="missing-value",
-        )
-
-    def _in_prototype(self, site: Site, table: Element, sites: list[Site]) -> bool:
-        row = row_in(table, site.element)
-        return row is not None and any(
-            other.tag.family == "row" and row_in(table, other.element) is row
-            for other in sites
-            if other.story is site.story
         )
 
     def _value(self, tag: Tag, site: Site | None, part: str | None = None) -> str:
@@ -355,6 +349,14 @@ class _Filler:
             self.log.manifest.append(Entry(tag=f"mark:{name}", text=text, part=self.parts[0].name))
             added.append(name)
         return tuple(added)
+
+
+def _prototypes(table: Element | None, sites: list[Site]) -> list[Element]:
+    """Return a table's rows that hold a ``tk:row.`` tag, through any table within."""
+    if table is None:
+        return []
+    rows = (row_in(table, one.element) for one in sites if one.tag.family == "row")
+    return [row for row in rows if row is not None]
 
 
 def _drop_if_empty(paragraph: Element) -> None:
