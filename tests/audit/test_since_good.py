@@ -69,10 +69,15 @@ def test_the_stretch_is_that_between_the_two_sessions(home):
     assert {one["load"] for one in told["loads"]} == {"FY", "MZ"}
 
 
-@pytest.mark.parametrize("workers", [1, 2])
-def test_each_test_has_the_share_of_its_days(home, workers):
+@pytest.fixture(scope="module")
+def made(home):
     root, registry = home
-    made = audit_archive(root / "archive", registry, known_at=dt.date(2022, 1, 1))
+    return audit_archive(root / "archive", registry, known_at=dt.date(2022, 1, 1))
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_each_test_has_the_share_of_its_days(home, made, workers):
+    _, registry = home
     drift = drift_since(registry, "m15-r2")
     files = {one.path: one for one in drifted_files(made, registry, drift, workers=workers)}
     # The day of the good session is still good, the day of the failing one has all of it.

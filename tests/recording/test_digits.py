@@ -95,3 +95,17 @@ def test_a_fixed_width_has_one_place_less_beside_a_minus_sign():
 def test_a_few_coarse_values_of_a_sign_have_the_finest_place_of_their_decade():
     values = np.array([1.23456, 2.34567, 3.45678, 4.56789, 5.67891, 6.78912, 7.89123, -1.5, -2.5, -3.5])
     np.testing.assert_array_equal(half_last_place(values), 5e-6)
+
+
+def test_columns_together_are_as_each_alone():
+    rng = np.random.default_rng(3)
+    columns = [
+        np.round(rng.normal(0, 300, 40), 3),
+        rng.normal(0, 1, 40),
+        np.where(rng.random(40) < 0.3, 0.0, np.round(rng.normal(0, 2, 40), 1)),
+        np.zeros(40),
+        np.rint(rng.normal(0, 1e17, 40)),
+        np.array([float(f"{v:.3g}") for v in rng.normal(0, 1e-11, 40)]),
+    ]
+    together = half_last_place(np.column_stack(columns))
+    np.testing.assert_array_equal(together, np.column_stack([half_last_place(one) for one in columns]))

@@ -114,14 +114,14 @@ def _design(
     record: CalibrationRecord, fit: LoadFit, x: NDArray[np.float64], half: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     # The terms, and how far each may be off when every indication is off by half its last place.
-    if all(term == INTERCEPT or term in record.indications for term in fit.terms):
-        rows = len(x)
-        at = [None if t == INTERCEPT else record.indications.index(t) for t in fit.terms]
-        return (
-            np.column_stack([np.ones(rows) if i is None else x[:, i] for i in at]),
-            np.column_stack([np.zeros(rows) if i is None else half[:, i] for i in at]),
-        )
-    values = {name: x[:, i] for i, name in enumerate(record.indications)}
+    names = record.indications
+    if all(term == INTERCEPT or term in names for term in fit.terms):
+        terms, moved = np.empty((len(x), len(fit.terms))), np.empty((len(x), len(fit.terms)))
+        for j, term in enumerate(fit.terms):
+            terms[:, j] = 1.0 if term == INTERCEPT else x[:, names.index(term)]
+            moved[:, j] = 0.0 if term == INTERCEPT else half[:, names.index(term)]
+        return terms, moved
+    values = {name: x[:, i] for i, name in enumerate(names)}
     terms = term_matrix(fit.terms, values)
     moved = np.zeros_like(terms)
     for i, name in enumerate(record.indications):

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolkit.recording.digits import rounding
+from toolkit.recording.digits import roundings
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -59,13 +59,13 @@ def columns_of(recording: Recording) -> Columns:
     cells = [one for one in recording.series if one.role == "indication"]
     own = [one for one in recording.series if one.role == "acquired" and one.symbol in LOADS]
     x = np.column_stack([one.values for one in cells]) if cells else np.empty((recording.rows, 0))
-    half_x = np.column_stack([rounding(one) for one in cells]) if cells else np.empty_like(x)
+    half = roundings([*cells, *own]) if cells or own else np.empty((0, recording.rows))
     return Columns(
         names=tuple(one.symbol for one in cells),
         units=tuple(one.unit for one in cells),
         x=x,
-        half_x=half_x,
+        half_x=np.ascontiguousarray(half[: len(cells)].T),
         y={one.symbol: one.values for one in own},
-        half_y={one.symbol: rounding(one) for one in own},
+        half_y={one.symbol: values for one, values in zip(own, half[len(cells) :], strict=True)},
         y_units={one.symbol: one.unit for one in own},
     )

@@ -103,7 +103,7 @@ def repair(
     columns: Columns, record: CalibrationRecord, new: Mapping[str, NDArray[np.float64]] | None = None
 ) -> Repair | None:
     """Return what a record would change at most; None where it cannot be applied to the file."""
-    if unfit(record, columns) is not None:
+    if new is None and unfit(record, columns) is not None:
         return None
     values = recompute(columns, record) if new is None else new
     most = {
@@ -245,7 +245,7 @@ class _Judge:
                 group.order, hit.signs,
             )  # fmt: skip
 
-        hit = min(same, key=rank)
+        hit = min(same, key=rank) if len(same) > 1 else next(iter(same))
         group = self.groups[hit.group]
         signs = {load: self._signs(hit, load, variant) for load, variant in hit.signs}
         return _Answer(

@@ -88,6 +88,7 @@ class Auditor:
         self.choices = Choices(registry=registry, known_at=known_at)
         self._toml = functools.lru_cache(maxsize=64)(read_toml)
         nearest = functools.lru_cache(maxsize=64)(nearest_test_toml)
+        self._test = functools.lru_cache(maxsize=64)(self._folder_of)
         self._find = lambda path: nearest(path.parent)  # what is no folder holds no test.toml
 
     def __call__(self, name: str) -> FileAudit | OwnOutput:
@@ -95,22 +96,21 @@ class Auditor:
         path = self.archive / name
         try:
             size = path.stat().st_size
-            if size > MAX_FILE_BYTES:  # the gate refuses it without reading it
-                data, sha256 = None, sha256_file(path)
-            else:
-                data = path.read_bytes()
-                sha256 = sha256_bytes(data)
+            data = path.read_bytes() if size <= MAX_FILE_BYTES else None
+            # The gate refuses a larger one without reading it; of others the reader tells the hash.
+            large = sha256_file(path) if data is None else ""
         except OSError as error:
             return unreadable(name, f"no-file: {error.strerror}")
         # A workbook's marks are looked at where it is opened, or not to be opened as a recording.
         workbook = data is not None and data.startswith(b"PK")
         if data is not None and not workbook and own_output(data):
-            return OwnOutput(sha256=sha256)
+            return OwnOutput(sha256=sha256_bytes(data))
         context, trouble = self._context(path, data or b"")
         try:
             recording = read_recording(path, context.machine, data=data)
             blocks = () if context.is_tare else split_blocks(recording, context.machine)[0]
         except ToolkitError as error:
+            sha256 = large if data is None else sha256_bytes(data)
             if workbook and data is not None and own_output(data):
                 return OwnOutput(sha256=sha256)
             told = f"{error.rule or 'unreadable'}: {error.what}" + (f", got {error.got}" if error.got else "")
@@ -138,7 +138,7 @@ class Auditor:
         sae = signs(context.machine.axes, "SAE", seen)
         return FileAudit(
             path=name,
-            sha256=sha256,
+            sha256=recording.sha256,
             size=size,
             instrument=instrument,
             date=context.date,
@@ -175,7 +175,7 @@ class Auditor:
             told = f"{error.rule or 'test-toml'}: {error.what} ({error.where})"
             return Context(machine=machine, machine_source=source, date=None, test_toml=None), told
 
-    def _test(self, toml: Path) -> str:
+    def _folder_of(self, toml: Path) -> str:
         try:
             return toml.parent.relative_to(self._root).as_posix()
         except ValueError:
@@ -184,12 +184,11 @@ class Auditor:
     def _rotation(self, path: Path, context: Context, table: Mapping[str, Any]) -> Rotation:
         if context.test_toml is None:
             return "forward"
-        named: Any = table.get("rotations")
-        inside = (
-            (self._root / path.relative_to(self.archive)).relative_to(context.test_toml.parent).as_posix()
-        )
-        own: Mapping[str, Any] = named if isinstance(named, dict) else {}
-        said = own.get(inside, own.get(path.name, table.get("rotation")))
+        said, own = table.get("rotation"), table.get("rotations")
+        if isinstance(own, dict):
+            here = self._root / path.relative_to(self.archive)
+            inside = here.relative_to(context.test_toml.parent).as_posix()
+            said = own.get(inside, own.get(path.name, said))
         return cast("Rotation", said) if said in ROTATIONS else "forward"
 
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -125,7 +126,9 @@ class Screen:
         self, columns: Columns, load: str, rows: NDArray[np.int64], among: NDArray[np.int64]
     ) -> NDArray[np.float64]:
         equations, y = self.equations[load], np.abs(columns.y[load][rows])
-        size, slack = equations.size[among], equations.slack[among]
+        size, slack = equations.size, equations.slack
+        if len(among) < len(size):
+            size, slack = size[among], slack[among]
         here = np.column_stack([np.abs(columns.x[rows]), np.ones(len(rows))])
         own = (columns.half_y[load][rows] + 1e-9 * y)[:, None]
         limit: NDArray[np.float64] = (
@@ -195,5 +198,6 @@ def _equations(
     return _Equations(coefficients=coefficients, size=np.abs(plain), slack=slack)
 
 
+@lru_cache(maxsize=256)
 def _probe(rows: int) -> NDArray[np.int64]:
     return np.unique(np.linspace(0, rows - 1, min(rows, _PROBE)).round().astype(np.int64))

@@ -51,22 +51,23 @@ def whole_file(fits: Sequence[dict[str, NDArray[np.bool_]]]) -> tuple[Hit, ...]:
 def partition(fits: Sequence[dict[str, NDArray[np.bool_]]], rows: int) -> tuple[Run, ...]:
     """Split a file into runs of rows that the same candidates fit."""
     lengths = [{load: _run_lengths(fit) for load, fit in by_load.items()} for by_load in fits]
+    # A pair of variants fits as long as the shorter of the two; the longest pair is wanted.
+    reaches = np.zeros((len(fits), rows), dtype=np.int64)
+    for reach, by_load in zip(reaches, lengths, strict=True):
+        if by_load:
+            reach[:] = np.minimum.reduce([length.max(axis=0) for length in by_load.values()])
     runs: list[Run] = []
     row = 0
     while row < rows:
-        longest = 0
+        here = reaches[:, row]
+        longest = int(here.max(initial=0))
         hits: list[Hit] = []
-        for index, by_load in enumerate(lengths):
-            # A pair of variants fits as long as the shorter of the two; the longest pair is wanted.
-            reach = min((int(length[:, row].max()) for length in by_load.values()), default=0)
-            if reach == 0 or reach < longest:
-                continue
+        for index in np.flatnonzero(here == longest).tolist() if longest else ():
             choices = [
-                [(load, int(v)) for v in np.flatnonzero(length[:, row] >= reach)]
-                for load, length in by_load.items()
+                [(load, int(v)) for v in np.flatnonzero(length[:, row] >= longest)]
+                for load, length in lengths[index].items()
             ]
-            found = _products(index, choices)
-            longest, hits = (reach, found) if reach > longest else (longest, hits + found)
+            hits += _products(index, choices)
         if longest == 0 and runs and not runs[-1].hits:
             runs[-1] = Run(start=runs[-1].start, stop=row + 1, hits=())
         else:

@@ -9,6 +9,7 @@ a new worker takes its place and the others go on.
 from __future__ import annotations
 
 import contextlib
+import gc
 import multiprocessing as mp
 import os
 import time
@@ -28,6 +29,7 @@ DIED = "worker-died: the reader's process ended without an answer"
 MEMORY_BYTES = 4 << 30
 _THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
 _TRIES = 3
+_CYCLES = 20_000  # new objects until they are looked through
 _AHEAD = 16  # files in a worker's pipe: it never waits for the next one
 
 
@@ -190,6 +192,9 @@ def _serve(make: Callable[[], Callable[[str], Result]], pipe: Connection) -> Non
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent is interrupted, and ends its workers
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY_BYTES, MEMORY_BYTES))
     work = make()
+    # What is there now stays, and a file leaves hardly any cycles that would have to be looked for.
+    gc.freeze()
+    gc.set_threshold(_CYCLES)
     pipe.send(None)  # ready
     while True:
         try:

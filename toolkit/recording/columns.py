@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import difflib
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import NoReturn
 
 from toolkit.channels import CHANNELS, Channel
@@ -111,13 +112,18 @@ def _plain(text: str) -> str:
 
 
 def _machine_column(name: str, machine: Machine) -> Column | None:
-    wanted = _plain(name)
-    for column in machine.columns:
+    return _names(machine.columns).get(_plain(name))
+
+
+@lru_cache(maxsize=32)
+def _names(columns: tuple[Column, ...]) -> Mapping[str, Column]:
+    # Every name of every column, once a machine; the first column that has a name keeps it.
+    known: dict[str, Column] = {}
+    for column in columns:
         channel = CHANNELS.get(column.symbol)
-        names = (column.header, column.symbol, *(channel.aliases if channel else ()))
-        if any(_plain(one) == wanted for one in names):
-            return column
-    return None
+        for one in (column.header, column.symbol, *(channel.aliases if channel else ())):
+            known.setdefault(_plain(one), column)
+    return known
 
 
 def _channel(name: str, header: str) -> Channel | None:

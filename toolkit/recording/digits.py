@@ -19,6 +19,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from numpy.typing import ArrayLike, NDArray
 
     from toolkit.recording.model import Series
@@ -28,6 +30,9 @@ _FEW = 6
 _FULL = 999
 _SMALL = -8  # below this decade the powers of ten that are needed are no longer exact in a double
 _TEN = 10.0 ** np.arange(23)
+_LEAST = 307
+_POWER = 10.0 ** np.arange(-_LEAST, 309)
+_HALF = np.array([0.5 * float(f"1e{-places}") for places in range(_FULL)] + [0.0])  # by decimals
 
 
 def half_last_place(values: ArrayLike) -> NDArray[np.float64]:
@@ -50,10 +55,7 @@ def half_last_place(values: ArrayLike) -> NDArray[np.float64]:
     """
     given = np.asarray(values, dtype=np.float64)
     table = given.reshape(len(given), math.prod(given.shape[1:]))
-    half = np.zeros(table.shape)
-    for column in range(table.shape[1]):
-        _column(table[:, column], half[:, column])
-    return half.reshape(given.shape)
+    return np.ascontiguousarray(_halves(np.ascontiguousarray(table.T)).T).reshape(given.shape)
 
 
 def rounding(series: Series) -> NDArray[np.float64]:
@@ -61,62 +63,76 @@ def rounding(series: Series) -> NDArray[np.float64]:
 
     Half a unit of its last printed place, or half the step in which a binary file stores it if that is more.
     """
-    printed = half_last_place(series.values)
-    return printed if series.half is None else np.maximum(printed, series.half)
+    return np.asarray(roundings([series])[0])
 
 
-def _column(values: NDArray[np.float64], half: NDArray[np.float64]) -> None:
-    size = np.abs(values)
+def roundings(series: Sequence[Series]) -> NDArray[np.float64]:
+    """Return `rounding` of several channels of one file (channels, rows)."""
+    printed = _halves(np.stack([one.values for one in series]))
+    for one, half in zip(series, printed, strict=True):
+        if one.half is not None:
+            np.maximum(half, one.half, out=half)
+    return printed
+
+
+def _halves(columns: NDArray[np.float64]) -> NDArray[np.float64]:
+    # All columns (columns, rows) at once: what is looked for is one number a column, decade and sign.
+    if not columns.size:
+        return np.zeros(columns.shape)
+    size = np.abs(columns)
     zero = size == 0
     any_zero = bool(zero.any())
-    if bool(zero.all()):  # also of an empty column
-        return
-    mixed = bool(values.min() < 0 < values.max())
     decade = _decades(np.where(zero, 1.0, size) if any_zero else size)
-    smallest = np.inf
-    low, high = int(decade.min()), int(decade.max())
-    for one in range(low, high + 1) if high - low < 8 else np.unique(decade).tolist():
-        here = slice(None) if low == high else (decade == one)
-        group = size[here]
-        if any_zero:
-            group = group[group > 0]
-        if not len(group):
-            continue
-        place = _half_of(group, one)
-        half[here] = place
-        smallest = min(smallest, place)
-        if mixed and place:
-            inside = np.ones(len(values), dtype=bool) if isinstance(here, slice) else here
-            for side in (inside & (values < 0), inside & (values > 0)):
-                if _FEW <= int(np.count_nonzero(side)) < len(group):
-                    half[side] = _half_of(size[side], one)
+    places = _places(size, decade)
+    low = int(decade.min())
+    n, decades = len(columns), int(decade.max()) - low + 1
+    group = (decade - low) + decades * np.arange(n)[:, None]
+    side = 2 * group + (columns < 0)
+    counted = (side[~zero], places[~zero]) if any_zero else (side.ravel(), places.ravel())
+    most = np.zeros(2 * n * decades, dtype=np.int64)
+    np.maximum.at(most, *counted)
+    count = np.bincount(counted[0], minlength=len(most)).reshape(-1, 2)
+    sides = most.reshape(-1, 2)
+    both = sides.max(axis=1)
+    # A sign of which there are enough, beside the other one, has the place that it shows.
+    own = (count >= _FEW) & (count < count.sum(axis=1)[:, None]) & (both != _FULL)[:, None]
+    half: NDArray[np.float64] = _HALF[np.where(own, sides, both[:, None]).ravel()[side]]
     if any_zero:
-        half[zero] = smallest
+        there = (count.sum(axis=1) > 0).reshape(n, decades)
+        smallest = np.where(there, _HALF[both].reshape(n, decades), np.inf).min(axis=1)
+        half = np.where(zero, np.where(np.isinf(smallest), 0.0, smallest)[:, None], half)
+    return half
 
 
 def _decades(size: NDArray[np.float64]) -> NDArray[np.int64]:
     # floor(log10), mended where the logarithm was rounded up to a whole number.
     decade = np.floor(np.log10(size)).astype(np.int64)
-    return np.where(10.0 ** decade.clip(-307).astype(np.float64) > size, decade - 1, decade)
+    too_high = _POWER[decade.clip(-_LEAST) + _LEAST] > size
+    return np.where(too_high, decade - 1, decade)
 
 
-def _half_of(group: NDArray[np.float64], decade: int) -> float:
-    """Return half the last place of positive values of one decade, 0.0 for full doubles.
+def _places(size: NDArray[np.float64], decade: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return how many decimals each value needs, `_FULL` for a full double; 0 or more.
 
     ``round(v 10^k) / 10^k == v`` is an exact test: both operands of the division are exact, so the
     quotient is the double nearest to that decimal number, as a reader of the text would have made it.
     """
-    if decade < _SMALL:
-        most = max(_decimals(float(value)) for value in group)
-    else:
-        # The first value needs so many; the others may need more, up to a full double.
-        most = max(_decimals(float(group[0])), 0)
-        limit = FULL_DIGITS - 2 - decade  # the most decimals with at most 14 significant digits
-        while most <= limit and not np.array_equal(np.rint(group * _TEN[most]) / _TEN[most], group):
-            most += 1
-        if most > limit:
-            return 0.0
-    return 0.0 if most == _FULL else 0.5 * float(f"1e{-most}")
+    places = np.full(size.shape, _FULL)
+    most = FULL_DIGITS - 2 - decade  # decimals, with at most 14 significant digits
+    small = decade < _SMALL
+    if small.any():
+        places[small] = [_decimals(value) for value in size[small].tolist()]
+        most[small] = -1
+    left = most >= 0
+    for k, ten in enumerate(_TEN.tolist()):
+        fits = np.rint(size * ten) / ten == size
+        fits &= left
+        places[fits] = k
+        left &= ~fits
+        left &= most > k
+        if not left.any():
+            break
+    return places
 
 
 def _decimals(value: float) -> int:

@@ -6,6 +6,7 @@ import datetime as dt
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import chain
 from typing import TYPE_CHECKING, Any, NoReturn
 
 import numpy as np
@@ -71,20 +72,48 @@ def read_table(table: Table, machine: Machine) -> tuple[Series, ...]:
         _no_data(table, "a header row and nothing below it")
     body = table.rows[first + 1 : last]
     _check_nameless(table, body, headers, first + 2)
-    return tuple(_series(one, [row[one.index] for row in body], table.where, first + 2) for one in assigned)
+    columns = _numbers(body)
+    if columns is None:  # one by one, for the first cell that is to blame
+        return tuple(
+            _series(one, [row[one.index] for row in body], table.where, first + 2) for one in assigned
+        )
+    return tuple(_named(one, columns[one.index]) for one in assigned)
+
+
+def _numbers(body: Sequence[Sequence[Any]]) -> NDArray[np.float64] | None:
+    # Every column (columns, rows) where each cell is a finite number, as of most files; else None.
+    width = len(body[0])
+    if set(map(len, body)) != {width}:
+        return None
+    cells = list(chain.from_iterable(body))
+    values = _array(cells)
+    if values is None:
+        return None
+    columns = np.ascontiguousarray(values.reshape(len(body), width).T)
+    columns.setflags(write=False)
+    return columns
+
+
+def _array(cells: list[Any]) -> NDArray[np.float64] | None:
+    # The types are looked at before numpy sees them: it would take True for 1 and "12.3" for text.
+    if not _NUMBERS.issuperset(map(type, cells)):
+        return None
+    try:
+        values = np.array(cells, dtype=np.float64)
+    except OverflowError:  # a whole number of more than 308 digits
+        return None
+    return values if np.isfinite(values).all() else None
 
 
 def _series(one: Assigned, cells: list[Any], where: str, first_row: int) -> Series:
-    # The types are looked at before numpy sees them: it would take True for 1 and "12.3" for text.
-    values: NDArray[np.float64] | None = None
-    if _NUMBERS.issuperset(map(type, cells)):
-        try:
-            values = np.array(cells, dtype=np.float64)
-        except OverflowError:  # a whole number of more than 308 digits
-            values = None
-    if values is None or not np.isfinite(values).all():
+    values = _array(cells)
+    if values is None:
         _refuse_first(one, cells, where, first_row)
     values.setflags(write=False)
+    return _named(one, values)
+
+
+def _named(one: Assigned, values: NDArray[np.float64]) -> Series:
     return Series(symbol=one.symbol, header=one.header, unit=one.unit, role=one.role, values=values)
 
 

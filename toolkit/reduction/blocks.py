@@ -53,11 +53,9 @@ def find_blocks(FZ: NDArray[np.float64]) -> tuple[Block, ...]:
     steps = np.abs(np.diff(FZ))
     largest = float(np.max(np.abs(FZ)))
     noise = 1.4826 * float(np.median(steps)) / np.sqrt(2) if steps.size else 0.0
-    limit = float(np.clip(_NOISE_FACTOR * noise, _LEAST_JUMP * largest, _LARGEST_JUMP * largest))
+    limit = min(max(float(_NOISE_FACTOR * noise), _LEAST_JUMP * largest), _LARGEST_JUMP * largest)
     edges = [0, *(np.flatnonzero(steps > limit) + 1).tolist(), len(FZ)]
-    return tuple(
-        Block(start=a, stop=b, mean_FZ=float(np.mean(FZ[a:b]))) for a, b in itertools.pairwise(edges)
-    )
+    return tuple(Block(start=a, stop=b, mean_FZ=float(FZ[a:b].mean())) for a, b in itertools.pairwise(edges))
 
 
 def is_tare(block: Block, *, smallest_load: float) -> bool:

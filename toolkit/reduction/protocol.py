@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -40,18 +41,16 @@ def nearest_step(SA: float, protocol: Protocol) -> float | None:
     The reach is half the distance to the neighbouring step, at least the tolerance: a file that is out
     of tolerance still is that step, with a finding.
     """
-    steps = np.unique(protocol.slip_angles_rad)
-    distances = np.abs(steps - SA)
-    best = int(np.argmin(distances))
-    others = np.abs(np.delete(steps, best) - steps[best])
-    reach = max(protocol.slip_angle_tolerance_rad, float(np.min(others)) / 2) if len(steps) > 1 else np.inf
-    return float(steps[best]) if distances[best] <= reach else None
+    steps = sorted(set(protocol.slip_angles_rad))
+    best = min(steps, key=lambda step: abs(step - SA))
+    others = [abs(step - best) for step in steps if step != best]
+    reach = max(protocol.slip_angle_tolerance_rad, min(others) / 2) if others else math.inf
+    return best if abs(best - SA) <= reach else None
 
 
 def nearest_load(FZ: float, protocol: Protocol) -> float | None:
     """Return the nominal load [N] nearest to a measured one, None where the protocol has none there."""
-    loads = np.asarray(protocol.loads_N)
-    best = float(loads[np.argmin(np.abs(loads - FZ))])
+    best = min(protocol.loads_N, key=lambda load: abs(load - FZ))
     return best if abs(FZ - best) <= _LOAD_REACH * best else None
 
 
