@@ -209,3 +209,10 @@ def test_a_makers_file_gives_its_friction_and_stiffness(psi):
     peak = np.abs(forces.FY - p["PVY1"] * F0).max()
     assert peak <= abs(p["PDY1"]) * F0 * (1 + 1e-9)
     assert file_text(parse_tir(file_text(tir))) == file_text(tir)
+
+
+def test_a_file_without_its_kind_says_so():
+    text = "[MODEL]\nPROPERTY_FILE_FORMAT = 'MF_61'\n"
+    with pytest.raises(ConfigError) as caught:
+        _ = parse_tir(text, where="x.tir").version
+    assert caught.value.got == "no FITTYP, and PROPERTY_FILE_FORMAT = MF_61"

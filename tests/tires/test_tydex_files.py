@@ -153,3 +153,41 @@ def test_digits_that_ten_columns_lose_are_said():
 def test_every_number_leaves_a_space(value):
     assert len(fitted(value)) <= 9
     assert float(fitted(value)) == pytest.approx(value, rel=5e-2)
+
+
+def carrier(camber=""):
+    lines = (
+        "SLIPANGL  slip angle                    deg       1         0         0\n"
+        "FZC       load                          kN        1         0         0\n"
+        "FYC       side force                    N         1         0         0\n"
+        "MZC       aligning moment               Nm        1         0         0\n"
+    )
+    return (
+        f"**HEADER\n**CONSTANTS\n{camber}**MEASURCHANNELS\n{lines}"
+        "**MEASURDATA         2\n         2         4      1200      -9.5\n        -2         4     -1200"
+        "       9.5\n**END\n"
+    )
+
+
+@pytest.mark.parametrize(
+    "camber",
+    ["", "INCLANGL  camber                        deg       0\n"],
+    ids=["no camber named", "zero camber"],
+)
+def test_without_camber_the_carriers_axes_are_the_roads(read, camber):
+    # TYDEX manual 1.3: C turns into W about the x-axis by the inclination angle, and W's origin lies below.
+    file = read(carrier(camber))
+    assert channel(file, "FZ") == ("kN", [4.0, 4.0])
+    assert channel(file, "FY") == ("N", [1200.0, -1200.0])
+    assert channel(file, "MZ")[1] == [-9.5, 9.5]
+    assert [(one.rule, one.level) for one in file.findings] == [("tydex-axes", "note")]
+
+
+def test_with_camber_the_carriers_axes_are_not_taken_for_the_roads(read):
+    file = read(carrier("INCLANGL  camber                        deg       2\n"))
+    assert {one.symbol for one in file.channels} == {"SA", "IA", None}
+    assert [(one.rule, one.level) for one in file.findings] == [("tydex-axes", "warning")]
+
+
+def test_a_sign_that_was_turned_leaves_no_minus_before_zero():
+    assert fitted(-0.0) == "0"

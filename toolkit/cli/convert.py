@@ -168,7 +168,7 @@ def _written(
     if kind == "csv":
         lines = [",".join(f"{symbol} [{name}]" for symbol, (name, _) in turned.items())]
         lines += [
-            ",".join(repr(float(value)) for value in row)
+            ",".join(repr(float(value) + 0.0) for value in row)  # -0 is 0
             for row in zip(*(values for _, values in turned.values()), strict=True)
         ]
         return "\n".join(lines) + "\n", ()

@@ -94,11 +94,17 @@ class TirFile:
         raise ConfigError(
             "the tire file's kind of Magic Formula is not known",
             where=self.where or None,
-            got=f"FITTYP = {fittyp:g}" if isinstance(fittyp, float) else f"FITTYP = {fittyp}",
+            got=self._kind_as_written(fittyp),
             expected="5, 6, 21 or 52 for MF 5.2; 60, 61 or 62 for MF 6.x",
             next_step="correct FITTYP in [MODEL]",
             rule="tir-fittyp",
         )
+
+    def _kind_as_written(self, fittyp: object) -> str:
+        if fittyp is not None:
+            return f"FITTYP = {fittyp:g}" if isinstance(fittyp, float) else f"FITTYP = {fittyp}"
+        told = self.get("PROPERTY_FILE_FORMAT")
+        return "no FITTYP" + (f", and PROPERTY_FILE_FORMAT = {told}" if told is not None else "")
 
     def coefficients(self) -> dict[str, float]:
         """Return every number of the coefficient and scaling sections by its name; LFZ0 is LFZO."""

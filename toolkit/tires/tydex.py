@@ -3,7 +3,8 @@
 TYDEX-Format Description and Reference Manual, release 1.3 (1997). Lines of **CONSTANTS: name in 10 columns,
 description 30, unit 10, value. Lines of **MEASURCHANNELS: name 10, description 30, unit 10, factor 10,
 offsets 10 and 10. Data stand in columns of 10, one a channel; physical = factor x value + offset in the
-unit that is given; a constant applies to every row. The W axes are ISO-W; FX is the same in C and W.
+unit that is given; a constant applies to every row. The W axes are ISO-W; FX is the same in C and W, and
+without camber FY, FZ and MZ are too. With camber they are not read in C: MZ would need the loaded radius.
 """
 
 from __future__ import annotations
@@ -29,6 +30,8 @@ if TYPE_CHECKING:
 SYMBOLS = {channel.tydex: symbol for symbol, channel in CHANNELS.items() if channel.tydex} | {
     "FXW": "FX", "FXC": "FX", "RUNTIME": "t",
 }  # fmt: skip
+# Of the wheel carrier's axes: without camber these are the same in C and W, since C only lies higher.
+_CARRIER = {"FYC": "FY", "FZC": "FZ", "MZC": "MZ"}
 NAMES = {symbol: channel.tydex for symbol, channel in CHANNELS.items() if channel.tydex} | {"t": "RUNTIME"}
 _NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eEdD][+-]?[0-9]{1,4})?")
 _LIMIT = 256_000_000
@@ -106,6 +109,9 @@ def read_tydex(path: Path) -> TydexFile:
             column = np.full(len(rows), number_of)
             measured.append(_made(name, symbol, line[40:50].strip(), column, f"{path}, line {number}"))
             known.add(symbol)
+    measured, carried = _from_carrier(measured, str(path))
+    findings += carried
+    known |= {one.symbol for one in measured}
     if misaligned:
         text = f"{misaligned} rows do not stand in columns of 10: read by their spaces"
         findings.append(Finding(rule="tydex-columns", where=str(path), message=text))
@@ -113,6 +119,27 @@ def read_tydex(path: Path) -> TydexFile:
         if sum(one.symbol == symbol for one in measured) > 1:
             raise _refuse(path, "doubled-column", f"{symbol} is measured twice", symbol, "one such channel")
     return TydexFile(where=str(path), channels=tuple(measured), other=tuple(other), findings=tuple(findings))
+
+
+def _from_carrier(measured: list[TydexChannel], where: str) -> tuple[list[TydexChannel], list[Finding]]:
+    # What C and W have in common is read from C where the file has no W.
+    have = {one.symbol for one in measured}
+    names = [one.name for one in measured if _CARRIER.get(one.name.upper(), "FX") not in have | {"FX"}]
+    if not names:
+        return measured, []
+    shown = ", ".join(names)
+    if any(one.symbol == "IA" and np.any(one.values) for one in measured):
+        text = (
+            f"{shown}: not read, for with camber the axes of the wheel carrier (C) are not those of the road"
+        )
+        return measured, [Finding(rule="tydex-axes", where=where, message=text)]
+    said = "the camber is zero" if "IA" in have else "the file names no camber, so that it counts as zero"
+    text = f"{shown}: read from the axes of the wheel carrier (C) as of the road (W), for {said}"
+    made = [
+        _made(one.name, _CARRIER[one.name.upper()], one.unit, one.values, where) if one.name in names else one
+        for one in measured
+    ]
+    return made, [Finding(rule="tydex-axes", where=where, message=text, level="note")]
 
 
 _KNOWN = ("HEADER", "COMMENTS", "CONSTANTS", "MEASURCHANNELS", "MEASURDATA", "END")
@@ -233,6 +260,7 @@ def fitted(value: float) -> str:
     >>> fitted(-1234.56789), fitted(0.1), fitted(-1.23456789e-7)
     ('-1234.568', '0.1', '-1.23e-07')
     """
+    value += 0.0  # a sign that was turned leaves -0
     if len(short := f"{value:.12g}") <= _WIDTH - 1 and float(short) == value:
         return short
     for digits in range(9, 0, -1):
