@@ -28,7 +28,7 @@ _C = (0.35, 0.7, 1.1, 1.6, 2.2, 2.9, 3.6)
 _E = (-19.0, -6.0, -2.0, -0.3, 0.5, 0.9)
 _H = (-3.0, -1.8, -1.2, -0.9, -0.6, -0.3, 0.0, 0.3, 0.6, 0.9, 1.2, 1.8, 3.0)
 _BLOCK = (16, 378)  # curves and shapes: 16 x 378 x 40 nodes is under 2^18, below which OpenBLAS stays alone
-_AT_ONCE = 16
+_AT_ONCE = 32
 _GRID = (len(_B), len(_C), len(_E), len(_H))
 
 
