@@ -22,6 +22,16 @@ if TYPE_CHECKING:
     from toolkit.diagnosis.case import Case, Run
 
 
+_BY_VALUE = (
+    "sensitivity_error",
+    "hysteresis",
+    "nonlinearity",
+    "creep",
+    "dead_band",
+    "filter_lag",
+    "channel_delay",
+)
+_LEAST_ROWS = 20  # of a run, to tell what its cells carried from its loads
 _ON_TARE = ("channel_sign", "sensitivity_error", "unit_error")
 
 
@@ -95,6 +105,26 @@ class Cells:
             total += (known[name] * sd * factor) ** 2
         return float(np.sqrt(total)) * unit(fit.unit).factor
 
+    def _carried(
+        self,
+        run: Run,
+        shown: NDArray[np.float64],
+        values: dict[str, NDArray[np.float64]],
+        outputs: Sequence[Output],
+    ) -> NDArray[np.float64]:
+        """Return what a cell showed as far as the simulated loads account for it, without its noise.
+
+        The cell's noise is in FY and MZ as well: an effect in proportion to what was recorded would explain
+        that noise, and be found where nothing is wrong.
+        """
+        columns = [values[one.name] for one in outputs if one.name in self.loads]
+        columns += [run.columns[name] for name in ("FZ",) if name in run.columns]
+        there = np.column_stack([*columns, np.ones(len(shown))])
+        good = np.isfinite(there).all(axis=1) & np.isfinite(shown)
+        if int(good.sum()) < _LEAST_ROWS:
+            return shown
+        return np.asarray(there @ np.linalg.lstsq(there[good], shown[good], rcond=None)[0])
+
     def _foretold(
         self, values: dict[str, NDArray[np.float64]], outputs: Sequence[Output]
     ) -> dict[str, NDArray[np.float64]]:
@@ -151,6 +181,8 @@ class Cells:
             return values
         if all(name in run.columns for name in self.names):
             recorded = {name: self._cell(run, name) for name in self.names}
+            for name in {str(one.channel) for one in here if one.effect.name in _BY_VALUE}:
+                recorded[name] = self._carried(run, recorded[name], values, outputs)
         else:
             recorded = self._foretold(values, outputs)
         true = dict(recorded)
