@@ -69,13 +69,21 @@ def candidates(problem: Problem) -> tuple[Candidate, ...]:
         if effect.name in _IN_TIME and not problem.case.has_time:
             continue
         for channel, source in problem.model.places(effect):
-            whole = Active(effect=effect, channel=channel, source=source)
+            whole = Active(effect=_as_known(problem, effect), channel=channel, source=source)
             for runs in (None, *_subsets(problem, effect)):
                 active = replace(whole, runs=runs)
                 starts = _starts(problem, active)
                 if starts:
                     made.append(Candidate(active=active, starts=starts, discrete=effect.name in DISCRETE))
     return tuple(made)
+
+
+def _as_known(problem: Problem, effect: Effect) -> Effect:
+    """Return an effect without the reference load as a parameter, where the tire's own file states it."""
+    stated = problem.case.nominal_load_N or getattr(problem.model, "nominal_load_N", None)
+    if effect.name != "load_friction" or stated is None:
+        return effect
+    return replace(effect, parameters=tuple(one for one in effect.parameters if one.name != "reference"))
 
 
 def _starts(problem: Problem, active: Active) -> tuple[Start, ...]:
