@@ -18,7 +18,7 @@ demo: setup
 	$(BIN)/toolkit demo --out demo-out
 
 test: setup check
-	$(BIN)/python -m pytest -q -n $(JOBS) --dist worksteal
+	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -q -n $(JOBS) --dist worksteal
 
 check: $(STAMP)
 	$(BIN)/ruff format --check --quiet

@@ -84,7 +84,8 @@ def _coverage(sealed: dict[str, Any], answer: dict[str, Any]) -> dict[str, bool]
         for effect in answer.get("effects", []):
             if effect["name"] != truth["name"] or not truth["parameters"]:
                 continue
-            if effect.get("channel") != truth["channel"] and truth["channel"] and effect.get("channel"):
+            here, there = effect.get("channel"), truth.get("channel")
+            if here and there and here != there:
                 continue  # the same name on another channel has a parameter in another unit
             for p in effect.get("parameters", []):
                 wanted, interval = truth["parameters"].get(p["name"]), p.get("ci95")

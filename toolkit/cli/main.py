@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import sys
 import traceback
-from typing import Annotated, NoReturn
+from functools import cache
+from typing import Annotated, Any, NoReturn
 
 import typer
 
@@ -41,6 +42,7 @@ def _root(
     pass
 
 
+@cache
 def _register() -> None:
     # Each module holds one command and imports what is heavy only when it runs.
     from toolkit.cli import (
@@ -77,13 +79,19 @@ def _register() -> None:
         app.command(module.NAME)(module.command)
 
 
+@cache
+def _command() -> Any:
+    # Built once: whoever calls `run` many times in a process would wait for all options every time.
+    _register()
+    return typer.main.get_command(app)
+
+
 def run(arguments: list[str] | None = None) -> NoReturn:
     """Run the command line: 0 clean, 1 findings, 2 bad input, 101 a bug."""
     arguments = sys.argv[1:] if arguments is None else arguments
     as_json = "--json" in arguments
-    _register()
     try:
-        code = app(args=arguments, prog_name="toolkit", standalone_mode=False)
+        code = _command()(args=arguments, prog_name="toolkit", standalone_mode=False)
     except ToolkitError as error:
         print_error(error, as_json=as_json)
         code = error.exit_code
