@@ -13,6 +13,7 @@ from report_factory import COMPARISON, LOADS_N, formula, make_record, make_resul
 from toolkit.errors import ConfigError, TemplateError
 from toolkit.report.build import build_content, report_id
 from toolkit.report.columns import TABLES
+from toolkit.report.diagnosis.entries import REPORT_TABLES
 from toolkit.report.figures import draw
 from toolkit.report.style import Style, read_style
 from toolkit.report.tags import catalogue, format_number, format_problem, parse_tag
@@ -43,7 +44,7 @@ def test_every_value_and_table_is_in_the_catalogue_and_the_other_way_round() -> 
     assert {path for path, one in listed.items() if one.kind in ("text", "number", "date")} <= set(
         made.values
     )
-    assert set(made.tables) == set(TABLES)
+    assert set(made.tables) == {*TABLES, *REPORT_TABLES}
     for path, one in made.values.items():
         if path in listed:
             assert one.kind == listed[path].kind, path

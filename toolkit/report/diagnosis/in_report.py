@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from toolkit.report.content import Plot, Table, Value
-from toolkit.report.diagnosis.entries import REPORT_TABLES, REPORT_VALUES
+from toolkit.report.diagnosis.entries import REPORT_FIGURES, REPORT_TABLES, REPORT_VALUES
 
 if TYPE_CHECKING:
     from toolkit.diagnosis.answer import Diagnosis
@@ -26,14 +26,15 @@ class Told:
 
 
 def diagnosis_values(told: Told | None, style: Style) -> dict[str, Value]:
-    """Return the values ``diagnosis.*`` of a report; without an answer they are missing."""
+    """Return the values ``diagnosis.*`` of a report and captions; without an answer they are missing."""
     texts: dict[str, str | None] = {}
     if told is not None:
         from toolkit.report.diagnosis.content import answer_texts
 
         texts = answer_texts(told.answer, style, by=told.by)
     names = (one.path.partition(".")[2] for one in REPORT_VALUES)
-    return {f"diagnosis.{name}": Value(kind="text", value=texts.get(name)) for name in names}
+    captions = {f"caption.{name}": Value(kind="text", value=None) for name in REPORT_FIGURES}
+    return captions | {f"diagnosis.{name}": Value(kind="text", value=texts.get(name)) for name in names}
 
 
 def diagnosis_tables(told: Told | None, style: Style) -> dict[str, Table]:
