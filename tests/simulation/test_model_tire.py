@@ -146,3 +146,15 @@ def test_a_model_that_no_plan_can_use_is_refused(tmp_path, change, said, rule):
 def test_a_number_outside_what_the_effect_can_have_is_refused(tmp_path):
     with pytest.raises(ConfigError, match="outside"):
         made(tmp_path, "model.toml", model=MODEL + GRIP.replace("WHERE", "").replace("0.8", "1e9"))
+
+
+def test_a_file_without_the_reference_load_means_the_nominal_one(tmp_path):
+    text = '[[effect]]\nname = "load_friction"\n[effect.parameters.sensitivity]\nvalue = -0.1\nunit = "1"\n'
+    told = text + '[effect.parameters.reference]\nvalue = 1.0\nunit = "1"\n'
+    without, with_it = (
+        made(tmp_path / name, "model.toml", model=MODEL + one) for name, one in (("a", text), ("b", told))
+    )
+    same(without, with_it)
+    other = made(tmp_path / "c", "model.toml", model=MODEL + told.replace("1.0", "1.2"))
+    files = [simulate(one).files[0].signals["FY"] for one in (without, other)]
+    assert not np.allclose(*files)

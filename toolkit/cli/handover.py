@@ -67,17 +67,18 @@ def diagnosis_of(given: Path | None, by: str | None, tests: Sequence[Path]) -> t
 
     if given is None and by is None:
         return None
-    if given is None or len(tests) > 1:
+    if given is None:
         raise ConfigError(
-            "there is no diagnosis to release"
-            if given is None
-            else "one diagnosis was given for several tests",
-            where="--by" if given is None else "--diagnosis",
-            got=by if given is None else f"{len(tests)} tests",
-            expected="--diagnosis DIR_OR_JSON beside it" if given is None else "one test",
-            next_step="make the report of the test that was diagnosed by itself",
+            "there is no diagnosis to release", where="--by", got=by,
+            expected="--diagnosis DIR_OR_JSON beside it", next_step="name the diagnosis, or leave --by away",
             rule="diagnosis-of-one-test",
-        )
+        )  # fmt: skip
+    if len(tests) > 1:
+        raise ConfigError(
+            "one diagnosis was given for several tests", where="--diagnosis", got=f"{len(tests)} tests",
+            expected="one test", next_step="make the report of the test that was diagnosed by itself",
+            rule="diagnosis-of-one-test",
+        )  # fmt: skip
     answer, file = read_answer(given)
     return Told(answer=answer, by=by), file
 

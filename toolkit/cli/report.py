@@ -115,7 +115,8 @@ def command(
         typer.Option(
             "--units",
             help="SI or lbf: N and N*m, or lbf and lbf*ft, in tables, figures and text of the report. "
-            "Default: the style file's. What is handed over beside it stays in SI.",
+            "Default: the style file's. What is handed over beside it stays in SI, a diagnosis in the units "
+            "of its case.",
         ),
     ] = None,
     diagnosis: Annotated[

@@ -38,7 +38,15 @@ def read_answer(path: Path) -> tuple[Diagnosis, Path]:
     try:
         payload = json.loads(read_bytes(file))
         return _answer(payload), file
-    except (ValueError, KeyError, IndexError, TypeError, AttributeError, RecursionError) as error:
+    except (
+        ValueError,
+        KeyError,
+        IndexError,
+        TypeError,
+        AttributeError,
+        OverflowError,
+        RecursionError,
+    ) as error:
         got = f"no key {error}" if isinstance(error, KeyError) else str(error)
         raise ConfigError(
             "this is no answer of a diagnosis",

@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 _FAR = 3.0  # prior standard deviations that a parameter must not be moved by
+_SHOWN = 1.1  # times the noise's mean square: an output with less shows no mismatch
 _TAKEN = 2 / 3  # of the held-out mean square above the noise, in one output at least
 _MOSTLY = 0.5  # of the log-likelihood that named effects must explain, beside the structure that stays
 
@@ -82,11 +83,13 @@ def mostly_unknown(found: Search) -> bool:
         return True
     if all(one.active.effect.name == "quantisation" for one in found.steps):
         return False  # read off the digits: it does not imitate anything
-    return all(
-        one.refitted_rmse**2 - one.augmented_rmse**2
-        < _TAKEN * (one.refitted_rmse**2 - min(one.noise_floor or 0.0, one.refitted_rmse) ** 2)
+    # Outputs that show nothing but noise do not count: of nothing, nothing is two thirds.
+    shown = [
+        (one.refitted_rmse**2 - one.augmented_rmse**2, one.refitted_rmse**2 - one.noise_floor**2)
         for one in _held_out(found, unknown=False)
-    )
+        if one.refitted_rmse**2 > _SHOWN * one.noise_floor**2
+    ]
+    return bool(shown) and all(taken < _TAKEN * above for taken, above in shown)
 
 
 def _verdict(

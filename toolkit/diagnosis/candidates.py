@@ -80,10 +80,13 @@ def candidates(problem: Problem) -> tuple[Candidate, ...]:
 
 def _as_known(problem: Problem, effect: Effect) -> Effect:
     """Return an effect without the reference load as a parameter, where the tire's own file states it."""
-    stated = problem.case.nominal_load_N or getattr(problem.model, "nominal_load_N", None)
-    if effect.name != "load_friction" or stated is None:
+    if effect.name != "load_friction" or getattr(problem.model, "nominal_load_N", None) is None:
         return effect
-    return replace(effect, parameters=tuple(one for one in effect.parameters if one.name != "reference"))
+    return replace(
+        effect,
+        equation="friction = 1 + sensitivity * (FZ - FZ0)/FZ0, FZ0 the nominal load",
+        parameters=tuple(one for one in effect.parameters if one.name != "reference"),
+    )
 
 
 def _starts(problem: Problem, active: Active) -> tuple[Start, ...]:

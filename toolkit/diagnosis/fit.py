@@ -365,7 +365,7 @@ def _moved(space: _Space, x: NDArray[np.float64]) -> list[NDArray[np.float64]]:
     """Return the points of one-sided differences, within the bounds."""
     points = []
     for i in range(len(x)):
-        step = _STEP * max(abs(x[i]), 1.0)
+        step = min(_STEP * max(abs(x[i]), 1.0), 0.1 * (space.high[i] - space.low[i]))
         step = -step if x[i] + step > space.high[i] else step
         moved = x.copy()
         moved[i] += step

@@ -58,15 +58,20 @@ def lattice_of(values: NDArray[np.float64], residual_sd: float) -> Lattice | Non
     printed = _last_place(values)
     if step < _FINER * printed or step**2 / 12 < _COARSE * residual_sd**2:
         return None
-    ends = _rounding(values)
+    ends = _rounding(values, printed)
     return Lattice(step=step, half_width=ends / whole, log_score_gain=len(values) * math.log(step / printed))
 
 
-def _rounding(values: NDArray[np.float64]) -> float:
-    """Return by how much the distance of the least and the largest value may be off: half a digit each."""
-    digits = max(len(f"{abs(v):.12g}".partition("e")[0].replace(".", "").strip("0")) for v in values.tolist())
+def _rounding(values: NDArray[np.float64], printed: float) -> float:
+    """Return by how much the distance of the least and the largest value may be off: half a place each.
+
+    A file prints either to a fixed place or to so many significant digits, then its ends are the coarsest.
+    """
+    shown = (f"{abs(one):.12g}".partition("e")[0].replace(".", "").lstrip("0") for one in values.tolist())
+    digits = max(map(len, shown))
     ends = (abs(float(values.min())), abs(float(values.max())))
-    return sum(0.5 * 10.0 ** (math.floor(math.log10(one)) + 1 - digits) for one in ends if one > 0)
+    places = (10.0 ** (math.floor(math.log10(one)) + 1 - digits) if one > 0 else printed for one in ends)
+    return sum(0.5 * max(printed, place) for place in places)
 
 
 def _last_place(values: NDArray[np.float64]) -> float:

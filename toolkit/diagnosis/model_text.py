@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from toolkit.simulation.model_file import ModelEffect
 
 MODEL = "model.toml"
-_INTERNAL = "_size_"
+_INTERNAL = ("_size_", "_half_")
 
 
 def model_text(case: Case, found: Search, made: Diagnosis, folder: Path) -> str | None:

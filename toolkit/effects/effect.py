@@ -41,6 +41,7 @@ class EffectParameter:
     effect, ``{force}``, ``{velocity}`` and ``{position}`` for a dynamic term. ``off`` is the value at which
     the effect is not there (None: it has no such value, another parameter switches it off); ``typical`` the
     range in ``unit``, in which a search starts; where ``relative`` it is in units of the channel's spread.
+    ``absent`` is what a file means that does not have the parameter, None where every file must have it.
     """
 
     name: str
@@ -51,6 +52,7 @@ class EffectParameter:
     bounds: tuple[float, float] = (-float("inf"), float("inf"))
     relative: bool = False
     starts: tuple[float, ...] = ()
+    absent: float | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

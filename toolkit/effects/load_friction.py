@@ -44,6 +44,7 @@ EFFECT = Effect(
             off=None,
             bounds=(0.2, 5.0),
             starts=(1.0,),
+            absent=1.0,
         ),
     ),
     drive=_loaded,

@@ -198,6 +198,12 @@ def _effects(entry: object, path: Path, axes: Axes, origin: str) -> tuple[ModelE
         effect = find_effect(_text(table.get("name"), f"{where}.name"), where=where)
         parameters = _parameters(table.get("parameters", {}), f"{where}.parameters")
         check_keys({each.name: 0 for each in parameters}, effect.names, where=f"{where}.parameters")
+        there = {each.name for each in parameters}
+        parameters += tuple(
+            ModelParameter(name=each.name, value=each.absent, unit=each.unit)
+            for each in effect.parameters
+            if each.name not in there and each.absent is not None
+        )
         missing = [name for name in effect.names if name not in {each.name for each in parameters}]
         if missing:
             raise _wrong(

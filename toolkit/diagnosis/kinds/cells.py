@@ -112,13 +112,13 @@ class Cells:
         values: dict[str, NDArray[np.float64]],
         outputs: Sequence[Output],
     ) -> NDArray[np.float64]:
-        """Return what a cell showed as far as the simulated loads account for it, without its noise.
+        """Return what a cell showed as far as simulated loads and recorded FZ account for it, noise-free.
 
         The cell's noise is in FY and MZ as well: an effect in proportion to what was recorded would explain
         that noise, and be found where nothing is wrong.
         """
         columns = [values[one.name] for one in outputs if one.name in self.loads]
-        columns += [run.columns[name] for name in ("FZ",) if name in run.columns]
+        columns += [run.columns[name] for name in ("FZ",) if np.isfinite(run.columns.get(name, np.nan)).all()]
         there = np.column_stack([*columns, np.ones(len(shown))])
         good = np.isfinite(there).all(axis=1) & np.isfinite(shown)
         if int(good.sum()) < _LEAST_ROWS:

@@ -7,6 +7,7 @@ What was measured and fitted is a result; what is taken for the cause is an opin
 from __future__ import annotations
 
 import datetime as dt
+import math
 from typing import TYPE_CHECKING
 
 from toolkit import __version__
@@ -166,7 +167,9 @@ def _remains(made: Diagnosis) -> str:
         return f"Structure that no named effect explains, a description and not physics: {listed}."
     if made.remaining == "unknown":
         return "Not judged: no search was made, or none to its end."
-    return "Nothing that stands out of the noise, down to the sizes of the last table."
+    return (
+        "Nothing that stands out of the noise, down to the sizes that the answer lists for effects not found."
+    )
 
 
 def _not_observable(made: Diagnosis) -> str | None:
@@ -249,5 +252,7 @@ def _unit(text: str) -> str:
 
 
 def _n(value: float, style: Style, digits: int = 3) -> str:
+    if not math.isfinite(value):
+        return "-"
     text = f"{value:.{digits}g}"
     return text.replace(".", ",") if style.decimal_comma else text

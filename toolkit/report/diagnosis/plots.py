@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -45,6 +46,8 @@ def errors_plot(made: Diagnosis, style: Style) -> Plot:
     said = []
     for one in made.held_out:
         errors = (one.nominal_rmse, one.refitted_rmse, one.augmented_rmse)
+        if not all(map(math.isfinite, (*errors, one.noise_floor))):
+            continue
         over = [value / max(one.noise_floor, 1e-300) for value in errors][: len(steps)]
         for i, value in enumerate(over):
             bars[i][0].append(float(len(names)))
@@ -53,7 +56,7 @@ def errors_plot(made: Diagnosis, style: Style) -> Plot:
         names.append("")
         listed = ", ".join(f"{s} {_number(v, style)}" for s, v in zip(steps, over, strict=True))
         said.append(f"{one.channel}: {listed}")
-    names.pop()
+    names = names[:-1]
     curves = [
         Curve(
             label=label, x=tuple(x), y=tuple(y), group=(6, 1, 0)[i], style="bars",

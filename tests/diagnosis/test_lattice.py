@@ -1,0 +1,37 @@
+"""The step of a coarse channel is known to the digits that a file prints, and no better."""
+
+import numpy as np
+import pytest
+
+from toolkit.diagnosis.lattice import lattice_of
+
+
+def printed(values, form):
+    return np.array([float(form % one) for one in values])
+
+
+@pytest.mark.parametrize("form", ["%.2f", "%.4f", "%.10g"])
+def test_the_true_step_lies_within_the_interval(form):
+    rng = np.random.default_rng(7)
+    for _ in range(50):
+        step, start = rng.uniform(20, 30), rng.uniform(-300, 300)
+        found = lattice_of(printed(start + step * rng.integers(0, 40, 200), form), 1.0)
+        assert found is not None
+        # plus what a double itself cannot hold
+        assert abs(found.step - step) <= found.half_width + 1e-15 * 1500
+
+
+def test_it_is_no_wider_than_half_a_place_at_each_end():
+    # steps of 100 printed as whole numbers from 0 to 5000: one place over fifty steps
+    values = 100.0 * np.random.default_rng(1).permutation(np.arange(51))
+    found = lattice_of(values, 1.0)
+    assert found is not None
+    assert found.step == pytest.approx(100.0, abs=1e-12)
+    assert found.half_width == pytest.approx(1 / 50)
+
+
+def test_negative_values_and_zero_have_a_step_too():
+    found = lattice_of(printed(0.25 * np.arange(-39, 40), "%.2f"), 0.01)
+    assert found is not None
+    assert found.step == pytest.approx(0.25)
+    assert 0 < found.half_width <= 0.01 / 78 * (1 + 1e-9)
