@@ -57,23 +57,15 @@ def judged(tmp_path_factory: pytest.TempPathFactory) -> dict[str, list[Judgment]
     return out
 
 
-def test_every_case_is_answered(judged: dict[str, list[Judgment]]) -> None:
-    assert [j.case for rows in judged.values() for j in rows if j.verdict == "failed"] == []
-
-
-def test_nothing_is_named_where_nothing_is_missing(judged: dict[str, list[Judgment]]) -> None:
-    assert [(j.case, j.reported) for j in judged["null"] if j.false_name] == []
-
-
-def test_two_of_three_large_effects_are_named(judged: dict[str, list[Judgment]]) -> None:
+def test_the_small_proof_stays_above_its_floors(judged: dict[str, list[Judgment]]) -> None:
+    """One test, so that a parallel run draws and answers the cases once."""
+    every = [j for rows in judged.values() for j in rows]
+    assert [j.case for j in every if j.verdict == "failed"] == []
+    # Nothing is named where nothing is missing, nor from outside the catalogue; what one speed cannot tell
+    # apart is not a wrong name.
+    for bucket in ("null", "outside", "confounded"):
+        assert [(j.case, j.reported) for j in judged[bucket] if j.false_name] == []
+    # Of three large effects two are named at least.
     assert sum(j.right for j in judged["single"]) >= 2, [
         (j.case, j.truth, j.column) for j in judged["single"]
     ]
-
-
-def test_what_is_outside_the_catalogue_gets_no_name(judged: dict[str, list[Judgment]]) -> None:
-    assert [(j.case, j.reported) for j in judged["outside"] if j.false_name] == []
-
-
-def test_what_one_speed_cannot_tell_apart_is_not_a_wrong_name(judged: dict[str, list[Judgment]]) -> None:
-    assert [(j.case, j.reported) for j in judged["confounded"] if j.false_name] == []
