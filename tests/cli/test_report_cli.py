@@ -238,6 +238,19 @@ def test_units_of_choice_go_through_values_and_tables(tmp_path: Path, resolved, 
     assert not (tmp_path / "none").exists()
 
 
+def test_the_protocol_of_a_file_is_what_the_test_is_read_by(tmp_path: Path, monkeypatch) -> None:
+    asked: list[object] = []
+
+    def read(_test: Path, **options: object) -> object:
+        asked.append(options["protocol"])
+        raise ConfigError("enough was asked", rule="enough")
+
+    monkeypatch.setattr(resolve, "resolve_test", read)
+    with pytest.raises(ConfigError, match="enough"):
+        command([Path("any")], template=make(tmp_path, ""), protocol=Path("own.toml"), out=tmp_path / "out")
+    assert asked == [Path("own.toml")]
+
+
 def test_a_diagnosis_is_of_one_test_and_a_release_needs_one(tmp_path: Path) -> None:
     (tmp_path / "diagnosis.json").write_text("{}")
     out = tmp_path / "out"

@@ -18,8 +18,9 @@ import pytest
 
 from toolkit.cli.home import packaged_home
 from toolkit.cli.report import Made
+from toolkit.cli.watch import command
 from toolkit.cli.watching import SET_ASIDE, STATE, Round, Watcher
-from toolkit.errors import OutputError, RegistryError, RenderError, ToolkitError, UnreadableError
+from toolkit.errors import ConfigError, OutputError, RegistryError, RenderError, ToolkitError, UnreadableError
 from toolkit.findings import Finding
 from toolkit.recording.marks import is_own_output
 
@@ -42,10 +43,11 @@ class Bench:
         self.refusals: dict[str, ToolkitError] = {}
         self.watcher = self.start()
 
-    def start(self) -> Watcher:
+    def start(self, settings: str = "as before") -> Watcher:
         self.watcher = Watcher(
             self.folder, self.folder.parent / "out", resolve=self.resolve, report=self.report,
             settle_s=3, patience_s=60, clock=lambda: self.now,
+            settings=settings,
         )  # fmt: skip
         return self.watcher
 
@@ -57,7 +59,10 @@ class Bench:
 
     def report(self, ready: dict[Path, Any], folders: Sequence[Path]) -> list[Made]:
         self.reported.append([test.name for test in ready])
-        done = [SimpleNamespace(pdf=folder / "report.pdf", content_sha256="0") for folder in folders]
+        done = [
+            SimpleNamespace(pdf=folder / "report.pdf", content_sha256="0", units=("N", "N*m"))
+            for folder in folders
+        ]
         return [
             Made(test=test, resolved=ready[test], outcome=self.refusals.get(test.name, one))  # type: ignore[arg-type]
             for test, one in zip(ready, done, strict=True)
@@ -193,6 +198,32 @@ def test_a_restart_goes_on_where_the_last_one_ended(bench: Bench) -> None:
     ]
 
 
+def test_what_was_refused_is_tried_again_by_other_settings_and_what_was_made_stays(bench: Bench) -> None:
+    for name in ("one", "refused", "bad"):
+        bench.test(name)
+    bench.refusals["refused"] = RenderError("the report was not verified", rule="not-verified")
+    bench.faults["bad"] = UnreadableError("the workbook holds macros", where="run", rule="macros")
+    bench.look()
+    bench.look(after=4)
+    bench.refusals.clear()
+    bench.start()
+    bench.look()
+    assert {one.test for one in bench.look(after=4).set_aside} == {"refused", "bad"}
+    assert bench.reported == [["one", "refused"]]
+    bench.start("another template")
+    bench.look()
+    assert [one.test for one in bench.look(after=4).set_aside] == ["bad"]
+    assert bench.reported == [["one", "refused"], ["refused"]]
+    assert not (bench.watcher.out / SET_ASIDE / "refused.txt").exists()
+
+
+def test_unknown_units_are_told_before_anything_is_written(tmp_path: Path) -> None:
+    with pytest.raises(ConfigError) as caught:
+        command(tmp_path, units="psi", out=tmp_path / "out")
+    assert caught.value.rule == "unknown-units"
+    assert not (tmp_path / "out").exists()
+
+
 def test_tests_of_like_names_have_notes_of_their_own(bench: Bench) -> None:
     names = ["a/b", "a_b", "a%2Fb", "/".join(["long" * 30] * 4)]
     for name in names:
@@ -240,7 +271,9 @@ def test_a_test_that_arrives_bit_by_bit_is_reported_when_it_is_whole(
     test.mkdir(parents=True)
     summary = packaged_home() / "report_templates" / "summary.docx"
     running = subprocess.Popen(
-        watch(inbox, "--template", summary, "--out", out, "--json"), stdout=subprocess.PIPE, text=True
+        watch(inbox, "--template", summary, "--out", out, "--units", "lbf", "--json"),
+        stdout=subprocess.PIPE,
+        text=True,
     )
     try:
         files = sorted((path for path in virtual_test.iterdir()), key=lambda path: path.suffix == ".xlsx")
@@ -264,6 +297,8 @@ def test_a_test_that_arrives_bit_by_bit_is_reported_when_it_is_whole(
         running.send_signal(signal.SIGTERM)
         told = json.loads(running.communicate(timeout=90)[0])
     assert [one["verified"] for one in told["made"]] == [True]
+    assert told["made"][0]["units"] == {"force": "lbf", "moment": "lbf*ft"}
+    assert json.loads((out / STATE).read_text())["tests"]["a"]["units"] == ["lbf", "lbf*ft"]
     assert sorted(one.name for one in (out / "a").iterdir()) == ["manifest.json", "report.docx", "report.pdf"]
     once = subprocess.run(
         watch(inbox, "--out", out, "--once", "--json"), capture_output=True, text=True, check=False

@@ -15,6 +15,7 @@ from toolkit.cli.console import (
     Home,
     Json,
     KnownAt,
+    ProtocolFile,
     Quiet,
     Reader,
     answer,
@@ -133,6 +134,7 @@ def command(
     ] = None,
     calibration: CalibrationId = None,
     known_at: KnownAt = None,
+    protocol: ProtocolFile = None,
     reader: Reader = "calamine",
     allow_missing: Annotated[
         bool, typer.Option("--allow-missing", help="Print n/a for a value that the test has not.")
@@ -180,6 +182,7 @@ def command(
                 home=home,
                 known_at=day(known_at),
                 reader=chosen,
+                protocol=protocol,
                 step=step,
             ),
             details=details,

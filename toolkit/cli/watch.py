@@ -50,6 +50,14 @@ def command(
             help="Seconds without a change after which a test that is not whole is judged.",
         ),
     ] = 900.0,
+    units: Annotated[
+        str | None,
+        typer.Option(
+            "--units",
+            help="SI or lbf: N and N*m, or lbf and lbf*ft, in the reports made from now on; those made "
+            "before stay. Default: the style file's.",
+        ),
+    ] = None,
     allow_missing: Annotated[
         bool, typer.Option("--allow-missing", help="Print n/a for a value that the test has not.")
     ] = False,
@@ -61,12 +69,14 @@ def command(
     """Make a report as soon as the last file of a test has arrived and is whole.
 
     A partial file is waited for; a bad one sets its test aside, with the reason in set-aside/. A restart
-    goes on where the last one ended. Ends with Ctrl-C or SIGTERM, after the report under way.
+    goes on where the last one ended; with another template or other units it tries again what was refused,
+    and leaves what was made. Ends with Ctrl-C or SIGTERM, after the report under way.
 
     Example: toolkit watch inbox --template report_templates/org.docx --out reports
     """
     from toolkit.cli.report import Options
     from toolkit.cli.resolve import resolve_test
+    from toolkit.cli.units import unit_choice
     from toolkit.cli.watching import Watcher
     from toolkit.errors import ConfigError
     from toolkit.report.pdf import find_soffice
@@ -77,11 +87,13 @@ def command(
             "the folder to watch does not exist", where=folder, got="no folder", expected="a folder",
             next_step="check the path", rule="no-test",
         )  # fmt: skip
+    shown = None if units is None else unit_choice(units)
     find_soffice()
     resolve = partial(resolve_test, calibrations=calibrations, home=home)
     options = Options(
         template=read_template(template or home_template("org.docx", home)),
         resolve=resolve,
+        units=shown,
         allow_missing=allow_missing,
     )
     target = out or folder / "reports"
@@ -96,6 +108,7 @@ def command(
             settle_s=settle,
             patience_s=patience,
             clock=time.monotonic,
+            settings=_settings(options, units),
         )
         while not stop:
             found = watcher.look()
@@ -106,6 +119,16 @@ def command(
     payload = told.payload()
     answer(payload, "", as_json=json, quiet=quiet)
     return 1 if payload["waiting"] or payload["set_aside"] or payload["attention"] else 0
+
+
+def _settings(options: Options, units: str | None) -> str:
+    """Return one hash of what decides whether a report is refused: the template, its style, the choices."""
+    from toolkit.files import sha256_bytes, sha256_file
+    from toolkit.report.style import style_file
+
+    style = style_file(options.template.path)
+    parts = (options.template.sha256, sha256_file(style) if style else "", units or "", options.allow_missing)
+    return sha256_bytes("\n".join(map(str, parts)).encode())
 
 
 def _report(

@@ -71,6 +71,7 @@ class Watcher:
     patience_s : after so long without a change a cut file sets its test aside, and a test that lacks steps
         is reported with its findings
     clock : seconds that never go back
+    settings : what the reports are made by; what was refused under others is tried again
     """
 
     def __init__(
@@ -83,10 +84,11 @@ class Watcher:
         settle_s: float,
         patience_s: float,
         clock: Callable[[], float],
+        settings: str = "",
     ) -> None:
         self.folder, self.out = folder, out
         self.resolve, self.report, self.clock = resolve, report, clock
-        self.settle_s, self.patience_s = settle_s, patience_s
+        self.settle_s, self.patience_s, self.settings = settle_s, patience_s, settings
         self.seen: dict[str, tuple[Listing, float]] = {}
         self.waited: dict[str, tuple[str, str]] = {}
         self.state = self._load()
@@ -113,7 +115,7 @@ class Watcher:
                 waiting.append(Waiting(test=name, reason=f"a file cannot be read yet: {error.strerror}"))
                 continue
             before_that = self.state.get(name, {})
-            if before_that.get("content") == content:
+            if before_that.get("content") == content and not self._refused_otherwise(before_that):
                 if before_that.get("state") == SET_ASIDE:
                     aside.append(_stands_aside(name, before_that))
                 continue
@@ -167,7 +169,7 @@ class Watcher:
             elif isinstance(one.outcome, ToolkitError):
                 fault = Aside(test=name, rule=one.outcome.rule or "error", reason=str(one.outcome))
                 aside.append(fault)
-                self._set_aside(fault, contents[one.test])
+                self._set_aside(fault, contents[one.test], by=self.settings)
             else:
                 delivered.append(one)
                 self._note(name).unlink(missing_ok=True)
@@ -176,6 +178,7 @@ class Watcher:
                     "content": contents[one.test],
                     "report": str(one.outcome.pdf),
                     "content_sha256": one.outcome.content_sha256,
+                    "units": list(one.outcome.units),
                 }
         self._save()
         return delivered
@@ -217,7 +220,11 @@ class Watcher:
             told = f"{told[:40]}-{sha256_bytes(name.encode())[:16]}"
         return self.out / SET_ASIDE / f"{told}.txt"
 
-    def _set_aside(self, fault: Aside, content: str) -> None:
+    def _refused_otherwise(self, told: dict[str, Any]) -> bool:
+        """Tell whether a report was refused under other settings: nothing may be wrong with its test."""
+        return told.get("state") == SET_ASIDE and told.get("settings", self.settings) != self.settings
+
+    def _set_aside(self, fault: Aside, content: str, *, by: str | None = None) -> None:
         from toolkit.files import write_atomic
         from toolkit.recording.marks import OWN_OUTPUT
 
@@ -226,6 +233,7 @@ class Watcher:
             "content": content,
             "rule": fault.rule,
             "reason": fault.reason,
+            **({} if by is None else {"settings": by}),
         }
         write_atomic(self._note(fault.test), f"{OWN_OUTPUT}\n{fault.test}: {fault.rule}\n\n{fault.reason}\n")
         self._save()
