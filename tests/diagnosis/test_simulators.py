@@ -1,9 +1,12 @@
 """Simulators of others: what they may do, and what ends with their file, the run and what they gave."""
 
+import sys
+from pathlib import Path
+
 import numpy as np
 import pytest
 
-from tests.diagnosis.cases import HEAD, ONE, TWO, carriage, write_case
+from tests.diagnosis.cases import HEAD, ONE, SIMULATOR, TWO, carriage, write_case
 from toolkit.diagnosis.case_read import read_case
 from toolkit.diagnosis.diagnose import diagnose
 from toolkit.diagnosis.kinds.ode import OdeModel
@@ -221,3 +224,40 @@ def test_columns_that_do_not_fit_are_told(tmp_path):
     wrong = '[simulation.parameters.mass]\nvalue = 1.0\nunit = "kg"\n'
     with pytest.raises(ConfigError, match="no such parameter"):
         model_of(columns(tmp_path / "b", parameters=wrong), None)
+
+
+@pytest.mark.parametrize(
+    ("column", "said"),
+    [
+        ("(inputs['v'] * 1j)", "no numbers in column 'F'"),
+        ("inputs['v'].astype(str)", "no numbers in column 'F'"),
+        ("np.full(len(inputs), 1e200)", "values beyond 1e+100 in column 'F'"),
+    ],
+)
+def test_what_only_looks_like_a_number_is_refused(tmp_path, column, said):
+    case = read_case(write_case(tmp_path, simulator=START + f"return pd.DataFrame({{'F': {column}}})\n"))
+    with pytest.raises(FitError) as caught:
+        diagnose(case, None)
+    assert said in str(caught.value.got)
+
+
+def test_a_simulator_leaves_our_output_and_folder_alone(tmp_path, capfd, monkeypatch):
+    (tmp_path / "here").mkdir()
+    monkeypatch.chdir(tmp_path / "here")
+    says = "import os; os.chdir('/'); os.write(1, b'one'); os.system('echo two'); print('three')\n"
+    case = read_case(write_case(tmp_path / "case", simulator=START + says + "    raise ValueError\n"))
+    sys.stdout.write("before\n")
+    with pytest.raises(FitError):
+        diagnose(case, None)
+    sys.stdout.write("after\n")
+    assert capfd.readouterr().out == "before\nafter\n"
+    assert Path.cwd() == tmp_path / "here"
+
+
+def test_a_simulator_that_refuses_other_parameters_is_told_not_taken_for_a_fit(tmp_path):
+    body = "if p['mass'] != 94.0: raise ValueError('only 94')\n    "
+    case = read_case(write_case(tmp_path, simulator=START + body + SIMULATOR.splitlines()[-1].strip() + "\n"))
+    (found,) = (one for one in diagnose(case, None).diagnosis.findings if one.rule == "simulator-refuses")
+    assert found.level == "warning"
+    assert "only 94" in found.message
+    assert "r0.csv, mass = " in found.message

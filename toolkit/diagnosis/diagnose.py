@@ -12,11 +12,13 @@ from toolkit.diagnosis.answer import Diagnosis
 from toolkit.diagnosis.assemble import answer_of, mostly_unknown
 from toolkit.diagnosis.built_in import built_in_findings
 from toolkit.diagnosis.case import Case
+from toolkit.diagnosis.kinds.guard import kept_apart
 from toolkit.diagnosis.load import model_of
 from toolkit.diagnosis.notes import calibration_findings, case_findings
 from toolkit.diagnosis.partial import STEPS, does_not_vary, without_search
 from toolkit.diagnosis.predict import prediction_csv, prediction_names
 from toolkit.diagnosis.problem import Problem, problem_of
+from toolkit.diagnosis.refused import Refused
 from toolkit.diagnosis.search import Budget, BudgetSpentError, Search, search
 from toolkit.diagnosis.watch import Watch
 from toolkit.findings import Finding
@@ -57,14 +59,19 @@ def diagnose(
     ConfigError
         the case cannot be used; FitError: its simulation gives no usable output as declared
     """
-    watch = Watch(budget_s, tell)
+    with kept_apart():
+        return _diagnosed(case, calibrations, Watch(budget_s, tell), budget_s)
+
+
+def _diagnosed(case: Case, calibrations: Path | None, watch: Watch, budget_s: float) -> Result:
     try:
         model = watch.guarded(model_of)(case, calibrations)
     except BudgetSpentError:
         return Result(diagnosis=_too_late(case, None, None, (), watch.step), search=None)
     problem = problem_of(case, model)
     simulate = model.simulate
-    model.simulate = watch.guarded(simulate)  # type: ignore[method-assign]
+    refused = Refused(simulate)
+    model.simulate = watch.guarded(refused)  # type: ignore[method-assign]
     told = (
         *case_findings(problem),
         *built_in_findings(case),
@@ -87,6 +94,7 @@ def diagnose(
         made = _too_late(case, problem, declared, told, str(error))
     finally:
         model.simulate = simulate  # type: ignore[method-assign]
+    made = replace(made, findings=(*made.findings, *refused.findings(case)))
     files, late = _predictions(problem, found, watch, budget_s)
     if late:
         made = replace(made, complete=False, skipped=(*made.skipped, late))

@@ -13,6 +13,7 @@ from toolkit.diagnosis.built_in import built_in_findings
 from toolkit.diagnosis.case import Case, CaseChannel, Role
 from toolkit.diagnosis.case_entries import number_of, text_of, wrong
 from toolkit.diagnosis.from_model import corrections_of, parameters_of, simulation_of
+from toolkit.diagnosis.kinds.guard import kept_apart
 from toolkit.diagnosis.load import model_of
 from toolkit.diagnosis.predict import csv_of, prediction_names
 from toolkit.diagnosis.recordings import read_run
@@ -48,6 +49,11 @@ def simulate_model(
         simulation gives no usable output
     """
     case = case_of(model, inputs, conditions or {})
+    with kept_apart():
+        return _outputs(case, calibrations), built_in_findings(case)
+
+
+def _outputs(case: Case, calibrations: Path | None) -> tuple[tuple[str, str], ...]:
     simulator = model_of(case, calibrations)
     p = {one.name: one.value for one in simulator.parameters}
     made = []
@@ -57,7 +63,7 @@ def simulate_model(
         columns = {one.name: run.columns[one.name] for one in case.channels if one.role == "time"}
         columns |= {one.name: found[one.name] for one in simulator.outputs}
         made.append((name, csv_of(columns)))
-    return tuple(made), built_in_findings(case)
+    return tuple(made)
 
 
 def case_of(model: ModelFile, inputs: Sequence[Path], conditions: Mapping[str, str]) -> Case:

@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from toolkit.diagnosis.case import Case, Run
 
 _KEPT = 300  # simulations that are remembered
+_LARGEST = 1e100  # of an output in its unit: the squares of larger ones are no numbers any more
 # Drive's field -> the channel that a simulator takes it from.
 _FIELDS = (("SA", ("SA", "SA_CMD")), ("FZ", ("FZ", "FZ_CMD")), ("IA", ("IA",)), ("V", ("V",)))
 
@@ -124,6 +125,8 @@ class PythonModel:
                 raise _failed(self.case, run, f"{got} in column {one.name!r}")
             if not np.isfinite(values).all():
                 raise _failed(self.case, run, f"no number in column {one.name!r}, row {_first_bad(values)}")
+            if np.abs(values).max(initial=0.0) > _LARGEST:
+                raise _failed(self.case, run, f"values beyond {_LARGEST:.0e} in column {one.name!r}")
             result[one.name] = values
         return result
 
@@ -244,8 +247,14 @@ def _failed(case: Case, run: Run, got: str) -> FitError:
 
 
 def _numbers(made: Any, name: str) -> NDArray[np.float64] | None:
+    """Return a column's numbers, None where it has texts or complex numbers."""
+    import pandas as pd
+
+    column = made[name]
+    if isinstance(column, pd.Series) and pd.api.types.infer_dtype(column) in ("string", "complex", "bytes"):
+        return None
     try:
-        return np.asarray(made[name], dtype=np.float64)
+        return np.asarray(column, dtype=np.float64)
     except (TypeError, ValueError):
         return None
 
