@@ -104,5 +104,23 @@ def test_round_trip(text: str, values: list[float]) -> None:
     np.testing.assert_allclose(from_si(there, text), values, rtol=1e-12, atol=1e-9)
 
 
+@pytest.mark.parametrize(
+    ("text", "factor", "dimension"),
+    [
+        ("1/degC", 1.0, "1 / [temperature]"),
+        ("1/degF", 1.8, "1 / [temperature]"),
+        ("1/°F", 1.8, "1 / [temperature]"),
+        ("%/degC", 0.01, "1 / [temperature]"),
+        ("degC/s", 1.0, "[temperature] / [time]"),
+        ("m/degree_Fahrenheit", 1.8, "[length] / [temperature]"),
+    ],
+)
+def test_in_a_compound_unit_a_temperature_is_a_difference(text: str, factor: float, dimension: str) -> None:
+    # SI brochure, 2.3.1: an interval of 1 degC is one of 1 K; an interval of 1 degF is 5/9 K.
+    found = unit(text)
+    assert found.factor == pytest.approx(factor, rel=1e-12)
+    assert (found.offset, found.dimension) == (0.0, dimension)
+
+
 def test_parsing_is_cached() -> None:
     assert _parse("lbf") is _parse("lbf")

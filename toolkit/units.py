@@ -88,6 +88,9 @@ _ANGLES = ("degree", "radian", "turn", "arcminute", "milliradian")
 # Also refused: a number to a power, which no unit needs and which can be made to compute for ever.
 _NEVER_GUESSED = re.compile(r"[^\w\s*/^.()·°µ%+-]|\d\s*\)?\s*(\*\*|\^)|.{41}")
 
+# In a compound unit (mV/degC, 1/degF) a temperature is a difference: pint would add the zero of its scale.
+_SCALE = re.compile(r"(?<!\w)(?:°|deg(?:ree)?_?)([CF])(?:elsius|ahrenheit)?\b")
+
 
 @dataclass(frozen=True, slots=True)
 class Unit:
@@ -205,8 +208,11 @@ def _parse(text: str) -> Unit:
     if _NEVER_GUESSED.search(text):
         raise _UnknownUnitError(text)
     ureg = registry()
+    expression = _SPELLINGS.get(text, text)
+    if not _SCALE.fullmatch(expression):
+        expression = _SCALE.sub(r"delta_deg\1", expression)
     try:
-        read: Any = ureg.parse_expression(_SPELLINGS.get(text, text))
+        read: Any = ureg.parse_expression(expression)
         one: Any = read if hasattr(read, "units") else ureg.Quantity(float(read), "dimensionless")
         if dict(one.dimensionality) == {"[temperature]": 1}:
             zero = float(ureg.Quantity(0.0, one.units).to("kelvin").magnitude)
