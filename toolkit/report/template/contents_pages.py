@@ -13,14 +13,32 @@ from lxml import etree
 
 from toolkit.report.template.bulk import with_rows, without_rows
 from toolkit.report.template.contents import ContentsEntry, contents_fields
-from toolkit.report.template.xml import SDT_PR, W_P, W_R, W_T, Element, ancestor, parser, q
+from toolkit.report.template.xml import (
+    SDT_CONTENT,
+    SDT_PR,
+    W_P,
+    W_R,
+    W_SDT,
+    W_T,
+    Element,
+    ancestor,
+    parser,
+    q,
+)
 
 Edit = Callable[[Element], None]
+_STORY = re.compile(r"word/[\w.-]+\.xml")
+_FIELDS = (q("w:fldChar"), q("w:fldSimple"), q("w:hyperlink"))
 _LABEL = r"[\s.…·‥_\-]*?(\d+|[ivxlcdmIVXLCDM]+|[A-Z]{1,2})(?=\s|$)"
 
 
-def for_printing(docx: bytes, part: str) -> bytes:
-    """Return the document with its tables of contents as plain lines: LibreOffice updates their pages."""
+def for_printing(docx: bytes, part: str, *, contents: bool) -> bytes:
+    """Return the document as LibreOffice prints it right; as it came where there is nothing to change.
+
+    Tables of contents become plain lines, whose pages it updates. Controls around paragraphs or cells with
+    fields go, in every part: of a control around one paragraph LibreOffice 7.4 prints the codes of the
+    fields in it, ``PAGE ?`` in a footer. ``contents`` tells that the main part has tables of contents.
+    """
 
     def unwrap(root: Element) -> None:
         for field in contents_fields(root):
@@ -32,8 +50,34 @@ def for_printing(docx: bytes, part: str) -> bytes:
         for gallery in list(root.iter(q("w:docPartObj"))):
             if gallery.getparent().tag == SDT_PR:
                 gallery.getparent().remove(gallery)
+        _without_controls(root)
 
-    return _edited(docx, part, unwrap)
+    with zipfile.ZipFile(io.BytesIO(docx)) as source:
+        edits: dict[str, Edit] = {
+            name: _without_controls
+            for name in source.namelist()
+            if _STORY.fullmatch(name) and _in_control(source.read(name))
+        }
+    if contents:
+        edits[part] = unwrap
+    return _edited(docx, edits) if edits else docx
+
+
+def _in_control(xml: bytes) -> bool:
+    return b"<w:sdt" in xml and any(mark in xml for mark in (b"<w:fldChar", b"<w:fldSimple", b"<w:hyperlink"))
+
+
+def _without_controls(root: Element) -> None:
+    """Take away the controls that stand around paragraphs, rows or cells with fields or links."""
+    for control in list(root.iter(W_SDT)):
+        content = control.find(SDT_CONTENT)
+        if content is None or next(content.iter(*_FIELDS), None) is None:
+            continue
+        if next(content.iter(W_P), None) is None:
+            continue
+        for child in list(content):
+            control.addprevious(child)
+        control.getparent().remove(control)
 
 
 def with_pages(docx: bytes, part: str, pages: Mapping[str, str]) -> bytes:
@@ -48,7 +92,7 @@ def with_pages(docx: bytes, part: str, pages: Mapping[str, str]) -> bytes:
                         following = (t for t in code.getparent().itersiblings(W_R) if t.find(W_T) is not None)
                         next(following).find(W_T).text = pages[found[1]]
 
-    return _edited(docx, part, put)
+    return _edited(docx, {part: put})
 
 
 def with_numbers(docx: bytes, part: str, titles: Mapping[str, str]) -> bytes:
@@ -69,7 +113,7 @@ def with_numbers(docx: bytes, part: str, titles: Mapping[str, str]) -> bytes:
                 if bookmark in titles and text is not None:
                     text.text = titles[bookmark]
 
-    return _edited(docx, part, put)
+    return _edited(docx, {part: put})
 
 
 def pdf_outline(pdf: Path) -> list[tuple[str, int]]:
@@ -133,7 +177,7 @@ def _span(root: Element, begin: Element, separate: Element | None) -> list[Eleme
     return found
 
 
-def _edited(docx: bytes, part: str, edit: Edit) -> bytes:
+def _edited(docx: bytes, edits: Mapping[str, Edit]) -> bytes:
     stream = io.BytesIO()
     with (
         zipfile.ZipFile(io.BytesIO(docx)) as source,
@@ -141,10 +185,10 @@ def _edited(docx: bytes, part: str, edit: Edit) -> bytes:
     ):
         for item in source.infolist():
             data = source.read(item)
-            if item.filename == part:
+            if item.filename in edits:
                 data, rows = without_rows(data)
                 root = etree.fromstring(data, parser())
-                edit(root)
+                edits[item.filename](root)
                 data = etree.tostring(root, xml_declaration=True, encoding="UTF-8", standalone=True)
                 data = with_rows(data, rows)
             target.writestr(item, data)

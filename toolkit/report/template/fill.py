@@ -26,11 +26,12 @@ from toolkit.report.template.controls import (
     replace_content,
     settle,
 )
+from toolkit.report.template.direction import from_the_right, kept_whole
 from toolkit.report.template.fields import number_captions
 from toolkit.report.template.filled import Entry, Filled
 from toolkit.report.template.headings import levelled
 from toolkit.report.template.package import Template, open_package
-from toolkit.report.template.pages import drop_notes, headers_shown, notes_used
+from toolkit.report.template.pages import drop_notes, headers_shown
 from toolkit.report.template.pictures import Ids, free_height, insert_at_mark, picture_run
 from toolkit.report.template.properties import set_properties
 from toolkit.report.template.rows import fill_table
@@ -130,13 +131,13 @@ class _Filler:
         self.pictures, self.allow_missing = pictures, allow_missing
         self.ids, self.log = Ids.of(parts), _Log()
         self.bulk = Bulk.of(parts, cache(lambda: levelled(package)))
+        self.printed = kept_whole if from_the_right(package, parts) else str
 
     def run(self, lint: tuple[LintFinding, ...]) -> Filled:
         used = {site.tag.path for site in scan(self.parts)}
         body = self.parts[0].root
-        noted = notes_used(body)
         self._conditions()
-        drop_notes(self.parts, noted - notes_used(body))
+        drop_notes(self.parts)
         never, perhaps = headers_shown(self.package, self.parts)
         sites = scan(self.parts)
         self._demand(sites)
@@ -234,7 +235,7 @@ class _Filler:
             text = value.text(tag.spec, self.content.style).replace(_MARK, "\ufffd")
         if site is None or not site.fallback:
             self.log.manifest.append(Entry(tag=f"tk:{tag.path}", text=text, part=name))
-        return text
+        return self.printed(text)
 
     def _table(self, site: Site, element: Element | None) -> None:
         table = self.content.tables.get(site.tag.name)
@@ -261,6 +262,7 @@ class _Filler:
             self.content.style,
             self.ids,
             self.bulk,
+            self.printed,
         )
         if not site.fallback:
             passing = {f"tk:{site.tag.path}.{one.name}" for one in table.columns if one.of_the_run}

@@ -67,14 +67,19 @@ def notes_used(body: Any) -> set[tuple[str, str]]:
     return {(kind, one.get(q("w:id")) or "") for kind in _NOTES for one in body.iter(q(f"w:{kind}Reference"))}
 
 
-def drop_notes(parts: list[Story], gone: set[tuple[str, str]]) -> None:
-    """Take out the footnotes and endnotes whose mark went away with a block: nothing prints them."""
-    for kind, identity in gone:
-        for story in parts:
+def drop_notes(parts: list[Story]) -> None:
+    """Take out the footnotes and endnotes that no mark refers to, or none any more: nothing prints them.
+
+    Separators have a type, and stay.
+    """
+    used = notes_used(parts[0].root)
+    for story in parts:
+        for kind in _NOTES:
             if story.root.tag != q(f"w:{kind}s"):
                 continue
             for note in list(story.root.findall(q(f"w:{kind}"))):
-                if note.get(q("w:id")) == identity:
+                special = (note.get(q("w:type")) or "normal") != "normal"
+                if not special and (kind, note.get(q("w:id")) or "") not in used:
                     story.root.remove(note)
 
 

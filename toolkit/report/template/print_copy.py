@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -25,7 +25,8 @@ def print_copies(filled: Sequence[Filled], office: Office, work: Path) -> list[P
     A document whose headings Word numbers by itself is converted twice: the numbers of its contents are
     those of the first PDF.
     """
-    made = _converted(filled, [one.docx for one in filled], office, work)
+    every = range(len(filled))
+    made = _converted(filled, dict(zip(every, (one.docx for one in filled), strict=True)), office, work)
     again = [
         i
         for i, (one, pdf) in enumerate(zip(filled, made, strict=True))
@@ -35,7 +36,7 @@ def print_copies(filled: Sequence[Filled], office: Office, work: Path) -> list[P
     if again:
         for i in again:
             documents[i] = _numbered(filled[i], made[i])
-        second = _converted([filled[i] for i in again], [documents[i] for i in again], office, work)
+        second = _converted(filled, {i: documents[i] for i in again}, office, work)
         for i, pdf in zip(again, second, strict=True):
             made[i] = pdf
     return [
@@ -45,14 +46,16 @@ def print_copies(filled: Sequence[Filled], office: Office, work: Path) -> list[P
 
 
 def _converted(
-    filled: Sequence[Filled], documents: Sequence[bytes], office: Office, work: Path
+    filled: Sequence[Filled], documents: Mapping[int, bytes], office: Office, work: Path
 ) -> list[Path | RenderError]:
+    """Convert documents by their place in ``filled``: no PDF ever takes the name of another document's."""
     from toolkit.report.template.contents_pages import for_printing
 
     sources = []
-    for index, (one, data) in enumerate(zip(filled, documents, strict=True)):
+    for index, data in documents.items():
+        one = filled[index]
         source = work / f"{index:04d}.docx"
-        source.write_bytes(for_printing(data, one.main_part) if one.contents.entries else data)
+        source.write_bytes(for_printing(data, one.main_part, contents=bool(one.contents.entries)))
         sources.append(source)
     return office.convert_each(sources, work) if sources else []
 

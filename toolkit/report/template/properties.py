@@ -13,6 +13,7 @@ from toolkit.report.template.xml import clean
 
 def set_properties(package: Any, content: ReportContent) -> None:
     """Set title, author and dates; the dates are the day of issue, so that the content is reproducible."""
+    _one_core(package)
     core = package.core_properties
     day = dt.datetime.combine(dt.date.fromisoformat(content.issued), dt.time(), tzinfo=dt.UTC).replace(
         tzinfo=None
@@ -26,3 +27,16 @@ def set_properties(package: Any, content: ReportContent) -> None:
     core.comments = ""
     core.created = core.modified = day
     core.revision = 1
+
+
+def _one_core(package: Any) -> None:
+    """Let go of properties that stand there under another program's name for their relation.
+
+    LibreOffice writes its own (``officedocument`` in small letters); python-docx does not see it and would
+    add a second part of the same name, a file that Word calls damaged.
+    """
+    from docx.opc.constants import RELATIONSHIP_TYPE
+
+    for identity, one in list(package.rels.items()):
+        if one.reltype.endswith("/core-properties") and one.reltype != RELATIONSHIP_TYPE.CORE_PROPERTIES:
+            del package.rels[identity]

@@ -35,6 +35,7 @@ def fill_table(
     style: Style,
     ids: Ids,
     bulk: Bulk | None = None,
+    printed: Callable[[str], str] = str,
 ) -> list[Element | tuple[str, ...]]:
     """Fill a w:tbl and return its new rows, or of each row kept as bytes the texts of its cells.
 
@@ -45,6 +46,7 @@ def fill_table(
     resolve : text of a value tag that stands in the prototype row
     said : receives (column, text) of every cell value
     bulk : takes the rows of a table that has very many
+    printed : makes of a cell's text what is written
     """
     prototype = _prototype(element)
     tagged = _has_tags(prototype)
@@ -61,7 +63,7 @@ def fill_table(
             column = table.columns[index[tag.name]]
             shown = cell_text(values[index[tag.name]], tag.spec or column.spec, style)
             said(tag.name, shown)
-            return shown
+            return printed(shown)
 
         return text
 
