@@ -34,6 +34,18 @@ def test_an_answer_is_read_back_as_it_was_written(told: dict[str, Any], tmp_path
         assert as_json(answer) == {key: told[key] for key in as_json(answer)}
 
 
+def test_an_answer_names_its_recordings_and_an_older_one_does_not(
+    told: dict[str, Any], tmp_path: Path
+) -> None:
+    assert told["recordings"]
+    for one in told["recordings"]:
+        assert len(one["sha256"]) == 64
+        assert one["own"] is False  # a table, not a file of the machine
+    file = tmp_path / "diagnosis.json"
+    file.write_text(json.dumps({key: one for key, one in told.items() if key != "recordings"}))
+    assert read_answer(file)[0].recordings is None
+
+
 @pytest.mark.parametrize(
     ("key", "value"),
     [

@@ -1,5 +1,7 @@
 """Kind machine: cells and the program's own FY, records by id and by path, the machine's numbers."""
 
+import hashlib
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -7,6 +9,7 @@ import pytest
 from tests.conftest import EXAMPLES
 from tests.diagnosis.cases import write_case
 from tests.diagnosis.tire_case import TIR, sweep, toml
+from toolkit.diagnosis.answer import Recorded
 from toolkit.diagnosis.case_read import read_case
 from toolkit.diagnosis.diagnose import diagnose
 from toolkit.diagnosis.load import model_of
@@ -180,6 +183,7 @@ def test_the_machines_own_workbook_names_the_sign_of_E5(tmp_path):
         ("channel_sign", "E5", ("wrong_calibration",))
     ]
     assert {one.rule for one in made.findings} == {"case-one-run", "case-calibration"}
+    assert made.recordings == (Recorded(name="run.xlsx", sha256=hashlib.sha256(book).hexdigest(), own=True),)
 
 
 def test_a_table_under_the_programs_own_headers_is_that_workbook(tmp_path):

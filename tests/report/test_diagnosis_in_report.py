@@ -11,6 +11,7 @@ from report_factory import make_record, make_result
 from template_factory import opened, p, texts
 
 from toolkit.diagnosis.answer import Diagnosis, FoundEffect, FoundParameter, HeldOutFit, Mismatch, Place
+from toolkit.findings import Finding
 from toolkit.report.build import build_content
 from toolkit.report.content import ReportContent
 from toolkit.report.design.blocks import placeholder_png
@@ -99,6 +100,26 @@ def test_a_diagnosis_that_found_nothing_has_no_opinion(tmp_path: Path) -> None:
     assert not tags & {"tk:diagnosis.opinion", "tk:diagnosis.opinion_by", "tk:diagnosis.basis"}
     assert not [one for one in tags if one.startswith(("tk:table.found", "tk:table.next"))]
     assert "tk:figure.diagnosis_errors" not in dict(said.figures)
+
+
+@pytest.mark.parametrize(
+    ("name", "caption"),
+    [("org", "Findings of the diagnosis."), ("pruefbericht", "Feststellungen der Diagnose.")],
+)
+def test_the_findings_of_the_answer_are_a_table_of_the_chapter(
+    name: str, caption: str, tmp_path: Path
+) -> None:
+    rests = Finding(rule="case-calibration", where="case.toml", message="rests on m15-r2, a candidate")
+    told = dataclasses.replace(ANSWER, findings=(rests,))
+    said = made(name, Told(answer=told), tmp_path)
+    tags = {one.tag: one.text for one in said.manifest}
+    for column in ("rule", "where", "message"):
+        assert tags[f"tk:table.diagnosis_findings.{column}"] == getattr(rests, column)
+    assert caption in " ".join(texts(said.docx).split())
+    # The table says it; the summary is what was found.
+    assert "candidate" not in tags["tk:diagnosis.summary"]
+    without = made(name, Told(answer=ANSWER), tmp_path)
+    assert caption not in " ".join(texts(without.docx).split())
 
 
 def test_without_a_name_the_opinion_is_a_draft(tmp_path: Path) -> None:

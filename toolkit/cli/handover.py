@@ -14,6 +14,8 @@ from toolkit.recording.marks import OWN_OUTPUT
 
 if TYPE_CHECKING:
     from toolkit.cli.resolve import Resolved
+    from toolkit.diagnosis.answer import Diagnosis
+    from toolkit.findings import Finding
     from toolkit.recording.details import ReportDetails
     from toolkit.report.diagnosis.in_report import Told
 
@@ -81,6 +83,57 @@ def diagnosis_of(given: Path | None, by: str | None, tests: Sequence[Path]) -> t
         )  # fmt: skip
     answer, file = read_answer(given)
     return Told(answer=answer, by=by), file
+
+
+def diagnosis_findings(answer: Diagnosis, resolved: Resolved, test: Path) -> tuple[Finding, ...]:
+    """Return what stands against telling a diagnosis in a test's report: recordings that are not its own.
+
+    Compared are the hashes of the recordings. A table that was made for the case has no counterpart in the
+    test: that it belongs to it, nobody can tell from the files.
+
+    Raises
+    ------
+    ConfigError
+        no recording of the diagnosis is one of the test, and files of the machine are among them
+    """
+    from toolkit.errors import ConfigError
+    from toolkit.findings import Finding
+
+    where = f"diagnosis {answer.title}"
+    if answer.recordings is None:
+        return (
+            Finding(
+                rule="diagnosis-not-tied", where=where,
+                message="the diagnosis does not say which recordings it rests on: it was made by an earlier "
+                "version; run 'toolkit diagnose' again",
+            ),
+        )  # fmt: skip
+    own = {one["sha256"] for one in provenance(resolved, test)["inputs"]}
+    others = [one for one in answer.recordings if one.sha256 not in own]
+    tables = [one.name for one in others if not one.own]
+    foreign = [one.name for one in others if one.own]
+    if foreign and len(others) == len(answer.recordings):
+        raise ConfigError(
+            "the diagnosis is of other recordings than the test",
+            where=where,
+            got=_listed([one.name for one in others]),
+            expected=f"recordings of {resolved.result.reduced.info.name}, by their SHA-256",
+            next_step="give the diagnosis of this test, or diagnose its recordings",
+            rule="diagnosis-of-other-recordings",
+        )
+    found = []
+    if foreign:
+        found.append(f"the diagnosis also rests on recordings of another test: {_listed(foreign)}")
+    if tables:
+        found.append(
+            f"the diagnosis rests on tables made for it ({_listed(tables)}): from the files "
+            "nobody can tell that they are of this test"
+        )
+    return tuple(Finding(rule="diagnosis-not-tied", where=where, message=text) for text in found)
+
+
+def _listed(names: Sequence[str]) -> str:
+    return ", ".join(names[:3]) + (f" and {len(names) - 3} more" if len(names) > 3 else "")
 
 
 def provenance(resolved: Resolved, test: Path, *, diagnosis: Path | None = None) -> dict[str, Any]:

@@ -224,6 +224,7 @@ def make_reports(
     ToolkitError
         the only test cannot be read, or its report is not delivered
     """
+    from toolkit.cli.handover import diagnosis_findings
     from toolkit.errors import ToolkitError
     from toolkit.report.deliver import deliver_all
 
@@ -238,6 +239,9 @@ def make_reports(
             if options.models:
                 step(f"{test.name}: tire models")
             one, comparison = _compared(test, one, options.models)
+            if options.diagnosis:
+                more = diagnosis_findings(options.diagnosis[0].answer, one, test)
+                one = replace(one, findings=(*one.findings, *more))
             jobs.append(_job(test, one, folder, options, comparison))
             resolved.append(one)
         except ToolkitError as error:

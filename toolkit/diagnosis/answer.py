@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 from toolkit.findings import Finding
+
+if TYPE_CHECKING:
+    from toolkit.diagnosis.case import Run
 
 Verdict = Literal["named", "equivalent", "unknown", "nothing", "untestable"]
 
@@ -99,8 +103,20 @@ class NotFound:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Recorded:
+    """A recording that the answer rests on: its file's name and SHA-256.
+
+    ``own`` tells a file as the machine's acquisition program wrote it from a table made for the case.
+    """
+
+    name: str
+    sha256: str
+    own: bool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Diagnosis:
-    """The whole answer."""
+    """The whole answer; ``recordings`` is None in one of a version that did not write them down."""
 
     title: str
     case_sha256: str
@@ -117,3 +133,9 @@ class Diagnosis:
     findings: tuple[Finding, ...]
     complete: bool
     skipped: tuple[str, ...]
+    recordings: tuple[Recorded, ...] | None = None
+
+
+def recorded(runs: Iterable[Run]) -> tuple[Recorded, ...]:
+    """Return what an answer says of the recordings of a case."""
+    return tuple(Recorded(name=one.name, sha256=one.sha256, own=one.own) for one in runs)

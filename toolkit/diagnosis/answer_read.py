@@ -16,6 +16,7 @@ from toolkit.diagnosis.answer import (
     NominalParameter,
     NotFound,
     Place,
+    Recorded,
 )
 from toolkit.errors import ConfigError
 from toolkit.files import read_bytes
@@ -106,7 +107,17 @@ def _answer(told: dict[str, Any]) -> Diagnosis:
         ),
         complete=bool(told["complete"]),
         skipped=_texts(told["skipped"]),
+        recordings=_recordings(told.get("recordings")),
     )  # fmt: skip
+
+
+def _recordings(told: Any) -> tuple[Recorded, ...] | None:
+    """Return the recordings of an answer; None where it is older than the key."""
+    if told is None:
+        return None
+    return tuple(
+        Recorded(name=_text(one["name"]), sha256=_text(one["sha256"]), own=bool(one["own"])) for one in told
+    )
 
 
 def _mismatch(one: dict[str, Any]) -> Mismatch:

@@ -15,6 +15,7 @@ from toolkit.diagnosis.answer import (
     Mismatch,
     NominalParameter,
     Verdict,
+    recorded,
 )
 from toolkit.diagnosis.case import Case
 from toolkit.diagnosis.classes import equivalent_to
@@ -67,6 +68,7 @@ def answer_of(case: Case, found: Search, told: tuple[Finding, ...]) -> Diagnosis
         findings=(*told, *_outliers(case, found)),
         complete=not found.skipped,
         skipped=found.skipped,
+        recordings=recorded(case.runs),
     )
 
 

@@ -48,7 +48,8 @@ class Run:
 
     ``t`` is the time [s]; without a time channel the row's number. ``simulated`` has the other program's
     output of a case of kind ``columns``; ``declared`` the run's table as written; ``filled`` how many
-    missing samples of which input were interpolated; ``sha256`` is the file's.
+    missing samples of which input were interpolated; ``sha256`` is the file's; ``own`` tells that
+    the machine's acquisition program wrote it.
     """
 
     name: str
@@ -59,6 +60,7 @@ class Run:
     simulated: Mapping[str, NDArray[np.float64]]
     filled: tuple[tuple[str, int], ...] = ()
     sha256: str = ""
+    own: bool = False
 
     @property
     def rows(self) -> int:

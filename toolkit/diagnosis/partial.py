@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolkit.diagnosis.answer import Diagnosis, HeldOutFit, NominalParameter, NotFound
+from toolkit.diagnosis.answer import Diagnosis, HeldOutFit, NominalParameter, NotFound, recorded
 from toolkit.effects.catalogue import effects
 
 if TYPE_CHECKING:
@@ -81,6 +81,7 @@ def without_search(
         findings=findings,
         complete=not skipped,
         skipped=skipped,
+        recordings=recorded(case.runs),
     )
 
 

@@ -46,7 +46,7 @@ def read_run(
     """
     names = {one.name for one in channels} | set(simulated.values())
     units = {one.name: one.unit for one in channels}
-    table, present = _read(path, data, machine=machine, units=units, wanted=names)
+    table, present, own = _read(path, data, machine=machine, units=units, wanted=names)
     columns: dict[str, NDArray[np.float64]] = {}
     for channel in channels:
         if channel.name in table:
@@ -74,7 +74,7 @@ def read_run(
             columns[channel.name] = _filled(path, channel.name, t, columns[channel.name])
     return Run(
         name=name, t=t, columns=columns, conditions=conditions(declared), declared=declared, simulated=others,
-        filled=tuple(filled), sha256=sha256_bytes(data),
+        filled=tuple(filled), sha256=sha256_bytes(data), own=own,
     )  # fmt: skip
 
 
@@ -91,8 +91,8 @@ def conditions(declared: Mapping[str, Any]) -> dict[str, str]:
 
 def _read(
     path: Path, data: bytes, *, machine: str, units: Mapping[str, str], wanted: set[str]
-) -> tuple[dict[str, NDArray[np.float64]], list[str]]:
-    """Return the wanted columns that a file has, and the names of all that it has."""
+) -> tuple[dict[str, NDArray[np.float64]], list[str], bool]:
+    """Return the wanted columns that a file has, the names of all, and whether it is the machine's own."""
     is_book = data[:4] == b"PK\x03\x04"
     header = [] if is_book else header_of(data)
     if machine:
@@ -101,9 +101,9 @@ def _read(
         # The acquisition program's own headers, in a workbook or as text.
         if is_book or (not wanted & set(header) and is_of_machine(header, machine)):
             made = read_workbook(path, data, machine, units)
-            return made, list(made)
+            return made, list(made), True
     if not is_book:
-        return read_csv(data, wanted, where=path), header
+        return read_csv(data, wanted, where=path), header, False
     raise UnreadableError(
         "a run is a workbook",
         where=path,

@@ -14,6 +14,9 @@ def as_json(made: Diagnosis) -> dict[str, Any]:
     answer: dict[str, Any] = _finite({
         "title": made.title,
         "case_sha256": made.case_sha256,
+        "recordings": None if made.recordings is None else [
+            {"name": one.name, "sha256": one.sha256, "own": one.own} for one in made.recordings
+        ],
         "verdict": made.verdict,
         "remaining": made.remaining,
         "complete": made.complete,

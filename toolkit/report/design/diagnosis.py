@@ -11,6 +11,7 @@ from toolkit.report.design.opening import heading
 _FOUND = ("effect", "class", "statement", "equation")
 _PARAMETERS = ("effect", "parameter", "value", "unit", "interval", "runs")
 _ERRORS = ("output", "unit", "nominal", "refitted", "augmented", "noise")
+_FINDINGS = ("rule", "where", "message")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -28,6 +29,7 @@ class Words:
     parameters: tuple[str, Sequence[str]]
     errors: tuple[str, Sequence[str]]
     next: tuple[str, Sequence[str]]
+    findings: tuple[str, Sequence[str]]
     figure: str = "Figure"
     table: str = "Table"
 
@@ -53,6 +55,7 @@ ENGLISH = Words(
         ("output", "unit", "as declared", "refitted", "with the effects", "noise"),
     ),
     next=("What to measure next.", ("measurement",)),
+    findings=("Findings of the diagnosis.", ("rule", "where", "finding")),
 )
 GERMAN = Words(
     title="Diagnose: Simulation und Messung",
@@ -75,6 +78,7 @@ GERMAN = Words(
         ("Ausgang", "Einheit", "wie angegeben", "angepasst", "mit den Effekten", "Rauschen"),
     ),
     next=("Was als Nächstes zu messen ist.", ("Messung",)),
+    findings=("Feststellungen der Diagnose.", ("Regel", "Ort", "Feststellung")),
     figure="Abbildung",
     table="Tabelle",
 )
@@ -127,6 +131,7 @@ def diagnosis_section(p: Pieces, words: Words = ENGLISH, *, width_mm: float = 16
         + line("", "not_observable")
         + line("", "complete")
         + table("next", words.next, ["measure"], [166])
+        + table("diagnosis_findings", words.findings, _FINDINGS, [34, 44, 88])
         + paragraph(
             run(words.case, bold=True)
             + p.inline("tk:diagnosis.id", "id")
