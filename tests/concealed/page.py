@@ -75,7 +75,8 @@ def curve(bins: list[dict[str, Any]], label: str) -> str:
 
 
 _STYLE = """
-body { font: 15px/1.5 sans-serif; color: #1b1f24; max-width: 66em; margin: 2em auto; padding: 0 1em }
+body { font: 15px/1.5 sans-serif; color: #1b1f24; background: #fff;
+       max-width: 66em; margin: 2em auto; padding: 0 1em }
 table { border-collapse: collapse; margin: .6em 0 1.6em }
 td, th { border-bottom: 1px solid #d5d9de; padding: .3em .8em; text-align: left; vertical-align: top }
 th { color: #57606a; font-weight: 600 }
@@ -89,7 +90,8 @@ svg polyline { fill: none; stroke: #0b5cad; stroke-width: 2 }
 .end { text-anchor: end }
 .no { color: #b3261e; font-weight: 600 }
 .yes { color: #1a7f37 }
-.wide { overflow-x: auto }
+.wide, pre { overflow-x: auto }
+@media print { .wide, pre { overflow: visible; white-space: pre-wrap } table { font-size: .7em } }
 """
 
 

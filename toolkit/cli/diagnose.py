@@ -12,7 +12,7 @@ from toolkit.cli.console import Calibrations, Home, Json, Quiet, answer, finding
 from toolkit.cli.home import calibrations_folder
 
 if TYPE_CHECKING:
-    from toolkit.diagnosis.answer import Diagnosis
+    from toolkit.diagnosis.answer import Diagnosis, Place
     from toolkit.report.template.package import Template
 
 NAME = "diagnose"
@@ -191,7 +191,10 @@ def _teller(*, show: bool) -> Any:
 
 
 def _text(made: Diagnosis, out: Path) -> str:
-    lines = [f"{made.title}: {_VERDICTS[made.verdict]}"]
+    from toolkit.report.diagnosis.chance import chance
+
+    cut = made.verdict == "unknown" and not made.complete
+    lines = [f"{made.title}: {_CUT if cut else _VERDICTS[made.verdict]}"]
     for one in made.effects:
         channel = f" on {one.channel}" if one.channel else ""
         lines += ["", f"{one.name}{channel} ({one.stage}): {one.statement}", f"  {one.equation}"]
@@ -204,14 +207,14 @@ def _text(made: Diagnosis, out: Path) -> str:
         if one.equivalent_to:
             lines.append(f"  this recording cannot tell it from: {', '.join(one.equivalent_to)}")
         lines.append(
-            f"  held-out log score +{one.held_out_log_score_gain:.1f}, p = {one.p_value:.2g} in the search"
+            f"  held-out log score +{one.held_out_log_score_gain:.1f}, {chance(one.p_value)} in the search"
         )
     for channel, names in made.depends_on:
         lines.append(f"{channel}: structure that no named effect explains, over {' and '.join(names)}")
     for place in made.mismatch:
         for at in place.where[:1]:
             lines.append(
-                f"{place.channel}: mismatch mostly where {at.variable} is {at.start} to {at.end} {at.unit}"
+                f"{place.channel}: mismatch mostly where {at.variable} is {_ends(at)} {at.unit}".rstrip()
             )
     rows = [
         [
@@ -240,6 +243,14 @@ def _text(made: Diagnosis, out: Path) -> str:
     return "\n".join([*lines, "", f"written to {out}"])
 
 
+def _ends(at: Place) -> str:
+    """Return the ends of a range in few digits; a condition's one value as it stands."""
+    if isinstance(at.start, float) and isinstance(at.end, float):
+        return f"{at.start:.4g} to {at.end:.4g}"
+    return str(at.start)
+
+
+_CUT = "something is missing; the budget was spent before every known effect was tried"
 _VERDICTS = {
     "named": "the missing physics has a name",
     "equivalent": "a class of effects explains it, which this recording cannot tell apart",

@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING
 
 from toolkit import __version__
 from toolkit.report.content import Cell, ReportContent, Table, Value
-from toolkit.report.diagnosis.page import HEADLINES
+from toolkit.report.diagnosis.chance import chance
+from toolkit.report.diagnosis.page import headline
 from toolkit.report.diagnosis.plots import diagnosis_plots
 from toolkit.report.diagnosis.vocabulary import DIAGNOSIS, TABLES
 
@@ -108,7 +109,7 @@ def answer_texts(made: Diagnosis, style: Style, *, by: str | None) -> dict[str, 
     return {
         "id": f"DIA-{made.case_sha256[:8].upper()}",
         "title": made.title,
-        "verdict": HEADLINES[made.verdict],
+        "verdict": headline(made),
         "summary": _summary(made, style),
         "opinion": _opinion(made),
         "opinion_by": released if made.effects else None,
@@ -157,7 +158,7 @@ def _where(made: Diagnosis, style: Style) -> str | None:
             numbers = isinstance(at.start, float) and isinstance(at.end, float)
             ends = f"{_n(at.start, style)} to {_n(at.end, style)}" if numbers else str(at.start)  # type: ignore[arg-type]
             text += f", most of it where {at.variable} is {ends} {at.unit}".rstrip()
-        told.append(f"{text} (p = {_n(one.p_value, style)}).")
+        told.append(f"{text} ({chance(one.p_value, decimal_comma=style.decimal_comma)}).")
     return " ".join(told) or None
 
 

@@ -48,7 +48,9 @@ def error_bars(made: Diagnosis) -> bytes:
             ]
             at = np.arange(len(names)) + (i - (len(steps) - 1) / 2) * 0.26
             bars = axes.barh(at, values, height=0.24, color=colour, label=label)
-            axes.bar_label(bars, labels=[f"{v:.3g}" for v in values], padding=4, fontsize=9, color="#333333")
+            axes.bar_label(
+                bars, labels=[f"{v:#.3g}".rstrip(".") for v in values], padding=4, fontsize=9, color="#333333"
+            )
         axes.axvline(1.0, color=GREEN, linewidth=1.6)
         top = axes.get_xaxis_transform()
         axes.text(1.0, 1.02, "noise", color=GREEN, transform=top, ha="center")
@@ -57,9 +59,10 @@ def error_bars(made: Diagnosis) -> bytes:
         axes.set_xlabel("root mean square error on held-out rows, over the noise")
         axes.margins(x=0.12)
         axes.grid(visible=False, axis="y")
-        axes.legend(loc="lower right", frameon=False)
+        # Above the bars: the longest of them would run through a legend inside.
+        figure.legend(loc="outside upper right", ncols=3, frameon=False)
 
-    return _svg((8.6, 1.3 + 0.85 * max(len(names), 1)), draw)
+    return _svg((8.6, 1.5 + 0.85 * max(len(names), 1)), draw)
 
 
 def mismatch_map(found: Search, channel: str, place: Place, *, after: bool) -> bytes | None:
@@ -131,27 +134,28 @@ def run_in_time(found: Search, channel: str, *, after: bool) -> bytes:
     return _svg((8.6, 4.4), draw)
 
 
-def run_map(found: Search, *, after: bool) -> bytes:
-    """Return root mean square residuals over the noise, by run and output, before and after."""
+def run_map(found: Search, made: Diagnosis, *, after: bool) -> bytes:
+    """Return root mean square residuals over the noise of the first chart, by run and output."""
     problem = found.problem
-    names = problem.names
+    floors = {one.channel: one.noise_floor for one in made.held_out}
+    names = [name for name in problem.names if name in floors]
     fits = [("refitted", found.refitted)] + ([("with the effect", found.augmented)] if after else [])
 
     def table(fit: Any) -> NDArray[np.float64]:
-        made = np.zeros((len(names), len(problem.runs)))
+        share = np.zeros((len(names), len(problem.runs)))
         for i, name in enumerate(names):
-            noise = found.augmented.noise[name].marginal_sd
+            noise = max(floors[name], 1e-300)
             for j, one in enumerate(problem.slices):
                 kept = problem.kept[name][one]
                 values = fit.residual[name][one][kept]
-                made[i, j] = np.sqrt(np.mean(values**2)) / noise if len(values) else np.nan
-        return made
+                share[i, j] = np.sqrt(np.mean(values**2)) / noise if len(values) else np.nan
+        return share
 
     def draw(figure: Figure) -> None:
-        made = [table(fit) for _, fit in fits]
-        most = max(2.0, float(np.nanmax(np.stack(made))))
+        shares = [table(fit) for _, fit in fits]
+        most = max(2.0, float(np.nanmax(np.stack(shares))))
         panels = figure.subplots(len(fits), 1, sharex=True, squeeze=False)[:, 0]
-        for axes, (label, _), values in zip(panels, fits, made, strict=True):
+        for axes, (label, _), values in zip(panels, fits, shares, strict=True):
             axes.imshow(values, aspect="auto", cmap="YlOrBr", vmin=0, vmax=most)
             axes.set_yticks(range(len(names)), names)
             axes.set_title(label, loc="left", fontsize=10)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from toolkit.files import write_atomic
 from toolkit.report.diagnosis import figures
+from toolkit.report.diagnosis.chance import chance
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -28,7 +29,7 @@ _COLOURS = {
     "untestable": "#6b6b6b",
 }  # fmt: skip
 _STYLE = """
-body{font:15px/1.5 Carlito,Calibri,"Liberation Sans",sans-serif;color:#222;max-width:60rem;
+body{font:15px/1.5 Carlito,Calibri,"Liberation Sans",sans-serif;color:#222;background:#fff;max-width:60rem;
   margin:2rem auto;padding:0 1rem}
 h1{font-size:1.5rem;margin:0}h2{font-size:1.15rem;margin:2rem 0 .4rem;border-bottom:1px solid #ddd}
 .verdict{border-left:.5rem solid VAR;padding:.6rem 1rem;background:#f6f6f6;margin:1rem 0}
@@ -36,8 +37,16 @@ h1{font-size:1.5rem;margin:0}h2{font-size:1.15rem;margin:2rem 0 .4rem;border-bot
 th,td{padding:.2rem .7rem;text-align:left;border-bottom:1px solid #e4e4e4}
 td.n,th.n{text-align:right;font-variant-numeric:tabular-nums}img{max-width:100%}
 code{background:#f0f0f0;padding:.1rem .3rem}
-small{color:#666}details{margin:.5rem 0}
+small{color:#666}details{margin:.5rem 0}.wide,code{overflow-x:auto;max-width:100%}code{display:inline-block;vertical-align:bottom}
+@media print{body{max-width:none;margin:0}h2,img,tr{break-inside:avoid}h2{break-after:avoid}}
 """
+
+
+def headline(made: Diagnosis) -> str:
+    """Return the verdict as a sentence; a search that was cut off has not tried every effect."""
+    if made.verdict == "unknown" and not made.complete:
+        return "Something is missing; the budget was spent before every known effect was tried."
+    return HEADLINES[made.verdict]
 
 
 def write_page(path: Path, result: Result) -> None:
@@ -56,10 +65,11 @@ def page(result: Result) -> str:
     made = result.diagnosis
     parts = [
         '<!doctype html><html lang="en"><head><meta charset="utf-8">',
+        '<meta name="viewport" content="width=device-width">',
         f"<title>Diagnosis: {escape(made.title)}</title>",
         f"<style>{_STYLE.replace('VAR', _COLOURS[made.verdict])}</style></head><body>",
         f"<h1>{escape(made.title)}</h1>",
-        f'<div class="verdict"><b>{escape(HEADLINES[made.verdict])}</b><br>{_sentence(made)}</div>',
+        f'<div class="verdict"><b>{escape(headline(made))}</b><br>{_sentence(made)}</div>',
         *(
             [_picture(figures.error_bars(made), "error before and after, over the noise")]
             if result.search is not None
@@ -117,7 +127,7 @@ def _effects(made: Diagnosis) -> list[str]:
 def _why(one: FoundEffect) -> str:
     text = (
         f"On rows that no fit had seen the log score rose by {one.held_out_log_score_gain:.1f}; the chance "
-        f"that a search of this size finds as much in noise is {one.p_value:.2g}."
+        f"that a search of this size finds as much in noise: {chance(one.p_value)}."
     )
     if one.equivalent_to:
         text += f" {', '.join(one.equivalent_to)} would explain the same: they are one class here."
@@ -144,7 +154,7 @@ def _where(result: Result) -> list[str]:
         )
     if len(found.problem.runs) > 1:
         parts.append("<p>Root mean square residual over the noise, by run:</p>")
-        parts.append(_picture(figures.run_map(found, after=after), "residual by run and output"))
+        parts.append(_picture(figures.run_map(found, made, after=after), "residual by run and output"))
     return parts
 
 
@@ -155,7 +165,7 @@ def _place(one: Mismatch) -> str:
     for at in one.where[:1]:
         ends = f"{at.start:.4g} to {at.end:.4g}" if isinstance(at.start, float) else str(at.start)
         text += f", most of it where {at.variable} is {ends} {at.unit}"
-    return escape(f"{text} (p = {one.p_value:.2g}).")
+    return escape(f"{text} ({chance(one.p_value)}).")
 
 
 def _held_out(made: Diagnosis) -> list[str]:
@@ -227,7 +237,7 @@ def _table(head: Sequence[str], rows: Sequence[Sequence[object]], *, numbers: Se
     body = "".join(
         "<tr>" + "".join(cell("td", i, one) for i, one in enumerate(row)) + "</tr>" for row in rows
     )
-    return f"<table><thead><tr>{top}</tr></thead><tbody>{body}</tbody></table>"
+    return f'<div class="wide"><table><thead><tr>{top}</tr></thead><tbody>{body}</tbody></table></div>'
 
 
 def _picture(svg: bytes, alt: str) -> str:
