@@ -283,7 +283,7 @@ def test_what_is_found_on_top_of_a_model_is_written_with_it(tmp_path, drag):
         (('kind = "python"', 'kind = "pyton"'), "model-file"),
         (('name = "quadratic_drag"', 'name = "quadratic_dragg"'), "unknown-effect"),
         (("[effect.parameters.drag]", "[effect.parameters.drug]"), None),
-        (("standard_error = 13", "standard_error = -13"), "model-file"),
+        (("standard_error = 14", "standard_error = -13"), "model-file"),
         (('channel = "F"', 'channel = "G"'), "model-place"),
         (('axes = "machine"', 'axes = "mechine"'), "model-file"),
         (('verdict = "named"', "verdict = 3"), "model-file"),

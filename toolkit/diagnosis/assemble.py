@@ -146,7 +146,7 @@ def _parameters(found: Search, active: Active, runs: tuple[str, ...] | None) -> 
         value = active.values.get(one.name, 0.0)
         ci: tuple[float, float] | None = None
         if active.searched:
-            variance = float(made.covariance[at + i, at + i])
+            variance = found.variance(at + i)
             reach = quantile * math.sqrt(max(variance, 0.0))
             if math.isfinite(reach) and reach < 1e5 * max(abs(value), 1e-300):
                 ci = (max(value - reach, one.bounds[0]), min(value + reach, one.bounds[1]))

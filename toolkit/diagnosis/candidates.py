@@ -14,6 +14,7 @@ from toolkit.diagnosis.model import DISCRETE, Active
 from toolkit.diagnosis.nuisance import INPUT_NOISE
 from toolkit.diagnosis.units_of import channel_unit
 from toolkit.effects.catalogue import effects
+from toolkit.effects.creep import FROM_REST
 from toolkit.effects.effect import Effect, EffectParameter
 from toolkit.effects.unit_error import factors_for
 from toolkit.errors import UnitError
@@ -99,10 +100,9 @@ def _starts(problem: Problem, active: Active) -> tuple[Start, ...]:
     shapes = [one for one in effect.parameters if one.off is None]
     amplitudes = [one for one in effect.parameters if one.off is not None]
     made = []
-    for shape in itertools.product(
-        *([v * scales[one.name] for v in one.starts or (_middle(one),)] for one in shapes)
-    ):
-        fixed = dict(zip((one.name for one in shapes), shape, strict=True)) | extra
+    grids = [[v * scales[one.name] for v in one.starts or (_middle(one),)] for one in shapes]
+    for before, shape in itertools.product(_histories(effect), itertools.product(*grids)):
+        fixed = dict(zip((one.name for one in shapes), shape, strict=True)) | extra | before
         off = {one.name: float(one.off or 0.0) for one in amplitudes}
         if len(amplitudes) == 1 and amplitudes[0].starts:
             one = amplitudes[0]
@@ -118,6 +118,11 @@ def _starts(problem: Problem, active: Active) -> tuple[Start, ...]:
             )
         )
     return tuple(made)
+
+
+def _histories(effect: Effect) -> tuple[dict[str, float], ...]:
+    """Return what may have been before the first row, where that shapes an effect."""
+    return ({}, {FROM_REST: 1.0}) if effect.name == "creep" else ({},)
 
 
 def _steps(problem: Problem, active: Active, one: EffectParameter) -> tuple[float, ...]:

@@ -199,7 +199,7 @@ def _condition(found: Search, active: Active) -> tuple[str, tuple[str, ...]] | N
 
 
 def _standard_error(found: Search, at: int) -> list[str]:
-    variance = float(found.augmented.covariance[at, at])
+    variance = found.variance(at)
     if not math.isfinite(variance) or variance <= 0:
         return []
     return _entries({"standard_error": math.sqrt(variance)})

@@ -128,7 +128,9 @@ class Screen:
             directions = {
                 name: np.stack([one[name] for one in responses], axis=1) for name in self.problem.names
             }
-            if not any(np.isfinite(one).all() and np.abs(one).max() > 0 for one in directions.values()):
+            # Rows that do not count (a cell was lost there) may be without a response.
+            counted = [one[self.layouts[name].index] for name, one in directions.items()]
+            if not any(np.isfinite(one).all() and np.abs(one).max(initial=0.0) > 0 for one in counted):
                 continue
             directions = {name: np.nan_to_num(one) for name, one in directions.items()}
             gain, block = self.quick(directions, fixed=candidate.discrete)

@@ -18,8 +18,10 @@ from toolkit.diagnosis.model import Active
 from toolkit.diagnosis.nuisance import INPUT_NOISE
 from toolkit.diagnosis.null import search_p_values
 from toolkit.diagnosis.problem import Problem, without_outliers
+from toolkit.diagnosis.refine import refined
 from toolkit.diagnosis.remainder import NOTICED, StructureFound, remainder
 from toolkit.diagnosis.screen import Scored, Screen, best_of
+from toolkit.errors import FitError
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -71,6 +73,14 @@ class Search:
     screen: Screen
     scored: tuple[Scored, ...]
     skipped: tuple[str, ...]
+
+    def variance(self, at: int) -> float:
+        """Return the variance of a parameter of the augmented fit, by its place among them.
+
+        What a short series leaves open of its noise's colour widens it as it shortens a gain.
+        """
+        made = self.augmented
+        return float(made.covariance[at, at]) / self.screen.trust(made.noise)
 
 
 class BudgetSpentError(Exception):
@@ -149,6 +159,7 @@ def search(problem: Problem, *, seed: int, budget: Budget) -> Search:
             base, held_base, step = found
             if not _is_nuisance(step, steps):
                 steps.append(step)
+        base = refined(problem, base, listed)
         base, held_base, steps = _stepped(problem, base, held_base, steps)
         if len(steps) > 1:
             budget.check("swaps")
@@ -246,12 +257,18 @@ def _best_step(
     weight = 0.5 * math.log(sum(int(one.sum()) for one in problem.kept.values()))
     tried: list[tuple[float, Scored, Fit]] = []
     for one in promising:
-        made = fit(problem, (*base.active, one.active), start=base.p, noise=None)
+        try:
+            made = fit(problem, (*base.active, one.active), start=base.p, noise=None)
+        except FitError:  # the values that screening leads to are beyond what the simulation can run with
+            continue
         penalty = weight * len(one.active.searched)
         tried.append((made.log_posterior - penalty, one, made))
     tried.sort(key=lambda each: -each[0])
     for score, one, made in tried[:3]:
-        held = hold_out(problem, folds, made.active, made)
+        try:
+            held = hold_out(problem, folds, made.active, made)
+        except FitError:
+            continue
         gain = held.total - held_base.total
         if gain < _LEAST_GAIN or score - base.log_posterior < _LEAST_GAIN:
             continue
@@ -333,8 +350,11 @@ def _pruned(
         if len(base.active) < 2:
             break
         rest = tuple(one for one in base.active if _place(one) != _place(steps[i].active))
-        made = fit(problem, rest, start=base.p)
-        held = hold_out(problem, folds, made.active, made)
+        try:
+            made = fit(problem, rest, start=base.p)
+            held = hold_out(problem, folds, made.active, made)
+        except FitError:  # what is left cannot be simulated: the effect is needed
+            continue
         if held_base.total - held.total < _LEAST_GAIN:
             base, held_base = made, held
             kept = {_place(one) for one in rest}

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from toolkit.effects.effect import Effect, EffectParameter, Values
-from toolkit.effects.filters import delayed
+from toolkit.effects.filters import STRAIGHT, delayed
 
 if TYPE_CHECKING:
     import numpy as np
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 def _late(y: NDArray[np.float64], values: Values, setting: Setting) -> NDArray[np.float64]:
-    return delayed(setting.t, y, values["delay"])
+    return delayed(setting.t, y, values["delay"], straight=STRAIGHT in values)
 
 
 EFFECT = Effect(

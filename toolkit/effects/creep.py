@@ -13,9 +13,13 @@ if TYPE_CHECKING:
 
     from toolkit.effects.signals import Setting
 
+FROM_REST = "_from_rest"
+"""Among the values: each run's first load came on an unloaded channel; without it, it had long been there."""
+
 
 def _creeping(y: NDArray[np.float64], values: Values, setting: Setting) -> NDArray[np.float64]:
-    return y + values["fraction"] * lag(setting.t, y, values["time_constant"])
+    start = 0.0 if values.get(FROM_REST) else None
+    return y + values["fraction"] * lag(setting.t, y, values["time_constant"], start)
 
 
 EFFECT = Effect(

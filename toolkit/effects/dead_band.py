@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,10 +14,23 @@ if TYPE_CHECKING:
 
     from toolkit.effects.signals import Setting
 
+NOISE = "_noise"
+"""Among the values: sd of noise that comes before the band, in the channel's unit; without it none does."""
+
 
 def _dead(y: NDArray[np.float64], values: Values, setting: Setting) -> NDArray[np.float64]:
     half = 0.5 * abs(values["width"])
-    return np.sign(y) * np.maximum(np.abs(y) - half, 0.0)
+    noise = values.get(NOISE, 0.0)
+    if not noise > 0:
+        return np.sign(y) * np.maximum(np.abs(y) - half, 0.0)
+    return _above(y - half, noise) - _above(-y - half, noise)
+
+
+def _above(y: NDArray[np.float64], sd: float) -> NDArray[np.float64]:
+    """Return the mean of max(y + noise, 0) for normal noise."""
+    from scipy.special import ndtr
+
+    return np.asarray(y * ndtr(y / sd) + sd / math.sqrt(2 * math.pi) * np.exp(-0.5 * (y / sd) ** 2))
 
 
 EFFECT = Effect(

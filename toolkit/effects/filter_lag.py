@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from toolkit.effects.effect import Effect, EffectParameter, Values
-from toolkit.effects.filters import filtered
+from toolkit.effects.filters import STRAIGHT, filtered
 
 if TYPE_CHECKING:
     import numpy as np
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 def _filtered(y: NDArray[np.float64], values: Values, setting: Setting) -> NDArray[np.float64]:
-    return filtered(setting.t, y, values["time_constant"])
+    return filtered(setting.t, y, values["time_constant"], straight=STRAIGHT in values)
 
 
 EFFECT = Effect(

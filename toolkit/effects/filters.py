@@ -11,6 +11,7 @@ if TYPE_CHECKING:
 
 
 _FINER = 4
+STRAIGHT = "_straight"  # among an effect's values: the rows are fine enough for straight lines
 
 
 def lag(
@@ -48,18 +49,26 @@ def lag(
     return y
 
 
-def delayed(t: NDArray[np.float64], x: NDArray[np.float64], delay: float) -> NDArray[np.float64]:
+def delayed(
+    t: NDArray[np.float64], x: NDArray[np.float64], delay: float, *, straight: bool = False
+) -> NDArray[np.float64]:
     """Return x(t - delay), cubic between rows; beyond the ends the end value.
 
     Straight lines would take a tenth of what changes within a few rows, and the delay would be found too
-    short by as much; a step between two rows overshoots by 7 % beside it. Where x has gaps, straight lines.
+    short by as much; a step between two rows overshoots by 7 % beside it. Where x has gaps, straight lines;
+    also where ``straight`` asks for them, of an x on rows so fine that its corners stand on them.
     """
-    return x.copy() if delay == 0 or not len(t) else _between(t, x, np.clip(t - delay, t[0], t[-1]))
+    if delay == 0 or not len(t):
+        return x.copy()
+    at = np.clip(t - delay, t[0], t[-1])
+    return np.interp(at, t, x) if straight else _between(t, x, at)
 
 
-def filtered(t: NDArray[np.float64], x: NDArray[np.float64], time_constant: float) -> NDArray[np.float64]:
+def filtered(
+    t: NDArray[np.float64], x: NDArray[np.float64], time_constant: float, *, straight: bool = False
+) -> NDArray[np.float64]:
     """Return a signal behind a first-order filter, cubic between rows as in `delayed`."""
-    if len(t) < 3 or not time_constant > 0:
+    if straight or len(t) < 3 or not time_constant > 0:
         return lag(t, x, time_constant)
     fine = np.interp(np.arange(_FINER * (len(t) - 1) + 1) / _FINER, np.arange(len(t)), t)
     return lag(fine, _between(t, x, fine), time_constant)[::_FINER]

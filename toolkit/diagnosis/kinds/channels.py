@@ -12,6 +12,7 @@ from toolkit.diagnosis.kinds.setting import dimension
 from toolkit.diagnosis.model import Active
 from toolkit.effects.effect import STAGES, Effect
 from toolkit.effects.signals import Setting
+from toolkit.errors import FitError
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
 _FORCE_LIKE = ("force", "moment", "bridge_ratio", "count")
 _STEPS = 8
 _EXACT = 1e-9  # of the largest value: no digit that a recording has
+_WILD = 10.0  # times the largest value: the fixed point runs away
 
 
 def channel_places(
@@ -92,7 +94,10 @@ def through_channels(
 def undone(
     recorded: NDArray[np.float64], one: Active, setting: Setting, others: Mapping[str, NDArray[np.float64]]
 ) -> NDArray[np.float64]:
-    """Return what a channel would have shown without an effect: the hook's inverse by fixed point."""
+    """Return what a channel would have shown without an effect: the hook's inverse by fixed point.
+
+    Raises FitError where the effect is so strong that nothing has an inverse.
+    """
     hook = one.effect.channel
     if hook is None:
         return recorded
@@ -106,10 +111,26 @@ def undone(
     if one.source is not None:
         seen = dataclasses.replace(setting, channels={**setting.channels, "from": others[one.source]})
     guess = recorded
-    enough = _EXACT * float(np.max(np.abs(recorded), initial=0.0))
+    size = float(np.nanmax(np.abs(recorded), initial=0.0))
     for _ in range(_STEPS):
-        missed = recorded - hook(guess, one.values, seen)
+        with np.errstate(over="ignore", invalid="ignore"):
+            missed = recorded - hook(guess, one.values, seen)
+        left = float(np.nanmax(np.abs(missed), initial=0.0))
+        if left > _WILD * size:
+            raise _not_undone(one)
         guess = guess + missed
-        if np.max(np.abs(missed), initial=0.0) <= enough:
+        if left <= _EXACT * size:
             break
     return np.where(np.isfinite(guess), guess, recorded)
+
+
+def _not_undone(one: Active) -> FitError:
+    values = ", ".join(f"{name} = {value:.4g}" for name, value in one.values.items() if name[0] != "_")
+    return FitError(
+        "an effect of this size cannot be taken out of a recording",
+        where=str(one.channel),
+        got=f"{one.effect.name}: {values}",
+        expected="an effect that leaves a channel's values in their order",
+        next_step="take a smaller value",
+        rule="simulator",
+    )
