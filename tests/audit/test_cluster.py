@@ -105,8 +105,22 @@ def cluster(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def two(cluster):
-    cluster.add_workers(2)
+def one(cluster):
+    """The address while the cluster has one worker."""
+    cluster.add_workers(1)
+    return cluster.wait_for(1)
+
+
+@pytest.fixture(scope="module")
+def there_by_one(archive, one, tmp_path_factory):
+    out = tmp_path_factory.mktemp("by one")
+    return audit_command(archive, out, "--scheduler", one), out
+
+
+@pytest.fixture(scope="module")
+def two(cluster, there_by_one):
+    """The address with two workers, once the one alone has done its part."""
+    cluster.add_workers(1)
     return cluster.wait_for(2)
 
 
@@ -175,6 +189,13 @@ def test_a_cluster_answers_as_the_workers_here_do(archive, there, tmp_path):
     assert len(lines(out)) == FILES
     assert lines(tmp_path) == lines(out)
     assert (tmp_path / "audit.jsonl").read_bytes() == (out / "audit.jsonl").read_bytes()
+
+
+def test_one_worker_of_a_cluster_answers_as_two_do(there_by_one, there):
+    (answer, out), (answer_of_two, out_of_two) = there_by_one, there
+    assert answer == answer_of_two
+    assert lines(out) == lines(out_of_two)
+    assert (out / "audit.jsonl").read_bytes() == (out_of_two / "audit.jsonl").read_bytes()
 
 
 def test_a_run_here_goes_on_from_what_a_cluster_did(archive, there, monkeypatch):

@@ -128,6 +128,13 @@ def test_records_that_coarse_digits_cannot_tell_apart_are_ambiguous():
     assert judged(columns(), (R2, near)).grade == "exact"
 
 
+def test_what_all_candidates_of_an_ambiguous_file_share_is_told():
+    near = record("m15-r5", (0.99722, 0.99718, 1.0228, 0.6473))
+    found = judged(columns((*FY[:2], -FY[2], FY[3]), decimals=1), (R2, near))
+    assert (found.grade, found.record, found.candidates) == ("ambiguous", None, ("m15-r2", "m15-r5"))
+    assert found.variant == found.segments[0].variant == "E5 negative in FY"
+
+
 def test_a_dead_channel_leaves_its_sign_open():
     file = columns()
     x = file.x.copy()

@@ -51,3 +51,9 @@ def test_no_equation_no_interval():
     file = columns(rows=25)
     file.y["FY"][:] = np.random.default_rng(1).uniform(-500, 500, 25)
     assert coefficient_intervals(file, "FY") == ()
+
+
+def test_numbers_without_a_square_leave_every_coefficient_open():
+    x = np.random.default_rng(2).uniform(-1e303, 1e303, (20, 1))
+    bounds = interval_bounds(x, 0.5 * x[:, 0], half_x=x * 0 + 1e295, half_y=x[:, 0] * 0 + 1e295)
+    assert np.isinf(bounds).all()

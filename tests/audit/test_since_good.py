@@ -69,6 +69,16 @@ def test_the_stretch_is_that_between_the_two_sessions(home):
     assert {one["load"] for one in told["loads"]} == {"FY", "MZ"}
 
 
+def test_it_tells_what_the_failing_session_found(home):
+    # One percent of the largest FY that the session applied, against a tenth of a percent of it.
+    drift = drift_since(home[1], "m15-r2")
+    FY_off = next(one for one in drift.failed.loads if one.load == "FY")
+    assert abs(FY_off.max_error) > FY_off.tolerance
+    assert drift.told.startswith("on 2021-01-01, m15-r3 found m15-r1: FY off by ")
+    assert f"(tolerance {FY_off.tolerance:.4g} lbf)" in drift.told
+    assert "MZ" not in drift.told
+
+
 @pytest.fixture(scope="module")
 def made(home):
     root, registry = home

@@ -56,12 +56,13 @@ def main() -> None:
     if given.json:
         json.dump({"schema": 1, "benchmarks": rows}, sys.stdout, indent=2)
         return
-    print(f"{'what':<52}{'ours':>10}{'peer':>10}{'ratio':>8}{'aim':>8}   peer")  # noqa: T201
+    print(f"{'what':<58}{'ours':>12}{'peer':>12}{'ratio':>8}{'aim':>8}   peer")  # noqa: T201
     for row in rows:
-        peer = "" if row["peer_s"] is None else f"{row['peer_s']:.3f} s"
+        unit = f"{row.get('unit', 's'):<2}"
+        peer = "" if row["peer_s"] is None else f"{row['peer_s']:.3f} {unit}"
         ratio = "" if row["ratio"] is None else f"{row['ratio']:.2f}"
         print(  # noqa: T201
-            f"{row['what']:<52}{row['ours_s']:>8.3f} s{peer:>10}{ratio:>8}{row['aim']:>8}   {row['peer']}"
+            f"{row['what']:<58}{row['ours_s']:>9.3f} {unit}{peer:>12}{ratio:>8}{row['aim']:>8}  {row['peer']}"
         )
 
 

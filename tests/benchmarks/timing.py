@@ -23,9 +23,9 @@ def pairs(
 
 
 def row(
-    what: str, ours: list[float], peer_name: str, peer: list[float] | None, aim: str
+    what: str, ours: list[float], peer_name: str, peer: list[float] | None, aim: str, *, unit: str = "s"
 ) -> dict[str, object]:
-    """Return one line of the result: medians, and the median of the ratios pair by pair."""
+    """Return one line of the result: medians in ``unit``, and the median of the ratios pair by pair."""
     ratio = statistics.median(a / b for a, b in zip(ours, peer, strict=True)) if peer else None
     return {
         "what": what,
@@ -35,4 +35,5 @@ def row(
         "ratio": ratio,
         "aim": aim,
         "pairs": len(ours),
+        "unit": unit,
     }

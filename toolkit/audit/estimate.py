@@ -7,6 +7,7 @@ such coefficients name a version; they never calibrate.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -89,6 +90,8 @@ def estimate(columns: Columns, segments: Sequence[Segment], screen: Screen) -> E
 
 
 def _equation(part: Columns, load: str) -> Equation:
+    # In parts of a power of two: what a broken channel holds may have no square in double precision.
+    largest = math.ldexp(1.0, math.frexp(float(np.abs(part.y[load]).max()))[1] - 1)
     design = np.column_stack([part.x, np.ones(part.rows)])
     scale = np.maximum(np.abs(design).max(axis=0), np.finfo(float).tiny)
     solved = np.linalg.lstsq(design / scale, part.y[load], rcond=1e-12)[0] / scale
@@ -108,7 +111,7 @@ def _equation(part: Columns, load: str) -> Equation:
             for name, value in zip(names, solved, strict=True)
         ),
         linear=bool(bounds),
-        rms=float(np.sqrt(np.mean(residual**2))),
+        rms=largest * float(np.sqrt(np.mean((residual / largest) ** 2))),
         max_abs=float(np.abs(residual).max()),
     )
 

@@ -186,12 +186,14 @@ class _Judge:
         made, single = [], []
         for run, told in zip(runs, answers, strict=True):
             one = told[0] if len(told) == 1 else None
+            # What all candidates of an ambiguous file share is known of it.
+            variants = {a.variant for a in told}
             made.append(
                 Segment(
                     first_row=run.start + 1,
                     last_row=run.stop,
                     record=one.record if one else None,
-                    variant=one.variant if one else None,
+                    variant=variants.pop() if len(variants) == 1 else None,
                     grade=self._grade(one) if one else "ambiguous" if told else "unknown",
                     candidates=tuple(sorted({a.record for a in told})) if len(told) > 1 else (),
                 )

@@ -97,7 +97,10 @@ def interval_bounds(
     target = y / rounding
     centre, rest = back @ (q.T @ target), target - q @ (q.T @ target)
     low, high = np.full(n + 1, np.inf), np.full(n + 1, -np.inf)
-    size = np.linalg.norm(back, axis=1)
+    with np.errstate(over="ignore"):
+        size = np.linalg.norm(back, axis=1)
+    if not np.isfinite(size).all():
+        return np.tile([-np.inf, np.inf], (n + 1, 1))  # numbers that no double precision can compare
     for signs in itertools.product(*_possible_signs(q, back, centre, half_x, half_y, rounding)):
         turned = np.array(signs)
         allowed = half_x / rounding[:, None] * turned  # |c| half_x for these signs

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from toolkit.calibration.records.record import CalibrationRecord, LoadFit
 
 _PROBE = 6  # rows that are looked at first
-_CELLS = 1 << 21  # predictions in memory at a time
+_CELLS = 1 << 16  # predictions at a time: they stay in the processor's cache
 # Both sides of a comparison are computed in another order here: what is near the limit goes through.
 _SPARE = 1.0 + 1e-6
 

@@ -14,7 +14,7 @@ from toolkit.audit.one_file import FileAudit
 from toolkit.findings import Finding
 
 _CHANGE = tuple(field.name for field in fields(Change))
-SHAPE = 3
+SHAPE = 4
 """Of what is written here; results of another one are not used again."""
 
 

@@ -55,6 +55,16 @@ class Drift:
         since = (day - self.good_date).days
         return since / span if 0 < since <= span else None
 
+    @property
+    def told(self) -> str:
+        """What the failing session found, in words."""
+        off = ", ".join(
+            f"{o.load} off by {o.max_error:+.4g} {o.unit} (tolerance {o.tolerance:.4g} {o.unit})"
+            for o in self.failed.loads
+            if not o.within
+        )
+        return f"on {self.failed.date}, {self.failed.session_record} found {self.failed.record}: {off}"
+
     def as_dict(self) -> dict[str, Any]:
         """Return the stretch under the keys of the answer."""
         return {

@@ -163,16 +163,19 @@ def _asked(told: Answer) -> Iterator[str]:
     if told.drift is not None:
         drift = told.drift
         yield ""
+        yield drift.told
         yield (
-            f"{drift.good} ({drift.good_date}) to {drift.failed.session_record} ({drift.failed.date}): "
-            f"{len(told.drifted)} files; interpolated effect:"
+            f"since {drift.good} ({drift.good_date}) {len(told.drifted)} files were recorded; an estimate of "
+            "the effect, interpolated by days:"
         )
         rows = [
             [f.path, f.date.isoformat(), f"{f.share:.0%}", "" if f.FY_N is None else f"{f.FY_N:.2f}",
-             "" if f.MZ_Nm is None else f"{f.MZ_Nm:.3f}"]
+             "" if f.MZ_Nm is None else f"{f.MZ_Nm:.3f}", f.reason or ""]
             for f in told.drifted[:_SHOWN]
         ]  # fmt: skip
-        yield table(["file", "date", "share", "dFY [N]", "dMZ [N·m]"], rows, align="<<>>>")
+        yield table(["file", "date", "share", "dFY [N]", "dMZ [N·m]", ""], rows, align="<<>>><")
+        if len(told.drifted) > len(rows):
+            yield f"... and {len(told.drifted) - len(rows)} more; --json tells all of them"
     if told.copies is not None:
         made = [one for one in told.copies if one.sha256 is not None]
         yield f"{len(made)} corrected copies"
@@ -195,7 +198,7 @@ def _rows(made: ArchiveAudit) -> Iterator[list[str]]:
         yield [
             one["path"],
             one["grade"],
-            one["record"] or "",
+            one["record"] or ", ".join(one["candidates"]),
             one["variant"] or one["reason"] or "",
             one["in_force"] or "",
             "" if FY is None else f"{FY:.1f}",

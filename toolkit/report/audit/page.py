@@ -160,8 +160,9 @@ def _worst(traces: Sequence[Trace]) -> Iterator[str]:
     for one in traces:
         plain = one.plain
         how = f", {plain['variant']}" if plain["variant"] else ""
+        who = plain["record"] or " or ".join(plain["candidates"]) or "no record"
         yield f"<h3>{escape(plain['path'])}</h3><p class=soft>{_grade(plain['grade'])} "
-        yield f"computed by {escape((plain['record'] or 'no record') + how)}; in force "
+        yield f"computed by {escape(who + how)}; in force "
         yield f"{escape(plain['in_force'])}; "
         yield f"largest change {plain['repair']['FY_max_abs_N']:.1f}&nbsp;N</p><div class=two>"
         for load, unit in (("FY", "N"), ("MZ", "N·m")):
@@ -266,10 +267,9 @@ def _reports(linked: Linked | None) -> Iterator[str]:
 def _drift(drift: Drift | None, files: Sequence[DriftedFile]) -> Iterator[str]:
     if drift is None:
         return
-    yield f"<h2>Since the last good as-found, {escape(drift.good)}</h2><p>Between {drift.good_date} and "
-    yield f"{drift.failed.date}, when {escape(drift.failed.session_record)} found "
-    yield f"{escape(str(drift.failed.record))}"
-    yield f" out of tolerance, {len(files)} files were recorded. Each has the share of the change that its "
+    yield f"<h2>Since the last good as-found, {escape(drift.good)}</h2><p>{escape(drift.told[:1].upper())}"
+    yield f"{escape(drift.told[1:])}. After {drift.good_date}, the last day on which it was good, and until "
+    yield f"then, {len(files)} files were recorded. Each has the share of the change that its "
     yield "day has "
     yield "of the days between: an estimate, since nobody knows when the change came.</p><div class=scroll>"
     yield "<table>"

@@ -20,7 +20,6 @@ COLOURS = {
     "sign_variant": "#c62828", "column_swap": "#8e24aa", "ambiguous": "#5c6bc0", "unknown": "#37474f",
     "unreadable": "#9e9e9e",
 }  # fmt: skip
-_OLD, _NEW = "#c62828", "#1565c0"
 _MOST_POINTS = 600
 
 
@@ -91,15 +90,15 @@ def rows_of(
         at = f"{y(value):.1f}"
         parts.append(f'<line x1="{left}" y1="{at}" x2="{width - right}" y2="{at}" class="grid"/>')
         parts.append(f'<text x="{left - 6}" y="{y(value) + 4:.1f}" class="name">{value:g}</text>')
-    for values, colour, stroke in ((old, _OLD, 2.6), (new, _NEW, 1.3)):  # both are seen where they agree
+    for values, kind, stroke in ((old, "file", 2.6), (new, "right", 1.3)):  # both are seen where they agree
         points = " ".join(
             f"{left + i / span * (width - left - right):.1f},{y(float(values[i])):.1f}" for i in some.tolist()
         )
-        parts.append(f'<polyline points="{points}" fill="none" stroke="{colour}" stroke-width="{stroke}"/>')
+        parts.append(f'<polyline points="{points}" class="{kind}" fill="none" stroke-width="{stroke}"/>')
     foot = top + height + 26
     parts.append(f'<text x="{left}" y="{foot}" class="left">row 1 to {len(old)}; {load} [{unit}]</text>')
-    parts.append(f'<text x="{width - right}" y="{foot}" class="name"><tspan fill="{_OLD}">file</tspan> \u2003'
-                 f'<tspan fill="{_NEW}">record in force</tspan></text>')  # fmt: skip
+    parts.append(f'<text x="{width - right}" y="{foot}" class="name"><tspan class="file">file</tspan> \u2003'
+                 f'<tspan class="right">record in force</tspan></text>')  # fmt: skip
     return "".join([*parts, "</svg>"])
 
 
