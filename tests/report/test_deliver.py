@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import datetime as dt
+import os
 import shutil
 import subprocess
 from pathlib import Path
@@ -14,6 +15,7 @@ from template_factory import opened, p, run, sdt, tbl
 
 from toolkit.errors import OutputError, RenderError, TemplateError
 from toolkit.recording.marks import is_own_output
+from toolkit.report import pdf
 from toolkit.report.build import build_content
 from toolkit.report.deliver import Delivered, deliver
 from toolkit.report.pdf import Office
@@ -139,6 +141,47 @@ def test_a_failed_conversion_leaves_nothing(tmp_path: Path, monkeypatch, script:
     assert "doctor" in str(caught.value.next_step)
     assert sorted(tmp_path.iterdir()) == before
     assert not office.folder.exists()
+
+
+@pytest.mark.parametrize(
+    ("script", "ends"),
+    [
+        # It works until its PDF is there, long after the limit; one that sleeps is ended at the limit.
+        ('n=0; while [ ! -e "$GO" ]; do n=$((n+1)); done; echo done >&2', True),
+        ("sleep 60", False),
+    ],
+)
+def test_a_conversion_that_a_busy_machine_holds_up_gets_more_time(
+    tmp_path: Path, monkeypatch, script: str, ends: bool
+) -> None:
+    go = tmp_path / "go"
+    monkeypatch.setattr(pdf, "_LOOK_S", 0.2)
+    # As if half of a core were given to it: it has worked for less than its limit when that is over.
+    looks = iter(range(1, 100))
+    real = pdf._processor_s
+
+    def slow(groups: set[int]) -> float:
+        if next(looks) == 4:
+            go.touch()
+        return real(groups) / 20
+
+    monkeypatch.setattr(pdf, "_processor_s", slow)
+    monkeypatch.setattr(pdf, "_STANDS", 0.001)
+    process = subprocess.Popen(
+        ["sh", "-c", script],
+        stderr=subprocess.PIPE,
+        start_new_session=True,
+        env={**os.environ, "GO": str(go)},
+    )
+    try:
+        if ends:
+            assert pdf._wait(process, 0.5, also=None) == b"done\n"
+            assert next(looks) > 3  # it was looked at after its limit
+        else:
+            with pytest.raises(subprocess.TimeoutExpired):
+                pdf._wait(process, 0.5, also=None)
+    finally:
+        pdf._kill(process)
 
 
 # A LibreOffice that makes a PDF of each document but those named bad*, and notes who converted what.

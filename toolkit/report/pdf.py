@@ -9,6 +9,7 @@ import shutil
 import signal
 import subprocess
 import tempfile
+import time
 import zipfile
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -40,6 +41,7 @@ _PROFILE = """<?xml version="1.0" encoding="UTF-8"?>
 """
 TIMEOUT_S = 180.0
 _MOST, _WORTH = 2, 2  # instances at once (200 MB each), and documents for which one more is started
+_STANDS, _BUSY, _LOOK_S = 0.02, 6, 10.0  # share of a core that is no work, patience of limits, seconds
 _SMALL, _SECONDS_PER_BYTE = 2 * 2**20, 100 / 2**20  # of the parts as they are unpacked
 
 
@@ -156,14 +158,15 @@ class Office:
                 *(str(one) for one in documents),
             ]
         )
+        begun = time.monotonic()
         try:
-            _, said = process.communicate(timeout=self._limit(documents))
+            said = _wait(process, self._limit(documents), also=self._warm)
         except subprocess.TimeoutExpired as error:
             _kill(process)
             raise RenderError(
                 "LibreOffice took too long",
                 where=documents[0].name,
-                got=f"no end after {self._limit(documents):.0f} s",
+                got=f"no end after {time.monotonic() - begun:.0f} s",
                 expected="a PDF within the time limit",
                 rule="render-timeout",
                 next_step="run 'toolkit doctor'; convert the document by hand to see what stops it",
@@ -203,6 +206,41 @@ class Office:
             start_new_session=True,
             env=environment,
         )
+
+
+def _wait(process: subprocess.Popen[bytes], limit_s: float, *, also: subprocess.Popen[bytes] | None) -> bytes:
+    """Return what a conversion said; on a busy machine it may take until it has worked for the limit.
+
+    ``also`` is the instance that the job may have been handed over to.
+
+    Raises
+    ------
+    subprocess.TimeoutExpired
+        after the limit it has worked for so long, or stands still, or has had several times the limit
+    """
+    groups = {one.pid for one in (process, also) if one is not None}
+    begun, first = time.monotonic(), _processor_s(groups)
+    worked, wait = 0.0, limit_s
+    while True:
+        try:
+            return process.communicate(timeout=wait)[1]
+        except subprocess.TimeoutExpired:
+            before, worked = worked, _processor_s(groups) - first
+            stands = worked - before < _STANDS * wait
+            if stands or worked >= limit_s or time.monotonic() - begun >= _BUSY * limit_s:
+                raise
+            wait = min(_LOOK_S, limit_s)
+
+
+def _processor_s(groups: set[int]) -> float:
+    """Return the processor time of groups of processes [s]; 0 where the system does not tell."""
+    ticks = 0
+    for stat in Path("/proc").glob("[0-9]*/stat"):
+        with contextlib.suppress(OSError, ValueError, IndexError):
+            fields = stat.read_text().rpartition(")")[2].split()
+            if int(fields[2]) in groups:
+                ticks += int(fields[11]) + int(fields[12])
+    return ticks / os.sysconf("SC_CLK_TCK")
 
 
 def _unpacked(docx: Path) -> int:
