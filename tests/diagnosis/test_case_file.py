@@ -1,11 +1,13 @@
 """A case file: every entry checked, with its place and the nearest known word; nothing guessed."""
 
 import os
+import tomllib
 
 import numpy as np
 import pytest
 
 from tests.diagnosis.cases import HEAD, ONE, TWO, carriage, write_case
+from toolkit.cli.explain import RULES_FILE
 from toolkit.diagnosis.case_read import read_case
 from toolkit.errors import CellError, ColumnError, ConfigError, ToolkitError, UnreadableError
 
@@ -185,3 +187,12 @@ def test_conditions_of_any_key_are_kept(tmp_path):
     told = 'date = 2024-01-02\norder = 2\ncolour = "blue"\npressure = { value = 200, unit = "kPa" }\n'
     run = read_case(write_case(tmp_path, HEAD + TWO + told)).runs[1]
     assert run.conditions == {"date": "2024-01-02", "order": "2", "colour": "blue", "pressure": "200 kPa"}
+
+
+def test_the_case_that_explain_shows_is_one_that_is_read(tmp_path):
+    shown = tomllib.loads(RULES_FILE.read_text(encoding="utf-8"))["case"]["do"]
+    lines = [line.removeprefix("    ") for line in shown.splitlines() if line.startswith("    ")]
+    case = write_case(tmp_path, "\n".join(lines), run01__csv=carriage())
+    assert [(one.name, one.role) for one in read_case(case).channels] == [
+        ("t", "time"), ("a", "input"), ("F", "output"),
+    ]  # fmt: skip

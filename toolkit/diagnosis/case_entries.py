@@ -61,6 +61,6 @@ def wrong(what: str, where: str, got: object, expected: str) -> ConfigError:
         where=where,
         got="nothing" if got is None else got,
         expected=expected,
-        next_step="correct the case file; diagnosis.md and `toolkit diagnose --help` show one",
+        next_step="correct the case file; `toolkit explain case` shows a whole one",
         rule="case",
     )
