@@ -113,7 +113,9 @@ def test_template_check_new_and_tags(tmp_path: Path, resolved, capsys) -> None:
     assert check(target, json=True) == 0
     assert answer(capsys)["findings"] == []
     assert check(make(tmp_path, p("{{tk:tire.sise}}")), json=True) == 1
-    finding = answer(capsys)["findings"][0]
+    said = answer(capsys)
+    assert said["tags"] == 2  # that one, and the hash
+    finding = said["findings"][0]
     assert finding["rule"] == "unknown-tag"
     assert set(finding) == {"rule", "level", "part", "place", "message"}
     assert tags(json=True) == 0

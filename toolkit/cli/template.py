@@ -24,13 +24,21 @@ def check(
     """
     from toolkit.report.style import read_style, style_file
     from toolkit.report.template.check import check_template
-    from toolkit.report.template.package import read_template
+    from toolkit.report.template.package import open_package, read_template
+    from toolkit.report.template.scan import scan
+    from toolkit.report.template.xml import stories
 
     template = read_template(file)
     found = check_template(template, read_style(style_file(file)))
+    tags = len({str(site.tag) for site in scan(stories(open_package(template)))})
     text = "\n".join(f"{one.level:<8}{one.rule:<18}{one.part}, {one.place}: {one.message}" for one in found)
-    payload = {"template_sha256": template.sha256, "findings": [one.as_dict() for one in found]}
-    answer(payload, text or f"{file}: no findings", as_json=json, quiet=quiet)
+    payload = {
+        "template_sha256": template.sha256,
+        "tags": tags,
+        "findings": [one.as_dict() for one in found],
+    }
+    # Their number tells a template that another program has robbed of its controls.
+    answer(payload, text or f"{file}: no findings; {tags} different tags", as_json=json, quiet=quiet)
     return 1 if found else 0
 
 
