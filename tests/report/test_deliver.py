@@ -251,7 +251,7 @@ def test_a_missing_value_leaves_the_old_report_alone(tmp_path: Path, monkeypatch
 
 
 @office_needed
-def test_a_report_is_known_again_and_replaces_only_a_report(tmp_path: Path) -> None:
+def test_a_report_is_known_again_and_replaces_only_a_report(tmp_path: Path, plain_report: Delivered) -> None:
     template = opened(tmp_path, p("{{tk:calibration.hash}}"))
     out = tmp_path / "out"
     out.mkdir()
@@ -260,8 +260,10 @@ def test_a_report_is_known_again_and_replaces_only_a_report(tmp_path: Path) -> N
         deliver(template, content(), out)
     assert caught.value.rule == "original"
     assert [path.name for path in out.iterdir()] == ["report.docx"]
-    (out / "report.docx").unlink()
-    for _ in range(2):
-        made = deliver(template, content(), out)
-        assert is_own_output(made.docx)
-        assert is_own_output(made.pdf)
+    for old in (plain_report.docx, plain_report.pdf):
+        shutil.copy(old, out)
+    made = deliver(template, content(), out)
+    for new, old in ((made.docx, plain_report.docx), (made.pdf, plain_report.pdf)):
+        assert is_own_output(new)
+        assert is_own_output(old)
+        assert new.read_bytes() != old.read_bytes()
