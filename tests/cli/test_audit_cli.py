@@ -43,6 +43,14 @@ def test_out_holds_a_page_and_lines_for_machines(archive, tmp_path):
     assert lines[1:] == answer["files"]
 
 
+def test_a_test_toml_that_cannot_be_used_is_told_once_with_what_is_wrong(archive):
+    toml = archive / "2019" / "run" / "test.toml"
+    toml.write_text('schema = 1\nmachine = "m15"\ndate = "soon"\n')
+    told = [line for line in run(archive).stdout.splitlines() if "test.toml cannot be used" in line]
+    assert len(told) == 1
+    assert "got soon, expected a date" in told[0]
+
+
 def test_the_answer_is_the_same_again_and_with_more_workers_but_for_timing(archive, tmp_path):
     answers = []
     for words in (

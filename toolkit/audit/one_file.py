@@ -172,7 +172,10 @@ class Auditor:
             own = machine_in(data)
             source: MachineSource = "default" if own is None else "file"
             machine = load_machine(own or DEFAULT_MACHINE)
-            told = f"{error.rule or 'test-toml'}: {error.what} ({error.where})"
+            told = (
+                f"{error.rule or 'test-toml'}: {error.what} ({error.where}); got {error.got}, "
+                f"expected {error.expected}"
+            )
             return Context(machine=machine, machine_source=source, date=None, test_toml=None), told
 
     def _folder_of(self, toml: Path) -> str:

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from toolkit.report.template.package import Template
 
 PAGE, LINES = "audit.html", "audit.jsonl"
-_SHOWN, _WORST = 40, 6
+_SHOWN, _WORST, _SETTINGS = 40, 6, 10
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -145,6 +145,8 @@ def text_of(told: Answer) -> str:
     notes = Counter(one.rule for one in made.findings if one.level == "note")
     if notes:
         lines.append("also: " + ", ".join(f"{count} {rule}" for rule, count in sorted(notes.items())))
+    settings = Counter(one.message for one in made.findings if one.rule == "test-toml")
+    lines += [f"{count} files: {said}" for said, count in settings.most_common(_SETTINGS)]
     lines += [f"refused record {one.id}: {one.reason}" for one in made.refused]
     lines += [f"head of {name}: {head}" for name, head in made.heads]
     return "\n".join([*lines, *_asked(told)])
