@@ -139,3 +139,13 @@ def test_no_number_of_a_search_that_did_not_run_is_made_up(run, tmp_path):
     made = answered(tmp_path / "out")
     assert (made["verdict"], made["complete"]) == ("untestable", True)
     assert made["fit"]["held_out"][0]["noise_floor"] is None
+
+
+def test_an_effect_of_some_runs_names_them(run, tmp_path):
+    dated = TWO.replace('"r0.csv"\n', '"r0.csv"\ndate = "2026-03-01"\n') + 'date = "2026-03-02"\n'
+    files = {f"r{i}__csv": carriage(seed=i, coulomb=0.0) for i in range(2)}
+    files["r1__csv"]["F"] += 30.0
+    found = run(write_case(tmp_path, HEAD + dated, **files), "--out", tmp_path / "out")
+    (one,) = answered(tmp_path / "out")["effects"]
+    assert one["parameters"][0]["runs"] in (["r0.csv"], ["r1.csv"])
+    assert f"in {one['parameters'][0]['runs'][0]} alone" in found.stdout

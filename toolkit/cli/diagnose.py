@@ -204,6 +204,9 @@ def _text(made: Diagnosis, out: Path) -> str:
                 continue
             reach = "" if each.ci95 is None else f"  [{each.ci95[0]:.4g}, {each.ci95[1]:.4g}] 95 %"
             lines.append(f"  {each.name} = {each.value:.4g} {each.unit}{reach}")
+        runs = next((each.runs for each in one.parameters if each.runs is not None), None)
+        if runs is not None:
+            lines.append(f"  in {', '.join(runs)} alone")
         if one.equivalent_to:
             lines.append(f"  this recording cannot tell it from: {', '.join(one.equivalent_to)}")
         lines.append(
