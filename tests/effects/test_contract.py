@@ -90,7 +90,7 @@ def test_metadata_is_whole(one):
             assert all(p.bounds[0] <= start <= p.bounds[1] for start in p.starts)
     assert one.drive is None or one.stage in ("carriage", "tire", "road")
     assert one.force is None or one.stage == "dynamics"
-    assert set(one.confined_by) <= {"surface", "pressure", "date", "order", "repeat_of", "phase"}
+    assert set(one.confined_by) <= {"surface", "pressure", "date", "order", "repeat_of", "phase", "*"}
 
 
 @pytest.mark.parametrize("one", ALL, ids=by_name)

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from toolkit.diagnosis.kinds.forces import LEAST_REACH
 from toolkit.diagnosis.model import DISCRETE, Active
 from toolkit.diagnosis.nuisance import INPUT_NOISE
 from toolkit.diagnosis.units_of import channel_unit
@@ -33,6 +34,7 @@ _IN_TIME = frozenset(
     ).split()
 )
 _SUBSETS = 8
+_SHORT = 0.05  # of the position's spread: the longest distance over which dry friction builds up
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -71,6 +73,7 @@ def candidates(problem: Problem) -> tuple[Candidate, ...]:
             continue
         for channel, source in problem.model.places(effect):
             whole = Active(effect=_as_known(problem, effect), channel=channel, source=source)
+            whole = _within_reach(problem, whole)
             for runs in (None, *_subsets(problem, effect)):
                 active = replace(whole, runs=runs)
                 starts = _starts(problem, active)
@@ -90,6 +93,23 @@ def _as_known(problem: Problem, effect: Effect) -> Effect:
     )
 
 
+def _within_reach(problem: Problem, active: Active) -> Active:
+    """Return dry friction whose presliding is short against the motion, where it is integrated.
+
+    A bristle as long as the way itself is a spring: over a fall from rest it grows as drag does.
+    """
+    from toolkit.diagnosis.kinds.ode import OdeModel
+
+    if active.effect.name != "coulomb_friction" or not isinstance(problem.model, OdeModel):
+        return active
+    most = _SHORT * _motion_scales(problem, active)[2]
+    parameters = tuple(
+        replace(one, bounds=(one.bounds[0], most)) if one.name == "presliding" else one
+        for one in active.effect.parameters
+    )
+    return replace(active, effect=replace(active.effect, parameters=parameters))
+
+
 def _starts(problem: Problem, active: Active) -> tuple[Start, ...]:
     effect = active.effect
     if not effect.parameters:
@@ -100,7 +120,7 @@ def _starts(problem: Problem, active: Active) -> tuple[Start, ...]:
     shapes = [one for one in effect.parameters if one.off is None]
     amplitudes = [one for one in effect.parameters if one.off is not None]
     made = []
-    grids = [[v * scales[one.name] for v in one.starts or (_middle(one),)] for one in shapes]
+    grids = [[v * scales[one.name] for v in _grid(problem, one)] for one in shapes]
     for before, shape in itertools.product(_histories(effect), itertools.product(*grids)):
         fixed = dict(zip((one.name for one in shapes), shape, strict=True)) | extra | before
         off = {one.name: float(one.off or 0.0) for one in amplitudes}
@@ -118,6 +138,14 @@ def _starts(problem: Problem, active: Active) -> tuple[Start, ...]:
             )
         )
     return tuple(made)
+
+
+def _grid(problem: Problem, one: EffectParameter) -> tuple[float, ...]:
+    from toolkit.diagnosis.kinds.ode import OdeModel
+
+    starts = one.starts or (_middle(one),)
+    # So short a bristle is stiff to integrate, and a longer one finds its way to it.
+    return starts[1:2] if one.name == "presliding" and isinstance(problem.model, OdeModel) else starts
 
 
 def _histories(effect: Effect) -> tuple[dict[str, float], ...]:
@@ -210,7 +238,8 @@ def _motion_scales(problem: Problem, active: Active) -> tuple[float, float, floa
 def _smoothing(problem: Problem, active: Active) -> dict[str, float]:
     if active.effect.name != "coulomb_friction":
         return {}
-    return {"smooth": 1e-3 * _motion_scales(problem, active)[1]}
+    speed = _motion_scales(problem, active)[1]
+    return {"smooth": 1e-3 * speed, LEAST_REACH: 1e-3 * speed * _row_time(problem)}
 
 
 def _span(problem: Problem, active: Active) -> dict[str, float]:
@@ -252,7 +281,7 @@ def _temperature_range(problem: Problem) -> float:
 def _subsets(problem: Problem, effect: Effect) -> list[frozenset[str]]:
     made: list[frozenset[str]] = []
     names = {run.name for run in problem.runs}
-    for key in effect.confined_by:
+    for key in effect.confining(key for run in problem.runs for key in run.conditions):
         levels: dict[str, list[str]] = {}
         for run in problem.runs:
             if key in run.conditions:

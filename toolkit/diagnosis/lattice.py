@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 _FEWEST = 20
 _COARSE = 0.1  # of the residual's variance that rounding to the step must make
 _EXACT = 1e-3  # of a step, by which values may miss the lattice
-_FINER = 10.0  # digits of the file: a step below ten of its last place is only how it was printed
+_FINER = 1.5  # a step of one last place is only how the file was printed
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

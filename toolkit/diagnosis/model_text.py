@@ -190,7 +190,7 @@ def _effect(case: Case, found: Search, active: Active, same: Sequence[str], *, n
 def _condition(found: Search, active: Active) -> tuple[str, tuple[str, ...]] | None:
     """Return the condition whose values part the effect's runs from all the others, None without one."""
     runs = found.problem.runs
-    for key in active.effect.confined_by:
+    for key in active.effect.confining(key for run in runs for key in run.conditions):
         inside = {run.conditions.get(key) for run in runs if run.name in (active.runs or ())}
         outside = {run.conditions.get(key) for run in runs if run.name not in (active.runs or ())}
         if inside and None not in inside and not inside & outside:

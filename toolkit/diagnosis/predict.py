@@ -83,8 +83,7 @@ def _spread_to(problem: Problem, run: Run, one: Active) -> Active:
     """
     if one.runs is None:
         return one
-    keys = dict.fromkeys(key for key in one.effect.confined_by if key in run.conditions)
-    for key in keys:
+    for key in one.effect.confining(run.conditions):
         inside = {each.conditions.get(key) for each in problem.runs if each.name in one.runs}
         outside = {each.conditions.get(key) for each in problem.runs if each.name not in one.runs}
         if not inside & outside and run.conditions[key] in inside:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from toolkit.effects.effect import Effect, Values
+from toolkit.effects.effect import ANY_OTHER, Effect, Values
 
 if TYPE_CHECKING:
     import numpy as np
@@ -27,4 +27,5 @@ EFFECT = Effect(
     separates="a known load in a known direction",
     parameters=(),
     channel=_negated,
+    confined_by=(ANY_OTHER,),
 )

@@ -11,7 +11,7 @@ All three are pure functions of signals and of the effect's parameters in their 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
@@ -55,12 +55,17 @@ class EffectParameter:
     absent: float | None = None
 
 
+ANY_OTHER = "*"
+_CONDITIONS = ("rotation", "mounting", "phase", "surface", "pressure", "date", "order", "repeat_of")
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Effect:
     """One effect of the catalogue.
 
     ``needs`` are channels without which the effect cannot be told at all, ``any_of`` channels of which one
-    is needed; ``confined_by`` the conditions of a run by which the effect may be confined to some runs.
+    is needed; ``confined_by`` the conditions of a run by which the effect may be confined to some runs,
+    `ANY_OTHER` among them for every condition to which the contract gives no meaning of its own.
     """
 
     name: str
@@ -78,6 +83,12 @@ class Effect:
     needs: tuple[str, ...] = ()
     any_of: tuple[str, ...] = ()
     confined_by: tuple[str, ...] = ()
+
+    def confining(self, conditions: Iterable[str]) -> tuple[str, ...]:
+        """Return those of some conditions' names by which the effect may be confined to some runs."""
+        given = dict.fromkeys(conditions)
+        others = (one for one in given if one not in _CONDITIONS) if ANY_OTHER in self.confined_by else ()
+        return (*(one for one in self.confined_by if one in given), *others)
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from toolkit.effects.effect import Effect, EffectParameter, Values
+from toolkit.effects.effect import ANY_OTHER, Effect, EffectParameter, Values
 
 if TYPE_CHECKING:
     import numpy as np
@@ -35,4 +35,5 @@ EFFECT = Effect(
         ),
     ),
     channel=_scaled,
+    confined_by=(ANY_OTHER,),
 )

@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import cache
 from typing import TYPE_CHECKING
 
-from toolkit.effects.effect import Effect, EffectParameter, Values
+from toolkit.effects.effect import ANY_OTHER, Effect, EffectParameter, Values
 from toolkit.units import unit
 
 if TYPE_CHECKING:
@@ -69,4 +69,5 @@ EFFECT = Effect(
         ),
     ),
     channel=_converted,
+    confined_by=(ANY_OTHER,),
 )

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from toolkit.diagnosis.kinds.channels import channel_places, through_channels
+from toolkit.diagnosis.kinds.forces import Forces
 from toolkit.diagnosis.kinds.integrate import IntegrationError, integrate
 from toolkit.diagnosis.kinds.python import silenced
 from toolkit.diagnosis.kinds.setting import nominal_load, setting
@@ -192,11 +193,13 @@ class OdeModel:
         sets = [p for _, p, _ in listed]
         try:
             starts = np.stack([self._start(run, p) for p in sets], axis=1)
-            rates = self._with_columns(
-                [forces for *_, forces in listed], columns_of(sets), _Inputs(run, self._drivers)
-            )
+            forces = [self._forces(one) for *_, one in listed]
+            rates = self._with_columns(forces, columns_of(sets), _Inputs(run, self._drivers))
+            own, added = len(starts), max(one.added for one in forces)
+            atol = self._tolerance(starts[:, 0], added)
+            starts = np.vstack([starts, np.zeros((added, len(sets)))])
             with silenced():
-                made = integrate_together(rates, run.t, starts, self._tolerance(starts[:, 0]))
+                made = integrate_together(rates, run.t, starts, atol)[:, :own]
         except NotTogetherError:
             middle = len(listed) // 2
             self._together(run, listed[:middle])
@@ -232,67 +235,53 @@ class OdeModel:
         self._kept[key] = made
 
     def _integrate(self, run: Run, p: Mapping[str, float], forces: Sequence[Active]) -> NDArray[np.float64]:
-        values = dict(p)
-        rate = self._with(forces, values, _Inputs(run, self._drivers))
+        values, acting = dict(p), self._forces(forces)
+        rate = self._with(acting, values, _Inputs(run, self._drivers))
         start = self._start(run, p)
         if run.rows == 1:
             return start[:, None]
+        begun = np.concatenate([start, np.zeros(acting.added)])
         try:
             with silenced():
-                return integrate(rate, run.t, start, self._tolerance(start))
+                return integrate(rate, run.t, begun, self._tolerance(start, acting.added))[: len(start)]
         except IntegrationError as error:
             raise _failed(self.case, run, f"the integration ended early: {error}") from error
         except (Exception, SystemExit) as error:
             raise _failed(self.case, run, f"rhs: {type(error).__name__}: {error}") from error
 
-    def _tolerance(self, start: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _tolerance(self, start: NDArray[np.float64], added: int = 0) -> NDArray[np.float64]:
         if not self.scale:
             return 0.01 * ATOL * np.maximum(np.abs(start), 1.0)
-        return ATOL * np.array([self.scale[name][1] for name in self.states])
+        return ATOL * np.array([*(self.scale[name][1] for name in self.states), *[10.0] * added])
 
-    def _with(self, forces: Sequence[Active], p: dict[str, float], u: _Inputs) -> Callable[..., Any]:
-        plain = self._rhs
-        if not forces:
+    def _with(self, forces: Forces, p: dict[str, float], u: _Inputs) -> Callable[..., Any]:
+        plain, own = self._rhs, len(self.states)
+        if not forces.listed:
             return lambda t, x: np.asarray(plain(t, x, u(t), p), dtype=np.float64)
-        terms = self._terms(forces)
 
         def rhs(t: float, x: NDArray[np.float64]) -> NDArray[np.float64]:
-            rate = np.array(plain(t, x, u(t), p), dtype=np.float64)
-            self._add(terms, x, rate)
+            rate = np.zeros(len(x))
+            rate[:own] = plain(t, x[:own], u(t), p)
+            forces.add(x, rate, own)
             return rate
 
         return rhs
 
-    def _with_columns(
-        self, forces: Sequence[Sequence[Active]], p: Mapping[str, Any], u: _Inputs
-    ) -> Callable[..., Any]:
-        plain, terms = self._rhs, [self._terms(one) for one in forces]
-        with_terms = [k for k, one in enumerate(terms) if one]
+    def _with_columns(self, forces: Sequence[Forces], p: Mapping[str, Any], u: _Inputs) -> Callable[..., Any]:
+        plain, own = self._rhs, len(self.states)
+        there = [(k, one) for k, one in enumerate(forces) if one.listed]
 
         def rhs(t: float, x: NDArray[np.float64]) -> NDArray[np.float64]:
-            rate = np.array(plain(t, x, u(t), p), dtype=np.float64)
-            for k in with_terms:
-                self._add(terms[k], x[:, k], rate[:, k])
+            rate = np.zeros_like(x)
+            rate[:own] = plain(t, x[:own], u(t), p)
+            for k, one in there:
+                one.add(x[:, k], rate[:, k], own)
             return rate
 
         return rhs
 
-    def _terms(self, forces: Sequence[Active]) -> list[tuple[int, int, Active]]:
-        """Return for every force the state whose equation it enters, and that state's position."""
-        places = [(self.states.index(str(one.channel)), one) for one in forces]
-        return [(i, self._derivative_of.get(i, i), one) for i, one in places]
-
-    def _add(
-        self, terms: Sequence[tuple[int, int, Active]], x: NDArray[np.float64], rate: NDArray[np.float64]
-    ) -> None:
-        """Add forces to the rates of one state, in place."""
-        for i, j, one in terms:
-            if one.effect.name == "overflow":
-                width = 1e-3 * self.scale[self.states[i]][1]
-                if rate[i] > 0:
-                    rate[i] *= min(max((one.values["level"] - x[i]) / width, 0.0), 1.0)
-            elif one.effect.force is not None:
-                rate[i] -= one.effect.force(float(x[j]), float(x[i]), one.values)
+    def _forces(self, active: Sequence[Active]) -> Forces:
+        return Forces.of(active, self.states, self._derivative_of, self.scale)
 
     def _made(
         self, run: Run, p: Mapping[str, float], x: NDArray[np.float64]
