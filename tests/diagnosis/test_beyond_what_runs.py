@@ -1,0 +1,129 @@
+"""A candidate that the simulation cannot run with goes alone; the search goes on with the others."""
+
+import json
+
+import numpy as np
+import pandas as pd
+import pytest
+import typer
+from typer.testing import CliRunner
+
+from tests.diagnosis.cases import HEAD, TWO, carriage, write_case
+from toolkit.cli import diagnose as command
+from toolkit.diagnosis import search
+from toolkit.diagnosis.case_read import read_case
+from toolkit.diagnosis.diagnose import diagnose
+from toolkit.errors import FitError
+
+GAIN = 1.2
+STOPPED = """
+def rhs(t, x, u, p):
+    if abs(x[0]) > {stop}:
+        raise ValueError("beyond the stop")
+    return [(u["U"] - x[0]) / p["tau"]]
+def outputs(x, u, p):
+    return {{"Y": x[0]}}
+def initial(p):
+    return [0.0]
+"""
+CASE = """schema = 1
+[simulation]
+kind = "ode"
+path = "sim.py"
+states = ["v"]
+[simulation.parameters.tau]
+value = 2.0
+unit = "s"
+sd = 0.1
+[recording]
+time = "t"
+[recording.channels]
+t = { unit = "s", role = "time" }
+U = { unit = "1", role = "input" }
+Y = { unit = "1", role = "output" }
+"""
+
+
+def lagging(seed):
+    """A first-order lag of 2 s behind a piecewise linear input, in its own closed form; its largest value."""
+    rng = np.random.default_rng(seed)
+    t = np.arange(60) * 0.5
+    u = np.sin(0.4 * t + seed) + 0.5 * np.sin(1.1 * t)
+    x = np.zeros(60)
+    for k in range(59):  # x = u - 2 b + c exp(-s/2) of an interval with u = a + b s
+        b = (u[k + 1] - u[k]) / 0.5
+        x[k + 1] = u[k + 1] - 2 * b + (x[k] - u[k] + 2 * b) * np.exp(-0.25)
+    shown = GAIN * (x + rng.normal(0, 0.02, 60))
+    return pd.DataFrame({"t": t, "U": u, "Y": shown}), np.abs(x).max()
+
+
+def test_an_equation_that_stops_within_the_reach_of_a_rival_is_diagnosed(tmp_path):
+    # The channel shows too much; a force that would explain it drives the equation past its stop.
+    made = [lagging(seed) for seed in range(2)]
+    stop = 1.02 * max(largest for _, largest in made)
+    frames = {f"r{i}__csv": frame for i, (frame, _) in enumerate(made)}
+    case = write_case(tmp_path / "case", CASE + TWO, simulator=STOPPED.format(stop=stop), **frames)
+    app = typer.Typer()
+    app.command("diagnose")(command.command)
+    done = CliRunner().invoke(
+        app, [str(case), "--out", str(tmp_path / "out"), "--json"], standalone_mode=False
+    )
+    assert (done.exception, done.return_value) == (None, 1)
+    answer = json.loads(done.stdout)
+    assert answer["verdict"] in ("named", "equivalent")
+    (one,) = answer["effects"]
+    assert (one["name"], one["channel"]) == ("sensitivity_error", "Y")
+    low, high = one["parameters"][0]["ci95"]
+    assert low < GAIN - 1 < high
+
+
+def refused():
+    raise FitError(
+        "no",
+        where="here",
+        got="beyond the stop",
+        expected="a run",
+        next_step="mend it",
+        rule="simulator",
+    )
+
+
+def names(folder, **files):
+    case = read_case(write_case(folder, HEAD + TWO, **files))
+    return [one.name for one in diagnose(case, None).diagnosis.effects]
+
+
+def test_a_fold_that_cannot_run_takes_its_candidate_away_and_no_other(tmp_path, monkeypatch):
+    # Dry friction is there; without it the next best is a friction of another kind, or nothing.
+    whole, asked = search.hold_out, []
+
+    def without_friction(problem, folds, active, made):
+        asked.append([one.effect.name for one in active])
+        return refused() if "coulomb_friction" in asked[-1] else whole(problem, folds, active, made)
+
+    monkeypatch.setattr(search, "hold_out", without_friction)
+    found = names(tmp_path)
+    assert ["coulomb_friction"] in asked
+    assert asked.index(["coulomb_friction"]) < len(asked) - 1  # others were asked after it
+    assert "coulomb_friction" not in found
+
+
+@pytest.mark.parametrize("cannot", ["fit", "hold_out"])
+def test_an_effect_without_which_nothing_runs_is_kept(tmp_path, monkeypatch, cannot):
+    # Friction and a zero: once both are there, the simulation with one of them alone can no longer be run.
+    whole, there, left = getattr(search, cannot), set(), []
+
+    def only_together(problem, *given, **more):
+        active = next((one for one in given if isinstance(one, tuple)), ())
+        here = frozenset(one.effect.name for one in active)
+        if here and any(here < each for each in there):
+            left.append(here)
+            refused()
+        made = whole(problem, *given, **more)
+        there.add(here)
+        return made
+
+    frames = {f"r{i}__csv": carriage(seed=i).assign(F=lambda df: df["F"] + 15) for i in range(2)}
+    monkeypatch.setattr(search, cannot, only_together)
+    assert sorted(names(tmp_path, **frames)) == ["coulomb_friction", "zero_offset"]
+    assert left

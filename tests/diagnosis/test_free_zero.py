@@ -1,0 +1,53 @@
+"""A drift with the temperature of a channel that was zeroed before its recording, at another temperature."""
+
+import numpy as np
+import pandas as pd
+
+from tests.diagnosis.cases import TWO, write_case
+from toolkit.diagnosis.case_read import read_case
+from toolkit.diagnosis.diagnose import diagnose
+
+COEFFICIENT = 0.8  # N/K
+NOISE = 1.5  # N; the zero is off by 1.2 N at the first row
+SIMULATOR = """
+import pandas as pd
+def simulate(inputs, p):
+    return pd.DataFrame({"F": p["gain"] * inputs["L"]})
+"""
+CASE = """schema = 1
+[simulation]
+kind = "python"
+path = "sim.py"
+[simulation.parameters.gain]
+value = 1.0
+unit = "1"
+sd = 0.002
+[recording]
+time = "t"
+[recording.channels]
+t = { unit = "s", role = "time" }
+L = { unit = "N", role = "input" }
+T = { unit = "degC", role = "covariate" }
+F = { unit = "N", role = "output" }
+"""
+
+
+def recording(draw, run):
+    rng = np.random.default_rng([draw, run])
+    t = np.arange(120) * 10.0
+    load = 400 + 300 * np.sin(0.013 * t + run) + 100 * np.sin(0.037 * t)
+    T = 20 + run + 2 * (1 - np.cos(0.05 * t))
+    force = load + COEFFICIENT * (T - 18.5) + rng.normal(0, NOISE, 120)
+    return pd.DataFrame({"t": t, "L": load, "T": T, "F": force})
+
+
+def test_the_interval_holds_the_coefficient_and_no_zero_is_named_beside_it(tmp_path):
+    held = 0
+    for draw in range(6):
+        frames = {f"r{run}__csv": recording(draw, run) for run in range(2)}
+        case = read_case(write_case(tmp_path / str(draw), CASE + TWO, simulator=SIMULATOR, **frames))
+        made = diagnose(case, None).diagnosis
+        assert [(one.name, one.channel) for one in made.effects] == [("thermal_drift", "F")]
+        low, high = made.effects[0].parameters[0].ci95
+        held += low < COEFFICIENT < high
+    assert held >= 5
