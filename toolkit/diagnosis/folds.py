@@ -91,3 +91,16 @@ def hold_out(problem: Problem, folds: Folds, active: Sequence[Active], start: Fi
         for name in problem.names:
             simulated[name][held] = made.simulated[name][held]
     return HeldOut(scores=tuple(scores), simulated=simulated, fits=tuple(fits))
+
+
+def matters(problem: Problem, before: HeldOut, after: HeldOut, least: float) -> bool:
+    """Tell whether some output's held-out error falls by a share that a user would notice.
+
+    By its mean square or by its variance: where a drift starts is found in a later step.
+    """
+    for name, kept in problem.kept.items():
+        observed = problem.observed[name][kept]
+        one, other = (observed - each.simulated[name][kept] for each in (before, after))
+        if np.mean(other**2) < np.mean(one**2) * (1 - least) or np.var(other) < np.var(one) * (1 - least):
+            return True
+    return False

@@ -12,7 +12,7 @@ import numpy as np
 from toolkit.diagnosis.absorbed import Key, absorbed
 from toolkit.diagnosis.candidates import Candidate, candidates
 from toolkit.diagnosis.fit import Fit, fit, replace_effects
-from toolkit.diagnosis.folds import Folds, HeldOut, folds_of, hold_out
+from toolkit.diagnosis.folds import Folds, HeldOut, folds_of, hold_out, matters
 from toolkit.diagnosis.lattice import lattice_of
 from toolkit.diagnosis.model import Active
 from toolkit.diagnosis.nuisance import INPUT_NOISE
@@ -257,9 +257,8 @@ def _best_step(
     weight = 0.5 * math.log(sum(int(one.sum()) for one in problem.kept.values()))
     tried: list[tuple[float, Scored, Fit]] = []
     for one in promising:
-        try:
-            made = fit(problem, (*base.active, one.active), start=base.p, noise=None)
-        except FitError:  # the values that screening leads to are beyond what the simulation can run with
+        made = _fitted(problem, base, one.active)
+        if made is None:
             continue
         penalty = weight * len(one.active.searched)
         tried.append((made.log_posterior - penalty, one, made))
@@ -273,7 +272,7 @@ def _best_step(
         if gain < _LEAST_GAIN or score - base.log_posterior < _LEAST_GAIN:
             continue
         # One that a later effect drives to its bound is no better than one that starts there.
-        if any(_at_bound(each) for each in made.active) or not _matters(problem, held_base, held, least):
+        if any(_at_bound(each) for each in made.active) or not matters(problem, held_base, held, least):
             continue
         rivals = tuple(
             Rival(
@@ -291,6 +290,24 @@ def _best_step(
             rivals=rivals,
         )
         return made, held, step
+    return None
+
+
+def _fitted(problem: Problem, base: Fit, added: Active) -> Fit | None:
+    """Return the joint fit with one effect more, None where the simulation runs with no part of it.
+
+    Screening is linear: the size to which it leads may be beyond what a simulation can run with, where the
+    true one is not.
+    """
+    for share in (1.0, 0.5, 0.25, 0.125):
+        values = dict(added.values)
+        for one in added.searched:
+            if one.off is not None and math.isfinite(one.off):
+                values[one.name] = one.off + share * (added.values[one.name] - one.off)
+        try:
+            return fit(problem, (*base.active, replace(added, values=values)), start=base.p)
+        except FitError:
+            continue
     return None
 
 
@@ -319,7 +336,7 @@ def _stepped(
             simulated={**held_base.simulated, name: _rounded(held_base.simulated[name], found.step)},
             fits=held_base.fits,
         )
-        if _matters(problem, held_base, held, 2 * NOTICED):
+        if matters(problem, held_base, held, 2 * NOTICED):
             held_base = held
         base = with_steps
     return base, held_base, steps
@@ -327,19 +344,6 @@ def _stepped(
 
 def _rounded(values: NDArray[np.float64], step: float) -> NDArray[np.float64]:
     return np.asarray(step * np.round(values / step))
-
-
-def _matters(problem: Problem, before: HeldOut, after: HeldOut, least: float) -> bool:
-    """Tell whether some output's held-out error falls by a share that a user would notice.
-
-    By its mean square or by its variance: where a drift starts is found in a later step.
-    """
-    for name, kept in problem.kept.items():
-        observed = problem.observed[name][kept]
-        one, other = (observed - each.simulated[name][kept] for each in (before, after))
-        if np.mean(other**2) < np.mean(one**2) * (1 - least) or np.var(other) < np.var(one) * (1 - least):
-            return True
-    return False
 
 
 def _pruned(

@@ -11,6 +11,7 @@ import numpy as np
 
 from toolkit.diagnosis.kinds.channels import channel_places, through_channels
 from toolkit.diagnosis.kinds.forces import Forces
+from toolkit.diagnosis.kinds.inputs import Inputs
 from toolkit.diagnosis.kinds.integrate import IntegrationError, integrate
 from toolkit.diagnosis.kinds.python import silenced
 from toolkit.diagnosis.kinds.setting import nominal_load, setting
@@ -79,7 +80,7 @@ class OdeModel:
 
     def _tried(self, p: Mapping[str, float]) -> bool:
         run = self.case.runs[0]
-        u = _Inputs(run, self._drivers).row(run.rows // 2)
+        u = Inputs(run, self._drivers).row(run.rows // 2)
         size = np.array([self.scale[name][1] for name in self.states])
         with silenced():
             return takes_columns(self._rhs, float(run.t[0]), self._start(run, p), size, u, p)
@@ -146,36 +147,27 @@ class OdeModel:
         self, run: Run, p: Mapping[str, float], active: Sequence[Active]
     ) -> dict[str, NDArray[np.float64]]:
         """Return every output of a free simulation over the whole run."""
-        if not _asks_between(run, active):
-            return self._simulate(run, p, active)
+        key, forces = self._key(run, p, active)
+        if key not in self._kept:
+            self._keep(key, self._made(run, p, forces, self._integrate(run, p, forces), between=key[1]))
+        kept = self._kept[key]
+        if isinstance(kept, FitError):
+            raise kept
+        if not key[1]:
+            return through_channels(kept, active, run, self.setting(run), run.columns)
         # An equation's outputs have a corner at each row, where its inputs have one.
         fine = [
             replace(one, values={**one.values, STRAIGHT: 1.0}) if one.effect.name in _BETWEEN_ROWS else one
             for one in active
         ]
-        made = self._simulate(self._finer(run), p, fine)
+        finer = self._finer(run)
+        made = through_channels(kept, fine, finer, self.setting(finer), finer.columns)
         return {name: values[::_FINER] for name, values in made.items()}
-
-    def _simulate(
-        self, run: Run, p: Mapping[str, float], active: Sequence[Active]
-    ) -> dict[str, NDArray[np.float64]]:
-        key, forces = self._key(run, p, active)
-        if key not in self._kept:
-            self._keep(key, self._made(run, p, self._integrate(run, p, forces)))
-        kept = self._kept[key]
-        if isinstance(kept, FitError):
-            raise kept
-        return through_channels(kept, active, run, self.setting(run), run.columns)
 
     def prepare(self, run: Run, wanted: Sequence[tuple[Mapping[str, float], Sequence[Active]]]) -> None:
         """Integrate several sets of parameters and effects at once, for `simulate` to find."""
         if not self._takes_columns or run.rows < 2:
             return
-        between = [one for one in wanted if _asks_between(run, one[1])]
-        self._prepare(self._finer(run) if between else run, between)
-        self._prepare(run, [one for one in wanted if not _asks_between(run, one[1])])
-
-    def _prepare(self, run: Run, wanted: Sequence[tuple[Mapping[str, float], Sequence[Active]]]) -> None:
         listed = {}
         for p, active in wanted:
             key, forces = self._key(run, p, active)
@@ -194,12 +186,12 @@ class OdeModel:
         try:
             starts = np.stack([self._start(run, p) for p in sets], axis=1)
             forces = [self._forces(one) for *_, one in listed]
-            rates = self._with_columns(forces, columns_of(sets), _Inputs(run, self._drivers))
-            own, added = len(starts), max(one.added for one in forces)
+            rates = self._with_columns(forces, columns_of(sets), Inputs(run, self._drivers))
+            added = max(one.added for one in forces)
             atol = self._tolerance(starts[:, 0], added)
             starts = np.vstack([starts, np.zeros((added, len(sets)))])
             with silenced():
-                made = integrate_together(rates, run.t, starts, atol)[:, :own]
+                made = integrate_together(rates, run.t, starts, atol)
         except NotTogetherError:
             middle = len(listed) // 2
             self._together(run, listed[:middle])
@@ -207,9 +199,11 @@ class OdeModel:
             return
         except (Exception, SystemExit):  # noqa: BLE001 - whatever it is, the same set alone raises it by name
             return
-        for k, (key, p, _) in enumerate(listed):
+        for k, (key, p, one) in enumerate(listed):
             try:
-                self._keep(key, self._made(run, p, np.ascontiguousarray(made[:, :, k].T)))
+                self._keep(
+                    key, self._made(run, p, one, np.ascontiguousarray(made[:, :, k].T), between=key[1])
+                )
             except FitError as error:
                 self._keep(key, error)
 
@@ -227,7 +221,8 @@ class OdeModel:
     ) -> tuple[tuple[Any, ...], list[Active]]:
         forces = [one for one in active if one.effect.stage == "dynamics" and one.acts_in(run)]
         told = tuple((one.effect.name, one.channel, tuple(one.values.values())) for one in forces)
-        return (run, tuple(p.values()), told), forces
+        between = any(one.effect.name in _BETWEEN_ROWS and one.acts_in(run) for one in active)
+        return (run, between and run.rows > 1, tuple(p.values()), told), forces
 
     def _keep(self, key: tuple[Any, ...], made: dict[str, NDArray[np.float64]] | FitError) -> None:
         if len(self._kept) > 400:
@@ -236,14 +231,14 @@ class OdeModel:
 
     def _integrate(self, run: Run, p: Mapping[str, float], forces: Sequence[Active]) -> NDArray[np.float64]:
         values, acting = dict(p), self._forces(forces)
-        rate = self._with(acting, values, _Inputs(run, self._drivers))
+        rate = self._with(acting, values, Inputs(run, self._drivers))
         start = self._start(run, p)
         if run.rows == 1:
             return start[:, None]
         begun = np.concatenate([start, np.zeros(acting.added)])
         try:
             with silenced():
-                return integrate(rate, run.t, begun, self._tolerance(start, acting.added))[: len(start)]
+                return integrate(rate, run.t, begun, self._tolerance(start, acting.added))
         except IntegrationError as error:
             raise _failed(self.case, run, f"the integration ended early: {error}") from error
         except (Exception, SystemExit) as error:
@@ -254,7 +249,7 @@ class OdeModel:
             return 0.01 * ATOL * np.maximum(np.abs(start), 1.0)
         return ATOL * np.array([*(self.scale[name][1] for name in self.states), *[10.0] * added])
 
-    def _with(self, forces: Forces, p: dict[str, float], u: _Inputs) -> Callable[..., Any]:
+    def _with(self, forces: Forces, p: dict[str, float], u: Inputs) -> Callable[..., Any]:
         plain, own = self._rhs, len(self.states)
         if not forces.listed:
             return lambda t, x: np.asarray(plain(t, x, u(t), p), dtype=np.float64)
@@ -267,7 +262,7 @@ class OdeModel:
 
         return rhs
 
-    def _with_columns(self, forces: Sequence[Forces], p: Mapping[str, Any], u: _Inputs) -> Callable[..., Any]:
+    def _with_columns(self, forces: Sequence[Forces], p: Mapping[str, Any], u: Inputs) -> Callable[..., Any]:
         plain, own = self._rhs, len(self.states)
         there = [(k, one) for k, one in enumerate(forces) if one.listed]
 
@@ -284,10 +279,40 @@ class OdeModel:
         return Forces.of(active, self.states, self._derivative_of, self.scale)
 
     def _made(
+        self,
+        run: Run,
+        p: Mapping[str, float],
+        forces: Sequence[Active],
+        x: NDArray[np.float64],
+        *,
+        between: bool,
+    ) -> dict[str, NDArray[np.float64]]:
+        """Return the outputs of integrated states, also ``between`` the rows."""
+        if between:
+            x, run = self._between(run, p, forces, x), self._finer(run)
+        return self._shown(run, p, x[: len(self.states)])
+
+    def _between(
+        self, run: Run, p: Mapping[str, float], forces: Sequence[Active], x: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """Return states also between the rows, by their rates at the rows: those have no corner there."""
+        from scipy.interpolate import CubicHermiteSpline
+
+        acting = self._forces(forces)
+        x = x[: len(self.states) + acting.added]
+        rate = self._with(acting, dict(p), Inputs(run, self._drivers))
+        try:
+            with silenced():
+                rates = np.stack([rate(t, x[:, k]) for k, t in enumerate(run.t.tolist())], axis=1)
+        except (Exception, SystemExit) as error:
+            raise _failed(self.case, run, f"rhs: {type(error).__name__}: {error}") from error
+        return np.asarray(CubicHermiteSpline(run.t, x, rates, axis=1)(self._finer(run).t))
+
+    def _shown(
         self, run: Run, p: Mapping[str, float], x: NDArray[np.float64]
     ) -> dict[str, NDArray[np.float64]]:
         values = dict(p)
-        inputs = _Inputs(run, self._drivers)
+        inputs = Inputs(run, self._drivers)
         rows: dict[str, list[float]] = {one.name: [] for one in self.outputs}
         with silenced():
             for k in range(run.rows):
@@ -330,40 +355,6 @@ class OdeModel:
         if run not in self._settings:
             self._settings[run] = setting(self.case, run, nominal_load_N=nominal_load(self.case))
         return self._settings[run]
-
-
-class _Inputs:
-    """Inputs between rows: linear, as a dict of floats."""
-
-    def __init__(self, run: Run, names: Sequence[str]) -> None:
-        self._t = run.t.tolist()
-        self._columns = [(name, run.columns[name].tolist()) for name in names]
-        self._at = 0
-        self._last = len(self._t) - 1
-
-    def __call__(self, t: float) -> dict[str, float]:
-        """Return the inputs at a time."""
-        if not self._columns:
-            return {}
-        times, i = self._t, self._at
-        while i > 0 and t < times[i]:
-            i -= 1
-        while i < self._last - 1 and t >= times[i + 1]:
-            i += 1
-        self._at = i
-        if self._last == 0:
-            return self.row(0)
-        w = (t - times[i]) / (times[i + 1] - times[i])
-        w = 0.0 if w < 0 else (1.0 if w > 1 else w)
-        return {name: (1 - w) * column[i] + w * column[i + 1] for name, column in self._columns}
-
-    def row(self, k: int) -> dict[str, float]:
-        """Return the inputs of a row."""
-        return {name: column[k] for name, column in self._columns}
-
-
-def _asks_between(run: Run, active: Sequence[Active]) -> bool:
-    return run.rows > 1 and any(one.effect.name in _BETWEEN_ROWS and one.acts_in(run) for one in active)
 
 
 def _number(value: Any) -> float:
