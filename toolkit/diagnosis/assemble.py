@@ -227,10 +227,18 @@ def _mismatches(found: Search, *, unknown: bool) -> tuple[Mismatch, ...]:
                 channel=name,
                 p_value=min(p_values),
                 share_of_variance=share,
-                where=places(problem, name, signal, found.refitted.simulated[name]),
+                where=places(problem, name, signal, found.refitted.simulated[name], _depends_on(found, name)),
             )
         )
     return tuple(made)
+
+
+def _depends_on(found: Search, name: str) -> tuple[str, ...]:
+    """Return the variables of the most telling structure in an output's refitted residual."""
+    most = max(
+        (one for one in found.structure_before if one.output == name), key=lambda one: one.gain, default=None
+    )
+    return () if most is None else most.variables
 
 
 def _structured(found: Search, name: str) -> tuple[float, NDArray[np.float64]]:
@@ -306,18 +314,43 @@ def _next(found: Search, effects: tuple[FoundEffect, ...], verdict: Verdict) -> 
                 f"{'; '.join(text for text in apart if text)}."
             )
     if verdict == "unknown":
-        names = dict.fromkeys(name for one in found.structure for name in one.variables)
-        said.append(
-            f"The mismatch depends on {', '.join(names)}: repeat the run with "
-            f"{next(iter(names), 'one input')} alone varied, everything else held."
-        )
-    if verdict == "untestable":
+        said += _to_find_it(found)
+    if found.skipped:
+        said.append("Give the search more time (--budget): it ended before every known effect was tried.")
+    elif verdict == "untestable":
         said.append(
             "Tighten the priors of the parameters that moved (certificate, data sheet), or vary the inputs."
         )
     if len(found.problem.runs) == 1:
         said.append("Repeat the run: with one recording alone, only blocks of it could be held out.")
     return tuple(said)
+
+
+def _to_find_it(found: Search) -> list[str]:
+    """Return what would narrow down a mismatch that no effect explains, by what it depends on."""
+    told = dict.fromkeys(name for one in found.structure for name in one.variables)
+    channels = {one.name for one in found.problem.case.drivers}
+    channels |= {one.name for one in found.problem.model.outputs}
+    rates = {f"d{name}/dt": f"the rate of {name}" for name in channels}
+    varied = [rates.get(name, name) for name in told if name in channels or name in rates]
+    said = []
+    if varied:
+        said.append(
+            f"The mismatch depends on {', '.join(varied)}: repeat the run with {varied[0]} alone varied, "
+            "everything else held."
+        )
+    lines = [name.removeprefix("time (a line at ").removesuffix(")") for name in told if "a line at" in name]
+    if lines:
+        said.append(
+            f"The mismatch swings at {' and '.join(lines)}: record what turns or swings at this frequency."
+        )
+    if "run" in told:
+        said.append(
+            "The mismatch differs from run to run: repeat one run unchanged, and note what else changed."
+        )
+    if "time" in told:
+        said.append("The mismatch goes with time: hold all inputs still for as long as a run takes.")
+    return said or ["Vary one input alone, everything else held, and record what else may act."]
 
 
 def _outliers(case: Case, found: Search) -> tuple[Finding, ...]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -19,15 +20,20 @@ _NARROW = 0.7  # of the rows: a range that is wider says nothing
 
 
 def places(
-    problem: Problem, name: str, signal: NDArray[np.float64], simulated: NDArray[np.float64]
+    problem: Problem,
+    name: str,
+    signal: NDArray[np.float64],
+    simulated: NDArray[np.float64],
+    depends_on: Sequence[str] = (),
 ) -> tuple[Place, ...]:
-    """Return the ranges that hold most of a mismatch, the narrowest first.
+    """Return the ranges that hold most of a mismatch: of what it depends on first, then the narrowest.
 
     Parameters
     ----------
     name : the output
     signal : the part of its residual that is no noise, over all rows
     simulated : the output itself as simulated, a variable like the others
+    depends_on : variables on which the mismatch was found to depend
     """
     energy = np.where(problem.kept[name], np.nan_to_num(signal) ** 2, 0.0)
     whole = float(energy.sum())
@@ -54,7 +60,7 @@ def places(
                 )
             )
     found += _conditions(problem, energy, rows)
-    found.sort(key=lambda one: one[0])
+    found.sort(key=lambda one: (one[1].variable not in depends_on, one[0]))
     chosen = [place for share, place in found if share <= _NARROW][:3]
     return tuple(chosen) if chosen else tuple(place for _, place in found[:1])
 
