@@ -1,7 +1,7 @@
 """Dry friction in an equation: a body under it slides, comes to rest and stays, as Coulomb's law says.
 
-The bristle's work is known: over a way x from rest the friction is coulomb (1 - exp(-x/presliding)), so that a
-slide from speed v0 ends where v0^2/2 = coulomb (way - presliding); the bent bristle then swings the body back.
+The bristle's work is known: over a way x from rest the friction is coulomb (1 - exp(-x/presliding)), so that
+a slide from speed v0 ends where v0^2/2 = coulomb (way - presliding); the bristle then swings the body back.
 """
 
 import numpy as np
