@@ -112,6 +112,8 @@ def test_round_trip(text: str, values: list[float]) -> None:
         ("1/°F", 1.8, "1 / [temperature]"),
         ("%/degC", 0.01, "1 / [temperature]"),
         ("degC/s", 1.0, "[temperature] / [time]"),
+        ("1/celsius", 1.0, "1 / [temperature]"),
+        ("m/fahrenheit", 1.8, "[length] / [temperature]"),
         ("m/degree_Fahrenheit", 1.8, "[length] / [temperature]"),
     ],
 )
@@ -124,3 +126,9 @@ def test_in_a_compound_unit_a_temperature_is_a_difference(text: str, factor: flo
 
 def test_parsing_is_cached() -> None:
     assert _parse("lbf") is _parse("lbf")
+
+
+def test_brackets_about_a_scale_leave_its_zero_and_a_space_in_it_is_refused() -> None:
+    assert unit("(degC)").offset == pytest.approx(273.15)
+    with pytest.raises(UnitError):
+        unit("mV/deg C")

@@ -89,7 +89,10 @@ _ANGLES = ("degree", "radian", "turn", "arcminute", "milliradian")
 _NEVER_GUESSED = re.compile(r"[^\w\s*/^.()·°µ%+-]|\d\s*\)?\s*(\*\*|\^)|.{41}")
 
 # In a compound unit (mV/degC, 1/degF) a temperature is a difference: pint would add the zero of its scale.
-_SCALE = re.compile(r"(?<!\w)(?:°|deg(?:ree)?_?)([CF])(?:elsius|ahrenheit)?\b")
+_SCALE = re.compile(
+    r"(?<!\w)(?:°|deg(?:ree)?s?_?)?([CF])(?:elsius|ahrenheit)\b|(?<!\w)(?:°|deg(?:ree)?_?)([CF])\b", re.I
+)
+_SPACED_SCALE = re.compile(r"\bdeg(?:ree)?s?\s+[CF]\b", re.I)
 
 
 @dataclass(frozen=True, slots=True)
@@ -209,8 +212,11 @@ def _parse(text: str) -> Unit:
         raise _UnknownUnitError(text)
     ureg = registry()
     expression = _SPELLINGS.get(text, text)
-    if not _SCALE.fullmatch(expression):
-        expression = _SCALE.sub(r"delta_deg\1", expression)
+    if not _SCALE.fullmatch(expression.strip("() ")):
+        # With a space between them pint would multiply an angle by a charge.
+        if _SPACED_SCALE.search(expression):
+            raise _UnknownUnitError(text)
+        expression = _SCALE.sub(lambda m: f"delta_deg{(m[1] or m[2]).upper()}", expression)
     try:
         read: Any = ureg.parse_expression(expression)
         one: Any = read if hasattr(read, "units") else ureg.Quantity(float(read), "dimensionless")

@@ -114,7 +114,7 @@ def test_template_check_new_and_tags(tmp_path: Path, resolved, capsys) -> None:
     assert answer(capsys)["findings"] == []
     assert check(make(tmp_path, p("{{tk:tire.sise}}")), json=True) == 1
     said = answer(capsys)
-    assert said["tags"] == 2  # that one, and the hash
+    assert said["tag_count"] == 2  # that one, and the hash
     finding = said["findings"][0]
     assert finding["rule"] == "unknown-tag"
     assert set(finding) == {"rule", "level", "part", "place", "message"}

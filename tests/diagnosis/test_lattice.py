@@ -35,3 +35,18 @@ def test_negative_values_and_zero_have_a_step_too():
     assert found is not None
     assert found.step == pytest.approx(0.25)
     assert 0 < found.half_width <= 0.01 / 78 * (1 + 1e-9)
+
+
+def test_four_plateaus_have_a_common_step_by_chance():
+    rng = np.random.default_rng(5)
+    for _ in range(400):
+        plateaus = printed(rng.uniform(0, 10, 4), "%.1f")
+        assert lattice_of(np.repeat(plateaus, 10), 0.01) is None
+
+
+def test_steps_of_five_last_places_are_steps():
+    # A converter of 0.5 whose file drops trailing zeros: 24.5, 25, 25.5
+    values = 0.5 * np.random.default_rng(6).integers(40, 60, 200)
+    found = lattice_of(values, 0.15)
+    assert found is not None
+    assert found.step == 0.5

@@ -70,3 +70,20 @@ def test_a_lost_row_hides_no_runaway():
 def test_a_channel_that_was_lost_or_stood_at_nothing_has_nothing_to_take_out():
     assert np.isnan(out(np.full(101, np.nan), 0.0, 1e-8)).all()
     np.testing.assert_array_equal(out(np.zeros(101), 0.0, 1e3), 0.0)
+
+
+def test_an_offset_is_taken_out_of_a_channel_that_showed_nothing():
+    one = Active(effect=effects()["zero_offset"], channel="E5", values={"offset": 0.1})
+    t = np.arange(5.0)
+    np.testing.assert_allclose(undone(np.zeros(5), one, setting(t), {}), -0.1)
+
+
+def test_what_has_a_memory_is_taken_out_behind_a_lost_row_too():
+    one = Active(effect=effects()["creep"], channel="E5", values={"fraction": 0.1, "time_constant": 4.0})
+    t = np.arange(30.0)
+    true = np.full(30, 50.0)
+    shown = one.effect.channel(true, one.values, setting(t))
+    shown[7] = np.nan
+    found = undone(shown, one, setting(t), {})
+    assert np.isnan(found[7])
+    np.testing.assert_allclose(np.delete(found, 7), 50.0, rtol=1e-6)

@@ -179,6 +179,8 @@ def test_a_body_in_free_fall_has_a_size_of_force(tmp_path):
         (RHS + "def outputs(x, u, p):\n    return {'X': x[0]}\n" + INITIAL, "no 'H'; it gives X"),
         (RHS + "def outputs(x, u, p):\n    return x[0]\n" + INITIAL, "not a dict"),
         (RHS + "def outputs(x, u, p):\n    return {'H': 'low'}\n" + INITIAL, "no number in output 'H'"),
+        (RHS + "def outputs(x, u, p):\n    return {'H': '2.5'}\n" + INITIAL, "no number in output 'H'"),
+        (RHS + "def outputs(x, u, p):\n    return {'H': 1e200}\n" + INITIAL, "no number in output 'H'"),
         (RHS + OUTPUTS + "def initial(p):\n    return p['h0']\n", "KeyError"),
     ],
 )
@@ -231,6 +233,8 @@ def test_columns_that_do_not_fit_are_told(tmp_path):
     [
         ("(inputs['v'] * 1j)", "no numbers in column 'F'"),
         ("inputs['v'].astype(str)", "no numbers in column 'F'"),
+        ("pd.Series([2.5, '1'] * (len(inputs) // 2), dtype=object)", "no numbers in column 'F'"),
+        ("pd.to_datetime(inputs['v'])", "no numbers in column 'F'"),
         ("np.full(len(inputs), 1e200)", "values beyond 1e+100 in column 'F'"),
     ],
 )

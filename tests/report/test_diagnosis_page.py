@@ -48,12 +48,17 @@ def test_the_map_of_runs_is_over_the_noise_of_the_first_chart(dragged, monkeypat
 
 
 def test_a_search_that_was_cut_off_does_not_say_that_no_effect_explains(dragged):
-    cut = dataclasses.replace(dragged.diagnosis, verdict="unknown", effects=(), complete=False)
+    screening = ("step 2: screening 150 candidates",)
+    cut = dataclasses.replace(
+        dragged.diagnosis, verdict="unknown", effects=(), complete=False, skipped=screening
+    )
     assert "before every known effect was tried" in headline(cut)
+    assert "no known effect explains" in headline(dataclasses.replace(cut, skipped=("predictions",)))
     assert headline(dataclasses.replace(cut, complete=True)) == HEADLINES["unknown"]
 
 
 def test_no_chance_is_zero(dragged):
     assert chance(0.0) == "p < 1e-300"
+    assert chance(float("nan")) == "p unknown"
     assert chance(0.0312, decimal_comma=True) == "p = 0,031"
     assert not re.search(r"(p =|is) 0[.)]", page(dragged))

@@ -147,6 +147,8 @@ def text_of(told: Answer) -> str:
         lines.append("also: " + ", ".join(f"{count} {rule}" for rule, count in sorted(notes.items())))
     settings = Counter(one.message for one in made.findings if one.rule == "test-toml")
     lines += [f"{count} files: {said}" for said, count in settings.most_common(_SETTINGS)]
+    if len(settings) > _SETTINGS:
+        lines.append(f"... and {len(settings) - _SETTINGS} more of test.toml; --json tells all of them")
     lines += [f"refused record {one.id}: {one.reason}" for one in made.refused]
     lines += [f"head of {name}: {head}" for name, head in made.heads]
     return "\n".join([*lines, *_asked(told)])

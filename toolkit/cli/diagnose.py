@@ -191,9 +191,10 @@ def _teller(*, show: bool) -> Any:
 
 
 def _text(made: Diagnosis, out: Path) -> str:
+    from toolkit.diagnosis.answer import cut_short
     from toolkit.report.diagnosis.chance import chance
 
-    cut = made.verdict == "unknown" and not made.complete
+    cut = made.verdict == "unknown" and cut_short(made.skipped)
     lines = [f"{made.title}: {_CUT if cut else _VERDICTS[made.verdict]}"]
     for one in made.effects:
         channel = f" on {one.channel}" if one.channel else ""

@@ -34,7 +34,7 @@ def check(
     text = "\n".join(f"{one.level:<8}{one.rule:<18}{one.part}, {one.place}: {one.message}" for one in found)
     payload = {
         "template_sha256": template.sha256,
-        "tags": tags,
+        "tag_count": tags,
         "findings": [one.as_dict() for one in found],
     }
     # Their number tells a template that another program has robbed of its controls.

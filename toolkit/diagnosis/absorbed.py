@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 
 from toolkit.diagnosis.candidates import Candidate
 from toolkit.diagnosis.screen import Screen, best_of
+from toolkit.errors import FitError
 
 if TYPE_CHECKING:
     from toolkit.diagnosis.fit import Fit
@@ -41,7 +42,10 @@ def absorbed(problem: Problem, base: Fit, left: Sequence[Candidate]) -> frozense
     if not moved or max(moved) < _FAR:
         return frozenset()
     declared = tuple(one.value for one in problem.free)
-    simulated = problem.simulate(declared, base.active)
+    try:
+        simulated = problem.simulate(declared, base.active)
+    except FitError:  # from there, an effect that was found already is beyond what can be simulated
+        return frozenset()
     residual = {name: problem.observed[name] - values for name, values in simulated.items()}
     screen = Screen.of(problem, replace(base, p=declared, simulated=simulated, residual=residual))
     ranked = best_of([one for each in left for one in screen.score(each)])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
@@ -134,6 +134,11 @@ class Diagnosis:
     complete: bool
     skipped: tuple[str, ...]
     recordings: tuple[Recorded, ...] | None = None
+
+
+def cut_short(skipped: Sequence[str]) -> bool:
+    """Tell whether a search ended before every known effect was tried; what comes later leaves names."""
+    return any(one not in ("swaps", "predictions") for one in skipped)
 
 
 def recorded(runs: Iterable[Run]) -> tuple[Recorded, ...]:

@@ -15,6 +15,7 @@ from toolkit.diagnosis.answer import (
     Mismatch,
     NominalParameter,
     Verdict,
+    cut_short,
     recorded,
 )
 from toolkit.diagnosis.case import Case
@@ -25,6 +26,7 @@ from toolkit.diagnosis.power import not_found
 from toolkit.diagnosis.search import ALPHA, Search, Step
 from toolkit.diagnosis.sense import sense
 from toolkit.diagnosis.units_of import unit_of
+from toolkit.effects.creep import FROM_REST
 from toolkit.findings import Finding
 
 if TYPE_CHECKING:
@@ -166,11 +168,18 @@ def _parameters(found: Search, active: Active, runs: tuple[str, ...] | None) -> 
 
 
 def _named(active: Active, runs: tuple[str, ...] | None) -> tuple[FoundParameter, ...]:
+    """Return what of an effect is no number: the other channel or record, its history, the runs it is in."""
     names = {"channel_swap": "with", "wrong_calibration": "record", "crosstalk": "from"}
-    if active.effect.name not in names or active.source is None:
-        return ()
-    name = names[active.effect.name]
-    return (FoundParameter(name=name, value=active.source, unit="", ci95=None, runs=runs),)
+    told = {}
+    if active.effect.name in names and active.source is not None:
+        told[names[active.effect.name]] = active.source
+    if active.values.get(FROM_REST):
+        told["history"] = "unloaded before each run"
+    if not active.effect.parameters and runs is not None:
+        told["runs"] = ", ".join(runs)
+    return tuple(
+        FoundParameter(name=name, value=value, unit="", ci95=None, runs=runs) for name, value in told.items()
+    )
 
 
 def _same(one: Active, other: Active) -> bool:
@@ -315,7 +324,7 @@ def _next(found: Search, effects: tuple[FoundEffect, ...], verdict: Verdict) -> 
             )
     if verdict == "unknown":
         said += _to_find_it(found)
-    if found.skipped:
+    if cut_short(found.skipped):
         said.append("Give the search more time (--budget): it ended before every known effect was tried.")
     elif verdict == "untestable":
         said.append(
@@ -330,7 +339,6 @@ def _to_find_it(found: Search) -> list[str]:
     """Return what would narrow down a mismatch that no effect explains, by what it depends on."""
     told = dict.fromkeys(name for one in found.structure for name in one.variables)
     channels = {one.name for one in found.problem.case.drivers}
-    channels |= {one.name for one in found.problem.model.outputs}
     rates = {f"d{name}/dt": f"the rate of {name}" for name in channels}
     varied = [rates.get(name, name) for name in told if name in channels or name in rates]
     said = []
@@ -338,6 +346,11 @@ def _to_find_it(found: Search) -> list[str]:
         said.append(
             f"The mismatch depends on {', '.join(varied)}: repeat the run with {varied[0]} alone varied, "
             "everything else held."
+        )
+    own = [one.name for one in found.problem.model.outputs if one.name in told]
+    if own:
+        said.append(
+            f"The mismatch depends on the size of {', '.join(own)}: apply known loads over its range."
         )
     lines = [name.removeprefix("time (a line at ").removesuffix(")") for name in told if "a line at" in name]
     if lines:

@@ -102,7 +102,10 @@ def _within_reach(problem: Problem, active: Active) -> Active:
 
     if active.effect.name != "coulomb_friction" or not isinstance(problem.model, OdeModel):
         return active
-    most = _SHORT * _motion_scales(problem, active)[2]
+    _, speed, way = _motion_scales(problem, active)
+    if problem.model.position_of(str(active.channel)) is None:
+        way = speed * max((float(run.t[-1] - run.t[0]) for run in problem.runs if run.rows), default=0.0)
+    most = max(_SHORT * way, speed * _row_time(problem))
     parameters = tuple(
         replace(one, bounds=(one.bounds[0], most)) if one.name == "presliding" else one
         for one in active.effect.parameters

@@ -20,6 +20,7 @@ _FEWEST = 20
 _COARSE = 0.1  # of the residual's variance that rounding to the step must make
 _EXACT = 1e-3  # of a step, by which values may miss the lattice
 _FINER = 1.5  # a step of one last place is only how the file was printed
+_COARSER, _MANY = 10.0, 8  # a few values have a step of two or five places by chance
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -56,7 +57,10 @@ def lattice_of(values: NDArray[np.float64], residual_sd: float) -> Lattice | Non
     whole = float(np.sum(counts))
     step = float(np.sum(steps)) / whole
     printed = _last_place(values)
-    if step < _FINER * printed or step**2 / 12 < _COARSE * residual_sd**2:
+    if (
+        step < (_FINER if len(steps) >= _MANY else _COARSER) * printed
+        or step**2 / 12 < _COARSE * residual_sd**2
+    ):
         return None
     ends = _rounding(values, printed)
     return Lattice(step=step, half_width=ends / whole, log_score_gain=len(values) * math.log(step / printed))

@@ -19,23 +19,26 @@ if TYPE_CHECKING:
 
 
 class Refused:
-    """A model's ``simulate`` that counts how often the simulation itself, without effects, gave nothing."""
+    """A model's ``simulate`` that counts the parameters at which the simulation itself gave nothing."""
 
     def __init__(self, simulate: Callable[..., dict[str, NDArray[np.float64]]]) -> None:
         self._simulate = simulate
-        self._calls = self._failed = 0
+        self._tried: set[tuple[float, ...]] = set()
+        self._failed: set[tuple[float, ...]] = set()
         self._first = ""
 
     def __call__(
         self, run: Run, p: Mapping[str, float], active: Sequence[Active]
     ) -> dict[str, NDArray[np.float64]]:
         """Return the outputs of a run."""
-        self._calls += not active
+        values = tuple(p.values())
+        if not active:
+            self._tried.add(values)
         try:
             return self._simulate(run, p, active)
         except FitError as error:
             if not active:
-                self._failed += 1
+                self._failed.add(values)
                 told = ", ".join(f"{name} = {value:.6g}" for name, value in p.items())
                 self._first = self._first or f"{run.name}, {told}: {error.got}"
             raise
@@ -48,7 +51,7 @@ class Refused:
             Finding(
                 rule="simulator-refuses",
                 where=f"{case.path.name}: simulation",
-                message=f"{self._failed} of {self._calls} simulations with other values of the parameters "
+                message=f"with {len(self._failed)} of {len(self._tried)} sets of parameters the simulation "
                 f"gave no usable output, first {self._first}",
             ),
         )

@@ -18,7 +18,7 @@ from toolkit.diagnosis.model import Active
 from toolkit.diagnosis.nuisance import INPUT_NOISE
 from toolkit.diagnosis.null import search_p_values
 from toolkit.diagnosis.problem import Problem, without_outliers
-from toolkit.diagnosis.refine import refined
+from toolkit.diagnosis.refine import refined, without
 from toolkit.diagnosis.remainder import NOTICED, StructureFound, remainder
 from toolkit.diagnosis.screen import Scored, Screen, best_of
 from toolkit.errors import FitError
@@ -159,7 +159,7 @@ def search(problem: Problem, *, seed: int, budget: Budget) -> Search:
             base, held_base, step = found
             if not _is_nuisance(step, steps):
                 steps.append(step)
-        base = refined(problem, base, listed)
+        base, held_base = refined(problem, folds, base, held_base, listed)
         base, held_base, steps = _stepped(problem, base, held_base, steps)
         if len(steps) > 1:
             budget.check("swaps")
@@ -299,7 +299,7 @@ def _fitted(problem: Problem, base: Fit, added: Active) -> Fit | None:
     Screening is linear: the size to which it leads may be beyond what a simulation can run with, where the
     true one is not.
     """
-    for share in (1.0, 0.5, 0.25, 0.125):
+    for share in (1.0, 0.5, 0.25, 0.125) if added.searched else (1.0,):
         values = dict(added.values)
         for one in added.searched:
             if one.off is not None and math.isfinite(one.off):
@@ -353,7 +353,7 @@ def _pruned(
     for i in range(len(steps) - 1):
         if len(base.active) < 2:
             break
-        rest = tuple(one for one in base.active if _place(one) != _place(steps[i].active))
+        rest = without(base.active, steps[i].active)
         try:
             made = fit(problem, rest, start=base.p)
             held = hold_out(problem, folds, made.active, made)

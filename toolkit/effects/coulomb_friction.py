@@ -64,7 +64,7 @@ EFFECT = Effect(
         EffectParameter(
             name="presliding",
             unit="{position}",
-            text="distance over which the friction builds up after a reversal, in a recorded motion",
+            text="distance over which the friction builds up after a reversal",
             typical=(0.2, 2.0),
             off=None,
             relative=True,

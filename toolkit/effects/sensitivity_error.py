@@ -35,5 +35,5 @@ EFFECT = Effect(
         ),
     ),
     channel=_scaled,
-    confined_by=(ANY_OTHER,),
+    confined_by=("date", ANY_OTHER),
 )

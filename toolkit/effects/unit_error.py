@@ -69,5 +69,5 @@ EFFECT = Effect(
         ),
     ),
     channel=_converted,
-    confined_by=(ANY_OTHER,),
+    confined_by=("date", ANY_OTHER),
 )

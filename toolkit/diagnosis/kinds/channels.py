@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
@@ -110,18 +111,27 @@ def undone(
     seen = setting
     if one.source is not None:
         seen = dataclasses.replace(setting, channels={**setting.channels, "from": others[one.source]})
+    # A row that was lost would take those after it along where an effect has a memory.
+    whole = np.isfinite(recorded)
+    if not whole.all():
+        if not whole.any():
+            return recorded
+        rows = np.arange(len(recorded))
+        recorded = np.interp(rows, rows[whole], recorded[whole])
     guess = recorded
-    size = float(np.nanmax(np.abs(recorded), initial=0.0))
+    size = float(np.abs(recorded).max(initial=0.0))
+    most: float | None = None
     for _ in range(_STEPS):
         with np.errstate(over="ignore", invalid="ignore"):
             missed = recorded - hook(guess, one.values, seen)
-        left = float(np.nanmax(np.abs(missed), initial=0.0))
-        if left > _WILD * size:
+        left = float(np.abs(missed).max(initial=0.0))
+        most = _WILD * max(size, left) if most is None else most
+        if not left <= most or not math.isfinite(left):
             raise _not_undone(one)
         guess = guess + missed
         if left <= _EXACT * size:
             break
-    return np.where(np.isfinite(guess), guess, recorded)
+    return np.where(whole, guess, np.nan)
 
 
 def _not_undone(one: Active) -> FitError:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import ctypes
 import os
 import sys
 from collections.abc import Iterator
@@ -32,7 +33,7 @@ def kept_apart() -> Iterator[None]:
 @contextlib.contextmanager
 def _led_to(descriptor: int) -> Iterator[None]:
     """Lead descriptor 1 to another one; nothing where the process has no standard output."""
-    with contextlib.suppress(OSError, ValueError):
+    with contextlib.suppress(OSError, ValueError, AttributeError):
         sys.stdout.flush()
     try:
         before = os.dup(1)
@@ -43,6 +44,9 @@ def _led_to(descriptor: int) -> Iterator[None]:
         os.dup2(descriptor, 1)
         yield
     finally:
+        # What a compiled library printed still stands in C's own buffer.
+        with contextlib.suppress(OSError, AttributeError):
+            ctypes.CDLL(None).fflush(None)
         os.dup2(before, 1)
         os.close(before)
 

@@ -12,7 +12,7 @@ import numpy as np
 from toolkit.diagnosis.kinds.channels import channel_places, through_channels
 from toolkit.diagnosis.kinds.forces import Forces
 from toolkit.diagnosis.kinds.inputs import Inputs
-from toolkit.diagnosis.kinds.integrate import IntegrationError, integrate
+from toolkit.diagnosis.kinds.integrate import OFF, IntegrationError, integrate
 from toolkit.diagnosis.kinds.python import silenced
 from toolkit.diagnosis.kinds.setting import nominal_load, setting
 from toolkit.diagnosis.kinds.together import NotTogetherError, columns_of, integrate_together, takes_columns
@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 
 ATOL = 1e-7  # of a state's spread over a run; before that is known, a hundredth of it of one
 _FINER = 4
+_MOST_HELD = 200_000_000  # bytes of simulations to remember
 _BETWEEN_ROWS = ("channel_delay", "filter_lag")  # they show what the equation did between two rows
 _POSITIONS = ("cubic_stiffness", "periodic_ripple")
 
@@ -45,6 +46,7 @@ class OdeModel:
         self._drivers = tuple(one.name for one in case.drivers)
         self._settings: dict[Run, Setting] = {}
         self._fine: dict[Run, Run] = {}
+        self._held = 0  # bytes of what is kept
         self._kept: dict[Any, dict[str, NDArray[np.float64]] | FitError] = {}
         p = {one.name: one.value for one in case.parameters}
         start = self._start(case.runs[0], p)
@@ -225,9 +227,11 @@ class OdeModel:
         return (run, between and run.rows > 1, tuple(p.values()), told), forces
 
     def _keep(self, key: tuple[Any, ...], made: dict[str, NDArray[np.float64]] | FitError) -> None:
-        if len(self._kept) > 400:
+        if len(self._kept) > 400 or self._held > _MOST_HELD:
             self._kept.clear()
+            self._held = 0
         self._kept[key] = made
+        self._held += 0 if isinstance(made, FitError) else sum(one.nbytes for one in made.values())
 
     def _integrate(self, run: Run, p: Mapping[str, float], forces: Sequence[Active]) -> NDArray[np.float64]:
         values, acting = dict(p), self._forces(forces)
@@ -358,10 +362,14 @@ class OdeModel:
 
 
 def _number(value: Any) -> float:
+    """Return a number of an outputs' dict; no number of a text, a complex one, or one too large to square."""
+    if isinstance(value, (str, bytes)):
+        return math.nan
     try:
-        return float(value)
+        number = float(value)
     except (TypeError, ValueError):
         return math.nan
+    return number if abs(number) < OFF else math.nan
 
 
 def _as_dict(run: Run) -> dict[str, Any]:

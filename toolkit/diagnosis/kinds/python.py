@@ -7,6 +7,7 @@ import difflib
 import io
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from numbers import Real
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
@@ -248,10 +249,9 @@ def _failed(case: Case, run: Run, got: str) -> FitError:
 
 def _numbers(made: Any, name: str) -> NDArray[np.float64] | None:
     """Return a column's numbers, None where it has texts or complex numbers."""
-    import pandas as pd
-
     column = made[name]
-    if isinstance(column, pd.Series) and pd.api.types.infer_dtype(column) in ("string", "complex", "bytes"):
+    kind = getattr(getattr(column, "dtype", None), "kind", "O")
+    if kind not in "iufb" and not all(isinstance(one, Real) for one in np.ravel(column)):
         return None
     try:
         return np.asarray(column, dtype=np.float64)

@@ -32,6 +32,10 @@ def diagnosis_values(told: Told | None, style: Style) -> dict[str, Value]:
         from toolkit.report.diagnosis.content import answer_texts
 
         texts = answer_texts(told.answer, style, by=told.by)
+        # On which calibration a cause rests stands beside it also where a template has no table of findings.
+        rests = [one.message for one in told.answer.findings if one.rule == "case-calibration"]
+        if rests:
+            texts["summary"] = " ".join([str(texts["summary"]), *(f"{one.capitalize()}." for one in rests)])
     names = (one.path.partition(".")[2] for one in REPORT_VALUES)
     captions = {f"caption.{name}": Value(kind="text", value=None) for name in REPORT_FIGURES}
     return captions | {f"diagnosis.{name}": Value(kind="text", value=texts.get(name)) for name in names}

@@ -37,14 +37,17 @@ h1{font-size:1.5rem;margin:0}h2{font-size:1.15rem;margin:2rem 0 .4rem;border-bot
 th,td{padding:.2rem .7rem;text-align:left;border-bottom:1px solid #e4e4e4}
 td.n,th.n{text-align:right;font-variant-numeric:tabular-nums}img{max-width:100%}
 code{background:#f0f0f0;padding:.1rem .3rem}
-small{color:#666}details{margin:.5rem 0}.wide,code{overflow-x:auto;max-width:100%}code{display:inline-block;vertical-align:bottom}
+small{color:#666}details{margin:.5rem 0}.wide,code{overflow-x:auto;max-width:100%}
+code{display:inline-block;vertical-align:bottom}
 @media print{body{max-width:none;margin:0}h2,img,tr{break-inside:avoid}h2{break-after:avoid}}
 """
 
 
 def headline(made: Diagnosis) -> str:
     """Return the verdict as a sentence; a search that was cut off has not tried every effect."""
-    if made.verdict == "unknown" and not made.complete:
+    from toolkit.diagnosis.answer import cut_short
+
+    if made.verdict == "unknown" and cut_short(made.skipped):
         return "Something is missing; the budget was spent before every known effect was tried."
     return HEADLINES[made.verdict]
 
@@ -82,6 +85,7 @@ def page(result: Result) -> str:
         *_remaining(made),
         *_power(made),
         *_next(made),
+        *_findings(made),
         f"<p><small>Case {escape(made.case_sha256[:16])}; held out by {escape(made.held_out_by)}"
         f"{'' if made.complete else '; incomplete: ' + escape(', '.join(made.skipped))}.</small></p>",
         "</body></html>",
@@ -227,6 +231,13 @@ def _next(made: Diagnosis) -> list[str]:
         return []
     items = "".join(f"<li>{escape(one)}</li>" for one in made.next_measurements)
     return ["<h2>What to measure next</h2>", f"<ul>{items}</ul>"]
+
+
+def _findings(made: Diagnosis) -> list[str]:
+    if not made.findings:
+        return []
+    rows = [(one.rule, one.where, one.message) for one in made.findings]
+    return ["<h2>Findings</h2>", _table(("rule", "where", "what"), rows)]
 
 
 def _table(head: Sequence[str], rows: Sequence[Sequence[object]], *, numbers: Sequence[int] = ()) -> str:
