@@ -70,3 +70,29 @@ def write_case(
     case = folder / "CASE.toml"
     case.write_bytes(toml if isinstance(toml, bytes) else toml.encode())
     return case
+
+
+CELL = """
+import pandas as pd
+def simulate(inputs, p):
+    return pd.DataFrame({"F": p["gain"] * inputs["L"]})
+"""
+
+
+def cell_case(gain_sd: float, covariate: str = "") -> str:
+    """A load cell F under a known load L, its gain known to ``gain_sd``; without its runs."""
+    return f"""schema = 1
+[simulation]
+kind = "python"
+path = "sim.py"
+[simulation.parameters.gain]
+value = 1.0
+unit = "1"
+sd = {gain_sd}
+[recording]
+time = "t"
+[recording.channels]
+t = {{ unit = "s", role = "time" }}
+L = {{ unit = "N", role = "input" }}
+{covariate}F = {{ unit = "N", role = "output" }}
+"""

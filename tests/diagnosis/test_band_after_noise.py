@@ -3,31 +3,12 @@
 import numpy as np
 import pandas as pd
 
-from tests.diagnosis.cases import TWO, write_case
+from tests.diagnosis.cases import CELL, TWO, cell_case, write_case
 from toolkit.diagnosis.case_read import read_case
 from toolkit.diagnosis.diagnose import diagnose
 
 WIDTH, NOISE = 16.0, 8.0
-SIMULATOR = """
-import pandas as pd
-def simulate(inputs, p):
-    return pd.DataFrame({"F": p["gain"] * inputs["L"]})
-"""
-CASE = """schema = 1
-[simulation]
-kind = "python"
-path = "sim.py"
-[simulation.parameters.gain]
-value = 1.0
-unit = "1"
-sd = 0.005
-[recording]
-time = "t"
-[recording.channels]
-t = { unit = "s", role = "time" }
-L = { unit = "N", role = "input" }
-F = { unit = "N", role = "output" }
-"""
+CASE = cell_case(0.005)
 
 
 def recording(seed):
@@ -42,9 +23,7 @@ def recording(seed):
 
 def test_the_interval_holds_the_width_of_a_band_on_a_noisy_reading(tmp_path):
     frames = {f"r{i}__csv": recording(i) for i in range(2)}
-    made = diagnose(
-        read_case(write_case(tmp_path, CASE + TWO, simulator=SIMULATOR, **frames)), None
-    ).diagnosis
+    made = diagnose(read_case(write_case(tmp_path, CASE + TWO, simulator=CELL, **frames)), None).diagnosis
     assert (made.verdict, made.remaining) == ("named", "nothing")
     (one,) = made.effects
     assert (one.name, one.channel) == ("dead_band", "F")

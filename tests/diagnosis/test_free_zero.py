@@ -3,33 +3,13 @@
 import numpy as np
 import pandas as pd
 
-from tests.diagnosis.cases import TWO, write_case
+from tests.diagnosis.cases import CELL, TWO, cell_case, write_case
 from toolkit.diagnosis.case_read import read_case
 from toolkit.diagnosis.diagnose import diagnose
 
 COEFFICIENT = 0.8  # N/K
 NOISE = 1.5  # N; the zero is off by 1.2 N at the first row
-SIMULATOR = """
-import pandas as pd
-def simulate(inputs, p):
-    return pd.DataFrame({"F": p["gain"] * inputs["L"]})
-"""
-CASE = """schema = 1
-[simulation]
-kind = "python"
-path = "sim.py"
-[simulation.parameters.gain]
-value = 1.0
-unit = "1"
-sd = 0.002
-[recording]
-time = "t"
-[recording.channels]
-t = { unit = "s", role = "time" }
-L = { unit = "N", role = "input" }
-T = { unit = "degC", role = "covariate" }
-F = { unit = "N", role = "output" }
-"""
+CASE = cell_case(0.002, 'T = { unit = "degC", role = "covariate" }\n')
 
 
 def recording(draw, run):
@@ -45,7 +25,7 @@ def test_the_interval_holds_the_coefficient_and_no_zero_is_named_beside_it(tmp_p
     held = 0
     for draw in range(6):
         frames = {f"r{run}__csv": recording(draw, run) for run in range(2)}
-        case = read_case(write_case(tmp_path / str(draw), CASE + TWO, simulator=SIMULATOR, **frames))
+        case = read_case(write_case(tmp_path / str(draw), CASE + TWO, simulator=CELL, **frames))
         made = diagnose(case, None).diagnosis
         assert [(one.name, one.channel) for one in made.effects] == [("thermal_drift", "F")]
         low, high = made.effects[0].parameters[0].ci95
