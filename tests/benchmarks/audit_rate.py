@@ -161,7 +161,7 @@ class _Reader:
         from toolkit.recording.xlsx import read_sheet
 
         try:
-            return len(read_sheet(gate(self.folder / name), self.machine)[1].rows)
+            return len(read_sheet(gate(self.folder / name), self.machine, grids=False)[1].rows)
         except ToolkitError:
             return 0
 

@@ -17,6 +17,8 @@ import numpy as np
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from toolkit.recording.grid import Grid
+
 MAX_ROW, MAX_COLUMN = 1_048_576, 16_384
 
 _SPARE_CELLS = 200_000
@@ -87,15 +89,24 @@ def reference(row: int, column: int) -> str:
     return f"{letters}{row}"
 
 
-def find_cells(xml: bytes) -> Cells:
+def find_cells(xml: bytes, grid: Grid | None = None) -> Cells:
     """Return the positions of all cells of a worksheet's XML.
+
+    ``grid`` is the sheet's rectangle of numbers where `toolkit.recording.grid` found one.
 
     Raises
     ------
     MalformedSheetError
         the XML is not well-formed, or a reference is none
     """
-    return _scan(xml) or _parse(xml)
+    if grid is None:
+        return _scan(xml) or _parse(xml)
+    first = find_cells(grid.rest(xml))
+    rows, columns = np.indices(grid.starts.shape)
+    return Cells(
+        np.concatenate([first.rows, rows.ravel() + grid.first_row]),
+        np.concatenate([first.columns, columns.ravel() + 1]),
+    )
 
 
 def error_cells(xml: bytes) -> tuple[tuple[str, str], ...]:

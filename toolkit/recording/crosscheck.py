@@ -14,7 +14,7 @@ from toolkit.recording.table import Table
 
 
 def cross_check(gated: Gated, sheet: str, table: Table) -> None:
-    """Compare a table that python-calamine read with openpyxl's reading of it.
+    """Compare a table as it was read (a grid, python-calamine) with openpyxl's reading of it.
 
     The full reader is used: openpyxl's read-only one believes ``<dimension>``.
 
@@ -25,6 +25,7 @@ def cross_check(gated: Gated, sheet: str, table: Table) -> None:
     UnreadableError
         rule ``readers-differ``: openpyxl cannot read the file at all
     """
+    table = table.whole()
     other = _openpyxl_rows(gated, sheet)
     height = max(len(table.rows), len(other))
     width = max((len(row) for row in (*table.rows, *other)), default=0)
@@ -35,7 +36,7 @@ def cross_check(gated: Gated, sheet: str, table: Table) -> None:
                 raise CellError(
                     f"cell {reference(row + 1, column + 1)}: two readers disagree",
                     where=f"{table.where}, cell {reference(row + 1, column + 1)}",
-                    got=f"python-calamine {one!r}, openpyxl {two!r}"[:200],
+                    got=f"read {one!r}, openpyxl {two!r}"[:200],
                     expected="the same value from both",
                     next_step="look at that cell in the file; save a copy of it with Excel",
                     rule="readers-differ",

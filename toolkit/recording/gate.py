@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NoReturn
 from xml.etree import ElementTree as ET
@@ -18,6 +18,7 @@ from toolkit.errors import UnreadableError
 from toolkit.files import sha256_bytes
 from toolkit.recording.archive import MAX_FILE_BYTES, read_members
 from toolkit.recording.cells import MalformedSheetError, find_cells
+from toolkit.recording.grid import Grid, find_grid
 from toolkit.recording.sniff import Kind, office_kind, ole_kind, sniff
 from toolkit.recording.walks.mat import unpack_mat
 from toolkit.recording.walks.mdf import walk_mdf
@@ -37,7 +38,8 @@ class Gated:
     """A file that passed: its bytes, their SHA-256, its kind, and what is inside.
 
     ``kind`` is ``xlsx``, ``text``, ``lvm``, ``mat``, ``mdf`` or ``tdms``. ``members`` of a workbook: name ->
-    inflated content; of a MAT-file: ``mat`` -> the file with its arrays unpacked.
+    inflated content; of a MAT-file: ``mat`` -> the file with its arrays unpacked. ``grids``: name -> the
+    rectangle of numbers of a worksheet that has one.
     """
 
     path: Path
@@ -45,6 +47,7 @@ class Gated:
     sha256: str
     kind: str
     members: Mapping[str, bytes]
+    grids: Mapping[str, Grid] = field(default_factory=dict)
 
 
 def gate(path: Path, data: bytes | None = None) -> Gated:
@@ -82,8 +85,8 @@ def gate(path: Path, data: bytes | None = None) -> Gated:
     if kind.id != "zip":
         _no_workbook(path, kind)
     members = read_members(data, where=path)
-    check_members(members, where=path)
-    return Gated(path=path, data=data, sha256=sha256_bytes(data), kind="xlsx", members=members)
+    grids = check_members(members, where=path)
+    return Gated(path=path, data=data, sha256=sha256_bytes(data), kind="xlsx", members=members, grids=grids)
 
 
 def check_workbook(path: Path) -> Gated:
@@ -100,8 +103,10 @@ def check_workbook(path: Path) -> Gated:
     return gated
 
 
-def check_members(members: Mapping[str, bytes], *, where: Path) -> None:
+def check_members(members: Mapping[str, bytes], *, where: Path) -> dict[str, Grid]:
     """Check the inflated members of a zip archive: a workbook, without anything active or far.
+
+    Return the grids of its worksheets, by the name of the member.
 
     Raises
     ------
@@ -119,6 +124,7 @@ def check_members(members: Mapping[str, bytes], *, where: Path) -> None:
                 "save it as .xlsx, without macros")  # fmt: skip
     if kind.id != "xlsx":
         _no_workbook(where, kind)
+    grids: dict[str, Grid] = {}
     for lower, name in by_lower.items():
         if lower.startswith(_LINK_PARTS):
             _refuse("external-link", "the workbook takes data from outside", where, name,
@@ -131,7 +137,10 @@ def check_members(members: Mapping[str, bytes], *, where: Path) -> None:
             lower.endswith((".xml", ".rels", ".vml"))
             or content[:64].lstrip(b"\xef\xbb\xbf \t\r\n")[:1] == b"<"
         ):
-            _check_xml(name, content, where)
+            grid = _check_xml(name, content, where)
+            if grid is not None:
+                grids[name] = grid
+    return grids
 
 
 def _walk_mat(data: bytes, where: Path) -> Mapping[str, bytes]:
@@ -152,7 +161,7 @@ _PLAIN = ("text", "lvm")
 _WALKED = {"mat": _walk_mat, "mdf": _walk_mdf, "tdms": _walk_tdms}
 
 
-def _check_xml(name: str, xml: bytes, where: Path) -> None:
+def _check_xml(name: str, xml: bytes, where: Path) -> Grid | None:
     # UTF-16 would hide everything from the searches below; Office writes UTF-8 only.
     declared = _ENCODING.match(xml[: xml.find(b"?>") + 2].removeprefix(b"\xef\xbb\xbf"))
     if b"\x00" in xml or (declared and declared.group(1).lower() not in _ENCODINGS):
@@ -163,7 +172,8 @@ def _check_xml(name: str, xml: bytes, where: Path) -> None:
     if name.endswith(".rels"):
         _check_relationships(name, xml, where)
     elif b"sheetData" in xml:
-        _check_sheet(name, xml, where)
+        return _check_sheet(name, xml, where)
+    return None
 
 
 def _check_relationships(name: str, xml: bytes, where: Path) -> None:
@@ -181,9 +191,10 @@ def _check_relationships(name: str, xml: bytes, where: Path) -> None:
                     f"{name}: {target[:120]}", "a workbook of values", _FOREIGN)  # fmt: skip
 
 
-def _check_sheet(name: str, xml: bytes, where: Path) -> None:
+def _check_sheet(name: str, xml: bytes, where: Path) -> Grid | None:
+    grid = find_grid(xml)
     try:
-        cells = find_cells(xml)
+        cells = find_cells(xml, grid)
     except MalformedSheetError as error:
         _refuse("xml", "a worksheet cannot be parsed", where, f"{name}: {error}", "well-formed XML",
                 "copy the file again from the machine")  # fmt: skip
@@ -197,6 +208,7 @@ def _check_sheet(name: str, xml: bytes, where: Path) -> None:
     if doubled := cells.doubled:
         _refuse("doubled-cell", "a cell occurs twice in a worksheet", where, f"{name}: cell {doubled}",
                 "every cell once", _FOREIGN)  # fmt: skip
+    return grid
 
 
 def _bytes(path: Path) -> bytes:

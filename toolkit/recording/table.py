@@ -28,12 +28,21 @@ _EMPTY = ("", None)
 class Table:
     """Cells of one sheet, row by row from the first row of the sheet; ``""`` is an empty cell.
 
-    ``errors``: (reference, text) of cells with an error value, which readers return as empty.
+    ``errors``: (reference, text) of cells with an error value, which readers return as empty. ``numbers``
+    (rows, columns): what stands below ``rows``, where that is nothing but finite numbers; as wide as the last
+    of ``rows``.
     """
 
     where: str
     rows: Sequence[Sequence[Any]]
     errors: tuple[tuple[str, str], ...] = ()
+    numbers: NDArray[np.float64] | None = None
+
+    def whole(self) -> Table:
+        """Return the same table with all of its cells in ``rows``."""
+        if self.numbers is None:
+            return self
+        return Table(where=self.where, rows=[*self.rows, *self.numbers.tolist()], errors=self.errors)
 
 
 def read_table(table: Table, machine: Machine) -> tuple[Series, ...]:
@@ -49,6 +58,8 @@ def read_table(table: Table, machine: Machine) -> tuple[Series, ...]:
     UnreadableError
         rule ``no-data``: there is no header or no row of data
     """
+    if table.numbers is not None and any(not str(cell or "").strip() for cell in table.rows[-1]):
+        table = table.whole()  # a column without a header, which is to be told with its first cell
     first = next((i for i, row in enumerate(table.rows) if not _blank(row)), None)
     if first is None:
         _no_data(table, "an empty sheet")
@@ -68,16 +79,20 @@ def read_table(table: Table, machine: Machine) -> tuple[Series, ...]:
     while last > first + 1 and _blank(table.rows[last - 1]):
         last -= 1
     _check_errors(table, first, headers)
+    if table.numbers is not None:
+        columns = np.ascontiguousarray(table.numbers.T)
+        columns.setflags(write=False)
+        return tuple(_named(one, columns[one.index]) for one in assigned)
     if last == first + 1:
         _no_data(table, "a header row and nothing below it")
     body = table.rows[first + 1 : last]
     _check_nameless(table, body, headers, first + 2)
-    columns = _numbers(body)
-    if columns is None:  # one by one, for the first cell that is to blame
+    found = _numbers(body)
+    if found is None:  # one by one, for the first cell that is to blame
         return tuple(
             _series(one, [row[one.index] for row in body], table.where, first + 2) for one in assigned
         )
-    return tuple(_named(one, columns[one.index]) for one in assigned)
+    return tuple(_named(one, found[one.index]) for one in assigned)
 
 
 def _numbers(body: Sequence[Sequence[Any]]) -> NDArray[np.float64] | None:

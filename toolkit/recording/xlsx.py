@@ -1,14 +1,15 @@
-"""Workbooks: python-calamine reads the members that passed the gate."""
+"""Workbooks: python-calamine reads the members that passed the gate, but for a plain grid of numbers."""
 
 from __future__ import annotations
 
 import io
 import posixpath
-from collections.abc import Mapping
+import re
+from collections.abc import Mapping, Sequence
 from typing import Any, NoReturn
 from xml.etree import ElementTree as ET
 
-from toolkit.errors import CellError, RecordingError, UnreadableError
+from toolkit.errors import CellError, RecordingError, ToolkitError, UnreadableError
 from toolkit.machine import Machine
 from toolkit.recording.archive import stored_archive
 from toolkit.recording.cells import error_cells
@@ -19,14 +20,16 @@ from toolkit.recording.table import Table
 _MAIN = "{http://schemas.openxmlformats.org/spreadsheetml/2006/main}"
 _ID = "{http://schemas.openxmlformats.org/officeDocument/2006/relationships}id"
 _STRICT_MAIN = "{http://purl.oclc.org/ooxml/spreadsheetml/main}"
+_CELL = re.compile(rb"<(?:[\w.-]+:)?c[\s/>]")
+_Errors = Mapping[str, tuple[tuple[str, str], ...]]  # sheet -> (reference, text) of each error value
 _STRICT_ID = "{http://purl.oclc.org/ooxml/officeDocument/relationships}id"
 
 
-def read_sheet(gated: Gated, machine: Machine) -> tuple[str, Table]:
+def read_sheet(gated: Gated, machine: Machine, *, grids: bool = True) -> tuple[str, Table]:
     """Return the name and the cells of the one visible worksheet that holds the recording.
 
     Hidden worksheets are never read. With several visible ones, the recording is the one whose first row
-    has headers of the machine.
+    has headers of the machine. ``grids=False`` has python-calamine read every cell, with the same result.
 
     Raises
     ------
@@ -38,8 +41,10 @@ def read_sheet(gated: Gated, machine: Machine) -> tuple[str, Table]:
         rule ``several-sheets``: more than one worksheet looks like a recording
     """
     errors = _errors_by_sheet(gated.members)
-    sheets = _visible_sheets(gated, errors)
-    filled = [(name, rows) for name, rows in sheets if any(any(c not in ("", None) for c in r) for r in rows)]
+    sheets = (grids and _around_grid(gated, errors)) or _visible_sheets(gated, gated.members, errors)
+    filled = [
+        (name, one) for name, one in sheets if any(any(c not in ("", None) for c in r) for r in one.rows)
+    ]
     if not filled:
         raise UnreadableError(
             "the workbook has no data",
@@ -49,9 +54,7 @@ def read_sheet(gated: Gated, machine: Machine) -> tuple[str, Table]:
             next_step="repeat the recording; hidden worksheets are not read",
             rule="no-data",
         )
-    fitting = [(name, rows) for name, rows in filled if looks_like_header(_first(rows), machine)] or filled[
-        :1
-    ]
+    fitting = [one for one in filled if looks_like_header(_first(one[1].rows), machine)] or filled[:1]
     if len(fitting) > 1:
         raise RecordingError(
             "more than one worksheet looks like a recording",
@@ -61,24 +64,49 @@ def read_sheet(gated: Gated, machine: Machine) -> tuple[str, Table]:
             next_step="save each worksheet as a file of its own",
             rule="several-sheets",
         )
-    name, rows = fitting[0]
-    return name, Table(where=f"{gated.path}, sheet {name!r}", rows=rows, errors=errors.get(name, ()))
+    return fitting[0]
 
 
-def _visible_sheets(
-    gated: Gated, errors: Mapping[str, tuple[tuple[str, str], ...]]
-) -> list[tuple[str, list[list[Any]]]]:
+def _around_grid(gated: Gated, errors: _Errors) -> list[tuple[str, Table]]:
+    """Return the visible sheets where one part alone has cells, and these are one row above a grid.
+
+    The parser is given the workbook without the grid's rows, and names the sheets. Empty where anything is
+    not as plain as that: the workbook is then read whole, and what is wrong with it is told from there.
+    """
+    cells = [name for name, xml in gated.members.items() if b"sheetData" in xml and _CELL.search(xml)]
+    if len(cells) != 1 or cells[0] not in gated.grids:
+        return []
+    grid, xml = gated.grids[cells[0]], gated.members[cells[0]]
+    numbers = grid.numbers(xml)
+    if numbers is None:
+        return []
+    try:
+        sheets = _visible_sheets(gated, {**gated.members, cells[0]: grid.rest(xml)}, errors)
+    except ToolkitError:
+        return []
+    made: list[tuple[str, Table]] = []
+    for name, one in sheets:
+        if one.rows:  # of the part with the cells: there is no other
+            if len(one.rows) != grid.first_row - 1 or len(one.rows[-1]) != numbers.shape[1]:
+                return []
+            one = Table(where=one.where, rows=one.rows, errors=one.errors, numbers=numbers)
+        made.append((name, one))
+    return made if any(one.rows for _, one in made) else []
+
+
+def _visible_sheets(gated: Gated, members: Mapping[str, bytes], errors: _Errors) -> list[tuple[str, Table]]:
     from python_calamine import CalamineWorkbook, SheetTypeEnum, SheetVisibleEnum
 
-    sheets: list[tuple[str, list[list[Any]]]] = []
+    sheets: list[tuple[str, Table]] = []
     name = "?"
     try:
-        with CalamineWorkbook.from_filelike(io.BytesIO(stored_archive(gated.members))) as workbook:
+        with CalamineWorkbook.from_filelike(io.BytesIO(stored_archive(members))) as workbook:
             for meta in workbook.sheets_metadata:
                 if meta.typ == SheetTypeEnum.WorkSheet and meta.visible == SheetVisibleEnum.Visible:
                     name = meta.name
                     rows = workbook.get_sheet_by_name(name).to_python(skip_empty_area=False)
-                    sheets.append((name, rows))
+                    where = f"{gated.path}, sheet {name!r}"
+                    sheets.append((name, Table(where=where, rows=rows, errors=errors.get(name, ()))))
     except BaseException as error:
         # A panic of the reader's Rust code derives from BaseException; whatever fails, the file is at fault.
         if not isinstance(error, Exception) and type(error).__name__ != "PanicException":
@@ -108,7 +136,7 @@ def _refuse(gated: Gated, name: str, errors: tuple[tuple[str, str], ...], error:
     ) from (error if isinstance(error, Exception) else None)
 
 
-def _first(rows: list[list[Any]]) -> list[str]:
+def _first(rows: Sequence[Sequence[Any]]) -> list[str]:
     for row in rows:
         texts = [cell for cell in row if isinstance(cell, str) and cell.strip()]
         if texts:
