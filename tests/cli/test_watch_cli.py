@@ -43,11 +43,11 @@ class Bench:
         self.refusals: dict[str, ToolkitError] = {}
         self.watcher = self.start()
 
-    def start(self, settings: str = "as before") -> Watcher:
+    def start(self, settings: str = "as before", version: str = "1.2.0") -> Watcher:
         self.watcher = Watcher(
             self.folder, self.folder.parent / "out", resolve=self.resolve, report=self.report,
             settle_s=3, patience_s=60, clock=lambda: self.now,
-            settings=settings,
+            settings=settings, version=version,
         )  # fmt: skip
         return self.watcher
 
@@ -215,6 +215,46 @@ def test_what_was_refused_is_tried_again_by_other_settings_and_what_was_made_sta
     assert [one.test for one in bench.look(after=4).set_aside] == ["bad"]
     assert bench.reported == [["one", "refused"], ["refused"]]
     assert not (bench.watcher.out / SET_ASIDE / "refused.txt").exists()
+
+
+def test_what_an_older_toolkit_set_aside_is_tried_once_more(bench: Bench) -> None:
+    for name in ("made", "refused", "bad", "worse"):
+        bench.test(name)
+    bench.refusals["refused"] = RenderError("the report was not verified", rule="not-verified")
+    for name in ("bad", "worse"):
+        bench.faults[name] = UnreadableError("the workbook holds macros", where="run", rule="macros")
+    bench.look()
+    bench.look(after=4)
+    # The newer one can read and print what the older could not, but for one test.
+    bench.refusals.clear()
+    del bench.faults["bad"]
+    bench.read.clear()
+    bench.start(version="1.3.0")
+    bench.look()
+    assert [one.test for one in bench.look(after=4).set_aside] == ["worse"]
+    assert sorted(bench.read) == ["bad", "refused", "worse"]
+    assert bench.reported == [["made", "refused"], ["bad", "refused"]]
+    # It tried: the one that it refused as well stays where it is, also after a restart.
+    bench.look(after=4)
+    bench.start(version="1.3.0")
+    bench.look()
+    assert [one.test for one in bench.look(after=4).set_aside] == ["worse"]
+    assert len(bench.read) == 3
+
+
+def test_a_state_that_names_no_version_is_an_older_toolkit_s(bench: Bench) -> None:
+    bench.test("bad")
+    bench.faults["bad"] = UnreadableError("the workbook holds macros", where="run", rule="macros")
+    bench.look()
+    bench.look(after=4)
+    state = bench.watcher.out / STATE
+    told = json.loads(state.read_text())
+    del told["tests"]["bad"]["version"]
+    state.write_text(json.dumps(told))
+    bench.faults.clear()
+    bench.start()
+    bench.look()
+    assert len(bench.look(after=4).made) == 1
 
 
 def test_unknown_units_are_told_before_anything_is_written(tmp_path: Path) -> None:

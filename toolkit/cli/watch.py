@@ -69,8 +69,9 @@ def command(
     """Make a report as soon as the last file of a test has arrived and is whole.
 
     A partial file is waited for; a bad one sets its test aside, with the reason in set-aside/. A restart
-    goes on where the last one ended; with another template or other units it tries again what was refused,
-    and leaves what was made. Ends with Ctrl-C or SIGTERM, after the report under way.
+    goes on where the last one ended; with another template, other units or another version of the toolkit it
+    tries again what was refused, and leaves what was made. Ends with Ctrl-C or SIGTERM, after the report
+    under way.
 
     Example: toolkit watch inbox --template report_templates/org.docx --out reports
     """

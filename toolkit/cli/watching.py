@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from toolkit import __version__
 from toolkit.errors import OutputError, RegistryError, ToolkitError
 from toolkit.files import sha256_bytes
 
@@ -72,6 +73,7 @@ class Watcher:
         is reported with its findings
     clock : seconds that never go back
     settings : what the reports are made by; what was refused under others is tried again
+    version : of the toolkit; what another one set aside is tried once more
     """
 
     def __init__(
@@ -85,8 +87,9 @@ class Watcher:
         patience_s: float,
         clock: Callable[[], float],
         settings: str = "",
+        version: str = __version__,
     ) -> None:
-        self.folder, self.out = folder, out
+        self.folder, self.out, self.version = folder, out, version
         self.resolve, self.report, self.clock = resolve, report, clock
         self.settle_s, self.patience_s, self.settings = settle_s, patience_s, settings
         self.seen: dict[str, tuple[Listing, float]] = {}
@@ -221,8 +224,13 @@ class Watcher:
         return self.out / SET_ASIDE / f"{told}.txt"
 
     def _refused_otherwise(self, told: dict[str, Any]) -> bool:
-        """Tell whether a report was refused under other settings: nothing may be wrong with its test."""
-        return told.get("state") == SET_ASIDE and told.get("settings", self.settings) != self.settings
+        """Tell whether a test was refused by another toolkit or under other settings.
+
+        Nothing may be wrong with it then. A state of before versions were noted is an older toolkit's.
+        """
+        if told.get("state") != SET_ASIDE:
+            return False
+        return told.get("version") != self.version or told.get("settings", self.settings) != self.settings
 
     def _set_aside(self, fault: Aside, content: str, *, by: str | None = None) -> None:
         from toolkit.files import write_atomic
@@ -233,6 +241,7 @@ class Watcher:
             "content": content,
             "rule": fault.rule,
             "reason": fault.reason,
+            "version": self.version,
             **({} if by is None else {"settings": by}),
         }
         write_atomic(self._note(fault.test), f"{OWN_OUTPUT}\n{fault.test}: {fault.rule}\n\n{fault.reason}\n")
