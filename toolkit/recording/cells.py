@@ -25,6 +25,8 @@ _SPARE_CELLS = 200_000
 _SPREAD = 16
 _REFERENCE = re.compile(r"([A-Za-z]{1,3})([0-9]{1,7})")
 _PREFIXED_CELL = re.compile(rb"<[\w.-]+:c[\s/>]")
+_ANY_CELL = re.compile(rb"<(?:[\w.-]+:)?c(?![A-Za-z])")
+_PLAIN_CELL = re.compile(rb'<c r="([A-Z]{1,3})([0-9]{1,7})"')
 # Every repetition stops at the next tag or cell, so that no text makes the search quadratic.
 _ERROR_CELL = re.compile(
     rb"""<(?:\w+:)?c\s[^<>]*?\bt\s*=\s*["']e["'][^<>]*(?<!/)>"""
@@ -101,7 +103,8 @@ def find_cells(xml: bytes, grid: Grid | None = None) -> Cells:
     """
     if grid is None:
         return _scan(xml) or _parse(xml)
-    first = find_cells(grid.rest(xml))
+    rest = grid.rest(xml)
+    first = _few(rest) or find_cells(rest)
     rows, columns = np.indices(grid.starts.shape)
     return Cells(
         np.concatenate([first.rows, rows.ravel() + grid.first_row]),
@@ -121,6 +124,15 @@ def error_cells(xml: bytes) -> tuple[tuple[str, str], ...]:
         own = _OWN_REFERENCE.search(cell.group(0).partition(b">")[0])
         found.append((own.group(1).decode() if own else "?", cell.group(1).decode("utf-8", "replace")))
     return tuple(found)
+
+
+def _few(xml: bytes) -> Cells | None:
+    # The same answer as `_scan`, in less time where there are few cells.
+    found = _PLAIN_CELL.findall(xml)
+    if not found or len(found) != len(_ANY_CELL.findall(xml)) or any(int(row) == 0 for _, row in found):
+        return None
+    rows = np.array([int(row) for _, row in found])
+    return Cells(rows, np.array([_column(letters.decode()) for letters, _ in found]))
 
 
 def _scan(xml: bytes) -> Cells | None:

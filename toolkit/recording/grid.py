@@ -12,7 +12,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -137,23 +137,28 @@ def _decimals(
     """
     length = stops - starts
     width = int(min(length.max(), _EXACT))
-    back = np.arange(width)
-    text = octets[stops[:, None] - 1 - back]  # from the last character back, and into what stands before
-    text[back >= length[:, None]] = 0
+    back = np.arange(width, dtype=np.uint8)[:, None]
+    text = octets[stops - 1 - back]  # (width, texts): from the last character back, beyond the first one too
+    text *= back < np.minimum(length, _EXACT).astype(np.uint8)
     digit = text - np.uint8(ord("0"))  # wraps round for whatever is none
     is_digit = digit < 10
-    digit[~is_digit] = 0
-    dot = (text == ord(".")).astype(np.float64) @ np.stack([back + 1.0, np.ones(width)], axis=1)
-    after, dots = dot[:, 0], dot[:, 1]  # decimals + 1 where there is a single point
+    digit *= is_digit
+    dot = text == ord(".")
+    dots, after = _sum(dot), _sum(dot * (back + np.uint8(1)))  # after: decimals + 1, of a single point
     minus = octets[starts] == ord("-")
-    counted = is_digit.sum(axis=1)
+    counted = _sum(is_digit)
     known = (length <= _EXACT) & (dots <= 1) & (counted > 0) & (counted + dots + minus == length)
     # A point counts as a digit 0 so far: the digits before it come down by one place.
-    decimals = np.where(known & (dots > 0), after, 1.0).astype(np.int64) - 1
-    whole = digit.astype(np.float64) @ _TEN[:width]
+    decimals = np.where(known & (dots > 0), after, 1) - 1
+    whole = _TEN[:width] @ digit.astype(np.float64)
     below = np.fmod(whole, _TEN[decimals + 1])
     size = np.where(dots > 0, below + (whole - below) / 10, whole) / _TEN[decimals]
     return np.where(minus, -size, size), known
+
+
+def _sum(counts: NDArray[Any]) -> NDArray[np.uint8]:
+    total: NDArray[np.uint8] = counts.sum(axis=0, dtype=np.uint8)  # of 15 places each at most 15
+    return total
 
 
 @lru_cache(maxsize=16)
