@@ -203,11 +203,6 @@ def test_bad_csv(read, old, new, kind, rule):
     refused(read, data.encode("latin-1" if rule == "encoding" else "utf-8"), kind, rule)
 
 
-def test_a_semicolon_file_with_decimal_commas_is_not_guessed_at(read):
-    text = CSV.replace(",", ";").replace(".", ",")
-    assert "'248,8146'" in refused(read, text.encode(), CellError, "text-cell").got
-
-
 def test_other_text(read):
     refused(read, b"dear reader, this is a letter", UnreadableError, "not-a-workbook")
     refused(read, ",".join(HEADERS).encode(), UnreadableError, "no-data")

@@ -64,7 +64,7 @@ def gate(path: Path, data: bytes | None = None) -> Gated:
         data = _bytes(path)
     kind = sniff(data)
     if kind.id in _PLAIN:
-        return Gated(path=path, data=data, sha256=sha256_bytes(data), kind=kind.id, members={})
+        return Gated(path=path, data=data, sha256=sha256_bytes(data), kind=_PLAIN[kind.id], members={})
     if kind.id in _WALKED:
         members = _WALKED[kind.id](data, path)
         return Gated(path=path, data=data, sha256=sha256_bytes(data), kind=kind.id, members=members)
@@ -157,7 +157,7 @@ def _walk_tdms(data: bytes, where: Path) -> Mapping[str, bytes]:
     return {}
 
 
-_PLAIN = ("text", "lvm")
+_PLAIN = {"text": "text", "utf-16": "text", "lvm": "lvm"}
 _WALKED = {"mat": _walk_mat, "mdf": _walk_mdf, "tdms": _walk_tdms}
 
 

@@ -18,7 +18,7 @@ import numpy as np
 
 from toolkit.errors import ColumnError, RecordingError, UnreadableError
 from toolkit.machine import Machine
-from toolkit.recording.csvfile import number_or_text
+from toolkit.recording.dialect import number_or_text
 from toolkit.recording.formats.vectors import Vector, Vectors, one_table
 from toolkit.recording.table import judge, refuse_cell
 from toolkit.recording.walks.refuse import damaged, truncated
@@ -217,9 +217,7 @@ def _values(
     values = []
     for line, fields in rows:
         text = fields[place] if place < len(fields) else ""
-        if decimal == ",":
-            text = text.replace(".", "?").replace(",", ".")
-        value = number_or_text(text)
+        value = number_or_text(text, decimal)
         rule, got = judge(value)
         if rule is not None:
             refuse_cell(rule, got, str(gated.path), line, place + 1, name)
