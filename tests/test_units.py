@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from toolkit.errors import UnitError
-from toolkit.units import _EXACT, _parse, from_si, registry, si_scale, to_si, unit
+from toolkit.units import _EXACT, _parse, from_si, in_both, registry, si_scale, to_si, unit
 
 # NIST SP 811 (2008), appendix B: exact where it prints a bold factor.
 PUBLISHED = {
@@ -26,6 +26,19 @@ def test_published_factors(text: str) -> None:
     factor, si = PUBLISHED[text]
     assert unit(text).factor == pytest.approx(factor, rel=1e-14)
     assert unit(text).si == si
+
+
+@pytest.mark.parametrize(
+    ("si", "text", "spec", "told"),
+    [
+        (444.82216152605, "N", ".1f", "444.8 N (100.0 lbf)"),
+        (444.82216152605, "lbf", ".1f", "100.0 lbf (444.8 N)"),
+        (-13.558179483314, "N*m", ".2f", "-13.56 N·m (-10.00 lbf·ft)"),
+        (13.558179483314, "lbf*ft", ".3g", "10 lbf·ft (13.6 N·m)"),
+    ],
+)
+def test_what_is_said_in_one_system_is_said_in_the_other(si: float, text: str, spec: str, told: str) -> None:
+    assert in_both(si, text, spec) == told
 
 
 _PINT = {

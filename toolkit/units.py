@@ -275,6 +275,25 @@ def from_si(values: ArrayLike, text: str) -> NDArray[np.float64]:
     return (np.asarray(values, dtype=np.float64) - found.offset) / found.factor
 
 
+_BESIDE = {"N": "lbf", "lbf": "N", "N*m": "lbf*ft", "lbf*ft": "N*m"}
+
+
+def in_both(values: ArrayLike, text: str, spec: str = ".4g") -> str:
+    """Return forces [N] or moments [N·m] in a unit, and behind them in that of the other system.
+
+    What a finding says stands as it is in reports in SI and in reports in pounds.
+
+    >>> in_both([1112.06, 2522.2], "lbf", ".0f")
+    '250, 567 lbf (1112, 2522 N)'
+    """
+    shown = [
+        f"{', '.join(f'{one:{spec}}' for one in np.atleast_1d(from_si(values, unit_text)).tolist())} "
+        + unit_text.replace("*", "·")
+        for unit_text in (text, _BESIDE[text])
+    ]
+    return f"{shown[0]} ({shown[1]})"
+
+
 def si_scale(text: str, dimension: str | None = None, *, where: object = None) -> float:
     """Return the factor to SI of a unit without an offset, optionally of a demanded dimension.
 

@@ -107,7 +107,7 @@ def test_too_few_angles_are_a_finding_and_null() -> None:
     assert found.stiffness[0].slope_cornering is None
     assert found.stiffness[0].secant_cornering is not None
     assert [f.where for f in found.findings] == [
-        f"drum {rotation}, 899 lbf, FY and MZ" for rotation in ("forward", "reverse")
+        f"drum {rotation}, 899 lbf (4000 N), FY and MZ" for rotation in ("forward", "reverse")
     ]
 
 

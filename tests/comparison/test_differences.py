@@ -145,4 +145,4 @@ def test_what_lacks_is_said() -> None:
     other = conicity("b", 1.0, 2.0, loads=(5000.0, 6000.0))
     found, left_out = differences([one, other], level=0.05)
     assert found == ()
-    assert left_out == ("b has no plysteer", "b does not reach the load 4000 N")
+    assert left_out == ("b has no plysteer", "b does not reach the load 4000 N (899 lbf)")

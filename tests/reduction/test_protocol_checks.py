@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from pathlib import Path
 
 import numpy as np
@@ -95,6 +96,20 @@ def test_drift_between_repeats(
 ) -> None:
     found = reduced(folder(tmp_path, (0.0, 2.0, -2.0, 0.0), drift=drift), published_record)
     assert ("repeat-drift" in rules(found)) is told
+
+
+def test_a_finding_serves_reports_in_either_system(
+    tmp_path: Path, published_record: CalibrationRecord
+) -> None:
+    found = reduced(folder(tmp_path, (0.0, 2.0, -2.0, 0.0), drift=9.0), published_record)
+    drifts = {f.message[:2]: f.message for f in found.findings if f.rule == "repeat-drift"}
+    for channel, si, pounds, factor in (("FY", "N", "lbf", 4.4482216), ("MZ", "N·m", "lbf·ft", 1.3558179)):
+        if channel in drifts:
+            drift, same = re.search(rf"by (\S+) {si} \((\S+) {pounds}\);", drifts[channel]).groups()
+            assert float(drift) == pytest.approx(float(same) * factor, rel=0.01)
+    # The cells are off by 9 lbf together; 400 lbf are 400 x 4.4482 N.
+    assert "FY" in drifts
+    assert re.search(r"and [48]00 lbf \((1779|3559) N\)", drifts["FY"])
 
 
 def test_repeats_at_unlike_angles_are_compared_at_one(

@@ -36,7 +36,7 @@ def test_a_tenth_of_the_rows_several_times_too_large_is_told_with_its_worst_row(
     one = curve(channel, change=spoiled(rows, factor))
     (finding,) = found(one)
     assert (finding.rule, finding.level) == ("gross-outliers", "warning")
-    assert finding.where == f"{channel} at 3000 N"
+    assert finding.where == f"{channel} at 3000 N (674 lbf)"
     assert finding.message.startswith(f"{len(rows)} of {len(SA)} rows")
     truth = value(TRUTH[channel], SA)
     worst = max(rows, key=lambda row: abs(one.y[row] - truth[row]))

@@ -27,7 +27,7 @@ from toolkit.findings import Finding
 from toolkit.tires.evaluate import estimate_at
 from toolkit.tires.fit import fit_curves, why_not
 from toolkit.tires.model import Curve
-from toolkit.units import from_si
+from toolkit.units import in_both
 
 if TYPE_CHECKING:
     from toolkit.calibration.records.record import CalibrationRecord
@@ -157,11 +157,11 @@ def _refused_findings(
     found = []
     for (rotation, rule, text), channels in same.items():
         loads = dict.fromkeys(index for indices in channels.values() for index in indices)
-        where = ", ".join(f"{float(from_si(groups[index].load_N, 'lbf')):.0f}" for index in loads)
+        where = in_both([groups[index].load_N for index in loads], "lbf", ".0f")
         found.append(
             Finding(
                 rule=rule,
-                where=f"drum {rotation}, {where} lbf, {' and '.join(channels)}",
+                where=f"drum {rotation}, {where}, {' and '.join(channels)}",
                 message=f"{text}; what these curves feed is null",
             )
         )
@@ -169,7 +169,7 @@ def _refused_findings(
 
 
 def _where(group: Group) -> str:
-    return f"drum {group.rotation}, {float(from_si(group.load_N, 'lbf')):.0f} lbf"
+    return f"drum {group.rotation}, {in_both(group.load_N, 'lbf', '.0f')}"
 
 
 def _line_findings(directions: Sequence[Direction]) -> list[Finding]:
@@ -182,7 +182,7 @@ def _line_findings(directions: Sequence[Direction]) -> list[Finding]:
                 message = "the slip angles lie on one side of zero: stiffness and pull at SA = 0 are null"
                 found.append(Finding(rule="one-sided", where=_where(one.group), message=message))
             continue
-        for channel, fit in (("FY", one.fit.FY), ("MZ", one.fit.MZ)):
+        for channel, unit, fit in (("FY", "N", one.fit.FY), ("MZ", "N*m", one.fit.MZ)):
             if fit is None:
                 continue
             at_zero = estimate_at(fit, 0.0)
@@ -194,8 +194,9 @@ def _line_findings(directions: Sequence[Direction]) -> list[Finding]:
                     Finding(
                         rule="curve-against-line",
                         where=_where(one.group),
-                        message=f"{channel} at SA = 0 is {at_zero.value:.4g} by the curve and {line:.4g} by "
-                        "the line through the nearest points: look at the residuals",
+                        message=f"{channel} at SA = 0 is {in_both(at_zero.value, unit)} by the curve, "
+                        f"{in_both(line, unit)} by the line through the nearest points: look at the "
+                        "residuals",
                     )
                 )
     return found

@@ -16,7 +16,7 @@ from toolkit.comparison.pattern import pattern_effect
 from toolkit.comparison.precision import repeats_of
 from toolkit.errors import ConfigError
 from toolkit.findings import Finding
-from toolkit.units import from_si
+from toolkit.units import from_si, in_both
 
 if TYPE_CHECKING:
     from toolkit.calibration.records.record import CalibrationRecord
@@ -199,7 +199,7 @@ def _findings(
     outliers: dict[str, list[str]] = {}
     for one in repeats.precisions if repeats else ():
         if one.outlier:
-            outliers.setdefault(one.farthest, []).append(f"{one.name} at {one.load_N:.0f} N")
+            outliers.setdefault(one.farthest, []).append(f"{one.name} at {in_both(one.load_N, 'N', '.0f')}")
     for label, where in outliers.items():
         message = f"stands apart from the other repeats in {', '.join(where)} (Grubbs, Holm over the table)"
         found.append(Finding(rule="repeat-outlier", where=label, message=message, level="note"))

@@ -12,6 +12,7 @@ from toolkit.comparison.at_load import at_load
 from toolkit.comparison.holm import holm
 from toolkit.comparison.model import PARTS, Difference, Entry, Part
 from toolkit.comparison.quantities import CHARACTERISTICS, CURVES
+from toolkit.units import in_both
 
 Series = tuple[str, str, float | None]
 _SAME_ANGLE = 1e-6  # rad
@@ -108,6 +109,5 @@ def _left_out(label: str, lacking: dict[str, None], beyond: dict[float, None]) -
     if lacking:
         found.append(f"{label} has no {', '.join(lacking)}")
     if beyond:
-        loads = ", ".join(f"{load:.0f}" for load in beyond)
-        found.append(f"{label} does not reach the load {loads} N")
+        found.append(f"{label} does not reach the load {in_both(list(beyond), 'N', '.0f')}")
     return found

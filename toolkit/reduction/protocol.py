@@ -12,7 +12,7 @@ import numpy as np
 
 from toolkit.channels import Rotation
 from toolkit.findings import Finding
-from toolkit.units import from_si
+from toolkit.units import from_si, in_both
 
 if TYPE_CHECKING:
     from toolkit.machine import Protocol
@@ -104,22 +104,22 @@ def _missing(placed: Sequence[Placed], protocol: Protocol, rotations: Sequence[R
                 Finding(
                     rule="missing",
                     where=f"drum {rotation}",
-                    message=f"no file at slip angle {_list(gone, 'deg')}: the curves"
+                    message=f"no file at slip angle {_angles_told(gone)}: the curves"
                     + (", the +-1 deg secant" if _has_one_degree(gone) else "")
                     + " and what they feed lack it",
                 )
             )
         for step in steps:
-            where = f"drum {rotation}, slip angle {_list([step], 'deg')}"
+            where = f"drum {rotation}, slip angle {_angles_told([step])}"
             loads = [load for load in protocol.loads_N if (step, load) not in there]
             if step not in gone and loads:
-                message = f"no block at load {_list(loads, 'lbf')}"
+                message = f"no block at load {_loads_told(loads)}"
                 found.append(Finding(rule="missing", where=where, message=message))
             few = [load for load in protocol.loads_N if 0 < there[step, load] < protocol.times(step)]
             if few:
                 message = (
                     f"{min(there[step, load] for load in few)} of {protocol.times(step)} declared repeats "
-                    f"at load {_list(few, 'lbf')}"
+                    f"at load {_loads_told(few)}"
                 )
                 found.append(Finding(rule="missing-repeat", where=where, message=message))
     return found
@@ -133,7 +133,7 @@ def _doubled(placed: Sequence[Placed], later: Sequence[int]) -> list[Finding]:
         Finding(
             rule="doubled",
             where=file,
-            message=f"slip angle {_list([some[0].step_SA or 0.0], 'deg')}, drum {some[0].rotation}: "
+            message=f"slip angle {_angles_told([some[0].step_SA or 0.0])}, drum {some[0].rotation}: "
             f"{len(some)} block(s) of a condition that earlier files hold as often as "
             "the protocol declares; unused",
         )
@@ -149,12 +149,12 @@ def _angles(placed: Sequence[Placed], protocol: Protocol) -> list[Finding]:
         step = angles[0].step_SA
         if step is None:
             message = (
-                f"slip angle {_list([SA], 'deg')} is no step of the protocol; its blocks feed the curves only"
+                f"slip angle {_angles_told([SA])} is no step of the protocol; its blocks feed the curves only"
             )
         elif abs(SA - step) > protocol.slip_angle_tolerance_rad:
             message = (
-                f"slip angle {_list([SA], 'deg')} is out of tolerance of the step {_list([step], 'deg')} "
-                f"(+-{_list([protocol.slip_angle_tolerance_rad], 'deg')})"
+                f"slip angle {_angles_told([SA])} is out of tolerance of the step {_angles_told([step])} "
+                f"(+-{_angles_told([protocol.slip_angle_tolerance_rad])})"
             )
         else:
             continue
@@ -177,7 +177,7 @@ def _loads(placed: Sequence[Placed], protocol: Protocol) -> list[Finding]:
                 Finding(
                     rule="unplanned-load",
                     where=file,
-                    message=f"load {_list(unknown, 'lbf')} is none of the protocol's",
+                    message=f"load {_loads_told(unknown)} is none of the protocol's",
                 )
             )
         if off:
@@ -185,9 +185,9 @@ def _loads(placed: Sequence[Placed], protocol: Protocol) -> list[Finding]:
                 Finding(
                     rule="load-tolerance",
                     where=file,
-                    message=f"load {_list([p.FZ for p in off], 'lbf')} is more than "
+                    message=f"load {_loads_told([p.FZ for p in off])} is more than "
                     f"{protocol.load_tolerance:.0%} off the protocol's "
-                    f"{_list([p.step_FZ for p in off if p.step_FZ is not None], 'lbf')}",
+                    f"{_loads_told([p.step_FZ for p in off if p.step_FZ is not None])}",
                 )
             )
     return found
@@ -201,10 +201,10 @@ def _has_one_degree(steps: Sequence[float]) -> bool:
     return any(abs(abs(float(from_si(step, "deg"))) - 1) < 1e-9 for step in steps)
 
 
-def _list(values: Sequence[float], unit: str) -> str:
-    digits = 2 if unit == "deg" else 0
-    texts = []
-    for value in from_si(list(values), unit):
-        text = f"{value:.{digits}f}"
-        texts.append(text.rstrip("0").rstrip(".") if "." in text else text)
-    return f"{', '.join(texts)} {unit}"
+def _loads_told(loads: Sequence[float]) -> str:
+    return in_both(loads, "lbf", ".0f")
+
+
+def _angles_told(angles: Sequence[float]) -> str:
+    texts = [f"{value:.2f}".rstrip("0").rstrip(".") for value in from_si(list(angles), "deg")]
+    return f"{', '.join(texts)} deg"

@@ -9,7 +9,7 @@ import numpy as np
 
 from toolkit.channels import CHANNELS
 from toolkit.findings import Finding
-from toolkit.units import from_si, unit
+from toolkit.units import from_si, in_both, unit
 
 if TYPE_CHECKING:
     from toolkit.calibration.records.record import CalibrationRecord
@@ -126,8 +126,8 @@ def acquired_findings(files: Sequence[OpenedFile], record: CalibrationRecord) ->
             rule="acquired-differs",
             where=_some(list(dict.fromkeys(d.file for d in wrong))),
             message=f"FY and MZ in the file were not computed by {record.id}: they differ by up to "
-            f"{largest['FY']:.1f} N and {largest['MZ']:.2f} N·m; the values here are recomputed from the "
-            "cells (toolkit inspect tells which calibration wrote them)",
+            f"{in_both(largest['FY'], 'N', '.1f')} and {in_both(largest['MZ'], 'N*m', '.2f')}; the values "
+            "here are recomputed from the cells (toolkit inspect tells which calibration wrote them)",
         )
     ]
 

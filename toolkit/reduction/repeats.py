@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from toolkit.findings import Finding
-from toolkit.units import from_si
+from toolkit.units import from_si, in_both
 
 if TYPE_CHECKING:
     from toolkit.machine import Protocol
@@ -41,11 +41,11 @@ def drift_findings(conditions: Sequence[Condition], protocol: Protocol) -> list[
             if worst is None:
                 continue
             difference, limit, one = worst
-            angle, load = float(from_si(one.step_SA or 0.0, "deg")), float(from_si(one.step_FZ or 0.0, "lbf"))
+            angle = float(from_si(one.step_SA or 0.0, "deg"))
             message = (
                 f"{channel} drifts between repeats in {count} condition(s), at {angle:g} deg and "
-                f"{load:.0f} lbf by {difference:.3g} {unit.replace('*', '·')}; "
-                f"{limit:.3g} are tolerated"
+                f"{in_both(one.step_FZ or 0.0, 'lbf', '.0f')} by {in_both(difference, unit, '.3g')}; "
+                f"{in_both(limit, unit, '.3g')} are tolerated"
             )
             found.append(Finding(rule="repeat-drift", where=f"drum {rotation}", message=message))
     return found

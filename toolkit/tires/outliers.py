@@ -16,6 +16,7 @@ from toolkit.findings import Finding
 from toolkit.tires.evaluate import value_at
 from toolkit.tires.fit import Curve, fit_curves
 from toolkit.tires.model import CHANNEL_UNIT, CurveFit
+from toolkit.units import in_both
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -46,11 +47,11 @@ def gross_outliers(curves: Sequence[Curve], fits: Sequence[CurveFit]) -> tuple[F
         )
         if away.any():
             worst, unit = int(np.argmax(size)), CHANNEL_UNIT[curve.channel]
-            load = "all loads" if curve.load_N is None else f"{curve.load_N:.0f} N"
+            load = "all loads" if curve.load_N is None else in_both(curve.load_N, "N", ".0f")
             text = (
                 f"{int(away.sum())} of {len(size)} rows lie far from the curve of the others, the farthest "
-                f"{curve.y[worst]:.5g} {unit} at {np.degrees(curve.SA[worst]):.2f} deg, by "
-                f"{size[worst]:.4g} {unit}: least squares follows them"
+                f"{in_both(curve.y[worst], unit, '.5g')} at {np.degrees(curve.SA[worst]):.2f} deg, by "
+                f"{in_both(size[worst], unit)}: least squares follows them"
             )
             found.append(Finding(rule="gross-outliers", where=f"{curve.channel} at {load}", message=text))
     return tuple(found)

@@ -18,6 +18,7 @@ from toolkit.tires.model import CurveFit, Loss, TireModel
 from toolkit.tires.outliers import gross_outliers
 from toolkit.tires.possible import size_findings
 from toolkit.tires.table import TireTable
+from toolkit.units import in_both
 
 # Sign of dy/dSA at small angles of a tire, see `toolkit.channels`.
 _SLOPE_SIGN: dict[Axes, dict[str, int]] = {
@@ -121,7 +122,7 @@ def fit_findings(fits: list[CurveFit]) -> list[Finding]:
     """Return a finding for every fit whose minimum is not confirmed, and a note for every limitation."""
     found = []
     for fit in fits:
-        load = "all loads" if fit.load_N is None else f"{fit.load_N:.0f} N"
+        load = "all loads" if fit.load_N is None else in_both(fit.load_N, "N", ".0f")
         where = f"{fit.model} {fit.channel} at {load}"
         if not fit.converged:
             found.append(Finding(rule="not-converged", where=where, message=fit.message))
