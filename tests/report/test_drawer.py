@@ -8,28 +8,38 @@ from toolkit.report.drawer import Drawer
 from toolkit.report.figures import Picture, draw
 
 
-def test_workers_draw_what_one_process_draws() -> None:
+@pytest.mark.parametrize("hands", [1, 2, 5])
+def test_a_worker_draws_what_this_process_draws_with_any_number_of_hands(hands: int) -> None:
     plots = dict(list(build_content(make_result(), make_record()).plots.items())[:3])
-    with Drawer(workers=2) as drawer:
+    with Drawer(hands=hands) as drawer:
         drawn = dict(drawer.pictures(plots))
     assert drawn == {name: draw(plot) for name, plot in plots.items()}
 
 
 def test_a_worker_that_died_costs_no_report() -> None:
     plots = dict(list(build_content(make_result(), make_record()).plots.items())[:1])
-    with Drawer(workers=1) as drawer:
-        drawer._workers[0].kill()
+    with Drawer(hands=1) as drawer:
+        drawer._worker.kill()
         assert drawer.pictures(plots)[next(iter(plots))].png.startswith(b"\x89PNG")
 
 
 def test_what_a_dying_worker_left_is_drawn_and_nobody_waits_for_it() -> None:
     plots = dict(list(build_content(make_result(), make_record()).plots.items())[:3])
-    with Drawer(workers=1) as drawer:
+    with Drawer(hands=1) as drawer:
         drawn = drawer.pictures(plots)
         first, *rest = plots
         assert drawn[first].png.startswith(b"\x89PNG")
-        drawer._workers[0].kill()
+        drawer._worker.kill()
         assert all(drawn[name].png.startswith(b"\x89PNG") for name in rest)
+
+
+def test_figures_larger_than_a_pipe_come_from_both_hands() -> None:
+    plots = build_content(make_result(), make_record()).plots
+    with Drawer(hands=2) as drawer:
+        drawn = dict(drawer.pictures(plots))
+    assert list(drawn) == list(plots)
+    # A pipe of Linux holds 64 kB.
+    assert sum(len(one.png) for one in list(drawn.values())[1::2]) > 2**16
 
 
 def test_an_error_of_a_figure_is_raised_where_it_is_asked_for(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -38,7 +48,7 @@ def test_an_error_of_a_figure_is_raised_where_it_is_asked_for(monkeypatch: pytes
 
     monkeypatch.setattr("toolkit.report.drawer.draw", broken)
     plots = dict(list(build_content(make_result(), make_record()).plots.items())[:1])
-    with Drawer(workers=1) as drawer:
-        drawer._workers[0].kill()
+    with Drawer(hands=1) as drawer:
+        drawer._worker.kill()
         with pytest.raises(ArithmeticError, match="cannot be drawn"):
             drawer.pictures(plots)[next(iter(plots))]

@@ -1,7 +1,8 @@
-"""Draw a report's figures in processes of their own, while the document is read and filled.
+"""Draw a report's figures in a process of their own, while the document is read and filled.
 
 matplotlib's import and its drawing are half of what a report costs in Python; started first, they run
-beside the reduction of the test and the preparation of LibreOffice.
+beside the reduction of the test and the preparation of LibreOffice. The import is paid for once: the process
+divides itself among the cores only when it has figures to draw.
 """
 
 from __future__ import annotations
@@ -11,29 +12,28 @@ import os
 import pickle
 import subprocess
 import sys
+import threading
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 from types import TracebackType
+from typing import IO
 
 from toolkit.report.content import Plot
 from toolkit.report.figures import Picture, draw
 
 
 class Drawer:
-    """Workers that import matplotlib at once and draw when they are asked to. A context manager."""
+    """A worker that imports matplotlib at once and draws when it is asked to. A context manager."""
 
-    def __init__(self, *, workers: int | None = None) -> None:
-        """Start the workers; by default one a core, two at most."""
-        count = min(2, os.cpu_count() or 1) if workers is None else workers
+    def __init__(self, *, hands: int | None = None) -> None:
+        """Start the worker; it draws with so many processes, by default one a core, two at most."""
+        count = min(2, os.cpu_count() or 1) if hands is None else hands
         # -P: a folder named toolkit where the user happens to stand must not be imported.
-        command = [sys.executable, "-P", "-m", "toolkit.report.drawer"]
-        self._workers = [
-            subprocess.Popen(
-                command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL
-            )
-            for _ in range(count)
-        ]
-        self._pool = ThreadPoolExecutor(max_workers=max(1, count))
+        command = [sys.executable, "-P", "-m", "toolkit.report.drawer", str(count)]
+        self._worker = subprocess.Popen(
+            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL
+        )
+        self._pool = ThreadPoolExecutor(max_workers=1)
         self._closed = False
 
     def __enter__(self) -> Drawer:
@@ -45,25 +45,20 @@ class Drawer:
         self.close()
 
     def close(self) -> None:
-        """End the workers."""
+        """End the worker; a process that draws beside it ends where its figures are no longer taken."""
         self._closed = True
-        for worker in self._workers:
-            worker.kill()
+        self._worker.kill()
         self._pool.shutdown()
-        for worker in self._workers:
-            worker.wait()
-            for stream in (worker.stdin, worker.stdout):
-                if stream is not None and not stream.closed:
-                    with contextlib.suppress(OSError):  # an order that the killed worker did not take
-                        stream.close()
-        self._workers = []
+        self._worker.wait()
+        for stream in (self._worker.stdin, self._worker.stdout):
+            if stream is not None and not stream.closed:
+                with contextlib.suppress(OSError):  # an order that the killed worker did not take
+                    stream.close()
 
     def pictures(self, plots: Mapping[str, Plot]) -> Mapping[str, Picture]:
         """Return the drawn figures by name; a look-up waits until its figure is there."""
         waiting: dict[str, Future[Picture]] = {name: Future() for name in plots}
-        shares = [dict(list(plots.items())[i :: len(self._workers)]) for i in range(len(self._workers))]
-        for worker, share in zip(self._workers, shares, strict=True):
-            self._pool.submit(_ask, worker, share, waiting, lambda: self._closed)
+        self._pool.submit(_ask, self._worker, dict(plots), waiting, lambda: self._closed)
         return _Waiting(waiting)
 
 
@@ -86,21 +81,21 @@ class _Waiting(Mapping[str, Picture]):
 
 def _ask(
     worker: subprocess.Popen[bytes],
-    share: dict[str, Plot],
+    plots: dict[str, Plot],
     waiting: Mapping[str, Future[Picture]],
     closed: Callable[[], bool],
 ) -> None:
-    """Give a worker its share; each figure is there as soon as it is drawn: filling goes on beside."""
+    """Give the worker its order; each figure is there as soon as it is drawn: filling goes on beside."""
     assert worker.stdin is not None  # noqa: S101  both are pipes
     assert worker.stdout is not None  # noqa: S101
     # A worker that could not start or was killed costs time, not the report: what is left is drawn here.
     with contextlib.suppress(Exception):
-        worker.stdin.write(pickle.dumps(share))
+        worker.stdin.write(pickle.dumps(plots))
         worker.stdin.close()
-        for _ in share:
+        for _ in plots:
             name, picture = pickle.load(worker.stdout)  # noqa: S301  our own child wrote it
             waiting[name].set_result(picture)
-    for name, plot in share.items():
+    for name, plot in plots.items():
         if waiting[name].done():
             continue
         if closed():
@@ -112,18 +107,58 @@ def _ask(
             waiting[name].set_exception(error)
 
 
-def _work() -> None:
+def _work(hands: int) -> None:
     import matplotlib.backends.backend_agg
     import matplotlib.figure
     import matplotlib.ticker  # noqa: F401  imported before the order comes
 
     order = sys.stdin.buffer.read()
     if order:
-        share: dict[str, Plot] = pickle.loads(order)  # noqa: S301  our own parent wrote it
-        for name, plot in share.items():
-            sys.stdout.buffer.write(pickle.dumps((name, draw(plot))))
-            sys.stdout.buffer.flush()
+        plots: dict[str, Plot] = pickle.loads(order)  # noqa: S301  our own parent wrote it
+        names = list(plots)
+        # What draws beside inherits matplotlib, which a process of its own would have to import again.
+        beside = [_beside({name: plots[name] for name in names[i::hands]}) for i in range(1, hands)]
+        told = threading.Lock()
+        threads = [threading.Thread(target=_pass_on, args=(drawn, told)) for drawn in beside]
+        for thread in threads:
+            thread.start()
+        for name in names[::hands]:
+            _tell(name, draw(plots[name]), told)
+        for thread in threads:
+            thread.join()
+
+
+def _pass_on(drawn: IO[bytes], told: threading.Lock) -> None:
+    # Taken as it comes: a pipe holds one figure or two, and its writer would stand still.
+    with contextlib.suppress(EOFError):
+        while True:
+            name, picture = pickle.load(drawn)  # noqa: S301  a copy of this process wrote it
+            _tell(name, picture, told)
+
+
+def _tell(name: str, picture: Picture, told: threading.Lock) -> None:
+    with told:
+        sys.stdout.buffer.write(pickle.dumps((name, picture)))
+        sys.stdout.buffer.flush()
+
+
+def _beside(share: dict[str, Plot]) -> IO[bytes]:
+    """Draw a share in a copy of this process and return the stream that its figures come from."""
+    reading, writing = os.pipe()
+    if os.fork():
+        os.close(writing)
+        return os.fdopen(reading, "rb")
+    # The parent's end is seen by whoever reads from it only where no copy holds its output open.
+    sys.stdout.close()
+    os.close(reading)
+    try:
+        with os.fdopen(writing, "wb") as out:
+            for name, plot in share.items():
+                out.write(pickle.dumps((name, draw(plot))))
+                out.flush()
+    finally:
+        os._exit(0)
 
 
 if __name__ == "__main__":
-    _work()
+    _work(int(sys.argv[1]))
