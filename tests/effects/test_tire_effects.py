@@ -124,7 +124,7 @@ def test_relaxation_is_first_order_in_the_distance_rolled():
     step = np.where(t > 0, 1e-3, 0.0)
     for V in (1.0, 2.0):
         d = driven(step, t=t, V=V)
-        made = effect("relaxation").drive(d, {"relaxation_length": 0.5}, setting(t), tire)
+        made = effect("relaxation").drive(d, {"relaxation_length": 0.5, "falling": 0.0}, setting(t), tire)
         at = np.searchsorted(t, 0.5 / V)  # one relaxation length
         # within the first interval the angle is a ramp: half an interval early
         assert made.SA[at] / 1e-3 == pytest.approx(1 - np.exp(-1), abs=2e-3)
@@ -133,12 +133,12 @@ def test_relaxation_is_first_order_in_the_distance_rolled():
 
 def test_relaxation_follows_the_cornering_stiffness_and_keeps_a_steady_angle():
     d = driven(0.05, 2000.0)
-    made = effect("relaxation").drive(d, {"relaxation_length": 0.5}, setting(d.t), tire)
+    made = effect("relaxation").drive(d, {"relaxation_length": 0.5, "falling": 0.0}, setting(d.t), tire)
     np.testing.assert_allclose(made.SA, 0.05, rtol=1e-12)
     # this tire's stiffness is in proportion to the load: half the load, half the length
     t = np.linspace(0.0, 4.0, 4001)
     ramp = driven(1e-3 * t, 2000.0, t=t, V=1.0)
-    late = effect("relaxation").drive(ramp, {"relaxation_length": 0.5}, setting(t), tire)
+    late = effect("relaxation").drive(ramp, {"relaxation_length": 0.5, "falling": 0.0}, setting(t), tire)
     assert (ramp.SA - late.SA)[-1] == pytest.approx(1e-3 * 0.25, rel=1e-3)  # rate * sigma / V
 
 

@@ -5,11 +5,12 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from toolkit.diagnosis import ripple
 from toolkit.diagnosis.kinds.forces import LEAST_REACH
 from toolkit.diagnosis.model import DISCRETE, Active
 from toolkit.diagnosis.nuisance import INPUT_NOISE
@@ -17,6 +18,7 @@ from toolkit.diagnosis.units_of import channel_unit
 from toolkit.effects.catalogue import effects
 from toolkit.effects.creep import FROM_REST
 from toolkit.effects.effect import Effect, EffectParameter
+from toolkit.effects.thermal_friction import TEMPERATURES
 from toolkit.effects.unit_error import factors_for
 from toolkit.errors import UnitError
 from toolkit.units import unit
@@ -39,11 +41,37 @@ _SHORT = 0.05  # of the position's spread: the longest distance over which dry f
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Start:
-    """One way to switch a candidate on: its full values, and one set of values for each direction."""
+    """One way to switch a candidate on: its full values, and one set of values for each direction.
+
+    ``amplitudes`` names for each direction the parameter that is on in it; an amplitude with a phase has
+    two, a quarter of a cycle apart, and ``phases`` names its phase.
+    """
 
     values: dict[str, float]
     directions: tuple[dict[str, float], ...]
     amplitudes: tuple[str, ...]
+    phases: dict[str, str] = field(default_factory=dict)
+
+    def reached(self, coefficients: Sequence[float], off: dict[str, float]) -> dict[str, float]:
+        """Return the values that a linear combination of the directions stands for.
+
+        Parameters
+        ----------
+        coefficients : one for each direction
+        off : of every amplitude the value at which the effect is not there, those without one left out
+        """
+        made = dict(self.values)
+        for name in dict.fromkeys(self.amplitudes):
+            if name not in off:
+                continue
+            own = [c for one, c in zip(self.amplitudes, coefficients, strict=True) if one == name]
+            size = self.values[name] - off[name]
+            if name in self.phases:
+                made[name] = off[name] + math.hypot(*own) * size
+                made[self.phases[name]] = math.degrees(math.atan2(own[1], own[0]))
+            else:
+                made[name] = off[name] + own[0] * size
+        return made
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -83,14 +111,15 @@ def candidates(problem: Problem) -> tuple[Candidate, ...]:
 
 
 def _as_known(problem: Problem, effect: Effect) -> Effect:
-    """Return an effect without the reference load as a parameter, where the tire's own file states it."""
-    if effect.name != "load_friction" or getattr(problem.model, "nominal_load_N", None) is None:
-        return effect
-    return replace(
-        effect,
-        equation="friction = 1 + sensitivity * (FZ - FZ0)/FZ0, FZ0 the nominal load",
-        parameters=tuple(one for one in effect.parameters if one.name != "reference"),
-    )
+    """Return an effect without the parameters that mean nothing in a case: nobody should search for them."""
+    needless: set[str] = set()
+    if effect.name == "load_friction" and getattr(problem.model, "nominal_load_N", None) is not None:
+        needless = {"reference"}  # the tire's own file states the load
+        effect = replace(effect, equation="friction = 1 + sensitivity * (FZ - FZ0)/FZ0, FZ0 the nominal load")
+    if effect.name == "thermal_friction":
+        recorded = {one.name for one in problem.case.drivers} & set(TEMPERATURES)
+        needless = {"time_constant" if recorded else "reference"}
+    return replace(effect, parameters=tuple(one for one in effect.parameters if one.name not in needless))
 
 
 def _within_reach(problem: Problem, active: Active) -> Active:
@@ -120,12 +149,14 @@ def _starts(problem: Problem, active: Active) -> tuple[Start, ...]:
     scales = {one.name: _scale(problem, active, one) for one in effect.parameters}
     extra = {f"_size_{one.name}": scales[one.name] * _middle(one) for one in effect.parameters}
     extra |= _smoothing(problem, active) | _span(problem, active)
-    shapes = [one for one in effect.parameters if one.off is None]
+    phases = {one.phase_of: one.name for one in effect.parameters if one.phase_of is not None}
+    still = dict.fromkeys(phases.values(), 0.0)
+    shapes = [one for one in effect.parameters if one.off is None and one.phase_of is None]
     amplitudes = [one for one in effect.parameters if one.off is not None]
     made = []
-    grids = [[v * scales[one.name] for v in _grid(problem, one)] for one in shapes]
+    grids = [_tried(problem, active, one, scales[one.name]) for one in shapes]
     for before, shape in itertools.product(_histories(effect), itertools.product(*grids)):
-        fixed = dict(zip((one.name for one in shapes), shape, strict=True)) | extra | before
+        fixed = dict(zip((one.name for one in shapes), shape, strict=True)) | extra | before | still
         off = {one.name: float(one.off or 0.0) for one in amplitudes}
         if len(amplitudes) == 1 and amplitudes[0].starts:
             one = amplitudes[0]
@@ -133,14 +164,24 @@ def _starts(problem: Problem, active: Active) -> tuple[Start, ...]:
                 values = fixed | {one.name: value * scales[one.name]}
                 made.append(Start(values=values, directions=(values,), amplitudes=(one.name,)))
             continue
-        directions = [fixed | off | {one.name: _middle(one) * scales[one.name]} for one in amplitudes]
+        directions, names = [], []
+        for one in amplitudes:
+            alone = fixed | off | {one.name: _middle(one) * scales[one.name]}
+            for turned in (0.0, 90.0) if one.name in phases else (None,):
+                directions.append(alone if turned is None else alone | {phases[one.name]: turned})
+                names.append(one.name)
         values = fixed | {one.name: _middle(one) * scales[one.name] for one in amplitudes}
         made.append(
-            Start(
-                values=values, directions=tuple(directions), amplitudes=tuple(one.name for one in amplitudes)
-            )
+            Start(values=values, directions=tuple(directions), amplitudes=tuple(names), phases=phases)
         )
     return tuple(made)
+
+
+def _tried(problem: Problem, active: Active, one: EffectParameter, scale: float) -> list[float]:
+    """Return the values of a shape from which a search starts."""
+    if active.effect.name == ripple.NAME and one.name == "period":
+        return list(ripple.periods(problem, active.channel))
+    return [value * scale for value in _grid(problem, one)]
 
 
 def _grid(problem: Problem, one: EffectParameter) -> tuple[float, ...]:

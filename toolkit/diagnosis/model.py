@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Protocol
 
@@ -15,6 +15,8 @@ if TYPE_CHECKING:
     from toolkit.diagnosis.case import CaseParameter, Run
 
     Arrays = dict[str, NDArray[np.float64]]
+    # Positions of shape (n,) to force-like terms of shape (n, forces)
+    Pattern = Callable[[NDArray[np.float64]], NDArray[np.float64]]
 
 
 # Effects that are there or not: nothing of them is fitted.
@@ -58,7 +60,8 @@ class Model(Protocol):
     """A simulation that can be run with effects in it.
 
     ``places`` says for an effect where it could act: pairs of channel and source. An effect without a
-    place is not applicable to this case, and ``why_not`` says why.
+    place is not applicable to this case, and ``why_not`` says why. One in which something moves has two
+    methods more: ``way`` and ``pushed`` (see `toolkit.diagnosis.ripple`).
     """
 
     outputs: tuple[Output, ...]

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from toolkit.diagnosis.case import Case, CaseParameter, Run
+    from toolkit.diagnosis.model import Pattern
 
     Stacked = dict[str, NDArray[np.float64]]
 
@@ -71,6 +72,27 @@ class Problem:
         sets = [(self.known | dict(zip(names, map(float, p), strict=True)), active) for p, active in wanted]
         for run in self.runs:
             prepare(run, sets)
+
+    def pushed(
+        self, p: Sequence[float], active: Sequence[Active], one: Active, pattern: Pattern, forces: int
+    ) -> Stacked:
+        """Return linear responses of every output over all runs to small forces, (rows, forces).
+
+        What acts on a channel already is taken row by row: a channel that is saturated shows nothing.
+
+        Parameters
+        ----------
+        one : where and in which runs they act
+        pattern : positions (n,) to forces (n, forces)
+        """
+        values = dict(self.known)
+        values.update(zip((each.name for each in self.free), map(float, p), strict=True))
+        parts: dict[str, list[NDArray[np.float64]]] = {name: [] for name in self.names}
+        for run in self.runs:
+            made = self.model.pushed(run, values, active, one.channel, pattern) if one.acts_in(run) else {}  # type: ignore[attr-defined]
+            for name, column in parts.items():
+                column.append(made.get(name, np.zeros((run.rows, forces))))
+        return {name: np.concatenate(column) for name, column in parts.items()}
 
     def sd_of(self, name: str) -> float | None:
         """Return the stated noise of an output."""

@@ -8,12 +8,14 @@ remains: a noise that was estimated with the effect in it would hide the effect.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from toolkit.diagnosis import ripple
 from toolkit.diagnosis.candidates import Candidate, Start
 from toolkit.diagnosis.fit import Fit, jacobian, log_prior
 from toolkit.diagnosis.model import Active
@@ -28,6 +30,7 @@ if TYPE_CHECKING:
     Stacked = dict[str, NDArray[np.float64]]
 
 _TURNS = 2
+_OF_ONE = 6  # starts of one candidate whose gain is made exact
 _SHORT, _LEAST_TRUST = 10.0, 0.3
 _COLLINEAR = 1e-11  # of the largest eigenvalue: what lies below adds nothing that could be told apart
 
@@ -108,6 +111,7 @@ class Screen:
         listed = [
             replace(one.active, values=values)
             for one in candidates
+            if one.name != ripple.NAME
             for start in one.starts
             for values in start.directions
         ]
@@ -116,18 +120,7 @@ class Screen:
     def score(self, candidate: Candidate) -> list[Scored]:
         """Return a candidate with its quick gains, one for each start that the simulation can run."""
         made = []
-        for start in candidate.starts:
-            responses = []
-            try:
-                for values in start.directions:
-                    one = replace(candidate.active, values=values)
-                    moved = self.problem.simulate(self.base.p, (*self.base.active, one))
-                    responses.append({name: moved[name] - self.base.simulated[name] for name in moved})
-            except FitError:
-                continue
-            directions = {
-                name: np.stack([one[name] for one in responses], axis=1) for name in self.problem.names
-            }
+        for start, directions in zip(candidate.starts, self._directions(candidate), strict=True):
             # Rows that do not count (a cell was lost there) may be without a response.
             counted = [one[self.layouts[name].index] for name, one in directions.items()]
             if not any(np.isfinite(one).all() and np.abs(one).max(initial=0.0) > 0 for one in counted):
@@ -147,6 +140,26 @@ class Screen:
                 )
             )
         return made
+
+    def _directions(self, candidate: Candidate) -> Iterator[Stacked]:
+        """Give the responses of every start, nothing for one that the simulation cannot run."""
+        if candidate.name == ripple.NAME:
+            try:
+                yield from ripple.responses(self.problem, self.base, candidate)
+            except FitError:
+                yield from ({} for _ in candidate.starts)
+            return
+        for start in candidate.starts:
+            responses = []
+            try:
+                for values in start.directions:
+                    one = replace(candidate.active, values=values)
+                    moved = self.problem.simulate(self.base.p, (*self.base.active, one))
+                    responses.append({name: moved[name] - self.base.simulated[name] for name in moved})
+            except FitError:
+                yield {}
+                continue
+            yield {name: np.stack([one[name] for one in responses], axis=1) for name in self.problem.names}
 
     def quick(self, directions: Stacked, *, fixed: bool = False) -> tuple[float, NDArray[np.float64]]:
         """Return twice the gain at a fixed noise, the better of two, and the responses' orthonormal block."""
@@ -190,19 +203,29 @@ class Screen:
 
     def sharpened(self, scored: Sequence[Scored], most: int) -> list[Scored]:
         """Return all of them, the ``most`` best with their exact gain and the values that reach it."""
-        ranked = sorted(scored, key=lambda one: -one.gain)
-        made = [self._exact(one) for one in ranked[:most]]
+        first: list[Scored] = []
+        later: list[Scored] = []
+        seen = Counter[object]()
+        for one in sorted(scored, key=lambda one: -one.gain):
+            seen[one.candidate.key] += 1
+            chosen = len(first) < most and seen[one.candidate.key] <= _OF_ONE
+            (first if chosen else later).append(one)
+        made = [self._exact(one) for one in first]
         least = min((one.gain for one in made), default=0.0)
         # What was not sharpened keeps its quick gain, but never ranks before what was.
-        return [*made, *(replace(one, gain=min(one.gain, least)) for one in ranked[most:])]
+        return [*made, *(replace(one, gain=min(one.gain, least)) for one in later)]
 
     def _exact(self, one: Scored) -> Scored:
         gain, coefficients, trust = self.gain(one.directions, fixed=one.candidate.discrete)
-        values = dict(one.start.values)
-        for name, c in zip(one.start.amplitudes, coefficients, strict=False):
-            off = next(each.off for each in one.active.effect.parameters if each.name == name) or 0.0
-            if math.isfinite(off) and not one.candidate.discrete:
-                values[name] = off + c * (one.start.values[name] - off)
+        if one.candidate.discrete:
+            return replace(one, gain=gain, trust=trust)
+        known = {each.name: each for each in one.active.effect.parameters}
+        amplitudes = {name: known[name] for name in one.start.amplitudes}
+        off = {name: each.off or 0.0 for name, each in amplitudes.items() if math.isfinite(each.off or 0.0)}
+        values = one.start.reached(coefficients, off) if coefficients else dict(one.start.values)
+        if len(off) == 1 and any(values[name] < known[name].bounds[0] for name in off):
+            # The other sign would fit, and the effect has one only.
+            gain = 0.0
         return replace(one, gain=gain, trust=trust, active=replace(one.active, values=values))
 
     def gain(self, directions: Stacked, *, fixed: bool = False) -> tuple[float, tuple[float, ...], float]:

@@ -204,12 +204,14 @@ def _is_nuisance(step: Step, steps: Sequence[Step]) -> bool:
 
 def _shapes(one: Active) -> int:
     """Return how many parameters only shape an effect: they make it no less able to imitate another."""
-    return sum(each.off is None for each in one.searched)
+    return sum(each.off is None and not each.ends_count for each in one.searched)
 
 
 def _at_bound(one: Active) -> bool:
     """Tell whether a parameter ends at a bound other than zero: then the effect only imitates another."""
     for parameter in one.searched:
+        if parameter.ends_count:
+            continue
         value = one.values[parameter.name]
         for bound in parameter.bounds:
             if math.isfinite(bound) and bound != 0 and abs(value - bound) < _BOUND * abs(bound):
@@ -260,7 +262,7 @@ def _best_step(
         made = _fitted(problem, base, one.active)
         if made is None:
             continue
-        penalty = weight * len(one.active.searched)
+        penalty = weight * sum(not each.ends_count for each in one.active.searched)
         tried.append((made.log_posterior - penalty, one, made))
     tried.sort(key=lambda each: -each[0])
     for score, one, made in tried[:3]:

@@ -42,6 +42,9 @@ class EffectParameter:
     the effect is not there (None: it has no such value, another parameter switches it off); ``typical`` the
     range in ``unit``, in which a search starts; where ``relative`` it is in units of the channel's spread.
     ``absent`` is what a file means that does not have the parameter, None where every file must have it.
+    ``ends_count`` says that the bounds are values like any other; elsewhere an estimate at a bound shows
+    that the effect only imitates another. ``phase_of`` names the amplitude whose phase this is [deg]: the
+    effect is then f(phase) = cos(phase) f(0) + sin(phase) f(90 deg).
     """
 
     name: str
@@ -53,6 +56,8 @@ class EffectParameter:
     relative: bool = False
     starts: tuple[float, ...] = ()
     absent: float | None = None
+    ends_count: bool = False
+    phase_of: str | None = None
 
 
 ANY_OTHER = "*"

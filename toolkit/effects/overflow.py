@@ -25,7 +25,7 @@ EFFECT = Effect(
             typical=(0.5, 0.98),
             off=float("inf"),
             relative=True,
-            starts=(0.6, 0.75, 0.9),
+            starts=(0.4, 0.5, 0.6, 0.68, 0.76, 0.84, 0.9, 0.95),
         ),
     ),
     force=_resisting,

@@ -38,7 +38,6 @@ EFFECT = Effect(
             off=None,
             relative=True,
             bounds=(0.0, float("inf")),
-            starts=(0.03, 0.05, 0.08, 0.12, 0.2, 0.33, 0.5),
         ),
         EffectParameter(
             name="phase",
@@ -46,7 +45,7 @@ EFFECT = Effect(
             text="at position zero",
             typical=(-180.0, 180.0),
             off=None,
-            starts=(0.0, 90.0),
+            phase_of="amplitude",
         ),
     ),
     force=_resisting,

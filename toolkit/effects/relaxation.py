@@ -16,29 +16,47 @@ if TYPE_CHECKING:
     from toolkit.effects.signals import Drive, Setting, Tire
 
 
-_STEP = 1e-3  # rad, for the slope at zero slip
+_STEP = 1e-3  # rad, for a slope
+_TURNS = 3  # after which the slip angle at which the slope is taken changes no more
+_LEAST = 0.05  # of the length at zero slip: beyond the peak the slope has no sense as a length
 
 
 def _relaxed(drive: Drive, values: Values, setting: Setting, tire: Tire) -> Drive:
-    sigma = values["relaxation_length"] * _stiffness_ratio(drive, setting, tire)
-    return dataclasses.replace(drive, SA=lag(drive.t, drive.SA, sigma / np.maximum(np.abs(drive.V), 1e-6)))
+    # The relaxation length is the slope of the lateral force over the lateral stiffness of the standing
+    # tire; the latter hardly depends on load (Pacejka 2012, 7.1).
+    straight = dataclasses.replace(drive, SA=np.zeros_like(drive.SA))
+    nominal = _slope(tire, dataclasses.replace(straight, FZ=np.full_like(drive.FZ, setting.nominal_load_N)))
+    at_zero = _over(_slope(tire, straight), nominal)
+    falling, slip = values["falling"], drive.SA
+    for _ in range(_TURNS if falling else 1):
+        ratio = at_zero
+        if falling:
+            here = _over(_slope(tire, dataclasses.replace(drive, SA=slip)), nominal)
+            ratio = np.maximum(at_zero + falling * (here - at_zero), _LEAST * at_zero)
+        length = values["relaxation_length"] * ratio
+        slip = lag(drive.t, drive.SA, length / np.maximum(np.abs(drive.V), 1e-6))
+    return dataclasses.replace(drive, SA=slip)
 
 
-def _stiffness_ratio(drive: Drive, setting: Setting, tire: Tire) -> NDArray[np.float64]:
-    # The relaxation length is cornering stiffness over lateral stiffness of the standing tire; the latter
-    # hardly depends on load (Pacejka 2012, 7.1).
-    at = dataclasses.replace(drive, SA=np.full_like(drive.SA, _STEP))
-    slope = np.abs(tire(at).FY - tire(dataclasses.replace(at, SA=-at.SA)).FY)
-    nominal = dataclasses.replace(at, FZ=np.full_like(drive.FZ, setting.nominal_load_N))
-    whole = np.abs(tire(nominal).FY - tire(dataclasses.replace(nominal, SA=-at.SA)).FY)
-    return np.divide(slope, whole, out=np.ones_like(slope), where=whole > 0)
+def _over(slope: NDArray[np.float64], nominal: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.divide(slope, nominal, out=np.ones_like(slope), where=nominal != 0)
+
+
+def _slope(tire: Tire, drive: Drive) -> NDArray[np.float64]:
+    """Return dFY/dSA [N/rad] at the drive's slip angles, shape (n,)."""
+    more = tire(dataclasses.replace(drive, SA=drive.SA + _STEP)).FY
+    less = tire(dataclasses.replace(drive, SA=drive.SA - _STEP)).FY
+    return np.asarray((more - less) / (2 * _STEP))
 
 
 EFFECT = Effect(
     name="relaxation",
     stage="tire",
     statement=("The tire answers a change of slip angle only after it has rolled a relaxation length."),
-    equation=("(sigma/V) * alpha' + alpha = SA, sigma in proportion to the cornering stiffness at the load"),
+    equation=(
+        "(sigma/V) * alpha' + alpha = SA; sigma in proportion to the cornering stiffness at the load, and by "
+        "the share `falling` to the slope of FY at alpha"
+    ),
     reference="Pacejka, Tire and Vehicle Dynamics, 3rd ed. 2012, 7.1 to 7.3",
     signature="a loop in proportion to the steering rate and to 1/V, closed at high slip",
     separates="two steering rates part it from backlash, two speeds from a delay of the channel",
@@ -50,6 +68,17 @@ EFFECT = Effect(
             typical=(0.1, 0.8),
             bounds=(0.0, 5.0),
             starts=(0.2, 0.6),
+        ),
+        EffectParameter(
+            name="falling",
+            unit="1",
+            text="share in which it falls with the slope of FY: 0 a constant length, 1 a carcass as a spring",
+            typical=(0.0, 1.0),
+            off=None,
+            bounds=(0.0, 1.0),
+            starts=(0.0, 1.0),
+            absent=0.0,
+            ends_count=True,
         ),
     ),
     drive=_relaxed,

@@ -45,7 +45,7 @@ def _order(n: int, text: str, typical: tuple[float, float]) -> tuple[EffectParam
             text="of it",
             typical=(-180.0, 180.0),
             off=None,
-            starts=(0.0, 90.0, 180.0, -90.0),
+            phase_of=f"amplitude_{n}",
         ),
     )
 

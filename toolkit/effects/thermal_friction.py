@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from toolkit.effects.signals import Drive, Setting, Tire
 
 
-_TEMPERATURES = ("T_TREAD", "T_TIRE", "T")  # the nearest to the road first
+TEMPERATURES = ("T_TREAD", "T_TIRE", "T")  # the nearest to the road first
 HEATING_K_PER_KJ = 0.5  # of the tread, where no temperature was recorded (about 2 kJ/K of rubber)
 
 
@@ -30,10 +30,10 @@ def _heated(drive: Drive, values: Values, setting: Setting, tire: Tire) -> Drive
 
 
 def _rise(drive: Drive, values: Values, setting: Setting, tire: Tire) -> NDArray[np.float64]:
-    name = next((one for one in _TEMPERATURES if one in setting.channels), None)
+    name = next((one for one in TEMPERATURES if one in setting.channels), None)
     if name is not None and len(drive.t):
         recorded = setting.channels[name]
-        return recorded - setting.first.get(name, float(recorded[0]))
+        return recorded - setting.first.get(name, float(recorded[0])) - values.get("reference", 0.0)
     power_kW = np.abs(tire(drive).FY * drive.V * np.sin(drive.SA)) * 1e-3
     tau = max(values["time_constant"], 1e-3)
     return HEATING_K_PER_KJ * tau * lag(drive.t, power_kW, tau, start=0.0)
@@ -45,7 +45,7 @@ EFFECT = Effect(
     statement=("The tire heats while it slips, and its friction and stiffness change with the temperature."),
     equation=(
         "friction = 1 + peak_per_K*(T - T0), stiffness = 1 + stiffness_per_K*(T - T0); T "
-        "recorded, or T' = heat*|FY V sin(alpha)| - (T - T0)/time_constant"
+        "recorded and T0 its first value + reference, or T' = heat*|FY V sin(alpha)| - (T - T0)/time_constant"
     ),
     reference="Mizuno et al., Int. J. Automotive Technology 6 (2005)",
     signature="|FY| is larger going out than coming back, and repeats of one angle drift",
@@ -65,6 +65,16 @@ EFFECT = Effect(
             off=None,
             bounds=(0.5, 2000.0),
             starts=(8.0, 60.0),
+        ),
+        EffectParameter(
+            name="reference",
+            unit="K",
+            text="temperature of the tire that is simulated, above the first one recorded",
+            typical=(-10.0, 10.0),
+            off=None,
+            bounds=(-80.0, 80.0),
+            starts=(0.0,),
+            absent=0.0,
         ),
     ),
     drive=_heated,

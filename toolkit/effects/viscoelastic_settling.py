@@ -13,12 +13,19 @@ if TYPE_CHECKING:
 
 
 def _settled(drive: Drive, values: Values, setting: Setting, tire: Tire) -> Drive:
-    forces, f, tau = tire(drive), values["fraction"], values["time_constant"]
-    return dataclasses.replace(
-        drive,
-        FY=drive.FY + f * (forces.FY - lag(drive.t, forces.FY, tau)),
-        MZ=drive.MZ + f * (forces.MZ - lag(drive.t, forces.MZ, tau)),
-    )
+    f, tau, of_load = values["fraction"], values["time_constant"], values["of_load"]
+    if of_load < 1:
+        forces, own = tire(drive), (1 - of_load) * f
+        drive = dataclasses.replace(
+            drive,
+            FY=drive.FY + own * (forces.FY - lag(drive.t, forces.FY, tau)),
+            MZ=drive.MZ + own * (forces.MZ - lag(drive.t, forces.MZ, tau)),
+        )
+    if of_load > 0:
+        drive = dataclasses.replace(
+            drive, FZ=drive.FZ + of_load * f * (drive.FZ - lag(drive.t, drive.FZ, tau))
+        )
+    return drive
 
 
 EFFECT = Effect(
@@ -27,7 +34,10 @@ EFFECT = Effect(
     statement=(
         "The tire settles with time after each step, longer than the revolutions that were waited for."
     ),
-    equation="F = F_inf + fraction * (F_inf - lag(F_inf, time_constant))",
+    equation=(
+        "F = F_inf + fraction * (F_inf - lag(F_inf, time_constant)), F the force; or the load, by the share "
+        "`of_load`, to which the tire answers"
+    ),
     reference="Ferry, Viscoelastic Properties of Polymers, 1980",
     signature="log time and not distance: it goes on after 2.5 revolutions at any speed",
     separates="a dwell of a minute, or the same steps at another speed",
@@ -43,6 +53,17 @@ EFFECT = Effect(
             off=None,
             bounds=(0.05, 2000.0),
             starts=(1.0, 8.0, 60.0),
+        ),
+        EffectParameter(
+            name="of_load",
+            unit="1",
+            text="share of the load: 0 after any step of the force, 1 after steps of the load alone",
+            typical=(0.0, 1.0),
+            off=None,
+            bounds=(0.0, 1.0),
+            starts=(0.0, 1.0),
+            absent=0.0,
+            ends_count=True,
         ),
     ),
     drive=_settled,

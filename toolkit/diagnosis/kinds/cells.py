@@ -158,8 +158,12 @@ class Cells:
         }
 
     def places(self, effect: Effect, drivers: set[str]) -> list[tuple[str | None, str | None]]:
-        """Return the cells on which an effect could act."""
-        if effect.name in ("crosstalk", "channel_swap", "unit_error"):
+        """Return the cells on which an effect could act: a force at the tire or the drum reaches them all."""
+        if effect.stage not in ("load_cells", "acquisition") or effect.name in (
+            "crosstalk",
+            "channel_swap",
+            "unit_error",
+        ):
             return []
         return channel_places(effect, [(name, self._units[name]) for name in self.names], (), drivers)
 

@@ -92,6 +92,26 @@ def through_channels(
     return made
 
 
+def slopes(
+    values: Mapping[str, NDArray[np.float64]],
+    active: Sequence[Active],
+    run: Run,
+    setting: Setting,
+    observed: Mapping[str, NDArray[np.float64]],
+) -> dict[str, NDArray[np.float64]]:
+    """Return by how much every channel shows a small change of itself, row by row, (n,).
+
+    A channel that is saturated shows nothing of it; what takes time to show it is taken as if it did not.
+    """
+    made = {}
+    shown = through_channels(values, active, run, setting, observed)
+    for name, column in values.items():
+        step = 1e-6 * (float(np.ptp(column)) or float(np.abs(column).max(initial=0.0)) or 1.0)
+        moved = through_channels({**values, name: column + step}, active, run, setting, observed)
+        made[name] = (moved[name] - shown[name]) / step
+    return made
+
+
 def undone(
     recorded: NDArray[np.float64], one: Active, setting: Setting, others: Mapping[str, NDArray[np.float64]]
 ) -> NDArray[np.float64]:

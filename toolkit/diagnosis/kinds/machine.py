@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import difflib
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
@@ -12,10 +13,18 @@ from toolkit.diagnosis.kinds.cells import Cells
 from toolkit.diagnosis.kinds.channels import channel_places, through_channels
 from toolkit.diagnosis.kinds.setting import setting, si
 from toolkit.diagnosis.kinds.tir_tire import TirTire
-from toolkit.diagnosis.kinds.tire import base_drive, first_of, rotation, through_tire, tire_places, tire_signs
+from toolkit.diagnosis.kinds.tire import (
+    base_drive,
+    first_of,
+    rotation,
+    slip_work_before,
+    through_tire,
+    tire_places,
+    tire_signs,
+)
 from toolkit.diagnosis.model import Active, Output
 from toolkit.effects.effect import Effect
-from toolkit.effects.filters import lag
+from toolkit.effects.filters import filtered
 from toolkit.effects.signals import Drive, TireForces
 from toolkit.errors import ConfigError
 from toolkit.units import unit
@@ -104,6 +113,7 @@ class MachineModel:
         """Return every output of a run with effects in it."""
         case, here = self.case, self._setting(run)
         start = base_drive(case, run, load_N=self._load, speed_m_s=self._drum_speed(p))
+        start = dataclasses.replace(start, FZ=start.FZ - self._shown_too_much(run, active, here))
         reverse = rotation(run) == "reverse"
         pressure = first_of(case, run, "P_INFL", "P")
 
@@ -140,13 +150,24 @@ class MachineModel:
                 return p[one.name] * unit(one.unit).factor
         return self._speed
 
+    def _shown_too_much(self, run: Run, active: Sequence[Active], here: Any) -> NDArray[np.float64] | float:
+        """Return by how much [N] a channel of FZ that is disturbed shows more than the load on the tire."""
+        if not any(one.channel == "FZ" and one.acts_in(run) for one in active):
+            return 0.0
+        if "FZ" not in self._direct or first_of(self.case, run, "FZ") is None:
+            return 0.0
+        factor = unit(self.case.unit("FZ")).factor
+        load = self._load_output(run, active) / factor
+        on_load = [one for one in active if one.channel == "FZ"]
+        return (through_channels({"FZ": load}, on_load, run, here, run.columns)["FZ"] - load) * factor
+
     def _load_output(self, run: Run, active: Sequence[Active]) -> NDArray[np.float64]:
         commanded = first_of(self.case, run, "FZ_CMD")
         if commanded is None:
             return si(self.case, "FZ", run.columns["FZ"])
         for one in active:
             if one.effect.name == "load_lag" and one.acts_in(run):
-                commanded = lag(run.t, commanded, one.values["time_constant"])
+                commanded = filtered(run.t, commanded, one.values["time_constant"])
         return commanded
 
     def places(self, effect: Effect) -> list[tuple[str | None, str | None]]:
@@ -180,18 +201,14 @@ class MachineModel:
         return self._settings[run]
 
     def _work_before(self, run: Run) -> float:
-        total = 0.0
         values = {one.name: one.value for one in self.parameters}
-        for one in self.case.runs:
-            if one.name == run.name:
-                break
-            start = base_drive(self.case, one, load_N=self._load, speed_m_s=self._speed)
-            FY, _ = self._tire(
+
+        def lateral(_: Run, start: Drive) -> NDArray[np.float64]:
+            return self._tire(
                 values, SA=-start.SA, FZ=start.FZ, IA=start.IA, V=start.V, P=None, pressure_error=0.0
-            )
-            power = np.abs(FY * start.V * np.sin(start.SA)) * 1e-3
-            total += float(np.sum(0.5 * (power[1:] + power[:-1]) * np.diff(one.t))) if one.rows > 1 else 0.0
-        return total
+            )[0]
+
+        return slip_work_before(self.case, run, lateral, load_N=self._load, speed_m_s=self._speed)
 
 
 def _check_dimension(case: Case, name: str, text: str) -> None:

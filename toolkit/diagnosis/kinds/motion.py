@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
+from toolkit.diagnosis.kinds.pushed import integrated
 from toolkit.diagnosis.kinds.setting import dimension
 from toolkit.diagnosis.model import Active
 from toolkit.effects.effect import Effect
@@ -62,6 +63,33 @@ class Motion:
         if self.kind == "position":
             return size / span**2, size / span, size
         return size / span, size, size * span
+
+    def way(self) -> tuple[float, float]:
+        """Return the longest way of a run [position's unit], and the usual way from row to row."""
+        name = self.position or ""
+        columns = [run.columns[name] for run in self.case.runs if name in run.columns]
+        columns = [one[np.isfinite(one)] for one in columns]
+        spans = [float(np.ptp(one)) for one in columns if len(one)]
+        steps = [np.abs(np.diff(one)) for one in columns if len(one) > 1]
+        return max(spans, default=0.0), float(np.median(np.concatenate(steps))) if steps else 0.0
+
+    def pushed(
+        self,
+        made: Mapping[str, NDArray[np.float64]],
+        run: Run,
+        pattern: Callable[[NDArray[np.float64]], NDArray[np.float64]],
+    ) -> dict[str, NDArray[np.float64]]:
+        """Return what small forces of a pattern over the position add to every output, (rows, forces)."""
+        x = made.get(str(self.position), run.columns.get(str(self.position)))
+        if x is None:
+            return {}
+        pushes = pattern(x)
+        if self.kind != "force":
+            pushes = integrated(run.t, pushes)
+            if self.kind == "position":
+                pushes = integrated(run.t, pushes)
+        none = np.zeros_like(pushes)
+        return {name: pushes if name == self.output else none for name in made}
 
     def disturbed(
         self, made: Mapping[str, NDArray[np.float64]], forces: Sequence[Active], run: Run

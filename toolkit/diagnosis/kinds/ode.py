@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from toolkit.diagnosis.kinds.channels import channel_places, through_channels
+from toolkit.diagnosis.kinds.channels import channel_places, slopes, through_channels
 from toolkit.diagnosis.kinds.forces import Forces
 from toolkit.diagnosis.kinds.inputs import Inputs
 from toolkit.diagnosis.kinds.integrate import OFF, IntegrationError, integrate
+from toolkit.diagnosis.kinds.pushed import propagated
 from toolkit.diagnosis.kinds.python import silenced
 from toolkit.diagnosis.kinds.setting import nominal_load, setting
 from toolkit.diagnosis.kinds.together import NotTogetherError, columns_of, integrate_together, takes_columns
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from toolkit.diagnosis.case import Case, Run
+    from toolkit.diagnosis.model import Pattern
 
 ATOL = 1e-7  # of a state's spread over a run; before that is known, a hundredth of it of one
 _FINER = 4
@@ -123,18 +125,75 @@ class OdeModel:
 
     def _sizes(self, p: Mapping[str, float]) -> dict[str, tuple[float, float]]:
         """Return for every state that a term may enter: size of its rate, and spread of itself."""
-        run = self.case.runs[0]
-        x = self._integrate(run, p, ())
-        rates = np.gradient(x, run.t, axis=1) if run.rows > 2 else np.zeros_like(x)
-        made = {}
+        runs = self.case.runs
+        states = [self._integrate(run, p, ()) for run in runs]
+        x = np.concatenate(states, axis=1)
+        rates = [
+            np.gradient(one, run.t, axis=1) if run.rows > 2 else np.zeros_like(one)
+            for one, run in zip(states, runs, strict=True)
+        ]
+        fastest = np.abs(np.concatenate(rates, axis=1)).max(axis=1)
+        steps = [np.abs(np.diff(one, axis=1)) for one in states]
+        self._ways = {
+            name: (
+                max(float(np.ptp(one[i])) for one in states),
+                float(np.median(np.concatenate([each[i] for each in steps] or [np.zeros(1)]))),
+            )
+            for i, name in enumerate(self.states)
+        }
         self.largest = {name: float(x[i].max()) for i, name in enumerate(self.states)}
-        for i, name in enumerate(self.states):
-            made[name] = (
+        return {
+            name: (
                 # Its largest rate, not its spread: a body in free fall has a force that never varies.
-                float(np.abs(rates[i]).max()) or 1.0,
+                float(fastest[i]) or 1.0,
                 float(np.std(x[i])) or float(np.abs(x[i]).max()) or 1.0,
             )
-        return made
+            for i, name in enumerate(self.states)
+        }
+
+    def way(self, channel: str | None) -> tuple[float, float]:
+        """Return the longest way of a run on the position of a velocity state, and the usual one a row."""
+        position = self.position_of(str(channel))
+        return (0.0, 0.0) if position is None else self._ways[position]
+
+    def pushed(
+        self,
+        run: Run,
+        p: Mapping[str, float],
+        active: Sequence[Active],
+        channel: str | None,
+        pattern: Pattern,
+    ) -> dict[str, NDArray[np.float64]]:
+        """Return linear responses of every output to small forces of a pattern over the position.
+
+        They have the shape (rows, forces).
+        """
+        at = self.states.index(str(channel))
+        forces = [one for one in active if one.effect.stage == "dynamics" and one.acts_in(run)]
+        acting, own = self._forces(forces), len(self.states)
+        x = self._integrate(run, p, forces)
+        if run.rows < 2:
+            return {}
+        fine = self._between(run, p, forces, x)
+        rate = self._with(acting, dict(p), Inputs(run, self._drivers))
+        sizes = np.array([*(self.scale[name][1] for name in self.states), *[1.0] * acting.added])
+        try:
+            with silenced():
+                moved = propagated(
+                    rate, self._finer(run).t, fine, pattern(fine[self._derivative_of[at]]), at=at, sizes=sizes
+                )[::_FINER]
+        except (Exception, SystemExit) as error:
+            raise _failed(self.case, run, f"rhs: {type(error).__name__}: {error}") from error
+        here = self._shown(run, p, x[:own])
+        made = {name: np.zeros((run.rows, moved.shape[2])) for name in here}
+        for i in range(own):
+            shifted = x[:own].copy()
+            shifted[i] += 1e-6 * sizes[i]
+            there = self._shown(run, p, shifted)
+            for name, column in made.items():
+                column += ((there[name] - here[name]) / (1e-6 * sizes[i]))[:, None] * moved[:, i]
+        shown = slopes(here, active, run, self.setting(run), run.columns)
+        return {name: shown[name][:, None] * column for name, column in made.items()}
 
     def position_of(self, name: str) -> str | None:
         """Return the state whose rate is this state, None where there is none."""

@@ -13,10 +13,10 @@ from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
-from toolkit.diagnosis.kinds.channels import channel_places, through_channels
+from toolkit.diagnosis.kinds.channels import channel_places, slopes, through_channels
 from toolkit.diagnosis.kinds.motion import Motion, motion_of
 from toolkit.diagnosis.kinds.setting import NOMINAL_SPEED, nominal_load, setting
-from toolkit.diagnosis.kinds.tire import base_drive, through_tire, tire_places, tire_signs
+from toolkit.diagnosis.kinds.tire import base_drive, slip_work_before, through_tire, tire_places, tire_signs
 from toolkit.diagnosis.model import Active, Output
 from toolkit.effects.effect import Effect
 from toolkit.effects.signals import Drive, Setting, TireForces
@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from toolkit.diagnosis.case import Case, Run
+    from toolkit.diagnosis.model import Pattern
 
 _KEPT = 300  # simulations that are remembered
 _LARGEST = 1e100  # of an output in its unit: the squares of larger ones are no numbers any more
@@ -131,6 +132,27 @@ class PythonModel:
             result[one.name] = values
         return result
 
+    def way(self, _channel: str | None) -> tuple[float, float]:
+        """Return the longest way of a run and the usual one between rows, nothing where nothing moves."""
+        return (0.0, 0.0) if self.motion is None else self.motion.way()
+
+    def pushed(
+        self,
+        run: Run,
+        p: Mapping[str, float],
+        active: Sequence[Active],
+        _channel: str | None,
+        pattern: Pattern,
+    ) -> dict[str, NDArray[np.float64]]:
+        """Return what small forces of a pattern over the position add to every output, (rows, forces)."""
+        if self.motion is None:
+            return {}
+        made = self.simulate(run, p, [one for one in active if one.effect.channel is None])
+        shown = slopes(made, active, run, self.setting(run), run.columns)
+        return {
+            name: shown[name][:, None] * one for name, one in self.motion.pushed(made, run, pattern).items()
+        }
+
     def places(self, effect: Effect) -> list[tuple[str | None, str | None]]:
         """Return where an effect could act."""
         found: list[tuple[str | None, str | None]] = []
@@ -148,8 +170,23 @@ class PythonModel:
     def setting(self, run: Run) -> Setting:
         """Return a run's setting."""
         if run not in self._settings:
-            self._settings[run] = setting(self.case, run, nominal_load_N=self._load, speed_m_s=NOMINAL_SPEED)
+            self._settings[run] = setting(
+                self.case,
+                run,
+                nominal_load_N=self._load,
+                speed_m_s=NOMINAL_SPEED,
+                work_kJ=self._work_before(run),
+            )
         return self._settings[run]
+
+    def _work_before(self, run: Run) -> float:
+        if not self._is_tire or "FY" not in {one.name for one in self.outputs}:
+            return 0.0
+        values = {one.name: one.value for one in self.parameters}
+        factor = unit(self.case.unit("FY")).factor
+        return slip_work_before(
+            self.case, run, lambda one, _: self.call(one, values, {})["FY"] * factor, load_N=self._load
+        )
 
     def _tire(
         self, run: Run, p: Mapping[str, float], active: Sequence[Active], here: Setting

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -55,6 +55,32 @@ def base_drive(case: Case, run: Run, *, load_N: float, speed_m_s: float = NOMINA
         IA=0.0 if IA is None else IA,
         V=speed_m_s if V is None else V,
     )
+
+
+def slip_work_before(
+    case: Case,
+    run: Run,
+    lateral: Callable[[Run, Drive], NDArray[np.float64] | None],
+    *,
+    load_N: float,
+    speed_m_s: float = NOMINAL_SPEED,
+) -> float:
+    """Return the slip work [kJ] that the runs before a run put into the tire; of all for one to predict.
+
+    Parameters
+    ----------
+    lateral : FY [N] of the nominal tire over a run under a drive, None where it is not known
+    """
+    total = 0.0
+    for one in case.runs:
+        if one.name == run.name:
+            break
+        start = base_drive(case, one, load_N=load_N, speed_m_s=speed_m_s)
+        FY = lateral(one, start)
+        if FY is not None and one.rows > 1:
+            power = np.abs(FY * start.V * np.sin(start.SA)) * 1e-3
+            total += float(np.sum(0.5 * (power[1:] + power[:-1]) * np.diff(one.t)))
+    return total
 
 
 def through_tire(
