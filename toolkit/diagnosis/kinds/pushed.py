@@ -1,0 +1,69 @@
+"""What many small forces would each do to a motion: linear responses about one simulation.
+
+A force that repeats with the position has a period that a search cannot guess: between two trial periods
+the response is another one altogether. Hundreds of them are affordable where the equation is linearised once
+about its simulated motion and all forces are propagated together.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    Rate = Callable[[float, "NDArray[np.float64]"], "NDArray[np.float64]"]
+
+_STEP = 1e-6  # of a state's size, for differences
+
+
+def propagated(
+    rate: Rate,
+    t: NDArray[np.float64],
+    x: NDArray[np.float64],
+    pushes: NDArray[np.float64],
+    *,
+    at: int,
+    sizes: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """Return how the states move under small additions to one state's rate, (times, states, forces).
+
+    The trapezoidal rule on the equation linearised about ``x``: stable at any step, of second order.
+
+    Parameters
+    ----------
+    rate : (time, state) -> its rate, with what acts already
+    t : rising times [s], (times,), several to each row of a recording
+    x : the simulated states, (states, times)
+    pushes : additions to the rate, (times, forces)
+    at : the state whose rate they enter
+    sizes : of the states, for differences, (states,)
+    """
+    n, count = x.shape
+    slopes = np.empty((count, n, n))
+    for k, now in enumerate(t.tolist()):
+        here = rate(now, x[:, k])
+        for i in range(n):
+            moved = x[:, k].copy()
+            moved[i] += _STEP * sizes[i]
+            slopes[k, :, i] = (rate(now, moved) - here) / (_STEP * sizes[i])
+    half = 0.5 * np.diff(t)[:, None, None]
+    ahead = np.eye(n) - half * slopes[1:]
+    on = np.linalg.solve(ahead, np.eye(n) + half * slopes[:-1])
+    entry = np.zeros((count - 1, n, 1))
+    entry[:, at, 0] = half[:, 0, 0]
+    entry = np.linalg.solve(ahead, entry)
+    both = pushes[1:] + pushes[:-1]
+    made = np.zeros((count, n, pushes.shape[1]))
+    for k in range(count - 1):
+        made[k + 1] = on[k] @ made[k] + entry[k] * both[k]
+    return made
+
+
+def integrated(t: NDArray[np.float64], pushes: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the integral over time of every column, by the trapezoidal rule from zero, (times, forces)."""
+    steps = 0.5 * np.diff(t)[:, None] * (pushes[1:] + pushes[:-1])
+    return np.concatenate([np.zeros((1, pushes.shape[1])), np.cumsum(steps, axis=0)])
