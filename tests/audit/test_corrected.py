@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from archive_made import FY, HEADER, MZ, dated, recording, write
+from archive_made import FY, HEADER, MZ, dated, factory, recording, write
 
 from toolkit.audit.archive import audit_archive
 from toolkit.audit.corrected import INDEX, check_target, write_copies
@@ -126,3 +126,42 @@ def test_a_header_that_a_spreadsheet_would_run_becomes_text(archive, tmp_path):
     (archive / "test" / "table.csv").write_text("\n".join(lines))
     write_copies(audit(archive), REGISTRY, tmp_path / "fixed")
     assert "'=cmd [1]" in (tmp_path / "fixed" / "test" / "table.csv").read_text().splitlines()[0]
+
+
+@pytest.mark.parametrize(
+    ("separator", "decimal", "encoding"),
+    [(";", ",", "utf-8"), ("\t", ",", "utf-16"), ("\t", ".", "utf-8"), (";", ".", "utf-16")],
+)
+def test_text_of_any_dialect_has_a_copy_that_is_exact(archive, tmp_path, separator, decimal, encoding):
+    path = archive / "test" / "table.csv"
+    words = path.read_text().replace(",", separator).replace(".", decimal)
+    path.write_bytes(words.encode(encoding))
+    before = sha256_file(path)
+    copies = write_copies(audit(archive), REGISTRY, tmp_path / "fixed")
+    assert "test/table.csv" in [one.path for one in copies if one.replaces == before]
+    assert sha256_file(path) == before
+    assert {one.grade for one in audit(tmp_path / "fixed").files} == {"exact"}
+
+
+def test_every_kind_of_wrong_file_has_a_copy_that_is_exact(tmp_path):
+    # Ambiguous, unknown, cut in the middle, one row off, swapped, turned, stale; originals cannot be written.
+    made = factory.make_archive(tmp_path / "made", files=300, rows=60, seed=3)
+    truth = made.truth
+    assert set(made.grades) == {*factory.SHARES} - {"segments", "single_row"}
+    assert any(len(one.segments) == 3 for one in truth.values())
+    before = {path: sha256_file(path) for path in made.folder.rglob("*") if path.is_file()}
+    for path in (*before, *made.folder.rglob("*")):
+        path.chmod(0o555 if path.is_dir() else 0o444)
+    registry = Registry(made.calibrations)
+    copies = write_copies(
+        audit_archive(made.folder, registry, known_at=factory.KNOWN_AT), registry, tmp_path / "fixed"
+    )
+    for path in made.folder.rglob("*"):
+        if path.is_dir():
+            path.chmod(0o755)
+    right = ("exact", "rounding", "undated", "unreadable")
+    assert {one.path for one in copies} == {path for path, one in truth.items() if one.grade not in right}
+    assert all(one.sha256 and one.replaces == before[made.folder / one.path] for one in copies)
+    assert {path: sha256_file(path) for path in before} == before
+    again = audit_archive(tmp_path / "fixed", registry, known_at=factory.KNOWN_AT)
+    assert {(one.path, one.grade) for one in again.files} == {(one.path, "exact") for one in copies}

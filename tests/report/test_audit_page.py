@@ -110,6 +110,14 @@ def test_pictures_are_well_formed_and_drawn_for_the_worst(view, text):
     assert [one["repair"]["FY_max_abs_N"] for one in worst] == sorted(repairs, reverse=True)[:3]
 
 
+def test_a_files_heading_stands_with_its_pictures_on_paper_too(view, text):
+    sections = re.findall(r"<section>(.*?)</section>", text, re.S)
+    worst = worst_files(view.made, 3)
+    for one, section in zip(worst, sections, strict=True):
+        assert section.startswith(f"<h3>{one['path']}</h3>")
+        assert section.count("<svg") == 2  # FY and MZ
+
+
 def test_a_change_that_rounds_to_nothing_has_no_sign():
     def told(change):
         return _largest([{"name": "conicity", "change": change, "old": 5.0}], "conicity")

@@ -41,3 +41,7 @@ document.querySelectorAll("#files th").forEach((th, at) => th.addEventListener("
 search.addEventListener("input", () => { shown = 200; draw(); });
 more.addEventListener("click", () => { shown += 1000; draw(); });
 draw();
+// On paper nothing can be opened: what is closed is open there.
+const closed = [];
+window.addEventListener("beforeprint", () => document.querySelectorAll("details:not([open])").forEach(one => { one.open = true; closed.push(one); }));
+window.addEventListener("afterprint", () => { closed.splice(0).forEach(one => { one.open = false; }); });

@@ -161,14 +161,14 @@ def _worst(traces: Sequence[Trace]) -> Iterator[str]:
         plain = one.plain
         how = f", {plain['variant']}" if plain["variant"] else ""
         who = plain["record"] or " or ".join(plain["candidates"]) or "no record"
-        yield f"<h3>{escape(plain['path'])}</h3><p class=soft>{_grade(plain['grade'])} "
+        yield f"<section><h3>{escape(plain['path'])}</h3><p class=soft>{_grade(plain['grade'])} "
         yield f"computed by {escape(who + how)}; in force "
         yield f"{escape(plain['in_force'])}; "
         yield f"largest change {plain['repair']['FY_max_abs_N']:.1f}&nbsp;N</p><div class=two>"
         for load, unit in (("FY", "N"), ("MZ", "N·m")):
             if load in one.old:
                 yield rows_of(load, unit, one.old[load], one.new[load])
-        yield "</div>"
+        yield "</div></section>"
 
 
 def _effects(made: ArchiveAudit) -> Iterator[str]:
