@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
-from tire_factory import LOAD, M15, PLYSTEER, at_load, reduced_test
+from tire_factory import LOAD, M15, PLYSTEER, Key, at_load, reduced_test, rows_of_many
 
 from toolkit.characteristics.characterise import characterise, characteristic_rows
 from toolkit.characteristics.rows import Row
@@ -26,7 +26,6 @@ if TYPE_CHECKING:
 
 THREE = (2000.0, LOAD, 6000.0)
 U_ZERO = M15.stated_uncertainty("SA").u
-Key = tuple[str, float, str, float | None]
 
 
 def rows(reduced: ReducedTest, record: CalibrationRecord | None = None) -> dict[Key, Row]:
@@ -180,18 +179,30 @@ def test_the_scatter_of_the_rows_goes_through_the_fit() -> None:
     rng = np.random.default_rng(5)
     base = reduced_test()
     trials: dict[Key, list[float]] = {key: [] for key in bare}
+    drawn = []
     for _ in range(300):
         noise = rng.normal(size=(len(base.conditions), 2)) * u
-        moved = dataclasses.replace(base, conditions=tuple(
+        drawn.append(dataclasses.replace(base, conditions=tuple(
             dataclasses.replace(c, FY_common=c.FY_common + float(e), MZ_common=c.MZ_common + float(f))
             for c, (e, f) in zip(base.conditions, noise, strict=True)
-        ))  # fmt: skip
-        for key, row in rows(moved).items():
+        )))  # fmt: skip
+    for found in rows_of_many(drawn):
+        for key, row in found.items():
             trials[key].append(row.number.value)
     for key, row in bare.items():
         sd = float(np.std(trials[key], ddof=1))
         # 300 trials know a standard deviation to 4 %; the fit bends by a little more.
         assert dict(row.number.by_source())["repeatability"] == pytest.approx(sd, rel=0.2), key
+
+
+def test_many_tests_fitted_together_are_each_as_fitted_alone() -> None:
+    tests = [reduced_test(loads=THREE, zero_rad=s * U_ZERO, u=(8.0, 0.3)) for s in (0, 1, -1)]
+    for test, found in zip(tests, rows_of_many(tests), strict=True):
+        alone = rows(test)
+        assert found.keys() == alone.keys()
+        for key, row in found.items():
+            assert row.number.value == pytest.approx(alone[key].number.value, rel=1e-9, abs=1e-9)
+            assert row.number.estimate().u == pytest.approx(alone[key].number.estimate().u, rel=1e-6)
 
 
 def test_the_fit_and_the_rows_are_never_counted_twice() -> None:

@@ -6,9 +6,7 @@ import dataclasses
 import math
 
 import numpy as np
-from tire_factory import CONICITY, CRAT, LOAD, M15, PLYSTEER, PRAT, curve, reduced_test
-
-from toolkit.characteristics.characterise import characterise
+from tire_factory import CONICITY, CRAT, LOAD, M15, PLYSTEER, PRAT, curve, reduced_test, rows_of_many
 
 LOADS = (2000.0, LOAD, 6000.0)
 TRIALS = 160
@@ -28,6 +26,7 @@ def test_ninety_five_per_cent_of_the_intervals_hold_the_truth() -> None:
     truth = {"conicity": CONICITY, "plysteer": PLYSTEER, "CRAT": CRAT, "PRAT": PRAT,
              "slope_cornering": 60_000.0, "secant_cornering": secant}  # fmt: skip
     inside = dict.fromkeys(truth, 0)
+    tests = []
     for _ in range(TRIALS):
         reduced = reduced_test(
             loads=LOADS,
@@ -41,11 +40,10 @@ def test_ninety_five_per_cent_of_the_intervals_hold_the_truth() -> None:
             dataclasses.replace(c, FY_common=c.FY_common + float(a), MZ_common=c.MZ_common + float(b))
             for c, (a, b) in zip(reduced.conditions, noise, strict=True)
         )
-        found = characterise(dataclasses.replace(reduced, conditions=drawn), machine=M15, record=None)
-        pull = next(p for p in found.pull if p.load_N == LOAD)
-        forward = next(s for s in found.stiffness if s.load_N == LOAD and s.rotation == "forward")
+        tests.append(dataclasses.replace(reduced, conditions=drawn))
+    for rows in rows_of_many(tests):
         for name, true in truth.items():
-            estimate = getattr(pull, name, None) or getattr(forward, name)
+            estimate = rows[name, LOAD, "forward" if "cornering" in name else "both", None].number.estimate()
             U, _ = estimate.expanded()
             inside[name] += abs(estimate.value - true) <= U
     # Binomial at 95 %, three and a half standard deviations to each side.
