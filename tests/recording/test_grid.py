@@ -210,6 +210,11 @@ HEADS = {
     "a wrong dimension": table_xml([HEADERS, *DATA], dimension="A1:B2"),
     "a far dimension": table_xml([HEADERS, *DATA], dimension="A1:XFD1048576"),
     "an end that is no worksheet": GOOD.replace("</worksheet>", ""),
+    "a blank in the end of the header's row": GOOD.replace("</row>", "</row >", 1),
+    "an end of the header's row that is none": GOOD.replace("</row>", "/row>", 1),
+    "numbers in an unusual row above": GOOD.replace('<c r="B2">', '<c r="B2" s="0">').replace(
+        "</row>", "</row >", 1
+    ),
     "a header in character data": GOOD.replace("FZ load", "<![CDATA[FZ load]]>"),
     "a header with an entity": GOOD.replace("FZ load", "FZ &#108;oad"),
     "a header of two words in bold": GOOD.replace("<t>FZ load</t>", "<r><t>FZ </t></r><r><t>load</t></r>"),

@@ -58,9 +58,9 @@ def read_table(table: Table, machine: Machine) -> tuple[Series, ...]:
     UnreadableError
         rule ``no-data``: there is no header or no row of data
     """
-    if table.numbers is not None and any(not str(cell or "").strip() for cell in table.rows[-1]):
-        table = table.whole()  # a column without a header, which is to be told with its first cell
     first = next((i for i, row in enumerate(table.rows) if not _blank(row)), None)
+    if table.numbers is not None and (first != len(table.rows) - 1 or _nameless(table.rows[-1])):
+        table = table.whole()  # a row of numbers above them, or a column to be told with its first cell
     if first is None:
         _no_data(table, "an empty sheet")
     header_row = table.rows[first]
@@ -198,6 +198,10 @@ def _check_nameless(table: Table, body: Sequence[Sequence[Any]], headers: list[s
                     next_step="name the column as 'NAME [unit]' or clear it in a copy of the file",
                     rule="unknown-column",
                 )
+
+
+def _nameless(row: Sequence[Any]) -> bool:
+    return any(cell in _EMPTY or (isinstance(cell, str) and not cell.strip()) for cell in row)
 
 
 def _blank(row: Sequence[Any]) -> bool:
