@@ -46,7 +46,7 @@ def test_an_error_of_a_figure_is_raised_where_it_is_asked_for(monkeypatch: pytes
     def broken(_plot: object) -> Picture:
         raise ArithmeticError("a figure that cannot be drawn")
 
-    monkeypatch.setattr("toolkit.report.drawer.draw", broken)
+    monkeypatch.setattr("toolkit.report.figures.draw", broken)
     plots = dict(list(build_content(make_result(), make_record()).plots.items())[:1])
     with Drawer(hands=1) as drawer:
         drawer._worker.kill()

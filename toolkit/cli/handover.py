@@ -63,12 +63,12 @@ def diagnosis_of(given: Path | None, by: str | None, tests: Sequence[Path]) -> t
     ConfigError
         it is no answer; it is given for several tests; a name releases what is not given
     """
+    if given is None and by is None:
+        return None
     from toolkit.diagnosis.answer_read import read_answer
     from toolkit.errors import ConfigError
     from toolkit.report.diagnosis.in_report import Told
 
-    if given is None and by is None:
-        return None
     if given is None:
         raise ConfigError(
             "there is no diagnosis to release", where="--by", got=by,

@@ -157,22 +157,24 @@ def command(
     """
     from functools import partial
 
-    from toolkit.cli.fit import model_choice
-    from toolkit.cli.handover import diagnosis_of
-    from toolkit.cli.resolve import resolve_test
-    from toolkit.cli.units import unit_choice
     from toolkit.report.drawer import Drawer
     from toolkit.report.pdf import Office
-    from toolkit.report.template.package import read_template
 
     chosen = choose_reader(reader)
-    compared = model_choice(models or [])
-    shown = None if units is None else unit_choice(units)
-    told = diagnosis_of(diagnosis, by, tests)
     started = time.perf_counter()
-    # The template is judged before anything is read: its error must not wait for a long reduction.
-    opened = read_template(template or home_template("org.docx", home))
+    # LibreOffice and matplotlib take a second to start: beside all that is imported and read here.
     with Office() as office, Drawer() as drawer, progress(None, "report", show=not (json or quiet)) as step:
+        from toolkit.cli.fit import model_choice
+        from toolkit.cli.handover import diagnosis_of
+        from toolkit.cli.resolve import resolve_test
+        from toolkit.cli.units import unit_choice
+        from toolkit.report.template.package import read_template
+
+        compared = model_choice(models) if models else ()
+        shown = None if units is None else unit_choice(units)
+        told = diagnosis_of(diagnosis, by, tests)
+        # The template is judged before anything is read: its error must not wait for a long reduction.
+        opened = read_template(template or home_template("org.docx", home))
         options = Options(
             template=opened,
             resolve=partial(

@@ -16,10 +16,11 @@ import threading
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 from types import TracebackType
-from typing import IO
+from typing import IO, TYPE_CHECKING
 
-from toolkit.report.content import Plot
-from toolkit.report.figures import Picture, draw
+if TYPE_CHECKING:
+    from toolkit.report.content import Plot
+    from toolkit.report.figures import Picture
 
 
 class Drawer:
@@ -62,7 +63,7 @@ class Drawer:
         return _Waiting(waiting)
 
 
-class _Waiting(Mapping[str, Picture]):
+class _Waiting(Mapping[str, "Picture"]):
     def __init__(self, jobs: dict[str, Future[Picture]]) -> None:
         self._jobs = jobs
 
@@ -95,6 +96,8 @@ def _ask(
         for _ in plots:
             name, picture = pickle.load(worker.stdout)  # noqa: S301  our own child wrote it
             waiting[name].set_result(picture)
+    from toolkit.report.figures import draw
+
     for name, plot in plots.items():
         if waiting[name].done():
             continue
@@ -111,6 +114,8 @@ def _work(hands: int) -> None:
     import matplotlib.backends.backend_agg
     import matplotlib.figure
     import matplotlib.ticker  # noqa: F401  imported before the order comes
+
+    from toolkit.report.figures import draw
 
     order = sys.stdin.buffer.read()
     if order:
@@ -144,6 +149,8 @@ def _tell(name: str, picture: Picture, told: threading.Lock) -> None:
 
 def _beside(share: dict[str, Plot]) -> IO[bytes]:
     """Draw a share in a copy of this process and return the stream that its figures come from."""
+    from toolkit.report.figures import draw
+
     reading, writing = os.pipe()
     if os.fork():
         os.close(writing)
