@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import re
 import textwrap
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -19,7 +20,7 @@ COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#0
 MARKERS = "os^Dvp*"
 SIZE_IN = (6.3, 3.7)
 DPI = 150
-_LINE = 15  # characters of a legend's line that fit beside the axes
+_LINE, _WORD = 15, 13  # characters of a line and of a single word that fit beside the axes in a legend
 _GREY = "#8a8a8a"
 
 
@@ -195,8 +196,23 @@ def _curve(axes: Axes, curve: Curve) -> None:
 
 def _in_lines(label: str) -> str:
     """Return a legend's label in lines that end before the picture does."""
-    lines = label.replace(", ", ",\n").split("\n")
-    return "\n".join(textwrap.fill(line, _LINE, break_long_words=False) for line in lines)
+    found = []
+    for part in label.replace(", ", ",\n").split("\n"):
+        for line in textwrap.wrap(part, _LINE, break_long_words=False):
+            found += [line] if " " in line else _chopped(line)
+    return "\n".join(found)
+
+
+def _chopped(word: str) -> list[str]:
+    """Return a word in pieces that fit: parted where names of files are joined, without a joint anywhere."""
+    room = _WORD - 3 if sum(map(str.isupper, word)) > len(word) / 2 else _WORD
+    pieces = [""]
+    for part in re.split(r"(?<=[_./-])", word):
+        if len(pieces[-1]) + len(part) <= room:
+            pieces[-1] += part
+        else:
+            pieces += [part[i : i + room] for i in range(0, len(part), room)]
+    return [one for one in pieces if one]
 
 
 def _legend(figure: Figure, plot: Plot) -> None:
