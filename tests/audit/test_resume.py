@@ -107,3 +107,24 @@ def test_two_audits_do_not_write_one_folder(archive, tmp_path):
         pytest.raises(OutputError, match="another audit"),
     ):
         Results(tmp_path, archive=archive, registry_hash="")
+
+
+def test_a_file_that_becomes_a_result_of_the_toolkit_and_back_is_what_it_is_now(archive, tmp_path, asked):
+    def paths():
+        return {one.path for one in audit_archive(archive, registry(), out=tmp_path / "out").files}
+
+    every = paths()
+    recording = (archive / "two" / "M15_fig4_4.xlsx").read_bytes()
+    for _ in range(2):
+        (archive / "two" / "M15_fig4_4.xlsx").write_text('{"generator": "toolkit", "schema": 1}')
+        assert paths() == paths() == every - {"two/M15_fig4_4.xlsx"}
+        (archive / "two" / "M15_fig4_4.xlsx").write_bytes(recording)
+        assert paths() == paths() == every
+
+
+def test_a_large_file_has_the_same_hash_as_a_small_one(archive, tmp_path, asked, monkeypatch):
+    audit_archive(archive, registry(), out=tmp_path / "out")
+    asked.clear()
+    monkeypatch.setattr("toolkit.audit.resume._SMALL", 100)  # every file is read in pieces
+    audit_archive(archive, registry(), out=tmp_path / "out")
+    assert asked == []

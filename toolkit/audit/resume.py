@@ -9,6 +9,7 @@ and day of knowledge, and the same version of the toolkit; file times are never 
 from __future__ import annotations
 
 import json
+import os
 import tempfile
 import weakref
 from collections.abc import Iterator, Sequence
@@ -30,6 +31,8 @@ RESULTS = "results.jsonl"
 _HEADER = (json.dumps({"generator": GENERATOR, "marks": OWN_OUTPUT}) + "\n").encode()
 _REST = b', "result": '
 _HASHING = 4  # threads; reading and hashing leave the interpreter free
+_SMALL = 2**20
+_BATCH = 32  # files that a thread is given at once
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,8 +110,9 @@ class Results:
         """
         self._archive = archive
         self._base = f"{__version__}|{SHAPE}|{registry_hash}"
-        self._tomls: dict[Path, str] = {}
+        self._tomls: dict[str, str] = {}
         self._places: dict[str, tuple[bytes, int]] = {}  # path -> key, offset of its newest line
+        self._own: set[str] = set()  # paths of files that the toolkit wrote
         self._path = None if folder is None else folder / RESULTS
         self._file = tempfile.TemporaryFile() if self._path is None else _opened(self._path)  # noqa: SIM115
         self._file.seek(0)
@@ -136,10 +140,12 @@ class Results:
     def known(self, names: Sequence[str]) -> Iterator[str]:
         """Yield those of the names whose results still hold."""
         before = [name for name in names if name in self._places]
+        batches = [before[at : at + _BATCH] for at in range(0, len(before), _BATCH)]
         with ThreadPoolExecutor(_HASHING) as pool:
-            for name, content in zip(before, pool.map(self._hashed, before, chunksize=32), strict=True):
-                if content is not None and self._places[name][0] == self._key(name, content):
-                    yield name
+            for batch, contents in zip(batches, pool.map(self._hashed, batches), strict=True):
+                for name, content in zip(batch, contents, strict=True):
+                    if content is not None and self._places[name][0] == self._key(name, content):
+                        yield name
 
     def put(self, name: str, done: Done) -> None:
         """Append a result; one without a hash is not used again."""
@@ -148,18 +154,20 @@ class Results:
         head = json.dumps({"key": key.hex(), "path": name})
         self._places[name] = (key, self._end)
         self._write(head[:-1].encode() + _REST + done.body + b"}\n")
+        self._mark(name, own=done.body == b"null")
 
     def files(self, names: Sequence[str]) -> Files:
         """Return the results of the names, without those of files that the toolkit wrote."""
         self._file.flush()
         stream = self._file if self._path is None else self._path.open("rb")
-        places = []
-        for name in sorted(names):
-            place = self._places[name][1]
-            stream.seek(place)
-            if not stream.readline().endswith(_REST + b"null}\n"):
-                places.append(place)
-        return Files(stream, places)
+        return Files(stream, [self._places[name][1] for name in sorted(names) if name not in self._own])
+
+    def _mark(self, name: str, *, own: bool) -> None:
+        # A file that was replaced by another is what its newest line says.
+        if own:
+            self._own.add(name)
+        else:
+            self._own.discard(name)
 
     def _write(self, line: bytes) -> None:
         try:
@@ -170,16 +178,13 @@ class Results:
             raise _refused(where, error.strerror or "an error", "space for the results") from error
         self._end += len(line)
 
-    def _hashed(self, name: str) -> str | None:
-        try:
-            return sha256_file(self._archive / name)
-        except OSError:
-            return None
+    def _hashed(self, names: Sequence[str]) -> list[str | None]:
+        return [_content_hash(self._archive / name) for name in names]
 
     def _key(self, name: str, content: str) -> bytes:
-        folder = (self._archive / name).parent
+        folder = name.rpartition("/")[0]
         if folder not in self._tomls:
-            self._tomls[folder] = _words(nearest_test_toml(folder))
+            self._tomls[folder] = _words(nearest_test_toml(self._archive / folder))
         return bytes.fromhex(sha256_bytes(f"{self._base}|{content}|{self._tomls[folder]}".encode()))
 
     def _remember(self, line: bytes, place: int) -> None:
@@ -187,8 +192,20 @@ class Results:
             head = json.loads(line[: line.index(_REST)] + b"}")
             if line.endswith(b"}\n"):
                 self._places[head["path"]] = (bytes.fromhex(head["key"]), place)
+                self._mark(head["path"], own=line.endswith(_REST + b"null}\n"))
         except (ValueError, KeyError, TypeError):
             return  # the header, or of another version, or damaged: the file is audited again
+
+
+def _content_hash(path: Path) -> str | None:
+    try:
+        # One read and no buffer: most files are small, and there are very many.
+        with path.open("rb", buffering=0) as stream:
+            if os.fstat(stream.fileno()).st_size <= _SMALL:
+                return sha256_bytes(stream.readall())
+        return sha256_file(path)
+    except OSError:
+        return None
 
 
 def _words(toml: Path | None) -> str:
