@@ -104,7 +104,7 @@ def test_a_fold_that_cannot_run_takes_its_candidate_away_and_no_other(tmp_path, 
     monkeypatch.setattr(search, "hold_out", without_friction)
     found = names(tmp_path)
     assert ["coulomb_friction"] in asked
-    assert asked.index(["coulomb_friction"]) < len(asked) - 1  # others were asked after it
+    assert asked.index(["coulomb_friction"]) > 0  # after the simulation without effects
     assert "coulomb_friction" not in found
 
 

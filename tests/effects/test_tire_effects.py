@@ -166,7 +166,7 @@ def test_load_lag_is_first_order_and_ends_at_the_command():
 
 def test_viscoelastic_settling_overshoots_by_its_fraction_and_dies_away_with_time():
     t = np.linspace(0.0, 40.0, 8001)
-    values = {"fraction": 0.04, "time_constant": 5.0}
+    values = {"fraction": 0.04, "time_constant": 5.0, "of_load": 0.0}
     d = driven(0.02, np.where(t > 0, 6000.0, 2000.0), t=t)
     for V in (1.0, 4.0):  # time and not distance
         moved = driven(0.02, d.FZ, t=t, V=V)
@@ -177,6 +177,48 @@ def test_viscoelastic_settling_overshoots_by_its_fraction_and_dies_away_with_tim
         at = np.searchsorted(t, 10.0)
         assert made.FY[at] - rest.FY[at] == pytest.approx(jump * np.exp(-2), rel=5e-3)
         assert made.FY[-1] == pytest.approx(rest.FY[-1], abs=abs(jump) * np.exp(-7.5))
+
+
+def test_settling_of_the_load_alone_leaves_a_steering_step_alone():
+    t = np.linspace(0.0, 40.0, 8001)
+    values = {"fraction": 0.04, "time_constant": 5.0, "of_load": 1.0}
+    steered = driven(np.where(t > 0, 0.02, 0.0), 4000.0, t=t)
+    made = forces(effect("viscoelastic_settling"), values, steered)
+    np.testing.assert_allclose(made.FY, tire(steered).FY, rtol=1e-12)
+    # 4 % of a load step of 4000 N more, on a tire whose force at a small angle goes with the load
+    loaded = driven(1e-3, np.where(t > 0, 6000.0, 2000.0), t=t)
+    made, rest = forces(effect("viscoelastic_settling"), values, loaded), tire(loaded)
+    assert made.FY[1] / rest.FY[1] == pytest.approx(1 + 0.04 * 4000 / 6000, rel=1e-3)
+    assert made.FY[-1] == pytest.approx(rest.FY[-1], rel=1e-4)
+
+
+def test_a_carcass_that_is_a_spring_lets_the_relaxation_length_fall_with_the_slope():
+    """Where the slope is down to a share, so is the lag behind a slow ramp: rate * sigma / V."""
+    t = np.linspace(0.0, 8.0, 8001)
+    middle, rate, sigma = 0.04, 1e-4, 0.5  # slow: the length hardly changes within itself
+    ramp = driven(middle + rate * (t - 8.0), t=t, V=1.0)
+    late = {}
+    for falling in (0.0, 0.5, 1.0):
+        values = {"relaxation_length": sigma, "falling": falling}
+        made = effect("relaxation").drive(ramp, values, setting(t), tire)
+        late[falling] = (ramp.SA - made.SA)[-1]
+    step, contact = 1e-6, middle - late[1.0]
+    there = driven(np.array([contact - step, contact + step]), t=np.arange(2.0))
+    zero = driven(np.array([-step, step]), t=np.arange(2.0))
+    share = np.ptp(tire(there).FY) / np.ptp(tire(zero).FY)
+    assert share < 0.9
+    assert late[0.0] == pytest.approx(rate * sigma, rel=1e-3)
+    assert late[1.0] == pytest.approx(rate * sigma * share, rel=3e-3)
+    assert late[0.5] == pytest.approx(rate * sigma * (1 + share) / 2, rel=3e-3)
+
+
+def test_heat_is_counted_from_the_reference_above_the_first_temperature():
+    t = np.linspace(0.0, 10.0, 11)
+    d = driven(0.001, 4000.0, t=t)
+    here = setting(t, channels={"T_TREAD": 25.0 + t}, first={"T_TREAD": 25.0})
+    values = {"peak_per_K": 0.0, "stiffness_per_K": -0.01, "time_constant": 8.0, "reference": 4.0}
+    made = effect("thermal_friction").drive(d, values, here, tire)
+    np.testing.assert_allclose(made.stiffness, 1 - 0.01 * (t - 4.0))  # nominal at 29 degC
 
 
 def test_turn_slip_is_there_only_while_steering_and_turns_with_the_travel():

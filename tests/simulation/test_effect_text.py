@@ -28,11 +28,11 @@ def one(text):
 @pytest.mark.parametrize(
     ("text", "channel", "parameters"),
     [
-        ("relaxation=0.5m", None, {"relaxation_length": 0.5}),
-        ("relaxation=500mm", None, {"relaxation_length": 0.5}),
-        ("relaxation=0.5", None, {"relaxation_length": 0.5}),
-        ("relaxation.relaxation_length=0.5 m", None, {"relaxation_length": 0.5}),
-        ("relaxation = relaxation_length:5e-1m", None, {"relaxation_length": 0.5}),
+        ("relaxation=0.5m", None, {"relaxation_length": 0.5, "falling": 0.0}),
+        ("relaxation=500mm", None, {"relaxation_length": 0.5, "falling": 0.0}),
+        ("relaxation=0.5", None, {"relaxation_length": 0.5, "falling": 0.0}),
+        ("relaxation.relaxation_length=0.5 m", None, {"relaxation_length": 0.5, "falling": 0.0}),
+        ("relaxation = relaxation_length:5e-1m", None, {"relaxation_length": 0.5, "falling": 0.0}),
         ("zero_offset.D51=0.002mV/V", "D51", {"offset": 0.002}),
         ("zero_offset.D51=2e-6 V/V", "D51", {"offset": 0.002}),
         ("zero_offset.FY=10lbf", "FY", {"offset": 44.482216152605}),

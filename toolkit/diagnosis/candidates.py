@@ -123,20 +123,27 @@ def _as_known(problem: Problem, effect: Effect) -> Effect:
 
 
 def _within_reach(problem: Problem, active: Active) -> Active:
-    """Return dry friction whose presliding is short against the motion, where it is integrated.
+    """Return an effect with the bounds that its motion sets.
 
-    A bristle as long as the way itself is a spring: over a fall from rest it grows as drag does.
+    A bristle as long as the way itself is a spring: over a fall from rest it grows as drag does. A ripple of
+    which the way sees less than two periods does not repeat: it is a stiffness, linear and cubic.
     """
     from toolkit.diagnosis.kinds.ode import OdeModel
 
+    if active.effect.name == ripple.NAME:
+        return _bounded(active, "period", ripple.longest(problem, active.channel))
     if active.effect.name != "coulomb_friction" or not isinstance(problem.model, OdeModel):
         return active
     _, speed, way = _motion_scales(problem, active)
     if problem.model.position_of(str(active.channel)) is None:
         way = speed * max((float(run.t[-1] - run.t[0]) for run in problem.runs if run.rows), default=0.0)
     most = max(_SHORT * way, speed * _row_time(problem))
+    return _bounded(active, "presliding", most)
+
+
+def _bounded(active: Active, name: str, most: float) -> Active:
     parameters = tuple(
-        replace(one, bounds=(one.bounds[0], most)) if one.name == "presliding" else one
+        replace(one, bounds=(one.bounds[0], most)) if one.name == name else one
         for one in active.effect.parameters
     )
     return replace(active, effect=replace(active.effect, parameters=parameters))
@@ -235,13 +242,16 @@ def _scale(problem: Problem, active: Active, one: EffectParameter) -> float:
 
 def _dynamic_scale(problem: Problem, active: Active, one: EffectParameter) -> float:
     force, speed, place = _motion_scales(problem, active)
+    known: dict[str, tuple[float, float]] = getattr(problem.model, "reach", {})
+    reach = known.get(str(active.channel), (speed, place))
     return {
         "force": force,
         "coulomb": force,
         "amplitude": force,
-        "viscous": force / speed,
-        "drag": force / speed**2,
-        "k3": force / place**3,
+        # Where it is largest, not at its spread: a cube of three of them would be another motion.
+        "viscous": force / reach[0],
+        "drag": force / reach[0] ** 2,
+        "k3": force / reach[1] ** 3,
         "period": place,
         "level": place,
         "presliding": speed * _row_time(problem),

@@ -7,6 +7,7 @@ along one simulation are not.
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,41 +17,56 @@ from toolkit.errors import FitError
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from toolkit.diagnosis.candidates import Candidate
     from toolkit.diagnosis.fit import Fit
+    from toolkit.diagnosis.model import Active
     from toolkit.diagnosis.problem import Problem
 
     Stacked = dict[str, NDArray[np.float64]]
 
 NAME = "periodic_ripple"
 _CLOSE = 0.5  # cycles over the way from one period to the next
-_CYCLES = 200.0  # over the way, of the shortest period
+_FEWEST, _MOST = 2.0, 200.0  # cycles over the way, of the longest and the shortest period
 _WORK = 4_000_000  # rows times periods
 _LEAST = 40
 
 
+def longest(problem: Problem, channel: str | None) -> float:
+    """Return the longest period of which a motion shows that it repeats, in the position's unit."""
+    return float(_way(problem, channel)[0] / _FEWEST)
+
+
 def periods(problem: Problem, channel: str | None) -> tuple[float, ...]:
     """Return the periods to try, in the position's unit, the longest first; none where nothing moves."""
-    whole, step = problem.model.way(channel) if hasattr(problem.model, "way") else (0.0, 0.0)
+    whole, step = _way(problem, channel)
     if not whole > 0:
         return ()
     # Two rows to a period at the usual speed; where the motion is slower, shorter ones would still be seen.
-    most = min(_CYCLES, whole / (2 * step) if step > 0 else _CYCLES)
-    count = min(int(most / _CLOSE), max(_LEAST, _WORK // problem.rows))
-    return tuple(float(whole / cycles) for cycles in 1 + _CLOSE * np.arange(max(count, 1)))
+    most = min(_MOST, whole / (2 * step) if step > 0 else _MOST)
+    count = min(int((most - _FEWEST) / _CLOSE), max(_LEAST, _WORK // problem.rows))
+    return tuple(float(whole / cycles) for cycles in _FEWEST + _CLOSE * np.arange(max(count, 1)))
 
 
-def responses(problem: Problem, base: Fit, candidate: Candidate) -> list[Stacked]:
+def _way(problem: Problem, channel: str | None) -> tuple[float, float]:
+    return problem.model.way(channel) if hasattr(problem.model, "way") else (0.0, 0.0)
+
+
+def responses(
+    problem: Problem, base: Fit, active: Active, starts: Sequence[Mapping[str, float]]
+) -> list[Stacked]:
     """Return the responses of every start: of each output (rows, 2), a sine and a cosine of the position.
+
+    Parameters
+    ----------
+    active : where the ripple acts
+    starts : amplitude and period of each
 
     Raises
     ------
     FitError
         the simulation cannot be run
     """
-    active, starts = candidate.active, candidate.starts
-    wave = np.array([2 * np.pi / one.values["period"] for one in starts])
-    size = np.array([one.values["amplitude"] for one in starts])
+    wave = np.array([2 * np.pi / one["period"] for one in starts])
+    size = np.array([one["amplitude"] for one in starts])
 
     def pattern(x: NDArray[np.float64]) -> NDArray[np.float64]:
         turned = np.multiply.outer(x, wave)

@@ -145,7 +145,8 @@ class Screen:
         """Give the responses of every start, nothing for one that the simulation cannot run."""
         if candidate.name == ripple.NAME:
             try:
-                yield from ripple.responses(self.problem, self.base, candidate)
+                starts = [one.values for one in candidate.starts]
+                yield from ripple.responses(self.problem, self.base, candidate.active, starts)
             except FitError:
                 yield from ({} for _ in candidate.starts)
             return

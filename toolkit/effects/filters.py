@@ -11,6 +11,7 @@ if TYPE_CHECKING:
 
 
 _FINER = 4
+_CORNER = 0.5  # of the largest step between two rows: by so much more or less in the next one is a corner
 STRAIGHT = "_straight"  # among an effect's values: the rows are fine enough for straight lines
 
 
@@ -72,6 +73,18 @@ def filtered(
         return lag(t, x, time_constant)
     fine = np.interp(np.arange(_FINER * (len(t) - 1) + 1) / _FINER, np.arange(len(t)), t)
     return lag(fine, _between(t, x, fine), time_constant)[::_FINER]
+
+
+def followed(
+    t: NDArray[np.float64], command: NDArray[np.float64], time_constant: float
+) -> NDArray[np.float64]:
+    """Return what follows a command with a time constant.
+
+    A command of steps and ramps is straight between its rows; one without corners is cubic, as in `filtered`.
+    """
+    steps = np.abs(np.diff(command)).max(initial=0.0)
+    corners = np.abs(np.diff(command, 2)).max(initial=0.0) > _CORNER * steps
+    return filtered(t, command, time_constant, straight=bool(corners))
 
 
 def _between(t: NDArray[np.float64], x: NDArray[np.float64], at: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -6,14 +6,14 @@ import dataclasses
 from typing import TYPE_CHECKING
 
 from toolkit.effects.effect import Effect, EffectParameter, Values
-from toolkit.effects.filters import filtered
+from toolkit.effects.filters import followed
 
 if TYPE_CHECKING:
     from toolkit.effects.signals import Drive, Setting, Tire
 
 
 def _followed(drive: Drive, values: Values, setting: Setting, tire: Tire) -> Drive:
-    return dataclasses.replace(drive, FZ=filtered(drive.t, drive.FZ, values["time_constant"]))
+    return dataclasses.replace(drive, FZ=followed(drive.t, drive.FZ, values["time_constant"]))
 
 
 EFFECT = Effect(

@@ -43,7 +43,7 @@ EFFECT = Effect(
     separates="a dwell of a minute, or the same steps at another speed",
     parameters=(
         EffectParameter(
-            name="fraction", unit="1", text="overshoot after a step", typical=(0.01, 0.05), bounds=(-0.9, 0.9)
+            name="fraction", unit="1", text="overshoot after a step", typical=(0.01, 0.05), bounds=(0.0, 0.5)
         ),
         EffectParameter(
             name="time_constant",

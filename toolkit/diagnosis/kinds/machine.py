@@ -24,7 +24,7 @@ from toolkit.diagnosis.kinds.tire import (
 )
 from toolkit.diagnosis.model import Active, Output
 from toolkit.effects.effect import Effect
-from toolkit.effects.filters import filtered
+from toolkit.effects.filters import followed
 from toolkit.effects.signals import Drive, TireForces
 from toolkit.errors import ConfigError
 from toolkit.units import unit
@@ -167,7 +167,7 @@ class MachineModel:
             return si(self.case, "FZ", run.columns["FZ"])
         for one in active:
             if one.effect.name == "load_lag" and one.acts_in(run):
-                commanded = filtered(run.t, commanded, one.values["time_constant"])
+                commanded = followed(run.t, commanded, one.values["time_constant"])
         return commanded
 
     def places(self, effect: Effect) -> list[tuple[str | None, str | None]]:

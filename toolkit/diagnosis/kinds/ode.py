@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
@@ -10,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from toolkit.diagnosis.kinds.channels import channel_places, slopes, through_channels
+from toolkit.diagnosis.kinds.equation import Equation, failed
 from toolkit.diagnosis.kinds.forces import Forces
-from toolkit.diagnosis.kinds.inputs import Inputs
-from toolkit.diagnosis.kinds.integrate import OFF, IntegrationError, integrate
+from toolkit.diagnosis.kinds.integrate import IntegrationError, integrate
 from toolkit.diagnosis.kinds.pushed import propagated
 from toolkit.diagnosis.kinds.python import silenced
 from toolkit.diagnosis.kinds.setting import nominal_load, setting
@@ -42,7 +41,7 @@ class OdeModel:
     def __init__(
         self, case: Case, rhs: Callable[..., Any], outputs: Callable[..., Any], initial: Callable[..., Any]
     ) -> None:
-        self.case, self._rhs, self._outputs, self._initial = case, rhs, outputs, initial
+        self.case, self._equation = case, Equation(case, rhs, outputs, initial)
         self.parameters = case.parameters
         self.outputs = tuple(Output(name=one.name, unit=one.unit, sd=one.sd) for one in case.outputs)
         self._drivers = tuple(one.name for one in case.drivers)
@@ -51,7 +50,7 @@ class OdeModel:
         self._held = 0  # bytes of what is kept
         self._kept: dict[Any, dict[str, NDArray[np.float64]] | FitError] = {}
         p = {one.name: one.value for one in case.parameters}
-        start = self._start(case.runs[0], p)
+        start = self._equation.start(case.runs[0], p)
         names = case.simulation.states or tuple(f"x{i}" for i in range(len(start)))
         if len(names) != len(start):
             raise ConfigError(
@@ -74,7 +73,7 @@ class OdeModel:
                 next_step="correct the name",
                 rule="case",
             )
-        self._derivative_of = self._kinematics(p)
+        self._derivative_of = self._equation.kinematics(p)
         self.force_units = terms or {
             name: "" for i, name in enumerate(names) if i not in self._derivative_of.values()
         }
@@ -84,44 +83,12 @@ class OdeModel:
 
     def _tried(self, p: Mapping[str, float]) -> bool:
         run = self.case.runs[0]
-        u = Inputs(run, self._drivers).row(run.rows // 2)
+        u = self._equation.inputs(run).row(run.rows // 2)
         size = np.array([self.scale[name][1] for name in self.states])
         with silenced():
-            return takes_columns(self._rhs, float(run.t[0]), self._start(run, p), size, u, p)
-
-    def _start(self, run: Run, p: Mapping[str, float]) -> NDArray[np.float64]:
-        import inspect
-
-        try:
-            many = len(inspect.signature(self._initial).parameters) > 1
-            given = self._initial(dict(p), _as_dict(run)) if many else self._initial(dict(p))
-            return np.atleast_1d(np.asarray(given, dtype=np.float64)).astype(np.float64)
-        except (Exception, SystemExit) as error:
-            raise _failed(self.case, run, f"initial: {type(error).__name__}: {error}") from error
-
-    def _kinematics(self, p: Mapping[str, float]) -> dict[int, int]:
-        """Return velocity state -> position state where one state's rate is another state as it is."""
-        rng = np.random.default_rng(0)
-        run = self.case.runs[0]
-        u = {name: float(run.columns[name][0]) for name in self._drivers}
-        found: dict[int, int] = {}
-        start = self._start(run, p)
-        size = np.maximum(np.abs(start), 1.0)
-        rates, points = [], []
-        for _ in range(4):
-            x = start + size * rng.normal(size=len(start))
-            try:
-                rates.append(np.asarray(self._rhs(float(run.t[0]), x.copy(), u, dict(p)), dtype=np.float64))
-            except (Exception, SystemExit) as error:
-                raise _failed(self.case, run, f"rhs: {type(error).__name__}: {error}") from error
-            points.append(x)
-        for i in range(len(start)):
-            for j in range(len(start)):
-                if i != j and all(
-                    abs(r[i] - x[j]) <= 1e-9 * (1 + abs(x[j])) for r, x in zip(rates, points, strict=True)
-                ):
-                    found[j] = i
-        return found
+            return takes_columns(
+                self._equation.rhs, float(run.t[0]), self._equation.start(run, p), size, u, p
+            )
 
     def _sizes(self, p: Mapping[str, float]) -> dict[str, tuple[float, float]]:
         """Return for every state that a term may enter: size of its rate, and spread of itself."""
@@ -142,6 +109,11 @@ class OdeModel:
             for i, name in enumerate(self.states)
         }
         self.largest = {name: float(x[i].max()) for i, name in enumerate(self.states)}
+        farthest = np.abs(x).max(axis=1)
+        self.reach = {
+            name: (float(farthest[i]) or 1.0, float(farthest[self._derivative_of.get(i, i)]) or 1.0)
+            for i, name in enumerate(self.states)
+        }
         return {
             name: (
                 # Its largest rate, not its spread: a body in free fall has a force that never varies.
@@ -175,7 +147,7 @@ class OdeModel:
         if run.rows < 2:
             return {}
         fine = self._between(run, p, forces, x)
-        rate = self._with(acting, dict(p), Inputs(run, self._drivers))
+        rate = self._equation.rates(run, dict(p), acting, len(self.states))
         sizes = np.array([*(self.scale[name][1] for name in self.states), *[1.0] * acting.added])
         try:
             with silenced():
@@ -183,13 +155,13 @@ class OdeModel:
                     rate, self._finer(run).t, fine, pattern(fine[self._derivative_of[at]]), at=at, sizes=sizes
                 )[::_FINER]
         except (Exception, SystemExit) as error:
-            raise _failed(self.case, run, f"rhs: {type(error).__name__}: {error}") from error
-        here = self._shown(run, p, x[:own])
+            raise failed(self.case, run, f"rhs: {type(error).__name__}: {error}") from error
+        here = self._equation.shown(run, p, x[:own])
         made = {name: np.zeros((run.rows, moved.shape[2])) for name in here}
         for i in range(own):
             shifted = x[:own].copy()
             shifted[i] += 1e-6 * sizes[i]
-            there = self._shown(run, p, shifted)
+            there = self._equation.shown(run, p, shifted)
             for name, column in made.items():
                 column += ((there[name] - here[name]) / (1e-6 * sizes[i]))[:, None] * moved[:, i]
         shown = slopes(here, active, run, self.setting(run), run.columns)
@@ -245,9 +217,9 @@ class OdeModel:
             return
         sets = [p for _, p, _ in listed]
         try:
-            starts = np.stack([self._start(run, p) for p in sets], axis=1)
+            starts = np.stack([self._equation.start(run, p) for p in sets], axis=1)
             forces = [self._forces(one) for *_, one in listed]
-            rates = self._with_columns(forces, columns_of(sets), Inputs(run, self._drivers))
+            rates = self._equation.rates_together(run, columns_of(sets), forces, len(self.states))
             added = max(one.added for one in forces)
             atol = self._tolerance(starts[:, 0], added)
             starts = np.vstack([starts, np.zeros((added, len(sets)))])
@@ -293,9 +265,9 @@ class OdeModel:
         self._held += 0 if isinstance(made, FitError) else sum(one.nbytes for one in made.values())
 
     def _integrate(self, run: Run, p: Mapping[str, float], forces: Sequence[Active]) -> NDArray[np.float64]:
-        values, acting = dict(p), self._forces(forces)
-        rate = self._with(acting, values, Inputs(run, self._drivers))
-        start = self._start(run, p)
+        acting = self._forces(forces)
+        rate = self._equation.rates(run, dict(p), acting, len(self.states))
+        start = self._equation.start(run, p)
         if run.rows == 1:
             return start[:, None]
         begun = np.concatenate([start, np.zeros(acting.added)])
@@ -303,40 +275,14 @@ class OdeModel:
             with silenced():
                 return integrate(rate, run.t, begun, self._tolerance(start, acting.added))
         except IntegrationError as error:
-            raise _failed(self.case, run, f"the integration ended early: {error}") from error
+            raise failed(self.case, run, f"the integration ended early: {error}") from error
         except (Exception, SystemExit) as error:
-            raise _failed(self.case, run, f"rhs: {type(error).__name__}: {error}") from error
+            raise failed(self.case, run, f"rhs: {type(error).__name__}: {error}") from error
 
     def _tolerance(self, start: NDArray[np.float64], added: int = 0) -> NDArray[np.float64]:
         if not self.scale:
             return 0.01 * ATOL * np.maximum(np.abs(start), 1.0)
         return ATOL * np.array([*(self.scale[name][1] for name in self.states), *[10.0] * added])
-
-    def _with(self, forces: Forces, p: dict[str, float], u: Inputs) -> Callable[..., Any]:
-        plain, own = self._rhs, len(self.states)
-        if not forces.listed:
-            return lambda t, x: np.asarray(plain(t, x, u(t), p), dtype=np.float64)
-
-        def rhs(t: float, x: NDArray[np.float64]) -> NDArray[np.float64]:
-            rate = np.zeros(len(x))
-            rate[:own] = plain(t, x[:own], u(t), p)
-            forces.add(x, rate, own)
-            return rate
-
-        return rhs
-
-    def _with_columns(self, forces: Sequence[Forces], p: Mapping[str, Any], u: Inputs) -> Callable[..., Any]:
-        plain, own = self._rhs, len(self.states)
-        there = [(k, one) for k, one in enumerate(forces) if one.listed]
-
-        def rhs(t: float, x: NDArray[np.float64]) -> NDArray[np.float64]:
-            rate = np.zeros_like(x)
-            rate[:own] = plain(t, x[:own], u(t), p)
-            for k, one in there:
-                one.add(x[:, k], rate[:, k], own)
-            return rate
-
-        return rhs
 
     def _forces(self, active: Sequence[Active]) -> Forces:
         return Forces.of(active, self.states, self._derivative_of, self.scale)
@@ -353,7 +299,7 @@ class OdeModel:
         """Return the outputs of integrated states, also ``between`` the rows."""
         if between:
             x, run = self._between(run, p, forces, x), self._finer(run)
-        return self._shown(run, p, x[: len(self.states)])
+        return self._equation.shown(run, p, x[: len(self.states)])
 
     def _between(
         self, run: Run, p: Mapping[str, float], forces: Sequence[Active], x: NDArray[np.float64]
@@ -363,39 +309,13 @@ class OdeModel:
 
         acting = self._forces(forces)
         x = x[: len(self.states) + acting.added]
-        rate = self._with(acting, dict(p), Inputs(run, self._drivers))
+        rate = self._equation.rates(run, dict(p), acting, len(self.states))
         try:
             with silenced():
                 rates = np.stack([rate(t, x[:, k]) for k, t in enumerate(run.t.tolist())], axis=1)
         except (Exception, SystemExit) as error:
-            raise _failed(self.case, run, f"rhs: {type(error).__name__}: {error}") from error
+            raise failed(self.case, run, f"rhs: {type(error).__name__}: {error}") from error
         return np.asarray(CubicHermiteSpline(run.t, x, rates, axis=1)(self._finer(run).t))
-
-    def _shown(
-        self, run: Run, p: Mapping[str, float], x: NDArray[np.float64]
-    ) -> dict[str, NDArray[np.float64]]:
-        values = dict(p)
-        inputs = Inputs(run, self._drivers)
-        rows: dict[str, list[float]] = {one.name: [] for one in self.outputs}
-        with silenced():
-            for k in range(run.rows):
-                try:
-                    made = self._outputs(x[:, k].copy(), inputs.row(k), values)
-                except (Exception, SystemExit) as error:
-                    raise _failed(self.case, run, f"outputs: {type(error).__name__}: {error}") from error
-                if not isinstance(made, Mapping):
-                    raise _failed(self.case, run, f"outputs gives a {type(made).__name__}, not a dict")
-                for name, column in rows.items():
-                    if name not in made:
-                        raise _failed(
-                            self.case, run, f"outputs gives no {name!r}; it gives {', '.join(map(str, made))}"
-                        )
-                    column.append(_number(made[name]))
-        result = {name: np.array(column) for name, column in rows.items()}
-        for name, values_of in result.items():
-            if not np.isfinite(values_of).all():
-                raise _failed(self.case, run, f"no number in output {name!r}")
-        return result
 
     def places(self, effect: Effect) -> list[tuple[str | None, str | None]]:
         """Return the states and outputs on which an effect could act."""
@@ -418,30 +338,3 @@ class OdeModel:
         if run not in self._settings:
             self._settings[run] = setting(self.case, run, nominal_load_N=nominal_load(self.case))
         return self._settings[run]
-
-
-def _number(value: Any) -> float:
-    """Return a number of an outputs' dict; no number of a text, a complex one, or one too large to square."""
-    if isinstance(value, (str, bytes)):
-        return math.nan
-    try:
-        number = float(value)
-    except (TypeError, ValueError):
-        return math.nan
-    return number if abs(number) < OFF else math.nan
-
-
-def _as_dict(run: Run) -> dict[str, Any]:
-    first = {name: float(values[0]) for name, values in run.columns.items()}
-    return {**first, **run.declared}
-
-
-def _failed(case: Case, run: Run, got: str) -> FitError:
-    return FitError(
-        "the simulation cannot be integrated",
-        where=f"{case.simulation.path}, {run.name}",
-        got=got,
-        expected="rhs, outputs and initial that give finite numbers over the whole run",
-        next_step="run the equation on that file by itself and mend it",
-        rule="simulator",
-    )
