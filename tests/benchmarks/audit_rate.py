@@ -1,9 +1,10 @@
 """`toolkit audit` on an archive of 5 000 recordings whose grades were decided when they were made.
 
 Peers: a plain script (pandas on openpyxl, least squares, comparison with every calibration) on one core, on
-a sample; and the gate with python-calamine alone, which reads every cell, in the same workers, on all of it. A
-dask cluster of one and two workers on loopback has a smaller archive. A wrong grade, or another answer of the cluster, ends the
-run with an error: no rate counts beside it. AUDIT_FILES=400 in the environment makes a short run.
+a sample; and the gate with python-calamine alone, which reads every cell, in the same workers, on all of
+it. A dask cluster of one and two workers on loopback has a smaller archive. A wrong grade, or another answer
+of the cluster, ends the run with an error: no rate counts beside it. AUDIT_FILES=400 in the environment
+makes a short run.
 """
 
 from __future__ import annotations
