@@ -41,6 +41,7 @@ $(STAMP): requirements.lock pyproject.toml
 	@test -x $(BIN)/pip || { rm -rf $(VENV); $(PYTHON) -m venv $(VENV); }
 	$(BIN)/pip install --quiet --disable-pip-version-check --require-hashes -r requirements.lock
 	$(BIN)/pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation -e .
+	@PYTHONDONTWRITEBYTECODE= $(BIN)/python -m compileall -q toolkit
 	@touch $@
 
 # LibreOffice, its fonts and poppler from the system's packages. Without root and without sudo nothing is

@@ -65,13 +65,17 @@ class Motion:
         return size / span, size, size * span
 
     def way(self) -> tuple[float, float]:
-        """Return the longest way of a run [position's unit], and the usual way from row to row."""
+        """Return the longest way of a run [position's unit], and the usual way from row to row.
+
+        None is passed unseen where the force stands on the rows' own positions.
+        """
         name = self.position or ""
         columns = [run.columns[name] for run in self.case.runs if name in run.columns]
         columns = [one[np.isfinite(one)] for one in columns]
         spans = [float(np.ptp(one)) for one in columns if len(one)]
         steps = [np.abs(np.diff(one)) for one in columns if len(one) > 1]
-        return max(spans, default=0.0), float(np.median(np.concatenate(steps))) if steps else 0.0
+        unseen = bool(steps) and self.kind != "force"
+        return max(spans, default=0.0), float(np.median(np.concatenate(steps))) if unseen else 0.0
 
     def pushed(
         self,
