@@ -13,6 +13,7 @@ from xml.etree import ElementTree as ET
 import numpy as np
 import pytest
 
+from tests.conftest import EXAMPLES
 from toolkit.audit.archive import audit_archive
 from toolkit.audit.linked import PastReport, link
 from toolkit.audit.timeline import timelines
@@ -167,6 +168,15 @@ class TestSummary:
         assert table == {grade: str(count) for grade, count in grades.items() if count}
         assert [row[0] for row in content.tables["audit_reports"].rows] == ["R <1>"]
         assert content.conditions["reports_to_amend"]
+
+    def test_it_does_not_say_no_change_where_none_can_be_told(self):
+        # Figure 4.4 carries the withdrawn record and no date: no record in force is known, and no change.
+        registry = Registry(CHECKOUT / "calibrations")
+        made = audit_archive(EXAMPLES / "fig4_4", registry, known_at=dt.date(2026, 1, 1))
+        bare = AuditView(made=made, rules=rules_catalogue(), timelines=(), traces=(), linked=None)
+        told = build_audit_content(bare).values["audit.conclusion"].value
+        assert "cannot be told" in told
+        assert "0.0 N" not in told
 
     def test_it_is_filled_converted_and_verified(self, view, tmp_path):
         from toolkit.report.deliver import deliver

@@ -59,7 +59,7 @@ def build_audit_content(view: AuditView, style: Style | None = None) -> ReportCo
 def _totals(view: AuditView) -> dict[str, Any]:
     # One pass over the files: what the texts and the picture need of them.
     FY = MZ = 0.0
-    right = wrong = 0
+    right = wrong = repaired = 0
     years: dict[int, list[int]] = {}
     for one in view.made.files.plain():
         ok = one["grade"] in _RIGHT
@@ -68,9 +68,10 @@ def _totals(view: AuditView) -> dict[str, Any]:
         if one["date"] is not None and one["grade"] != "unreadable":
             years.setdefault(int(one["date"][:4]), [0, 0])[not ok] += 1
         if not ok and one["repair"] is not None:
+            repaired += 1
             FY = max(FY, one["repair"]["FY_max_abs_N"] or 0.0)
             MZ = max(MZ, one["repair"]["MZ_max_abs_Nm"] or 0.0)
-    return {"FY": FY, "MZ": MZ, "right": right, "wrong": wrong, "years": years}
+    return {"FY": FY, "MZ": MZ, "right": right, "wrong": wrong, "repaired": repaired, "years": years}
 
 
 def _texts(view: AuditView, totals: Mapping[str, Any]) -> dict[str, str | None]:
@@ -85,8 +86,12 @@ def _texts(view: AuditView, totals: Mapping[str, Any]) -> dict[str, str | None]:
     else:
         conclusion = (
             f"Of {files} files, {totals['right']} carry the Fy and Mz of the record that was in force on the "
-            f"day of their test, and {totals['wrong']} do not. By that record Fy changes by up to "
-            f"{totals['FY']:.1f} N and Mz by up to {totals['MZ']:.2f} N·m."
+            f"day of their test, and {totals['wrong']} do not. "
+        )
+        conclusion += (
+            f"By that record Fy changes by up to {totals['FY']:.1f} N and Mz by up to {totals['MZ']:.2f} N·m."
+            if totals["repaired"]
+            else "By how much cannot be told: for none of them a record in force on its day is known."
         )
     if made.grades["unreadable"]:
         conclusion += f" {made.grades['unreadable']} files could not be read and are set aside."
