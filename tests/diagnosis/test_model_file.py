@@ -13,7 +13,10 @@ from tests.diagnosis.tire_case import TIR, plain, python_tire, toml
 from toolkit.diagnosis.case_read import read_case
 from toolkit.diagnosis.diagnose import diagnose
 from toolkit.diagnosis.forward import simulate_model
+from toolkit.diagnosis.load import model_of
+from toolkit.diagnosis.model import Active
 from toolkit.diagnosis.model_text import MODEL, model_text
+from toolkit.effects.catalogue import effects
 from toolkit.errors import ConfigError, ToolkitError
 from toolkit.simulation.model_file import read_model
 
@@ -155,6 +158,19 @@ def test_a_model_with_what_was_found_misses_nothing_on_the_same_recordings(tmp_p
     assert len(own) == len(effect.parameters)
     assert all(abs(one.shift_in_sd or 0.0) < 1 for one in own)
     assert [one.level for one in again.findings if one.rule == "case-model"] == ["note"]
+
+
+def test_small_forces_act_beside_what_a_model_has_in_it(tmp_path):
+    case = drag_ode(tmp_path / "case")
+    _, path = written(case, tmp_path / "answer")
+    model = model_of(read_case(case, model=path), None)
+    run, p = model.case.runs[0], {one.name: one.value for one in model.parameters}
+    linear = model.pushed(run, p, (), "v", lambda x: np.ones((len(x), 1)))["h"][:, 0]
+    push = Active(effect=effects()["constant_force"], channel="v", values={"force": 1e-3})
+    moved = (model.simulate(run, p, (push,))["h"] - model.simulate(run, p, ())["h"]) / 1e-3
+    # the drag holds back: less than the t^2/2 of a body without it
+    assert moved[-1] < 0.9 * run.t[-1] ** 2 / 2
+    np.testing.assert_allclose(linear, moved, atol=0.01 * moved[-1])
 
 
 def test_a_model_file_says_what_it_rests_on(tmp_path, drag):

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from toolkit.diagnosis.case import CaseParameter
-from toolkit.diagnosis.model import Active, Model
+from toolkit.diagnosis.model import Active, Model, Moving
 from toolkit.diagnosis.units_of import unit_of
 from toolkit.effects.sense import computed_in
 from toolkit.errors import ConfigError
@@ -96,6 +96,11 @@ def build_in(case: Case, model: Model) -> None:
     if prepare is not None:
         model.prepare = lambda run, sets: prepare(  # type: ignore[attr-defined]
             run, [(only_own(p), with_them(p, active)) for p, active in sets]
+        )
+    if isinstance(model, Moving):
+        pushed = model.pushed
+        model.pushed = lambda run, p, active, *more: pushed(  # type: ignore[method-assign]
+            run, only_own(p), with_them(p, active), *more
         )
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
 from toolkit.effects.effect import Effect, EffectParameter
 
@@ -60,8 +60,7 @@ class Model(Protocol):
     """A simulation that can be run with effects in it.
 
     ``places`` says for an effect where it could act: pairs of channel and source. An effect without a
-    place is not applicable to this case, and ``why_not`` says why. One in which something moves has two
-    methods more: ``way`` and ``pushed`` (see `toolkit.diagnosis.ripple`).
+    place is not applicable to this case, and ``why_not`` says why.
     """
 
     outputs: tuple[Output, ...]
@@ -77,4 +76,25 @@ class Model(Protocol):
 
     def places(self, effect: Effect) -> Sequence[tuple[str | None, str | None]]:
         """Return where an effect could act in this case."""
+        ...
+
+
+@runtime_checkable
+class Moving(Protocol):
+    """A simulation in which something moves: what forces over a position would each do to its outputs."""
+
+    def way(self, channel: str | None, /) -> tuple[float, float]:
+        """Return the longest way of a run [position's unit] and the usual one from row to row."""
+        ...
+
+    def pushed(
+        self,
+        run: Run,
+        p: Mapping[str, float],
+        active: Sequence[Active],
+        channel: str | None,
+        pattern: Pattern,
+        /,
+    ) -> Arrays:
+        """Return linear responses of every output to small forces, (rows, forces); none where none move."""
         ...

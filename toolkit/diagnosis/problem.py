@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolkit.diagnosis.model import Active, Model
+from toolkit.diagnosis.model import Active, Model, Moving
 from toolkit.diagnosis.noise import Layout, layout
 
 if TYPE_CHECKING:
@@ -88,8 +88,11 @@ class Problem:
         values = dict(self.known)
         values.update(zip((each.name for each in self.free), map(float, p), strict=True))
         parts: dict[str, list[NDArray[np.float64]]] = {name: [] for name in self.names}
+        moving = self.model if isinstance(self.model, Moving) else None
         for run in self.runs:
-            made = self.model.pushed(run, values, active, one.channel, pattern) if one.acts_in(run) else {}  # type: ignore[attr-defined]
+            made: Stacked = {}
+            if moving is not None and one.acts_in(run):
+                made = moving.pushed(run, values, active, one.channel, pattern)
             for name, column in parts.items():
                 column.append(made.get(name, np.zeros((run.rows, forces))))
         return {name: np.concatenate(column) for name, column in parts.items()}

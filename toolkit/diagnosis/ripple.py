@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from toolkit.diagnosis.model import Moving
 from toolkit.errors import FitError
 
 if TYPE_CHECKING:
@@ -47,7 +48,7 @@ def periods(problem: Problem, channel: str | None) -> tuple[float, ...]:
 
 
 def _way(problem: Problem, channel: str | None) -> tuple[float, float]:
-    return problem.model.way(channel) if hasattr(problem.model, "way") else (0.0, 0.0)
+    return problem.model.way(channel) if isinstance(problem.model, Moving) else (0.0, 0.0)
 
 
 def responses(

@@ -119,7 +119,7 @@ class ColumnsModel:
         """Return what small forces of a pattern over the position add to every output, (rows, forces)."""
         if self.motion is None:
             return {}
-        made = self.simulate(run, p, [one for one in active if one.effect.channel is None])
+        made = ColumnsModel.simulate(self, run, p, [one for one in active if one.effect.channel is None])
         shown = slopes(made, active, run, self.setting(run), run.columns)
         return {
             name: shown[name][:, None] * one for name, one in self.motion.pushed(made, run, pattern).items()
