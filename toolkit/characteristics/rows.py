@@ -15,7 +15,7 @@ from toolkit.characteristics.reading import CHANNELS, Channel, Direction, Reader
 from toolkit.characteristics.shared import Shared
 from toolkit.characteristics.stiffness import stiffness
 from toolkit.characteristics.uncertain import Part, Uncertain
-from toolkit.reduction.common_load import slopes
+from toolkit.reduction.common_load import at_one_angle, slopes
 
 if TYPE_CHECKING:
     from toolkit.characteristics.model import DirectionFit
@@ -120,14 +120,13 @@ def point_u(directions: Sequence[Direction], *, shared: Shared) -> Mapping[tuple
     Sources: the record, the cells' zeros or tares, the scatter of the rows, and through the curve's slopes
     the slip angle (zero and scale), the load and the pressure.
     """
-    by_file: dict[str, list[tuple[Direction, int]]] = {}
-    for one in directions:
-        for place, condition in enumerate(one.group.conditions):
-            by_file.setdefault(condition.file, []).append((one, place))
+    every = [(one, place) for one in directions for place in range(len(one.group.conditions))]
+    groups = at_one_angle([one.group.conditions[place] for one, place in every])
     found: dict[tuple[str, int], dict[str, float]] = {}
     for channel in CHANNELS:
         squares = _squares(directions, channel, shared)
-        for pairs in by_file.values():
+        for members in groups:
+            pairs = [every[index] for index in members]
             conditions = [one.group.conditions[place] for one, place in pairs]
             FZ = np.array([c.FZ for c in conditions])
             y = np.array([c.FY if channel == "FY" else c.MZ for c in conditions])

@@ -64,7 +64,7 @@ def window(recording: Recording, block: Block, *, machine: Machine, rolling_radi
     discarded only where the recording itself can tell revolutions: by a tire or drum angle, a time channel,
     or by a sample rate of a machine that records continuously.
     """
-    turns = _revolutions(recording, block, machine=machine, rolling_radius_m=rolling_radius_m)
+    turns = revolutions(recording, block, machine=machine, rolling_radius_m=rolling_radius_m)
     if turns is None:
         return Window(rows=block.rows, revolutions=None, short=False)
     protocol = machine.protocol
@@ -80,7 +80,7 @@ def window(recording: Recording, block: Block, *, machine: Machine, rolling_radi
     return Window(rows=rows, revolutions=float(turns[stop - 1] - turns[start]), short=short)
 
 
-def _revolutions(
+def revolutions(
     recording: Recording, block: Block, *, machine: Machine, rolling_radius_m: float | None
 ) -> NDArray[np.float64] | None:
     """Return revolutions of the protocol's shaft since the block's first row (rows,), None if unknown.

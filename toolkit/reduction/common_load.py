@@ -6,10 +6,19 @@ slope comes from the neighbouring loads of the same file, so that it is taken at
 
 from __future__ import annotations
 
+from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from toolkit.reduction.model import Condition
+
+# Rests at no step of the protocol are at two slip angles where they are further apart than half a degree.
+_GAP_RAD = float(np.radians(0.5))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -18,6 +27,32 @@ class Slope:
 
     value: float
     u: float
+
+
+def at_one_angle(conditions: Sequence[Condition]) -> tuple[tuple[int, ...], ...]:
+    """Return the groups of conditions whose loads are neighbours: indices, one group a file and slip angle.
+
+    A file of one slip angle is one group. A continuous recording has several: its rests are told apart by
+    the protocol's step, those at no step by a gap in the angle, and a load that stands twice by its turn.
+    """
+    places: dict[tuple[str, float | None], list[int]] = {}
+    for index, one in enumerate(conditions):
+        places.setdefault((one.file, one.step_SA), []).append(index)
+    groups: dict[tuple[str, float | None, int, int], list[int]] = {}
+    for (file, step), mine in places.items():
+        angles = sorted({conditions[index].SA for index in mine})
+        cluster: dict[float, int] = {}
+        last = angles[0]
+        for SA in angles:
+            number = cluster.get(last, 0) + (step is None and SA - last > _GAP_RAD)
+            cluster[SA], last = number, SA
+        seen: Counter[tuple[int, float | None]] = Counter()
+        for index in sorted(mine, key=lambda i: conditions[i].first_row):
+            one = conditions[index]
+            turn = seen[cluster[one.SA], one.step_FZ]
+            seen[cluster[one.SA], one.step_FZ] += one.step_FZ is not None
+            groups.setdefault((file, step, cluster[one.SA], turn), []).append(index)
+    return tuple(tuple(sorted(group)) for group in groups.values())
 
 
 def slopes(FZ: NDArray[np.float64], y: NDArray[np.float64]) -> tuple[Slope | None, ...]:

@@ -11,10 +11,11 @@ from toolkit.calibration.apply import apply_record
 from toolkit.channels import Rotation
 from toolkit.errors import RecordError, RecordingError
 from toolkit.reduction.acquired import Difference, compare
-from toolkit.reduction.averaging import ROLLING_RATIO, Window, free_radius_m, window
+from toolkit.reduction.averaging import ROLLING_RATIO, Window, free_radius_m, revolutions, window
 from toolkit.reduction.blocks import Block, find_blocks, is_tare
 from toolkit.reduction.corrections import corrected
 from toolkit.reduction.model import Tare
+from toolkit.reduction.rests import find_rests
 from toolkit.units import from_si
 
 if TYPE_CHECKING:
@@ -96,6 +97,66 @@ def split_blocks(recording: Recording, machine: Machine) -> tuple[tuple[Block, .
     return loads, tare
 
 
+def split_rests(
+    recording: Recording, machine: Machine, info: TestInfo
+) -> tuple[tuple[Block, ...], tuple[Block, ...]]:
+    """Return the blocks at a load and the tare blocks of a recording, by the protocol's acquisition.
+
+    A file that is recorded continuously holds the moves too, at any number of slip angles: its blocks are
+    the rests between them. Where its revolutions cannot be counted, and in the machine's own files, a block
+    is what lies between two jumps of the load.
+
+    Raises
+    ------
+    RecordingError
+        the file has no load block, its load is negative, or nothing in it rests long enough
+    """
+    protocol = machine.protocol
+    whole = Block(start=0, stop=recording["FZ"].si.size, mean_FZ=0.0)
+    turns = (
+        revolutions(recording, whole, machine=machine, rolling_radius_m=rolling_radius_m(info))
+        if protocol.acquisition == "continuous"
+        else None
+    )
+    if turns is None:
+        return split_blocks(recording, machine)
+    smallest = min(protocol.loads_N)
+    rests = find_rests(
+        SA=recording["SA"].si,
+        FZ=recording["FZ"].si,
+        turns=turns,
+        band_SA=protocol.slip_angle_tolerance_rad,
+        band_FZ=2 * protocol.load_tolerance,
+        floor_FZ=protocol.load_tolerance * smallest,
+        least_turns=protocol.average_revolutions,
+    )
+    tare = tuple(rest for rest in rests if is_tare(rest, smallest_load=smallest))
+    loads = tuple(rest for rest in rests if not is_tare(rest, smallest_load=smallest))
+    if not loads or any(rest.mean_FZ < 0 for rest in loads):
+        low, high = from_si([np.min(recording["SA"].si), np.max(recording["SA"].si)], "deg")
+        raise RecordingError(
+            "the load is negative" if loads else "the recording does not rest at any slip angle and load",
+            where=recording.path,
+            got=f"{float(turns[-1]):.3g} {protocol.revolutions_of} revolutions, slip angle {low:.2f} to "
+            f"{high:.2f} deg, FZ from {_lbf(recording['FZ'].si.min())} to "
+            f"{_lbf(recording['FZ'].si.max())} lbf",
+            expected=f"rests of {protocol.average_revolutions:g} {protocol.revolutions_of} revolutions or "
+            f"more, in which the slip angle stays within "
+            f"{float(from_si(protocol.slip_angle_tolerance_rad, 'deg')):g} deg and the load within "
+            f"+-{protocol.load_tolerance:.0%}",
+            next_step="hold each condition longer, or give a protocol with wider tolerances or a shorter "
+            "averaging; else check the load channel",
+            rule="no-rest" if not loads else "no-load-block",
+        )
+    return loads, tare
+
+
+def rolling_radius_m(info: TestInfo) -> float | None:
+    """Return the effective rolling radius [m] by the tire's size, None where that is not known."""
+    radius = free_radius_m(info.tire_size)
+    return None if radius is None else ROLLING_RATIO * radius
+
+
 def open_file(
     name: str,
     recording: Recording,
@@ -116,8 +177,7 @@ def open_file(
         machine,
         {"SA": recording["SA"].si, "FZ": recording["FZ"].si, "FY": loads["FY"], "MZ": loads["MZ"]},
     )
-    radius = free_radius_m(info.tire_size)
-    rolling = None if radius is None else ROLLING_RATIO * radius
+    rolling = rolling_radius_m(info)
     return OpenedFile(
         name=name,
         recording=recording,

@@ -129,11 +129,15 @@ def _doubled(placed: Sequence[Placed], later: Sequence[int]) -> list[Finding]:
     files: dict[str, list[Placed]] = {}
     for index in later:
         files.setdefault(placed[index].file, []).append(placed[index])
+
+    def angles(some: Sequence[Placed]) -> str:
+        return _angles_told(list(dict.fromkeys(one.step_SA or 0.0 for one in some)))
+
     return [
         Finding(
             rule="doubled",
             where=file,
-            message=f"slip angle {_angles_told([some[0].step_SA or 0.0])}, drum {some[0].rotation}: "
+            message=f"slip angle {angles(some)}, drum {some[0].rotation}: "
             f"{len(some)} block(s) of a condition that earlier files hold as often as "
             "the protocol declares; unused",
         )
@@ -143,10 +147,8 @@ def _doubled(placed: Sequence[Placed], later: Sequence[int]) -> list[Finding]:
 
 def _angles(placed: Sequence[Placed], protocol: Protocol) -> list[Finding]:
     found: list[Finding] = []
-    for file in dict.fromkeys(p.file for p in placed):
-        angles = [p for p in placed if p.file == file]
-        SA = float(np.mean([p.SA for p in angles]))
-        step = angles[0].step_SA
+    for file, step in dict.fromkeys((p.file, p.step_SA) for p in placed):
+        SA = float(np.mean([p.SA for p in placed if (p.file, p.step_SA) == (file, step)]))
         if step is None:
             message = (
                 f"slip angle {_angles_told([SA])} is no step of the protocol; its blocks feed the curves only"

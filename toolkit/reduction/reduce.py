@@ -13,10 +13,10 @@ from toolkit.channels import Reversal, Rotation, seen_by_cells, signs
 from toolkit.reduction import protocol as plan
 from toolkit.reduction import remarks
 from toolkit.reduction.averaging import Window, means
-from toolkit.reduction.common_load import carry, slopes
+from toolkit.reduction.common_load import at_one_angle, carry, slopes
 from toolkit.reduction.corrections import correction_findings
 from toolkit.reduction.model import CalibrationUse, Condition, ReducedTest, Tare
-from toolkit.reduction.opened import OpenedFile, check_record, open_file, split_blocks
+from toolkit.reduction.opened import OpenedFile, check_record, open_file, split_rests
 from toolkit.reduction.repeats import drift_findings
 from toolkit.reduction.tare import choose_tares, zero_shifts
 
@@ -55,7 +55,7 @@ def reduce_test(
         the record does not take the machine's indications in their units, or lacks FY or MZ
     """
     check_record(record, machine)
-    blocks = [split_blocks(recording, machine) for _, recording, _ in recordings]
+    blocks = [split_rests(recording, machine, info) for _, recording, _ in recordings]
     tares = choose_tares(
         [(recording, empty) for (_, recording, _), (_, empty) in zip(recordings, blocks, strict=True)],
         declared=tare,
@@ -105,6 +105,8 @@ def _conditions(
     for order, file in enumerate(files):
         step = plan.nearest_step(float(np.mean(file.channels[0])), machine.protocol)
         for block, rows in zip(file.blocks, file.windows, strict=True):
+            if machine.protocol.acquisition == "continuous":
+                step = plan.nearest_step(float(np.mean(file.channels[0][rows.rows])), machine.protocol)
             one = _condition(file, rows, step_SA=step, machine=machine, record=record, reversal=reversal)
             conditions.append(one)
             placed.append(
@@ -190,7 +192,9 @@ def _own_loads(conditions: Sequence[Condition]) -> list[Condition]:
             continue
         last = groups[-1] if groups else []
         near = bool(last) and one.FZ - found[last[-1]].FZ <= _SAME_LOAD * one.FZ
-        if near and all(found[other].file != one.file for other in last):
+        if near and all(
+            (found[other].file, found[other].step_SA) != (one.file, one.step_SA) for other in last
+        ):
             last.append(index)
         else:
             groups.append([index])
@@ -209,8 +213,9 @@ def _at_common_load(conditions: Sequence[Condition]) -> list[Condition]:
         if step is not None
     }
     found = list(conditions)
-    for file in dict.fromkeys(c.file for c in conditions):
-        mine = [index for index, c in enumerate(conditions) if c.file == file and c.used]
+    used = [index for index, c in enumerate(conditions) if c.used]
+    for group in at_one_angle([conditions[index] for index in used]):
+        mine = [used[place] for place in group]
         FZ = np.array([conditions[i].FZ for i in mine])
         for_FY = slopes(FZ, np.array([conditions[i].FY for i in mine]))
         for_MZ = slopes(FZ, np.array([conditions[i].MZ for i in mine]))

@@ -94,6 +94,7 @@ def angle_findings(files: Sequence[OpenedFile]) -> list[Finding]:
     columns = dict.fromkeys(
         one.header
         for file in files
+        if not (file.recording.has("TIRE_ANGLE") or file.recording.has("DRUM_ANGLE"))
         for one in file.recording.series
         if one.role == "covariate" and unit(one.unit).dimension == "angle" and one.symbol not in CHANNELS
     )

@@ -65,7 +65,7 @@ def _drifts(
     found = []
     used = [c for c in conditions if c.used and c.rotation == rotation and c.step_SA is not None]
     for load in dict.fromkeys(c.step_FZ for c in used):
-        here = sorted((c for c in used if c.step_FZ == load), key=lambda c: c.file)
+        here = sorted((c for c in used if c.step_FZ == load), key=lambda c: (c.file, c.first_row))
         largest = max(abs(value(c)) for c in here)
         steps = sorted({c.step_SA for c in here if c.step_SA is not None})
         angles = np.array([np.mean([c.SA for c in here if c.step_SA == s]) for s in steps])
