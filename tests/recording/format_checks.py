@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pickle
+
 import numpy as np
 import pytest
 
@@ -15,12 +17,18 @@ ROWS = 12
 def refused(read, data, rule, kind: type[ToolkitError] = UnreadableError):
     with pytest.raises(kind) as caught:
         read(data)
-    error = caught.value
-    assert error.rule == rule, str(error)
-    assert "a recording" in error.where
+    assert "a recording" in caught.value.where
+    return whole(caught.value, rule)
+
+
+def whole(error, rule=None):
+    """The same error, which has every part, the rule where one is told, and survives the way to a caller."""
+    assert error.rule == rule if rule is not None else error.rule, str(error)
+    assert error.where
     assert error.got
     assert error.expected
     assert error.next_step
+    assert str(pickle.loads(pickle.dumps(error))) == str(error)  # noqa: S301
     return error
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pytest
+from format_checks import whole
 from workbook_factory import HEADERS
 
 from toolkit.errors import ColumnError
@@ -19,12 +20,8 @@ def assigned(headers, machine=M15):
 def refused(headers, machine=M15):
     with pytest.raises(ColumnError) as caught:
         assign_columns(headers, machine, where="file")
-    error = caught.value
-    assert error.where == "file"
-    assert error.got
-    assert error.expected
-    assert error.next_step
-    return error
+    assert caught.value.where == "file"
+    return whole(caught.value)
 
 
 def test_the_machines_own_headers():

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import pickle
-
 import numpy as np
 import pytest
+from format_checks import whole
 from workbook_factory import DATA, HEADERS, members, packed, sheet_xml, table_xml, with_cell, workbook
 
 from toolkit.errors import CellError, ColumnError, RecordingError, ToolkitError, UnreadableError
@@ -32,14 +31,7 @@ def read(tmp_path):
 def refused(read, data, kind: type[ToolkitError], rule: str, reader="calamine") -> ToolkitError:
     with pytest.raises(kind) as caught:
         read(data, reader=reader)
-    error = caught.value
-    assert error.rule == rule
-    assert error.where
-    assert error.got
-    assert error.expected
-    assert error.next_step
-    assert str(pickle.loads(pickle.dumps(error))) == str(error)  # noqa: S301
-    return error
+    return whole(caught.value, rule)
 
 
 def check(recording) -> None:

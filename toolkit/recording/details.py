@@ -66,16 +66,16 @@ def read_details(table: Any, *, where: object) -> ReportDetails:
         no table, an unknown key, a value of the wrong type, an amendment without its report or its reason
     """
     if not isinstance(table, dict):
-        raise _wrong(where, "report", table, "a table [report]")
+        raise wrong_value(where, "report", table, "a table [report]")
     check_keys(table, KEYS, where=f"{where}, [report]")
     texts = {
         key: _text(value, key, where) for key, value in table.items() if key not in ("received", "opinions")
     }
     if ("amends" in texts) != ("amendment" in texts):
-        raise _wrong(where, "report.amends", texts.get("amends"), "amends and amendment, both or none")
+        raise wrong_value(where, "report.amends", texts.get("amends"), "amends and amendment, both or none")
     return ReportDetails(
         **texts,
-        received=_day(table["received"], where) if "received" in table else None,
+        received=iso_day(table["received"], "report.received", where) if "received" in table else None,
         opinions=tuple(_opinion(one, where) for one in _list(table.get("opinions", []), where)),
     )
 
@@ -90,11 +90,18 @@ def _opinion(entry: Any, where: object) -> Opinion:
 
 def _list(value: Any, where: object) -> list[Any]:
     if not isinstance(value, list):
-        raise _wrong(where, "report.opinions", value, "a list of statements")
+        raise wrong_value(where, "report.opinions", value, "a list of statements")
     return value
 
 
-def _day(value: Any, where: object) -> str:
+def iso_day(value: Any, key: str, where: object) -> str:
+    """Return a date of a settings file, a TOML date or text, as YYYY-MM-DD.
+
+    Raises
+    ------
+    ConfigError
+        ``wrong-value``
+    """
     if isinstance(value, dt.datetime):
         return value.date().isoformat()
     if isinstance(value, dt.date):
@@ -102,16 +109,17 @@ def _day(value: Any, where: object) -> str:
     try:
         return dt.date.fromisoformat(value).isoformat()
     except (TypeError, ValueError) as error:
-        raise _wrong(where, "report.received", value, "a date such as 2026-03-31") from error
+        raise wrong_value(where, key, value, "a date such as 2026-03-31") from error
 
 
 def _text(value: Any, key: str, where: object) -> str:
     if not isinstance(value, str) or not value.strip():
-        raise _wrong(where, f"report.{key}", value, "a text")
+        raise wrong_value(where, f"report.{key}", value, "a text")
     return value.strip()
 
 
-def _wrong(where: object, key: str, got: object, expected: str) -> ConfigError:
+def wrong_value(where: object, key: str, got: object, expected: str) -> ConfigError:
+    """Return the error of a key whose value does not fit."""
     return ConfigError(
         f"{key!r} has a value that does not fit",
         where=where,

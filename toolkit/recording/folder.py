@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import datetime as dt
 import difflib
 import math
 import os
@@ -16,7 +15,7 @@ from toolkit.errors import ConfigError, RecordingError
 from toolkit.files import check_keys, is_number, read_toml
 from toolkit.machine import Machine, Protocol, load_machine, read_protocol
 from toolkit.machine.quantity import quantity
-from toolkit.recording.details import read_details
+from toolkit.recording.details import iso_day, read_details, wrong_value
 from toolkit.recording.marks import is_own_output
 from toolkit.recording.model import TestInfo
 from toolkit.units import from_si, si_scale, unit
@@ -109,7 +108,7 @@ def read_test_folder(folder: Path) -> TestFolder:
     table = read_toml(toml)
     check_keys(table, _KEYS, where=toml)
     if table.get("schema", 1) != 1:
-        raise _wrong(toml, "schema", table["schema"], "1")
+        raise wrong_value(toml, "schema", table["schema"], "1")
     read_details(table.get("report", {}), where=toml)  # the report reads it again; a slip shows here
     machine = _machine(table, toml)
     plan = _protocol_file(table, toml)
@@ -190,18 +189,18 @@ def _info(table: Mapping[str, Any], machine: Machine, folder: Path, toml: Path) 
     check_keys(tire, _TIRE, where=f"{toml}, [tire]")
     simulated = table.get("simulated", False)
     if not isinstance(simulated, bool):
-        raise _wrong(toml, "simulated", simulated, "true or false")
+        raise wrong_value(toml, "simulated", simulated, "true or false")
     texts = {key: _text(table[key], key, toml) for key in _TEXTS if key in table}
     reversal = table.get("reversal", "drum")
     if reversal not in REVERSALS:
-        raise _wrong(toml, "reversal", reversal, " or ".join(REVERSALS))
+        raise wrong_value(toml, "reversal", reversal, " or ".join(REVERSALS))
     if tire.get("belt", BELTS[0]) not in BELTS:
-        raise _wrong(toml, "tire.belt", tire["belt"], " or ".join(BELTS))
+        raise wrong_value(toml, "tire.belt", tire["belt"], " or ".join(BELTS))
     tires = {f"tire_{key}": _text(value, f"tire.{key}", toml) for key, value in tire.items()}
     return TestInfo(
         name=folder.resolve().name,
         machine=_machine_name(table, toml),
-        date=_date(table["date"], toml) if "date" in table else None,
+        date=iso_day(table["date"], "date", toml) if "date" in table else None,
         speed_m_s=_positive(table, "speed", "speed", toml),
         pressure_Pa=_positive(table, "pressure", "pressure", toml),
         rated_load_N=_positive(table, "rated_load", "force", toml),
@@ -219,28 +218,17 @@ def _positive(table: Mapping[str, Any], key: str, dimension: str, toml: Path) ->
     if isinstance(entry, dict):
         check_keys(entry, ("value", "unit"), where=f"{toml}, {key}")
         if "unit" in entry and not isinstance(entry["unit"], str):
-            raise _wrong(toml, f"{key}.unit", entry["unit"], "a unit as text")
+            raise wrong_value(toml, f"{key}.unit", entry["unit"], "a unit as text")
     found = quantity(entry, dimension, f"{toml}, {key}")
     if not (math.isfinite(found) and found > 0):
-        raise _wrong(toml, key, entry["value"], "a positive number")
+        raise wrong_value(toml, key, entry["value"], "a positive number")
     return found
-
-
-def _date(value: Any, toml: Path) -> str:
-    if isinstance(value, dt.datetime):
-        return value.date().isoformat()
-    if isinstance(value, dt.date):
-        return value.isoformat()
-    try:
-        return dt.date.fromisoformat(value).isoformat()
-    except (TypeError, ValueError) as error:
-        raise _wrong(toml, "date", value, "a date such as 2026-03-31") from error
 
 
 def _rotation(value: Any, key: str, toml: Path) -> Rotation:
     if value not in ROTATIONS:
         near = difflib.get_close_matches(str(value), ROTATIONS, n=1)
-        raise _wrong(toml, key, value, near[0] if near else " or ".join(ROTATIONS))
+        raise wrong_value(toml, key, value, near[0] if near else " or ".join(ROTATIONS))
     return cast("Rotation", value)
 
 
@@ -279,7 +267,7 @@ def _tare(
     table = _table(entry, "tare", toml)
     check_keys(table, ("file", "values"), where=f"{toml}, [tare]")
     if {"file", "values"} <= set(table):
-        raise _wrong(toml, "tare", "file and values", "one of the two")
+        raise wrong_value(toml, "tare", "file and values", "one of the two")
     if "file" in table:
         name = _text(table["file"], "tare.file", toml)
         path = folder / name
@@ -310,9 +298,9 @@ def _tare_value(name: str, entry: Any, machine: Machine, toml: Path) -> tuple[st
     check_keys(entry, ("value", "unit"), where=f"{toml}, [tare] values.{name}")
     value, printed = entry.get("value"), entry.get("unit", own)
     if not is_number(value):
-        raise _wrong(toml, f"tare.values.{name}", value, "a number")
+        raise wrong_value(toml, f"tare.values.{name}", value, "a number")
     if not isinstance(printed, str):
-        raise _wrong(toml, f"tare.values.{name}.unit", printed, "a unit as text")
+        raise wrong_value(toml, f"tare.values.{name}.unit", printed, "a unit as text")
     scale = si_scale(printed, unit(own).dimension, where=f"{toml}, [tare] values.{name}")
     same = unit(printed).text == own
     return name, float(value) if same else float(from_si(float(value) * scale, own)), own
@@ -320,23 +308,12 @@ def _tare_value(name: str, entry: Any, machine: Machine, toml: Path) -> tuple[st
 
 def _table(value: Any, key: str, toml: Path) -> dict[str, Any]:
     if not isinstance(value, dict):
-        raise _wrong(toml, key, value, f"a table [{key}]")
+        raise wrong_value(toml, key, value, f"a table [{key}]")
     return value
 
 
 def _text(value: Any, key: str, toml: Path) -> str:
     # A series or a DOT code may be written as a number.
     if isinstance(value, bool) or not isinstance(value, str | int | float):
-        raise _wrong(toml, key, value, "a text")
+        raise wrong_value(toml, key, value, "a text")
     return str(value).strip()
-
-
-def _wrong(toml: Path, key: str, got: object, expected: str) -> ConfigError:
-    return ConfigError(
-        f"{key!r} in {TEST_FILE} has a value that does not fit",
-        where=toml,
-        got=got,
-        expected=expected,
-        next_step="correct the line",
-        rule="wrong-value",
-    )
