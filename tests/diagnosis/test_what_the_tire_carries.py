@@ -80,3 +80,24 @@ def test_a_force_at_the_tire_has_no_place_on_a_single_cell(tmp_path):
     for name in ("nonuniformity", "drum_runout"):
         assert {channel for channel, _ in model.places(effects()[name])} == {"FY", "MZ"}, name
     assert {"D51", "D52", "E5"} <= {channel for channel, _ in model.places(effects()["hysteresis"])}
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "unit", "load"),
+    [
+        ("FZ0", 4.0, "kN", 4000.0),
+        ("F_nom", 1000.0, "lbf", 4448.22),
+        ("FZ0", 4.0, "1", None),
+        ("mass0", 4000.0, "N", None),
+    ],
+)
+def test_parameters_count_from_the_nominal_load_that_a_simulator_names(tmp_path, name, value, unit, load):
+    frames = {f"r{i}__csv": sweep("SAE", seed=i) for i in range(2)}
+    simulator = SIMULATOR.format(signs=SIGNS["SAE"])
+    text = toml('kind = "python"\npath = "sim.py"')
+    text += f'[simulation.parameters.{name}]\nvalue = {value}\nunit = "{unit}"\n'
+    case = read_case(write_case(tmp_path, text, simulator=simulator, **frames))
+    if load is None:
+        load = float(np.median(np.concatenate([one.columns["FZ"] for one in case.runs])))
+    found = model_of(case, None).setting(case.runs[0]).nominal_load_N
+    assert found == pytest.approx(load, rel=1e-5)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 import pytest
 
 from toolkit.effects.catalogue import effect
@@ -62,3 +63,35 @@ def test_stiffness_conserves_energy():
 def test_overflow_is_no_force():
     assert all(force("overflow", x, v, level=0.1) == 0 for x, v in PLACES)
     assert math.isinf(effect("overflow").parameters[0].off)
+
+
+def test_recorded_dry_friction_turns_over_one_row_about_the_reversal():
+    # v falls through zero at 0.53 of a row after row 5; a row shows the mean of sign(v) over its interval
+    t = 0.04 * np.arange(12)
+    v = 0.2 - t * 0.2 / (5.53 * 0.04)
+    made = effect("coulomb_friction").recorded(t, v, {"coulomb": 3.0, "presliding": 0.0})
+    assert made[:6] == pytest.approx(np.full(6, 3.0))
+    assert made[6] == pytest.approx(
+        3.0 * (0.03 - 0.97)
+    )  # 5.5 to 5.53 before the reversal, the rest behind it
+    assert made[7:] == pytest.approx(np.full(5, -3.0))
+
+
+def test_recorded_dry_friction_follows_the_bristle_equation():
+    # z' = (v - |v| z)/presliding in ten thousand small steps, and its means over one interval of rows
+    t, reach, finer = 0.02 * np.arange(150), 0.004, 400
+    v = 0.05 * np.interp(t, t, np.sin(7.0 * t + 1.0) + 0.4 * np.sin(17.0 * t))
+    fine = np.linspace(t[0], t[-1], (len(t) - 1) * finer + 1)
+    speed = np.interp(0.5 * (fine[1:] + fine[:-1]), t, v)
+    z = [float(np.sign(v[0]))]
+    for one in speed:
+        way = math.copysign(1.0, one)
+        z.append(way + (z[-1] - way) * math.exp(-abs(one) * (fine[1] - fine[0]) / reach))
+    area = np.concatenate([[0.0], np.cumsum(0.5 * (np.array(z)[1:] + np.array(z)[:-1]))]) * (
+        fine[1] - fine[0]
+    )
+    inner = slice(1, -1)
+    means = (np.interp(t[inner] + 0.01, fine, area) - np.interp(t[inner] - 0.01, fine, area)) / 0.02
+    made = effect("coulomb_friction").recorded(t, v, {"coulomb": 2.0, "presliding": reach})
+    # a piece is a quarter of a row: its speed is taken as even
+    assert made[inner] == pytest.approx(2.0 * means, abs=0.02)

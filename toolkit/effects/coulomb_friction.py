@@ -20,28 +20,55 @@ def _resisting(position: float, velocity: float, values: Values) -> float:
 
 def _recorded(t: NDArray[np.float64], velocity: NDArray[np.float64], values: Values) -> NDArray[np.float64]:
     # Dahl's bristle along a velocity that is linear between rows: z tends to sign(v) with the distance
-    # travelled. An interval in which the velocity changes its sign is two: before the reversal and after.
+    # travelled. A row shows its mean over one interval between rows, half before it and half after: a
+    # filter that suits the rows leaves no sharper a jump, and a jump taken as sharp would be found too small.
     reach = max(values["presliding"], 0.0)
-    if reach <= 0 or len(t) < 2:
+    if len(t) < 2:
         return values["coulomb"] * np.sign(velocity)
-    v, w, h = velocity[:-1], velocity[1:], np.diff(t)
-    turns = v * w < 0
-    share = np.where(turns, v / np.where(turns, v - w, 1.0), 1.0)
-    first = np.where(turns, 0.5 * np.abs(v) * share, 0.5 * np.abs(v + w)) * h
-    second = np.where(turns, 0.5 * np.abs(w) * (1 - share), 0.0) * h
-    ways = np.sign(np.where(turns, v, v + w))
-    made = np.empty_like(velocity)
-    made[0] = last = float(np.sign(velocity[0]))
-    steps = zip(
-        ways.tolist(), np.exp(-first / reach).tolist(), np.exp(-second / reach).tolist(), turns.tolist(),
-        strict=True,
-    )  # fmt: skip
-    for i, (way, keep, keep_on, turned) in enumerate(steps, start=1):
-        last = way + (last - way) * keep
-        if turned:
-            last = -way + (last + way) * keep_on
-        made[i] = last
-    return values["coulomb"] * made
+    knots, travelled, ways = _path(t, velocity)
+    sizes = np.diff(travelled)
+    z, made = _bristle(sizes, ways, reach, start=float(np.sign(velocity[0])))
+    # The bristle's mean over a piece, at an even speed along it.
+    slow = sizes > 1e-9 * reach if reach > 0 else sizes > 0
+    settled = np.where(slow, (z - made) * reach / np.where(slow, sizes, 1.0) + ways, z)
+    area = np.concatenate([[0.0], np.cumsum(settled * np.diff(knots))])
+    half = 0.5 * float(np.median(np.diff(t)))
+    low, high = np.maximum(t - half, t[0]), np.minimum(t + half, t[-1])
+    means = (np.interp(high, knots, area) - np.interp(low, knots, area)) / (high - low)
+    return np.asarray(values["coulomb"] * means)
+
+
+def _path(
+    t: NDArray[np.float64], velocity: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Return instants between which the way does not turn, the distance by then, and each piece's way.
+
+    The rows, the quarters between them, and the reversals: shapes (k,), (k,), (k - 1,).
+    """
+    turns = velocity[:-1] * velocity[1:] < 0
+    share = velocity[:-1][turns] / (velocity[:-1][turns] - velocity[1:][turns])
+    step = np.diff(t)
+    crossings = t[:-1][turns] + share * step[turns]
+    knots = np.concatenate([t, *(t[:-1] + part * step for part in (0.25, 0.5, 0.75)), crossings])
+    speeds = np.interp(knots, t, velocity)
+    speeds[len(knots) - len(crossings) :] = 0.0
+    order = np.argsort(knots, kind="stable")
+    knots, speeds = knots[order], speeds[order]
+    moved = 0.5 * (speeds[1:] + speeds[:-1]) * np.diff(knots)
+    return knots, np.concatenate([[0.0], np.cumsum(np.abs(moved))]), np.sign(moved)
+
+
+def _bristle(
+    sizes: NDArray[np.float64], ways: NDArray[np.float64], reach: float, *, start: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the bristle at the beginning and at the end of each piece."""
+    keep = np.exp(-sizes / reach) if reach > 0 else (sizes <= 0).astype(float)
+    before, after = np.empty_like(sizes), np.empty_like(sizes)
+    last = start
+    for i, (kept, way) in enumerate(zip(keep.tolist(), ways.tolist(), strict=True)):
+        before[i] = last
+        last = after[i] = way + (last - way) * kept
+    return before, after
 
 
 EFFECT = Effect(

@@ -15,6 +15,7 @@ from toolkit.diagnosis.kinds.integrate import IntegrationError, integrate
 from toolkit.diagnosis.kinds.pushed import propagated
 from toolkit.diagnosis.kinds.python import silenced
 from toolkit.diagnosis.kinds.setting import nominal_load, setting
+from toolkit.diagnosis.kinds.states import dimensions, fitting
 from toolkit.diagnosis.kinds.together import NotTogetherError, columns_of, integrate_together, takes_columns
 from toolkit.diagnosis.model import Active, Output
 from toolkit.effects.effect import Effect
@@ -32,7 +33,6 @@ ATOL = 1e-7  # of a state's spread over a run; before that is known, a hundredth
 _FINER = 4
 _MOST_HELD = 200_000_000  # bytes of simulations to remember
 _BETWEEN_ROWS = ("channel_delay", "filter_lag")  # they show what the equation did between two rows
-_POSITIONS = ("cubic_stiffness", "periodic_ripple")
 
 
 class OdeModel:
@@ -94,6 +94,7 @@ class OdeModel:
         """Return for every state that a term may enter: size of its rate, and spread of itself."""
         runs = self.case.runs
         states = [self._integrate(run, p, ()) for run in runs]
+        self._dimensions = dimensions(states[0], self._equation.shown(runs[0], p, states[0]), self.outputs)
         x = np.concatenate(states, axis=1)
         rates = [
             np.gradient(one, run.t, axis=1) if run.rows > 2 else np.zeros_like(one)
@@ -323,13 +324,9 @@ class OdeModel:
         if effect.stage == "dynamics":
             if effect.name == "overflow":
                 return [(name, None) for i, name in enumerate(self.states) if i not in self._derivative_of]
-            if effect.name in _POSITIONS:
-                return [
-                    (name, None)
-                    for name in self.force_units
-                    if self.states.index(name) in self._derivative_of
-                ] or ([(name, None) for name in self.force_units] if effect.name == "cubic_stiffness" else [])
-            return [(name, None) for name in self.force_units]
+            at = [self.states.index(name) for name in self.force_units]
+            known = {} if self.case.simulation.force_terms else self._dimensions
+            return [(self.states[i], None) for i in fitting(effect.name, at, self._derivative_of, known)]
         others = [(one.name, one.unit) for one in self.case.drivers]
         return channel_places(effect, [(one.name, one.unit) for one in self.outputs], others, drivers)
 

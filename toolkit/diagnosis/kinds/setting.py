@@ -17,6 +17,8 @@ if TYPE_CHECKING:
     from toolkit.diagnosis.case import Case, Run
 
 NOMINAL_SPEED = 7.66 / 3.6  # m/s, of the M-15's drum (the thesis, 2.2)
+# What tire models call the load to which their coefficients are counted, without case and underlines.
+_NOMINAL_LOADS = frozenset({"FZ0", "FZNOM", "FZNOMINAL", "FNOMIN", "FNOM", "NOMINALLOAD"})
 
 
 def si(case: Case, name: str, values: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -72,9 +74,17 @@ def dimension(text: str) -> str:
 
 
 def nominal_load(case: Case) -> float:
-    """Return the median load of the case [N], 4000 N where no load was recorded; that of its model first."""
+    """Return the load [N] to which effects' parameters are counted.
+
+    That of the case's model file, else a parameter of the simulation that is named as a tire's nominal load
+    is named (`FZ0`, `FNOMIN`), else the median load of the recordings; 4000 N where none was recorded.
+    """
     if case.nominal_load_N is not None:
         return case.nominal_load_N
+    for one in case.parameters:
+        named = one.name.replace("_", "").upper() in _NOMINAL_LOADS
+        if named and dimension(one.unit) == dimension("N") and one.value > 0:
+            return one.value * unit(one.unit).factor
     loads = [
         si(case, name, run.columns[name])
         for run in case.runs

@@ -1,0 +1,54 @@
+"""Which states of an equation an effect of a motion can act on: velocities, places, and no temperatures."""
+
+import numpy as np
+import pytest
+
+from toolkit.diagnosis.kinds.states import dimensions, fitting
+from toolkit.diagnosis.model import Output
+
+FRICTION = ("coulomb_friction", "viscous_damping", "quadratic_drag")
+
+
+def test_units_are_told_by_outputs_that_show_one_state_alone():
+    t = np.linspace(0.0, 3.0, 40)
+    x = np.array([np.sin(t), np.cos(2 * t), t, np.exp(-t)])
+    shown = {"A": np.degrees(x[0]), "B": x[1] + 0.1 * x[2], "C": x[2] + 1.0, "D": -x[3]}
+    outputs = [
+        Output(name=n, unit=u, sd=None) for n, u in zip("ABCD", ("deg", "m", "m", "degC"), strict=True)
+    ]
+    assert dimensions(x, shown, outputs) == {0: "angle", 3: "temperature"}
+
+
+def test_a_state_that_stands_still_or_is_a_bare_number_tells_nothing():
+    x = np.array([np.full(9, 20.0), np.arange(9.0)])
+    outputs = [Output(name="T", unit="degC", sd=None), Output(name="N", unit="1", sd=None)]
+    assert dimensions(x, {"T": x[0], "N": x[1]}, outputs) == {}
+
+
+@pytest.mark.parametrize("name", FRICTION)
+@pytest.mark.parametrize(
+    ("velocities", "known", "there"),
+    [
+        ({1: 0}, {0: "angle"}, [1]),  # a pendulum whose angle is recorded
+        ({}, {2: "frequency"}, [2]),  # a motor's speed, with a current of which nothing is known
+        ({}, {1: "temperature"}, []),  # warm bodies, not all of them recorded
+        ({}, {1: "length", 2: "length"}, []),  # levels
+        ({}, {}, [1, 2]),
+    ],
+)
+def test_friction_and_drag_act_on_velocities(name, velocities, known, there):
+    assert fitting(name, [1, 2], velocities, known) == there
+
+
+@pytest.mark.parametrize(
+    ("velocities", "known", "there"),
+    [({1: 0}, {0: "length"}, [1]), ({}, {1: "length"}, [1]), ({}, {1: "temperature"}, []), ({}, {}, [1, 2])],
+)
+def test_a_cubic_stiffness_acts_on_places(velocities, known, there):
+    assert fitting("cubic_stiffness", [1, 2], velocities, known) == there
+
+
+def test_a_ripple_needs_a_place_behind_the_velocity_and_a_constant_flow_nothing():
+    assert fitting("periodic_ripple", [1, 2], {1: 0}, {}) == [1]
+    assert fitting("periodic_ripple", [1, 2], {}, {1: "length"}) == []
+    assert fitting("constant_force", [1, 2], {}, {1: "temperature"}) == [1, 2]
