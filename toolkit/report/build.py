@@ -16,7 +16,7 @@ from toolkit.report.content import Cell, ReportContent, Table, Value
 from toolkit.report.details import details_values
 from toolkit.report.diagnosis.in_report import Told, diagnosis_tables, diagnosis_values, told_plots
 from toolkit.report.models import model_plots
-from toolkit.report.plots import build_plots, load_groups
+from toolkit.report.plots import TURNED, build_plots, load_groups
 from toolkit.report.style import Style
 from toolkit.report.tables import build_tables, summary_load
 from toolkit.report.tags import FIGURES, catalogue, format_number
@@ -152,9 +152,7 @@ def _values(
         if groups
         else None,
         "test.slip_angles": _angles([c.step_SA for c in used]),
-        "test.directions": " and ".join(
-            r for r in ("forward", "reverse") if any(c.rotation == r for c in used)
-        ),
+        "test.directions": _directions(result),
         "test.axes": "SAE J670" if reduced.axes == "SAE" else reduced.axes,
         "test.averaging": reduced.averaging,
         "test.tare": "no tare was subtracted" if reduced.tare.source == "none" else reduced.tare.source,
@@ -224,6 +222,13 @@ def _pressure(psi: float, pascal: float, style: Style) -> str:
     # As the source document's title page has it: 34 psi, 2.34 bar.
     text = f"{format(round(psi, 1), 'g')} psi, {pascal / 1e5:.2f} bar"
     return text.replace(".", ",").replace(" psi, ", " psi; ") if style.decimal_comma else text
+
+
+def _directions(result: TestResult) -> str:
+    """Return the directions, and what was turned for the reversed run where it was not the drum."""
+    found = [r for r in ("forward", "reverse") if any(c.rotation == r for c in result.reduced.used())]
+    turned = "reverse" in found and result.reduced.info.reversal == "tire"
+    return " and ".join(found) + (f", {TURNED}" if turned else "")
 
 
 def _angles(steps: Sequence[float | None]) -> str | None:

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from toolkit.tires.model import CurveFit
 
 ANGLES_DEG = (1, 2, 4, 6, 8, 10)
+TURNED = "the tire turned round on the hub"
 _AXES_NOTE = "SAE J670 axes"
 _SYMBOLS = {"FY": "lateral force FY", "MZ": "aligning moment MZ"}
 
@@ -137,7 +138,8 @@ class _Plots:
                         _curve(label, grid, drawn * factor, index, "line", open_=rotation == "reverse")
                     )
         what = _SYMBOLS[channel]
-        both = "; filled: drum forward, open and dashed: reversed" if len(self._rotations()) > 1 else ""
+        how = f"reversed by {TURNED}" if self.result.reduced.info.reversal == "tire" else "reversed"
+        both = f"; filled: drum forward, open and dashed: {how}" if len(self._rotations()) > 1 else ""
         curves_text = ", fitted curves as lines" if lines else ""
         return self._plot(
             f"{channel.lower()}_vs_slip",
