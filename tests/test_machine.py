@@ -74,3 +74,14 @@ def test_a_wrong_definition_is_refused(tmp_path: Path, old: str, new: str) -> No
     path.write_text(text.replace(old, new, 1))
     with pytest.raises(ToolkitError):
         load_machine(str(path))
+
+
+def test_a_statement_of_an_own_machine_goes_before_its_bases_and_drops_no_other(tmp_path: Path) -> None:
+    path = tmp_path / "own.toml"
+    path.write_text(
+        'name = "own"\nextends = "m15"\n[type_b]\nFZ = { u = 15, unit = "N", source = "certificate" }\n'
+    )
+    own, base = load_machine(str(path)), load_machine("m15")
+    assert (own.stated_uncertainty("FZ").u, own.stated_uncertainty("FZ").relative) == (15.0, 0.0)
+    for symbol in ("SA", "SA_scale", "P", "zero"):
+        assert own.stated_uncertainty(symbol) == base.stated_uncertainty(symbol)

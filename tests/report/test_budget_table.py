@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 
 import pytest
 from report_factory import make_result
 
 from toolkit.characteristics.model import AtAngle, Budget
 from toolkit.estimate import Estimate
+from toolkit.machine import TypeB
 from toolkit.pipeline import TestResult
 from toolkit.report.style import Style
 from toolkit.report.tables import build_tables, summary_load
@@ -71,3 +73,31 @@ def test_values_at_slip_angles_have_their_uncertainty() -> None:
     assert row["SA"] == pytest.approx(-2.0)
     assert (row["FY"], row["MZ"]) == (2000.0, None)
     assert row["U_FY"] == pytest.approx(19.6, abs=0.01)
+
+
+STATED = (
+    TypeB(symbol="FZ", u=15.0, relative=0.001, source="certificate LC-7", common="machine"),
+    TypeB(symbol="SA", u=math.radians(0.05), relative=0.0, source="rack"),
+    TypeB(symbol="P", u=3500.0, relative=0.0, source="=gauge", effect=0.5),
+)
+
+
+def stated(style: Style, *given: TypeB) -> list[tuple[object, ...]]:
+    result = make_result()
+    result = dataclasses.replace(result, reduced=dataclasses.replace(result.reduced, stated=given))
+    return list(build_tables(result, None, (), style)["stated"].rows)
+
+
+def test_what_the_machine_states_is_told_with_its_source() -> None:
+    assert stated(Style(), *STATED) == [
+        ("load", "15 N and 0.1 %", "all tests of the machine", "certificate LC-7"),
+        ("zero of the slip angle", "0.05 deg", "this test", "rack"),
+        ("inflation pressure", "3.5 kPa, of which a force follows 50 %", "this test", "=gauge"),
+    ]
+    assert stated(Style()) == []
+
+
+def test_what_is_stated_is_told_in_the_unit_of_choice() -> None:
+    # 15 N are 15 / 4.4482 = 3.37 lbf.
+    ((_, u, _, _),) = stated(Style(force="lbf", decimal_comma=True), STATED[0])
+    assert u == "3,37 lbf and 0,1 %"

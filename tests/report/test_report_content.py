@@ -163,3 +163,13 @@ def test_style_file(tmp_path) -> None:
     path.write_text('[units]\nforce = "m"\n')
     with pytest.raises(Exception, match="unit"):
         read_style(path)
+
+
+def test_a_report_says_that_the_tire_was_turned_and_not_the_drum() -> None:
+    drum, tire = content(), content(reversal="tire")
+    assert drum.values["test.directions"].value == "forward and reverse"
+    assert tire.values["test.directions"].value == "forward and reverse, the tire turned round on the hub"
+    assert drum.plots["fy_vs_slip"].caption.endswith("dashed: reversed. SAE J670 axes.")
+    assert "reversed by the tire turned round on the hub" in tire.plots["fy_vs_slip"].caption
+    one_way = content(reversal="tire", both=False)  # nothing was turned yet
+    assert one_way.values["test.directions"].value == "forward"

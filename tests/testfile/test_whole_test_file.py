@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
+import hashlib
+import json
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -11,6 +13,7 @@ import pytest
 
 from toolkit.errors import RecordingError, ToolkitError
 from toolkit.findings import Finding
+from toolkit.machine import load_machine
 from toolkit.pipeline import TestResult, process, read_test
 from toolkit.recording.folder import read_test_folder
 from toolkit.testfile import is_test_file, read_test_file, write_test_file
@@ -120,3 +123,20 @@ def test_the_hash_is_that_of_the_content(made: Made) -> None:
     assert content_hash(again) == content_hash(result)
     other = dataclasses.replace(result, reduced=dataclasses.replace(result.reduced, code_version="x"))
     assert content_hash(other) != content_hash(result)
+
+
+def test_what_the_machine_states_is_in_the_file(made: Made, file: Path) -> None:
+    stated = {one.symbol: one for one in read_test_file(file).reduced.stated}
+    m15 = load_machine("m15")  # the zero of the cells is not used: the test has a tare
+    assert stated == {symbol: m15.stated_uncertainty(symbol) for symbol in ("FZ", "SA", "SA_scale", "P")}
+
+
+def test_a_file_from_before_anything_was_stated_keeps_its_hash(tmp_path: Path, made: Made) -> None:
+    """Its hash was made of a reduced test that had no such field."""
+    bare = dataclasses.replace(made[0], reduced=dataclasses.replace(made[0].reduced, stated=()))
+    content = dataclasses.asdict(bare)
+    del content["reduced"]["stated"]
+    text = json.dumps(content, sort_keys=True, separators=(",", ":"))
+    digest = write_test_file(tmp_path / "x.xlsx", bare)
+    assert digest == hashlib.sha256(text.encode()).hexdigest()
+    assert read_test_file(tmp_path / "x.xlsx") == bare

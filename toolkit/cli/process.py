@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from toolkit.channels import CHANNELS
 from toolkit.cli.console import (
     CalibrationId,
     Calibrations,
@@ -113,6 +114,18 @@ def test_payload(resolved: Resolved) -> dict[str, Any]:
             "values": dict(reduced.tare.values),
             "unit": reduced.tare.unit,
         },
+        "stated": [
+            {
+                "symbol": one.symbol,
+                "u": one.u,
+                "unit": CHANNELS[one.symbol].si if one.symbol in CHANNELS else "1",
+                "relative": one.relative,
+                "effect": one.effect,
+                "common": one.common,
+                "source": one.source,
+            }
+            for one in reduced.stated
+        ],
         "conditions": [
             {
                 "file": c.file,
@@ -193,6 +206,7 @@ def _text(resolved: Resolved, out: Path | None, style: Style) -> str:
         + ("  UNVERIFIED" if reduced.calibration.unverified else ""),
         f"averaging: {reduced.averaging}",
         f"tare: {reduced.tare.source}",
+        *(["reversed runs: the tire turned round on the hub"] if reduced.info.reversal == "tire" else []),
         "",
         _pull_table(resolved, style),
     ]

@@ -178,7 +178,10 @@ def _extended(table: dict[str, Any], path: Path) -> dict[str, Any]:
     check_keys(table, _KEYS, where=path)
     if "extends" in table:
         base = _merged(_PACKAGED / f"{table.pop('extends')}.toml")
-        table = {**base, **table}
+        stated = table.get("type_b", {})
+        if isinstance(stated, dict):  # one new figure must not silently drop the others
+            stated = {**base.get("type_b", {}), **stated}
+        table = {**base, **table, "type_b": stated}
     return table
 
 

@@ -12,6 +12,8 @@ from toolkit.recording.model import TestInfo
 if TYPE_CHECKING:
     import pandas as pd
 
+    from toolkit.machine import TypeB
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CalibrationUse:
@@ -83,7 +85,9 @@ class Tare:
 class ReducedTest:
     """A whole test, reduced. ``conditions`` in the order of the protocol, unused ones last.
 
-    ``protocol`` is the source that the protocol of the test names.
+    ``protocol`` is the source that the protocol of the test names; ``stated`` are the standard
+    uncertainties that the machine states of what has no calibration record (GUM type B), as far as the test
+    uses them.
     """
 
     info: TestInfo
@@ -95,6 +99,7 @@ class ReducedTest:
     code_version: str
     axes: str = "SAE"
     protocol: str = ""
+    stated: tuple[TypeB, ...] = ()
 
     def used(self, rotation: Rotation | None = None) -> tuple[Condition, ...]:
         """Return the conditions that feed results, optionally of one direction of rotation."""

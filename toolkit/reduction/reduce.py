@@ -22,7 +22,7 @@ from toolkit.reduction.tare import choose_tares, zero_shifts
 
 if TYPE_CHECKING:
     from toolkit.calibration.records.record import CalibrationRecord
-    from toolkit.machine import Machine
+    from toolkit.machine import Machine, TypeB
     from toolkit.recording.model import Recording, TestInfo
 
 
@@ -94,7 +94,18 @@ def reduce_test(
         findings=tuple(findings),
         code_version=__version__,
         protocol=protocol.source,
+        stated=_stated(machine, info, files[0].tare),
     )
+
+
+def _stated(machine: Machine, info: TestInfo, tare: Tare) -> tuple[TypeB, ...]:
+    """Return what the machine states and the test uses: a zero without a tare, a pressure it declares."""
+    idle = set()
+    if tare.source != "none":
+        idle.add("zero")
+    if info.pressure_Pa is None:
+        idle.add("P")
+    return tuple(one for one in machine.type_b if one.symbol not in idle and (one.u or one.relative))
 
 
 def _conditions(

@@ -163,6 +163,15 @@ TABLES: dict[str, tuple[str, tuple[Column, ...]]] = {
             _text("u", "standard uncertainty of all"),
         ),
     ),
+    "stated": (
+        "standard uncertainties that the machine states of what has no calibration record of its own",
+        (
+            _text("quantity", "what it is the uncertainty of"),
+            _text("u", "standard uncertainty, in a unit and relative to the value"),
+            _text("common", "whether its error is the same in all tests of the machine, or another in each"),
+            _text("source", "where the figure comes from"),
+        ),
+    ),
     "characteristics": (
         "every characteristic, one row each",
         (

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from toolkit.report.columns import TABLES, Column
 from toolkit.report.content import Cell, Table
 from toolkit.report.models import model_rows
+from toolkit.report.stated import stated_rows
 from toolkit.report.style import Style
 
 if TYPE_CHECKING:
@@ -40,6 +41,7 @@ def build_tables(
         "pull_thesis": lambda: _pull(result, _THESIS),
         "at_angles": lambda: _at_angles(result),
         "budget": lambda: _budget(result, style),
+        "stated": lambda: stated_rows(result.reduced.stated, style),
         "characteristics": lambda: _characteristics(result, style),
         "fits": lambda: _fits(result, style),
         "models": lambda: model_rows(comparison),

@@ -20,6 +20,7 @@ from toolkit.characteristics.model import (
 from toolkit.errors import RecordingError
 from toolkit.estimate import Estimate
 from toolkit.findings import Finding, Level
+from toolkit.machine import TypeB
 from toolkit.pipeline import TestResult
 from toolkit.recording.gate import check_workbook
 from toolkit.recording.model import TestInfo
@@ -143,8 +144,28 @@ def _result(sheets: dict[str, list[Row]], items: Row) -> TestResult:
         code_version=items["code_version"],
         axes=items["axes"],
         protocol=items["protocol"],
+        stated=_stated(items),
     )
     return TestResult(reduced=reduced, characteristics=_characteristics(sheets))
+
+
+def _stated(items: Row) -> tuple[TypeB, ...]:
+    found: dict[str, Row] = {}
+    for key, value in items.items():
+        if key.startswith("stated."):
+            _, symbol, name = key.split(".")
+            found.setdefault(symbol, {})[name] = value
+    return tuple(
+        TypeB(
+            symbol=symbol,
+            u=number(one["u"]),
+            relative=number(one["relative"]),
+            effect=number(one["effect"]),
+            source=str(one["source"]),
+            common=one["common"],
+        )
+        for symbol, one in found.items()
+    )
 
 
 def _as(kind: Any, value: Any) -> Any:

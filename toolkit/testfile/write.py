@@ -128,6 +128,9 @@ def _provenance(result: TestResult, digest: str) -> Rows:
         yield (f"tare.values.{name}", value)
     for name, value in reduced.tare.u:
         yield (f"tare.u.{name}", value)
+    for one in reduced.stated:
+        for field in dataclasses.fields(one)[1:]:
+            yield (f"stated.{one.symbol}.{field.name}", getattr(one, field.name))
     for field in dataclasses.fields(reduced.info):
         yield (f"info.{field.name}", getattr(reduced.info, field.name))
 

@@ -112,7 +112,8 @@ def chapters(p: Pieces) -> list[str]:
             "tk:if.pull",
             text(
                 "From the forward and the reversed run at slip angle zero, read off each direction's own curve at a common "
-                "load. Conicity keeps its sign when the drum is reversed; plysteer changes it.",
+                "load. To the machine's cells conicity keeps its sign when the drum is reversed and changes it when the tire "
+                "is turned round on the hub; plysteer the other way round.",
                 keep=True,
             )
             + p.figure("conicity", 150)
@@ -296,6 +297,7 @@ def chapters(p: Pieces) -> list[str]:
                     run(", ") + p.inline("tk:report.authorised_function", "function"),
                 ),
                 style="Signature",
+                keep=True,
             ),
         ),
         paragraph(run("End of report ") + p.inline("tk:report.id", "report id"), style="EndMark"),

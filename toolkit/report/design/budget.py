@@ -1,4 +1,4 @@
-"""The budget of a report: what makes each characteristic uncertain, one column a source."""
+"""The budget of a report: what makes each characteristic uncertain, and what the machine states."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _COLUMNS = (
 
 
 def budget_table(p: Pieces) -> str:
-    """Return the table of standard uncertainties at the load of the summary."""
+    """Return the table of standard uncertainties at the load of the summary, and what of them is stated."""
     head, cells, widths = zip(*_COLUMNS, strict=True)
     return p.table(
         "budget",
@@ -31,4 +31,11 @@ def budget_table(p: Pieces) -> str:
         cells,
         widths,
         "lll" + "r" * (len(_COLUMNS) - 3),
+    ) + p.table(
+        "stated",
+        "Stated standard uncertainties (GUM, type B) of what has no calibration record of its own.",
+        ["quantity", "u", "its error is one of", "source"],
+        ["quantity", "u", "common", "source"],
+        [36, 30, 32, 68],
+        "llll",
     )
