@@ -6,9 +6,11 @@ import datetime as dt
 import re
 import shutil
 import subprocess
+import zipfile
 from pathlib import Path
 
 import pytest
+from lxml import etree
 from report_factory import make_record, make_result
 
 from toolkit.errors import ConfigError
@@ -21,6 +23,7 @@ from toolkit.report.template.check import check_template
 from toolkit.report.template.contents_pages import pdf_outline
 from toolkit.report.template.package import read_template
 from toolkit.report.template.verify import pdf_text
+from toolkit.report.template.xml import q
 from toolkit.report.words import say
 
 FOLDER = Path(__file__).resolve().parents[2] / "report_templates"
@@ -112,7 +115,8 @@ def test_the_summary_is_one_page(tmp_path: Path) -> None:
 
 
 @office_needed
-def test_the_german_report_has_its_own_look(tmp_path: Path) -> None:
+def test_the_german_report_has_its_own_look(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(DETAILS, "conformity", "nicht beurteilt")
     done = report("pruefbericht", tmp_path / "out")
     assert done.warnings == ()
     text = " ".join(pdf_text(done.pdf).split())
@@ -123,6 +127,8 @@ def test_the_german_report_has_its_own_look(tmp_path: Path) -> None:
         "Abbildung 1. Seitenkraft",
         "vorwärts",
         "-0,30",  # the first slip angle, with a decimal comma
+        "Freigegeben: A. Authoriser, head of laboratory",
+        "Konformität nicht beurteilt",
     ):
         assert words in text, words
     sizes = subprocess.run(
@@ -137,6 +143,26 @@ def test_the_german_report_has_its_own_look(tmp_path: Path) -> None:
         "Prüfbedingungen", "Kennlinien", "Geradeauslauf", "Messwerte", "Feststellungen",
         "Meinungen und Interpretationen",
     ]  # fmt: skip
+
+
+@pytest.mark.parametrize("name", ["summary", "pruefbericht"])
+def test_a_header_of_several_cells_has_one_rule(name: str) -> None:
+    """The style rules each paragraph: beside each other these would be broken lines, of unlike heights."""
+    book = zipfile.ZipFile(FOLDER / f"{name}.docx")
+    parts = [part for part in book.namelist() if part.startswith(("word/header", "word/footer"))]
+    seen = set()
+    for part in parts:
+        root = etree.fromstring(book.read(part))
+        for kind, edge in (("header", "bottom"), ("footer", "top")):
+            if kind not in part or root.find(f".//{q('w:tbl')}") is None:
+                continue
+            seen.add(kind)
+            (drawn,) = root.iterfind(f".//{q('w:tblBorders')}/{q(f'w:{edge}')}")
+            assert drawn.get(q("w:val")) == "single"
+            ruled = root.findall(f".//{q('w:tc')}//{q('w:p')}")
+            assert ruled
+            assert {p.find(f".//{q('w:pBdr')}/{q(f'w:{edge}')}").get(q("w:val")) for p in ruled} == {"nil"}
+    assert seen == {"header", "footer"}
 
 
 def test_an_amended_report_has_an_id_of_its_own() -> None:

@@ -9,7 +9,7 @@ from toolkit.report.design.blocks import Pieces, cell, field, paragraph, row, ru
 from toolkit.report.design.default import build_document
 from toolkit.report.design.diagnosis import GERMAN, diagnosis_section
 from toolkit.report.design.opening import heading
-from toolkit.report.design.pieces import across, contents, logo, logo_png, section_break
+from toolkit.report.design.pieces import across, contents, logo, logo_png, one_rule, section_break
 from toolkit.report.design.styles import make_styles
 from toolkit.report.template.xml import q
 
@@ -68,6 +68,7 @@ load = 0
 "at 0 deg" = "bei 0 deg"
 "at FY = 0" = "bei FY = 0"
 "forward and reverse" = "vorwärts und rückwärts"
+"the tire turned round on the hub" = "Reifen auf der Nabe gewendet"
 "forward" = "vorwärts"
 "reverse" = "rückwärts"
 "simulated data" = "simulierte Daten"
@@ -187,6 +188,9 @@ def _body(p: Pieces) -> list[str]:
                 [("Prüfort?", "report.location")],
                 [("Verfahren", "report.method")],
                 [("Abweichungen", "report.deviations")],
+                [("Probenahme?", "report.sampling")],
+                [("Konformität?", "report.conformity")],
+                [("Fremdleistungen?", "report.external")],
                 [("Prüfer?", "test.operator")],
                 [("Ausgestellt am", "report.date")],
             ],
@@ -306,7 +310,16 @@ def _body(p: Pieces) -> list[str]:
         ),
         p.block(
             "tk:if.report.authorised_by",
-            paragraph(run("Freigegeben: ") + p.inline("tk:report.authorised_by", "Name"), style="Signature"),
+            paragraph(
+                run("Freigegeben: ")
+                + p.inline("tk:report.authorised_by", "Name")
+                + p.block(
+                    "tk:if.report.authorised_function",
+                    run(", ") + p.inline("tk:report.authorised_function", "Funktion"),
+                ),
+                style="Signature",
+                keep=True,
+            ),
         ),
         paragraph(
             run("Ende des Prüfberichts ") + p.inline("tk:report.id", "Berichtsnummer"), style="EndMark"
@@ -328,7 +341,7 @@ def _letterhead(p: Pieces, rel: str) -> str:
         + right[end:]
     )
     mark = cell(logo(rel, 17, number=900, text="Zeichen der Prüfstelle"), 30, style="Header")
-    return table(row(mark + stacked), (30, 135), rules="none") + paragraph("", style="Gap")
+    return one_rule(table(row(mark + stacked), (30, 135), rules="none")) + paragraph("", style="Gap")
 
 
 def _header(p: Pieces) -> str:

@@ -6,7 +6,7 @@ from __future__ import annotations
 import struct
 import zlib
 
-from toolkit.report.design.blocks import MM, TWIP_MM, paragraph, row, run, table
+from toolkit.report.design.blocks import MM, RULE, TWIP_MM, paragraph, row, run, table
 from toolkit.report.template.xml import NS
 
 
@@ -45,10 +45,24 @@ def section(*, landscape: bool, margins_mm: tuple[float, float, float, float], t
 
 def across(cells: str, widths_mm: tuple[float, ...]) -> str:
     """Return a row without rules over the whole width of the page, upright or landscape."""
-    made = table(row(cells), widths_mm, rules="none")
+    made = one_rule(table(row(cells), widths_mm, rules="none"))
     start = made.index("<w:tblW ")
     wide = made[:start] + '<w:tblW w:w="5000" w:type="pct"/>' + made[made.index("/>", start) + 2 :]
     return wide.replace('<w:tblLayout w:type="fixed"/>', "") + paragraph("", style="Gap")
+
+
+def one_rule(grid: str) -> str:
+    """Return a header's or footer's table with one rule over its whole width, in place of one in each cell.
+
+    The styles of headers and footers rule each paragraph: beside each other these would be broken lines.
+    """
+    for style, edge in (("Header", "bottom"), ("Footer", "top")):
+        named = f'<w:pStyle w:val="{style}"/>'
+        if named in grid:
+            grid = grid.replace(named, f'{named}<w:pBdr><w:{edge} w:val="nil"/></w:pBdr>')
+            line = f'<w:{edge} w:val="single" w:sz="4" w:space="0" w:color="{RULE}"/>'
+            grid = grid.replace(f'<w:{edge} w:val="nil"/>', line, 1)  # of the table, which stands first
+    return grid
 
 
 def logo(rel: str, size_mm: float, *, number: int, text: str) -> str:
