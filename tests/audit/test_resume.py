@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from toolkit import machine as machine_module
 from toolkit.audit import archive as archive_module
 from toolkit.audit.archive import audit_archive
 from toolkit.audit.resume import RESULTS, Results
@@ -95,6 +96,29 @@ def test_a_line_that_a_crash_cut_off_costs_one_file(archive, tmp_path, asked):
 
 
 @pytest.mark.usefixtures("asked")
+def test_a_damaged_line_costs_one_file(archive, tmp_path, asked):
+    first = list(audit_archive(archive, registry(), out=tmp_path / "out").files)
+    results = tmp_path / "out" / RESULTS
+    data = results.read_bytes()
+    results.write_bytes(data.replace(b'"grade": "stale"', b'"grade": "exact"', 1))
+    asked.clear()
+    assert list(audit_archive(archive, registry(), out=tmp_path / "out").files) == first
+    assert len(asked) == 1
+
+
+def test_a_machine_of_its_own_is_part_of_a_test(archive, tmp_path, asked):
+    definition = Path(machine_module.__file__).with_name("m15.toml").read_text()
+    (archive / "two" / "own.toml").write_text(definition)
+    (archive / "two" / "test.toml").write_text('schema = 1\nmachine = "own.toml"\n')
+    audit_archive(archive, registry(), out=tmp_path / "out")
+    asked.clear()
+    (archive / "two" / "own.toml").write_text(definition + "# looked at again\n")
+    audit_archive(archive, registry(), out=tmp_path / "out")
+    assert set(asked) == {f"two/{name}" for name in ("M15_fig4_4.xlsx", "own.toml")} | {
+        p.relative_to(archive).as_posix() for p in (archive / "two").iterdir() if p.suffix != ".toml"
+    }
+
+
 def test_an_output_folder_inside_the_archive_is_no_part_of_it(archive):
     first = audit_archive(archive, registry(), out=archive / "audit")
     again = audit_archive(archive, registry(), out=archive / "audit")

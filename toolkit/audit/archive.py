@@ -4,28 +4,23 @@ from __future__ import annotations
 
 import datetime as dt
 import os
-from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 from toolkit import __version__
-from toolkit.audit.across import Across
 from toolkit.audit.cluster import run_on_cluster
 from toolkit.audit.inventory import inventory
 from toolkit.audit.lines import Lines
-from toolkit.audit.model import GRADES, TELLS, Grade
 from toolkit.audit.one_file import Auditor, unreadable
 from toolkit.audit.resume import Done, Files, Results, done
+from toolkit.audit.sums import Sums, read_sums, sum_up, write_sums
 from toolkit.audit.workers import Lost, run_isolated
 from toolkit.calibration.registry.registry import Refused, Registry
 from toolkit.errors import ConfigError, RegistryError
 from toolkit.files import sha256_bytes
 from toolkit.findings import Finding
-
-CLEAN = ("exact", "rounding")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -109,7 +104,9 @@ def audit_archive(
         for name, result in run(new):
             kept.put(name, done(unreadable(name, result.reason)) if isinstance(result, Lost) else result)
             step(name)
-        return _summed(archive, registry, day, kept.files(todo), reused=len(reused))
+        files = kept.files(todo)
+        sums = _sums(out, files, kept.digest(todo))
+        return _judged(archive, registry, day, files, sums, reused=len(reused))
 
 
 class _Worker:
@@ -152,25 +149,13 @@ def _same(archive: Path, registry: Registry, day: dt.date, digest: str, version:
     return _Worker(archive, registry, day)
 
 
-def _summed(archive: Path, registry: Registry, day: dt.date, files: Files, *, reused: int) -> ArchiveAudit:
-    across = Across()
-    grades: Counter[str] = Counter()
-    undated = 0
-    instruments: set[str] = set()
-    findings: list[Finding] = []
-    notes: list[Finding] = []
-    for one in files.plain():
-        grades[one["grade"]] += 1
-        undated += one["grade"] != "unreadable" and one["date"] is None
-        if one["instrument"] is not None:
-            instruments.add(one["instrument"])
-        findings += _of_file(one)
-        notes += across.add(one)
-    notes += across.rest()
+def _judged(
+    archive: Path, registry: Registry, day: dt.date, files: Files, sums: Sums, *, reused: int
+) -> ArchiveAudit:
     refused: list[Refused] = []
     heads: list[tuple[str, str]] = []
     troubles: list[Finding] = []
-    for instrument in sorted(instruments):
+    for instrument in sums.instruments:
         refused += registry.usable(instrument)[1]
         try:
             heads.append((instrument, registry.head(instrument)))
@@ -180,43 +165,30 @@ def _summed(archive: Path, registry: Registry, day: dt.date, files: Files, *, re
         archive=archive,
         known_at=day,
         files=files,
-        grades={grade: grades[grade] for grade in GRADES},
-        undated=undated,
-        tests=across.tests,
+        grades=sums.grades,
+        undated=sums.undated,
+        tests=sums.tests,
         refused=tuple(refused),
         heads=tuple(heads),
-        findings=(*findings, *_refusals(refused), *troubles, *notes),
+        findings=(*sums.findings, *_refusals(refused), *troubles, *sums.notes),
         reused=reused,
     )
+
+
+def _sums(out: Path | None, files: Files, key: str | None) -> Sums:
+    """Return what the files amount to, and keep it where their results are kept."""
+    if out is None or key is None:
+        return sum_up(files.plain())
+    kept = read_sums(out, key)
+    if kept is None:
+        kept = sum_up(files.plain())
+        write_sums(out, kept, key)
+    return kept
 
 
 def _hash(registry: Registry, day: dt.date) -> str:
     parts = [f"{name}={registry.digest(name)}" for name in registry.instruments()]
     return sha256_bytes("|".join([day.isoformat(), *parts]).encode())
-
-
-def _of_file(one: Mapping[str, Any]) -> list[Finding]:
-    made = []
-    path, grade, reason = one["path"], one["grade"], one["reason"]
-    if one["test_toml"] is not None:
-        message = f"its test.toml cannot be used, the file counts as undated: {one['test_toml']}"
-        made.append(Finding(rule="test-toml", where=path, message=message))
-    if grade == "unreadable":
-        made.append(Finding(rule="unreadable-file", where=path, message=reason or ""))
-    elif grade not in CLEAN:
-        made.append(Finding(rule=f"identified-{grade}", where=path, message=reason or told(one)))
-    return made
-
-
-def told(one: Mapping[str, Any]) -> str:
-    """Return in one sentence what computed a file, from its plain answer."""
-    grade: Grade = one["grade"]
-    who = ""
-    if one["record"]:
-        who = f" ({one['record']}{', ' + one['variant'] if one['variant'] else ''})"
-    elif one["candidates"]:
-        who = f" ({', '.join(one['candidates'])})"
-    return f"Fy and Mz were computed {TELLS[grade]}{who}"
 
 
 def _refusals(refused: list[Refused]) -> list[Finding]:

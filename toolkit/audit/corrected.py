@@ -21,6 +21,7 @@ import numpy as np
 from toolkit.audit.columns import columns_of
 from toolkit.audit.context import context_of
 from toolkit.audit.identify import recompute
+from toolkit.audit.model import CLEAN
 from toolkit.errors import OutputError, ToolkitError
 from toolkit.files import sha256_bytes, sha256_file, write_atomic
 from toolkit.recording.folder import TEST_FILE, nearest_test_toml
@@ -39,7 +40,6 @@ if TYPE_CHECKING:
     from toolkit.recording.model import Recording
 
 INDEX = "corrected.json"
-_CLEAN = ("exact", "rounding")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -98,7 +98,7 @@ def write_copies(
     records: dict[str, CalibrationRecord] = {}
     copies: list[Copy] = []
     for plain in made.files.plain():
-        if plain["repair"] is None or plain["grade"] in _CLEAN or not plain["units"]:
+        if plain["repair"] is None or plain["grade"] in CLEAN or not plain["units"]:
             continue
         identity = plain["in_force"]
         if identity not in records:

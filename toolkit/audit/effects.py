@@ -13,6 +13,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
+from toolkit.audit.model import CLEAN
 from toolkit.channels import ROTATIONS, Rotation
 from toolkit.findings import Finding
 from toolkit.machine import load_machine, machine_names
@@ -58,7 +59,7 @@ class TestSums:
     def add(self, one: Mapping[str, Any]) -> None:
         """Take a file's plain answer."""
         self.files += 1
-        self.dirty += one["grade"] not in ("exact", "rounding")
+        self.dirty += one["grade"] not in CLEAN
         if one["repair"] is not None:
             self.worst_FY_N = max(self.worst_FY_N, one["repair"]["FY_max_abs_N"] or 0.0)
             self.worst_MZ_Nm = max(self.worst_MZ_Nm, one["repair"]["MZ_max_abs_Nm"] or 0.0)

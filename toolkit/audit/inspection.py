@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from toolkit.audit.columns import Columns, columns_of
 from toolkit.audit.context import Context, context_of
 from toolkit.audit.identify import identify_columns, recompute
-from toolkit.audit.model import TELLS, Identification
+from toolkit.audit.model import CLEAN, TELLS, Identification
 from toolkit.errors import RecordError, RegistryError
 from toolkit.findings import Finding
 from toolkit.recording.read import read_recording
@@ -263,7 +263,7 @@ def _findings(path: Path, found: Identification | None, choice: Choice | None) -
     ]
     if choice.trouble is not None:
         made.append(Finding(rule="registry-damaged", where=where, message=choice.trouble))
-    if found is not None and found.grade not in ("exact", "rounding"):
+    if found is not None and found.grade not in CLEAN:
         who = f" ({found.record}{', ' + found.variant if found.variant else ''})" if found.record else ""
         text = f"Fy and Mz were computed {TELLS[found.grade]}{who}"
         made.append(Finding(rule=f"identified-{found.grade}", where=where, message=text))

@@ -19,20 +19,28 @@ class Lines:
 
     def add(self, value: dict[str, Any]) -> None:
         """Append a value that JSON can hold."""
+        self.take(json.dumps(value).encode() + b"\n")
+
+    def take(self, line: bytes) -> None:
+        """Append a value as the line that `raw` yields for it."""
         self._file.seek(0, 2)
-        self._file.write(json.dumps(value).encode() + b"\n")
+        self._file.write(line)
         self._count += 1
 
     def __len__(self) -> int:
         return self._count
 
     def __iter__(self) -> Iterator[dict[str, Any]]:
+        return (json.loads(line) for line in self.raw())
+
+    def raw(self) -> Iterator[bytes]:
+        """Yield every value as a line."""
         place = 0
         for _ in range(self._count):
             self._file.seek(place)
             line = self._file.readline()
             place += len(line)
-            yield json.loads(line)
+            yield line
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Lines):

@@ -18,6 +18,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from toolkit.audit.model import CLEAN
 from toolkit.errors import ConfigError
 from toolkit.files import check_keys, read_bytes
 from toolkit.recording.archive import MAX_FILE_BYTES
@@ -29,7 +30,6 @@ if TYPE_CHECKING:
 DOCUMENTS = (".docx", ".doc", ".pdf", ".odt", ".rtf", ".xlsx", ".xls", ".html", ".htm", ".txt", ".md")
 _COLUMNS = ("report", "test", "sha256")
 _SHA = re.compile(r"[0-9a-fA-F]{64}")
-_CLEAN = ("exact", "rounding")
 
 
 @dataclass(slots=True, kw_only=True, eq=False)
@@ -113,7 +113,7 @@ def link(made: ArchiveAudit, reports: tuple[PastReport, ...]) -> Linked:
     in_force: dict[str, set[str]] = {}
     for plain in made.files.plain():
         test = plain["test"]
-        dirty = plain["grade"] not in _CLEAN
+        dirty = plain["grade"] not in CLEAN
         if test is not None:
             n, bad = tests.get(test, (0, 0))
             tests[test] = (n + 1, bad + dirty)

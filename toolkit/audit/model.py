@@ -19,6 +19,9 @@ Grade = Literal[
 GRADES: tuple[Grade, ...] = get_args(Grade)
 """A file has the first grade that applies to any of its rows."""
 
+CLEAN: tuple[Grade, ...] = ("rounding", "exact")
+"""The grades of a file whose FY and MZ are those of the record in force."""
+
 TELLS: dict[Grade, str] = {
     "unreadable": "cannot be read",
     "unknown": "by no record of the registry, nor by a sign or column variant of one",

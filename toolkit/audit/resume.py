@@ -2,16 +2,21 @@
 
 ``results.jsonl`` holds one line a file, written as soon as the file is done; without an output folder it is a
 temporary file. Nothing but its index stays in memory, so that an archive may have any number of files. A
-result is used again only for the same content of the file, the same words of its test.toml, the same registry
-and day of knowledge, and the same version of the toolkit; file times are never asked.
+result is used again only for the same content of the file, the same words of its test.toml (and of a machine
+that it names by a file), the same registry and day of knowledge, and the same version of the toolkit. Every
+file is read and hashed for that: its size and its times are never asked, for a copy of an archive keeps them
+and an editor may set them.
 """
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
 import tempfile
+import tomllib
 import weakref
+import zlib
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -29,7 +34,7 @@ from toolkit.recording.marks import GENERATOR, OWN_OUTPUT
 
 RESULTS = "results.jsonl"
 _HEADER = (json.dumps({"generator": GENERATOR, "marks": OWN_OUTPUT}) + "\n").encode()
-_REST = b', "result": '
+_REST, _END = b', "result": ', b"}\n"
 _HASHING = 4  # threads; reading and hashing leave the interpreter free
 _SMALL = 2**20
 _BATCH = 32  # files that a thread is given at once
@@ -88,10 +93,18 @@ class Files(Sequence[FileAudit]):
         """Yield the results under the keys of the answer."""
         return (self._plain(place) for place in self._places)
 
+    def raw(self) -> Iterator[bytes]:
+        """Yield what `plain` yields as JSON in ASCII."""
+        return (self._raw(place) for place in self._places)
+
     def _plain(self, place: int) -> dict[str, Any]:
-        self._file.seek(place)
-        found: dict[str, Any] = json.loads(self._file.readline())["result"]
+        found: dict[str, Any] = json.loads(self._raw(place))
         return found
+
+    def _raw(self, place: int) -> bytes:
+        self._file.seek(place)
+        line = self._file.readline()
+        return line[line.index(_REST) + len(_REST) : -len(_END)]
 
 
 class Results:
@@ -111,7 +124,8 @@ class Results:
         self._archive = archive
         self._base = f"{__version__}|{SHAPE}|{registry_hash}"
         self._tomls: dict[str, str] = {}
-        self._places: dict[str, tuple[bytes, int]] = {}  # path -> key, offset of its newest line
+        # path -> key, CRC-32 of the answer, offset of its newest line
+        self._places: dict[str, tuple[bytes, int, int]] = {}
         self._own: set[str] = set()  # paths of files that the toolkit wrote
         self._path = None if folder is None else folder / RESULTS
         self._file = tempfile.TemporaryFile() if self._path is None else _opened(self._path)  # noqa: SIM115
@@ -151,16 +165,27 @@ class Results:
         """Append a result; one without a hash is not used again."""
         key = b"" if done.sha256 is None else self._key(name, done.sha256)
         # ASCII: a name that is no UTF-8 survives as well.
-        head = json.dumps({"key": key.hex(), "path": name})
-        self._places[name] = (key, self._end)
-        self._write(head[:-1].encode() + _REST + done.body + b"}\n")
+        crc = zlib.crc32(done.body)
+        head = json.dumps({"key": key.hex(), "path": name, "crc": crc})
+        self._places[name] = (key, crc, self._end)
+        self._write(head[:-1].encode() + _REST + done.body + _END)
         self._mark(name, own=done.body == b"null")
 
     def files(self, names: Sequence[str]) -> Files:
         """Return the results of the names, without those of files that the toolkit wrote."""
         self._file.flush()
         stream = self._file if self._path is None else self._path.open("rb")
-        return Files(stream, [self._places[name][1] for name in sorted(names) if name not in self._own])
+        return Files(stream, [self._places[name][2] for name in sorted(names) if name not in self._own])
+
+    def digest(self, names: Sequence[str]) -> str | None:
+        """Return the hash of all that the results of the names are, None where one is not used again."""
+        whole = hashlib.sha256()
+        for name in sorted(names):
+            key, crc, _ = self._places[name]
+            if not key:
+                return None
+            whole.update(json.dumps([name, key.hex(), crc]).encode())
+        return whole.hexdigest()
 
     def _mark(self, name: str, *, own: bool) -> None:
         # A file that was replaced by another is what its newest line says.
@@ -179,7 +204,7 @@ class Results:
         self._end += len(line)
 
     def _hashed(self, names: Sequence[str]) -> list[str | None]:
-        return [_content_hash(self._archive / name) for name in names]
+        return [_content_hash(f"{self._archive}/{name}") for name in names]
 
     def _key(self, name: str, content: str) -> bytes:
         folder = name.rpartition("/")[0]
@@ -189,30 +214,43 @@ class Results:
 
     def _remember(self, line: bytes, place: int) -> None:
         try:
-            head = json.loads(line[: line.index(_REST)] + b"}")
-            if line.endswith(b"}\n"):
-                self._places[head["path"]] = (bytes.fromhex(head["key"]), place)
-                self._mark(head["path"], own=line.endswith(_REST + b"null}\n"))
+            cut = line.index(_REST)
+            head = json.loads(line[:cut] + b"}")
+            body = line[cut + len(_REST) : -len(_END)]
+            if line.endswith(_END) and zlib.crc32(body) == head["crc"]:
+                self._places[head["path"]] = (bytes.fromhex(head["key"]), head["crc"], place)
+                self._mark(head["path"], own=body == b"null")
         except (ValueError, KeyError, TypeError):
             return  # the header, or of another version, or damaged: the file is audited again
 
 
-def _content_hash(path: Path) -> str | None:
+def _content_hash(path: str) -> str | None:
     try:
-        # One read and no buffer: most files are small, and there are very many.
-        with path.open("rb", buffering=0) as stream:
-            if os.fstat(stream.fileno()).st_size <= _SMALL:
-                return sha256_bytes(stream.readall())
-        return sha256_file(path)
+        # One read and no buffer, nor a Path: most files are small, and there are very many.
+        handle = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
+        try:
+            size = os.fstat(handle).st_size
+            data = os.read(handle, size + 1) if size <= _SMALL else b""
+        finally:
+            os.close(handle)
+        return sha256_bytes(data) if data and len(data) == size else sha256_file(Path(path))
     except OSError:
         return None
 
 
 def _words(toml: Path | None) -> str:
+    # A machine that test.toml names by a file is as much a part of it as its own words.
+    if toml is None:
+        return ""
+    data = b""
     try:
-        return "" if toml is None else f"{toml}:{sha256_bytes(toml.read_bytes())}"
-    except OSError as error:
-        return f"{toml}:{error.strerror}"
+        data = toml.read_bytes()
+        machine = tomllib.loads(data.decode()).get("machine") if b".toml" in data else None
+        named = isinstance(machine, str) and machine.endswith(".toml")
+        own = sha256_file(toml.parent / str(machine)) if named else ""
+    except (OSError, ValueError) as error:
+        own = str(error)
+    return f"{toml}:{sha256_bytes(data)}:{own}"
 
 
 def _opened(path: Path) -> IO[bytes]:

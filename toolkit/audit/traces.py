@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from toolkit.audit.columns import columns_of
 from toolkit.audit.context import context_of
 from toolkit.audit.identify import recompute
+from toolkit.audit.model import CLEAN
 from toolkit.errors import ToolkitError
 from toolkit.recording.read import read_recording
 
@@ -37,7 +38,7 @@ def worst_files(made: ArchiveAudit, count: int) -> list[dict[str, Any]]:
         for number, plain in enumerate(made.files.plain())
         if plain["repair"] is not None
         and plain["repair"]["FY_max_abs_N"] is not None
-        and plain["grade"] not in ("exact", "rounding")
+        and plain["grade"] not in CLEAN
     )
     return [plain for _, _, plain in heapq.nlargest(count, bad)]
 

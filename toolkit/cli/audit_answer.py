@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from toolkit.audit.model import CLEAN
 from toolkit.cli.console import table
 
 if TYPE_CHECKING:
@@ -92,10 +93,11 @@ def write_folder(out: Path, told: Answer, registry: Registry, template: Template
     from toolkit.recording.marks import GENERATOR, OWN_OUTPUT
     from toolkit.report.audit.page import AuditView, write_page
 
-    with atomic_path(out / LINES) as temporary, temporary.open("w", encoding="ascii") as lines:
+    with atomic_path(out / LINES) as temporary, temporary.open("wb") as lines:
         head = {"generator": GENERATOR, "marks": OWN_OUTPUT, "schema": 1, "kind": "audit"}
-        lines.write(json.dumps({**head, "known_at": told.made.known_at.isoformat()}) + "\n")
-        lines.writelines(json.dumps(one) + "\n" for one in _files(told))
+        lines.write(json.dumps({**head, "known_at": told.made.known_at.isoformat()}).encode() + b"\n")
+        whole = told.made.files.raw() if told.linked is None else (json.dumps(f).encode() for f in _files(told))
+        lines.writelines(one + b"\n" for one in whole)
     view = AuditView(
         made=told.made,
         rules=rules_catalogue(),
@@ -192,7 +194,7 @@ def _asked(told: Answer) -> Iterator[str]:
 def _rows(made: ArchiveAudit) -> Iterator[list[str]]:
     shown = 0
     for one in made.files.plain():
-        if one["grade"] in ("exact", "rounding"):
+        if one["grade"] in CLEAN:
             continue
         if shown == _SHOWN:
             return
