@@ -23,6 +23,7 @@ def archive(tmp_path):
     for name in NAMES:
         (root / name).mkdir(parents=True)
         write_fig4_4(root / name)
+        (root / name / "test.toml").write_text('schema = 1\nmachine = "m15"\ndate = 2018-03-01\n')
     (root / "letter.xlsx").write_bytes(b"no recording")
     return root
 

@@ -96,8 +96,9 @@ def write_folder(out: Path, told: Answer, registry: Registry, template: Template
     with atomic_path(out / LINES) as temporary, temporary.open("wb") as lines:
         head = {"generator": GENERATOR, "marks": OWN_OUTPUT, "schema": 1, "kind": "audit"}
         lines.write(json.dumps({**head, "known_at": told.made.known_at.isoformat()}).encode() + b"\n")
-        whole = told.made.files.raw() if told.linked is None else (json.dumps(f).encode() for f in _files(told))
-        lines.writelines(one + b"\n" for one in whole)
+        linked = told.linked is not None
+        files = (json.dumps(one).encode() for one in _files(told)) if linked else told.made.files.raw()
+        lines.writelines(one + b"\n" for one in files)
     view = AuditView(
         made=told.made,
         rules=rules_catalogue(),
