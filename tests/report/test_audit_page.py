@@ -187,6 +187,23 @@ class TestSummary:
         assert done.pdf.read_bytes().startswith(b"%PDF")
         assert not [one for one in done.checks if not one.ok and not one.warning]
 
+    @pytest.mark.parametrize("archive", [EXAMPLES / "fig4_4", None], ids=["undated", "empty"])
+    def test_a_heading_without_rows_is_left_out(self, archive, tmp_path):
+        from docx import Document
+
+        from toolkit.report.deliver import deliver
+        from toolkit.report.template.package import read_template
+
+        (tmp_path / "nothing").mkdir()
+        made = audit_archive(archive or tmp_path / "nothing", Registry(CHECKOUT / "calibrations"))
+        content = build_audit_content(AuditView(made=made, rules=rules_catalogue(), timelines=(), traces=()))
+        conclusion = str(content.values["audit.conclusion"].value)
+        assert ("1 file could not be read and is" if archive else "has no file") in conclusion
+        template = read_template(CHECKOUT / "report_templates" / "audit.docx")
+        done = deliver(template, content, tmp_path / "out", name="audit")
+        headings = [one.text for one in Document(str(done.docx)).paragraphs if one.style.name == "Heading 1"]
+        assert headings == (["Grades", "Findings"] if archive else [])
+
     def test_a_template_is_known_by_its_tags_and_asks_for_no_reports_tags(self):
         from toolkit.report.audit.vocabulary import AUDIT
         from toolkit.report.certificate.vocabulary import CERTIFICATE

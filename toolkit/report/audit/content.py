@@ -79,7 +79,9 @@ def _texts(view: AuditView, totals: Mapping[str, Any]) -> dict[str, str | None]:
     name = made.archive.absolute().name
     heads = ", ".join(f"{who} {head}" for who, head in made.heads)
     files = len(made.files)
-    if totals["wrong"] == 0:
+    if totals["right"] + totals["wrong"] == 0:
+        conclusion = "The archive has no file that could be read as a recording."
+    elif totals["wrong"] == 0:
         conclusion = (
             f"All {totals['right']} files that could be read carry the values of the record in force."
         )
@@ -93,8 +95,9 @@ def _texts(view: AuditView, totals: Mapping[str, Any]) -> dict[str, str | None]:
             if totals["repaired"]
             else "By how much cannot be told: for none of them a record in force on its day is known."
         )
-    if made.grades["unreadable"]:
-        conclusion += f" {made.grades['unreadable']} files could not be read and are set aside."
+    if unreadable := made.grades["unreadable"]:
+        many = "files could not be read and are" if unreadable > 1 else "file could not be read and is"
+        conclusion += f" {unreadable} {many} set aside."
     reports = None
     if view.linked is not None:
         amend = sum(one.to_amend for one in view.linked.reports)

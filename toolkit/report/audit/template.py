@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from toolkit.report.design.blocks import Pieces, paragraph, run
 from toolkit.report.design.default import build_document
 from toolkit.report.design.opening import (
@@ -56,8 +58,9 @@ def _first(p: Pieces) -> list[str]:
 
 def _results(p: Pieces) -> list[str]:
     return [
-        heading("Grades"),
-        p.table(
+        _titled(
+            p,
+            "Grades",
             "audit_grades",
             "Files by their grade, the first that applies.",
             ["grade", "files", "%", "what it means"],
@@ -66,8 +69,9 @@ def _results(p: Pieces) -> list[str]:
             "lrrl",
         ),
         p.figure("audit_years", 150),
-        heading("Tests that change most"),
-        p.table(
+        _titled(
+            p,
+            "Tests that change most",
             "audit_tests",
             "Largest changes by the record in force: of any row, and of the characteristics at any load.",
             [
@@ -96,8 +100,9 @@ def _results(p: Pieces) -> list[str]:
                 "lllr",
             ),
         ),
-        heading("Findings"),
-        p.table(
+        _titled(
+            p,
+            "Findings",
             "audit_findings",
             "What was found, by rule.",
             ["rule", "count", "what it means", "what to do"],
@@ -106,3 +111,18 @@ def _results(p: Pieces) -> list[str]:
             "lrll",
         ),
     ]
+
+
+def _titled(
+    p: Pieces,
+    title: str,
+    name: str,
+    caption: str,
+    head: Sequence[str],
+    cells: Sequence[str],
+    widths_mm: Sequence[float],
+    align: str,
+) -> str:
+    # A heading goes with its table where that has no row: no file, no dated test, nothing found.
+    table = p.table(name, caption, head, cells, widths_mm, align)
+    return p.block(f"tk:if.{name}", heading(title) + table)
