@@ -77,8 +77,12 @@ def answer_of(case: Case, found: Search, told: tuple[Finding, ...]) -> Diagnosis
 def mostly_unknown(found: Search) -> bool:
     """Tell whether what stays after the named effects outweighs them: they then only imitate it.
 
-    By the log-likelihood, and by what they take of the held-out mean square that is above the noise.
+    By the log-likelihood, by what they take of the held-out mean square that is above the noise, and by the
+    parameters of the simulation: effects beside which one of these is what nobody believes it to be are not
+    what was left out.
     """
+    if found.steps and implausible(found):
+        return True
     if not found.structure:
         return False
     left = found.structure[0].gain / 2
@@ -94,6 +98,12 @@ def mostly_unknown(found: Search) -> bool:
         if one.refitted_rmse**2 > _SHOWN * one.noise_floor**2
     ]
     return bool(shown) and all(taken < _TAKEN * above for taken, above in shown)
+
+
+def implausible(found: Search) -> tuple[str, ...]:
+    """Return the parameters that are far off their priors beside every effect that was found."""
+    values = zip(found.problem.free, found.augmented.p, strict=True)
+    return tuple(one.name for one, p in values if one.sd is not None and abs(p - one.value) > _FAR * one.sd)
 
 
 def _verdict(
@@ -324,6 +334,11 @@ def _next(found: Search, effects: tuple[FoundEffect, ...], verdict: Verdict) -> 
             )
     if verdict == "unknown":
         said += _to_find_it(found)
+        beside = ", ".join(dict.fromkeys(one.active.effect.name for one in found.steps))
+        said += [
+            f"Measure {name} by itself: even beside the nearest effects ({beside}) it is far off its prior."
+            for name in (implausible(found) if found.steps else ())
+        ]
     if cut_short(found.skipped):
         said.append("Give the search more time (--budget): it ended before every known effect was tried.")
     elif verdict == "untestable":
