@@ -199,7 +199,17 @@ def test_the_hand_over_has_one_manifest_and_the_content_hash_is_the_same_twice(
     assert (cells["info.special"].value, cells["info.special"].data_type) == ("=1+1", "s")
     table = read_tydex(out / "test.tdx")
     FZ = next(one for one in table.channels if one.symbol == "FZ")
-    assert FZ.values == pytest.approx([one.FZ for one in made.result.reduced.used()], rel=1e-6)
+    used = made.result.reduced.used()
+    assert FZ.values == pytest.approx([one.FZ for one in used], rel=1e-6)
+    # What the test declares is in it, and which rows are of which direction: the format has no channel for it.
+    constant = {one.symbol: set(one.values) for one in table.channels if one.symbol in ("P", "V")}
+    assert constant["P"] == {pytest.approx(made.result.reduced.info.pressure_Pa, rel=1e-6)}
+    assert constant["V"] == {pytest.approx(made.result.reduced.info.speed_m_s, rel=1e-6)}
+    forward = sum(one.rotation == "forward" for one in used)
+    said = (
+        f"rows 1 to {forward} forward, rows {forward + 1} to {len(used)} reverse; the axes follow the travel"
+    )
+    assert said in (out / "test.tdx").read_text()
     assert read_tir(out / "tire.tir").version is not None
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import platform
 import sys
 from collections.abc import Callable, Sequence
@@ -187,9 +188,23 @@ def _tydex(resolved: Resolved, path: Path) -> None:
         "FY": ("N", np.array([one.FY for one in used])),
         "MZ": ("N*m", np.array([one.MZ for one in used])),
     }
+    info = resolved.result.reduced.info
+    for symbol, unit, one in (("V", "m/s", info.speed_m_s), ("P", "Pa", info.pressure_Pa)):
+        if one is not None:
+            columns[symbol] = (unit, np.full(len(used), one))
     turned = {symbol: (unit, turn.get(symbol, 1) * values) for symbol, (unit, values) in columns.items()}
-    text, _ = tydex_text(turned, comments=_comments(resolved))
+    text, _ = tydex_text(turned, comments=[*_comments(resolved), _directions([c.rotation for c in used])])
     path.write_text(text, encoding="utf-8")
+
+
+def _directions(rotations: Sequence[str]) -> str:
+    """Return which rows are of which direction: a file of the format has no channel for it."""
+    parts, first = [], 1
+    for rotation, run in itertools.groupby(rotations):
+        last = first + len(list(run)) - 1
+        parts.append(f"rows {first} to {last} {rotation}")
+        first = last + 1
+    return f"{', '.join(parts)}; the axes follow the travel"
 
 
 def _tir(resolved: Resolved, path: Path) -> None:
