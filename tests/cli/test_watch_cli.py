@@ -103,6 +103,26 @@ def test_a_test_is_reported_once_its_files_have_settled(bench: Bench) -> None:
     assert json.loads((bench.watcher.out / STATE).read_text())["tests"]["year/two"]["state"] == "made"
 
 
+def test_a_file_that_grows_while_its_test_is_read_makes_one_report(bench: Bench) -> None:
+    """What was hashed before is not what was read: reported at once, the test would be reported twice."""
+    bench.test("one")
+    bench.look()
+    read = bench.watcher.resolve
+
+    def slow(test: Path) -> Any:
+        bench.test("one", "the rest came")
+        bench.watcher.resolve = read
+        return read(test)
+
+    bench.watcher.resolve = slow
+    assert [one.reason for one in bench.look(after=4).waiting] == ["files are arriving"]
+    assert bench.reported == []
+    bench.look(after=4)
+    bench.look(after=4)
+    bench.look(after=4)
+    assert bench.reported == [["one"]]
+
+
 def test_all_tests_that_are_whole_are_made_in_one_call(bench: Bench) -> None:
     bench.test("one")
     bench.test("two")

@@ -128,6 +128,10 @@ class Watcher:
                 continue
             contents[test] = content
             found = self._read(test, age)
+            if self._listing(test) != listing:
+                # Files came or grew while the test was read: what was read is not what was hashed.
+                waiting.append(Waiting(test=name, reason="files are arriving"))
+                continue
             if isinstance(found, Waiting):
                 self.waited[name] = (content, found.reason)
                 waiting.append(found)
