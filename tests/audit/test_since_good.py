@@ -3,16 +3,21 @@
 from __future__ import annotations
 
 import datetime as dt
+import json
+from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from archive_made import FY, MZ, dated, recording, write
+from typer.testing import CliRunner
 
 from toolkit.audit.archive import audit_archive
-from toolkit.audit.since_good import drift_since, drifted_files
+from toolkit.audit.since_good import drift_since, drifted_files, drifted_tests
 from toolkit.calibration.control.calibrate import calibrate
 from toolkit.calibration.registry.approval import approve
 from toolkit.calibration.registry.registry import Registry
+from toolkit.cli.main import _register, app
 from toolkit.errors import ConfigError
 
 LBF = 4.4482216152605
@@ -105,6 +110,28 @@ def test_each_test_has_the_share_of_its_days(home, made, workers):
     assert files["2021-01-01/run"].share == 1.0
 
 
+def test_a_test_has_the_largest_of_its_files(home, made):
+    drift = drift_since(home[1], "m15-r2")
+    files = tuple(drifted_files(made, home[1], drift))
+    tests = drifted_tests(made, files)
+    assert [(one.test, one.files, one.left_out) for one in tests] == [
+        ("2020-01-01", 1, 0),
+        ("2021-01-01", 1, 0),
+    ]
+    # Two more recordings of the first test: one that changes more, and one that could not be computed.
+    more = replace(files[0], path="2020-01-01/more", FY_N=1e6, MZ_Nm=0.0)
+    none = replace(files[0], path="2020-01-01/none", FY_N=None, MZ_Nm=None, reason="no record was in force")
+    plain = [{"path": one.path, "test": one.path.split("/")[0]} for one in (*files, more, none)]
+    view = SimpleNamespace(files=SimpleNamespace(plain=lambda: iter(plain)))
+    first = drifted_tests(view, (*files, more, none))[0]
+    assert (first.files, first.left_out, first.FY_N, first.MZ_Nm) == (3, 1, 1e6, files[0].MZ_Nm)
+    alone = drifted_tests(view, (none,))[0]
+    assert alone.as_dict() == {
+        "test": "2020-01-01", "date": "2020-01-01", "share": none.share, "files": 1, "left_out": 1,
+        "FY_max_abs_N": None, "MZ_max_abs_Nm": None,
+    }  # fmt: skip
+
+
 def test_the_first_record_may_be_named_too(home):
     drift = drift_since(home[1], "m15-r1")
     assert drift.good_date == dt.date(2018, 1, 1)
@@ -124,3 +151,20 @@ def test_without_such_a_stretch_it_is_refused(home, tmp_path, record, said):
         drift_since(registry, record)
     assert caught.value.rule == "since-good"
     assert said in str(caught.value)
+
+
+def test_the_command_tells_each_test_and_its_page_too(home, tmp_path):
+    root, registry = home
+    _register()
+    given = ["audit", str(root / "archive"), "--calibrations", str(registry.folder), "--known-at", "2022-01-01",
+             "--since-good", "m15-r2", "--out", str(tmp_path)]  # fmt: skip
+    text = CliRunner().invoke(app, given, standalone_mode=False).stdout
+    told = json.loads(CliRunner().invoke(app, [*given, "--json"], standalone_mode=False).stdout)["since_good"]
+    assert [one["test"] for one in told["tests"]] == ["2020-01-01", "2021-01-01"]
+    assert [one["path"] for one in told["files"]] == ["2020-01-01/run", "2021-01-01/run"]
+    page = (tmp_path / "audit.html").read_text()
+    for one in told["tests"]:
+        line = next(row for row in text.splitlines() if row.startswith(one["test"]) and "%" in row)
+        assert line.split()[-2:] == [f"{one['FY_max_abs_N']:.2f}", f"{one['MZ_max_abs_Nm']:.3f}"]
+        assert f"<tr><td>{one['test']}</td><td class=d>{one['date']}</td>" in page
+        assert f"<td class=n>{one['FY_max_abs_N']:.2f}</td>" in page

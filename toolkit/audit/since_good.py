@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import datetime as dt
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -111,6 +111,56 @@ class DriftedFile:
             ],
             "reason": self.reason,
         }
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DriftedTest:
+    """A test of the stretch: the largest share of the change of any row of its recordings.
+
+    ``test`` is the folder of its test.toml, relative to the archive. ``FY_N`` and ``MZ_Nm`` are None where
+    of no recording it could be computed; ``left_out`` counts those.
+    """
+
+    test: str
+    date: dt.date
+    share: float
+    files: int
+    left_out: int
+    FY_N: float | None
+    MZ_Nm: float | None
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the test under the keys of the answer."""
+        return {
+            "test": self.test,
+            "date": self.date.isoformat(),
+            "share": self.share,
+            "files": self.files,
+            "left_out": self.left_out,
+            "FY_max_abs_N": self.FY_N,
+            "MZ_max_abs_Nm": self.MZ_Nm,
+        }
+
+
+def drifted_tests(made: ArchiveAudit, files: Sequence[DriftedFile]) -> tuple[DriftedTest, ...]:
+    """Return the tests that recordings of the stretch belong to, by date and folder."""
+    by_path = {one.path: one for one in files}
+    tests: dict[str, list[DriftedFile]] = {}
+    for plain in made.files.plain():
+        if plain["path"] in by_path:
+            tests.setdefault(plain["test"], []).append(by_path[plain["path"]])
+    return tuple(
+        DriftedTest(
+            test=name,
+            date=some[0].date,
+            share=some[0].share,
+            files=len(some),
+            left_out=sum(one.reason is not None for one in some),
+            FY_N=max((one.FY_N for one in some if one.FY_N is not None), default=None),
+            MZ_Nm=max((one.MZ_Nm for one in some if one.MZ_Nm is not None), default=None),
+        )
+        for name, some in sorted(tests.items(), key=lambda pair: (pair[1][0].date, pair[0]))
+    )
 
 
 def drift_since(registry: Registry, good: str) -> Drift:

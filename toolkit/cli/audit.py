@@ -73,7 +73,7 @@ def command(
     from toolkit.audit.inventory import inventory
     from toolkit.audit.linked import link, read_reports
     from toolkit.audit.parquet import check_parquet
-    from toolkit.audit.since_good import drift_since, drifted_files
+    from toolkit.audit.since_good import drift_since, drifted_files, drifted_tests
     from toolkit.calibration.registry.registry import Registry
     from toolkit.cli.audit_answer import Answer, payload_of, text_of, write_folder, write_table
 
@@ -142,6 +142,7 @@ def command(
         linked=linked,
         drift=drift,
         drifted=drifted,
+        drifted_tests=drifted_tests(made, drifted),
         copies=copies,
         amended=amended,
     )

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from toolkit.audit.archive import ArchiveAudit
     from toolkit.audit.corrected import Copy
     from toolkit.audit.linked import Linked
-    from toolkit.audit.since_good import Drift, DriftedFile
+    from toolkit.audit.since_good import Drift, DriftedFile, DriftedTest
     from toolkit.calibration.registry.registry import Registry
     from toolkit.cli.audit_amend import Amended
     from toolkit.report.template.package import Template
@@ -33,6 +33,7 @@ class Answer:
     linked: Linked | None
     drift: Drift | None
     drifted: tuple[DriftedFile, ...]
+    drifted_tests: tuple[DriftedTest, ...]
     copies: tuple[Copy, ...] | None
     amended: tuple[Amended, ...] = ()
 
@@ -54,8 +55,11 @@ def payload_of(told: Answer) -> dict[str, Any]:
         found["reports"] = [one.as_dict() for one in told.linked.reports]
         found["report_unknown"] = list(told.linked.unknown)
     if told.drift is not None:
-        files = [one.as_dict() for one in told.drifted]
-        found["since_good"] = {**told.drift.as_dict(), "files": files}
+        found["since_good"] = {
+            **told.drift.as_dict(),
+            "tests": [one.as_dict() for one in told.drifted_tests],
+            "files": [one.as_dict() for one in told.drifted],
+        }
     if told.copies is not None:
         found["repaired"] = [one.as_dict() for one in told.copies]
         found["amended"] = [one.as_dict() for one in told.amended]
@@ -107,6 +111,7 @@ def write_folder(out: Path, told: Answer, registry: Registry, template: Template
         linked=told.linked,
         drift=told.drift,
         drifted=told.drifted,
+        drifted_tests=told.drifted_tests,
     )
     write_page(out / PAGE, view)
     if template is None:
@@ -176,13 +181,14 @@ def _asked(told: Answer) -> Iterator[str]:
             "the effect, interpolated by days:"
         )
         rows = [
-            [f.path, f.date.isoformat(), f"{f.share:.0%}", "" if f.FY_N is None else f"{f.FY_N:.2f}",
-             "" if f.MZ_Nm is None else f"{f.MZ_Nm:.3f}", f.reason or ""]
-            for f in told.drifted[:_SHOWN]
+            [t.test, t.date.isoformat(), f"{t.share:.0%}", str(t.files),
+             "" if t.FY_N is None else f"{t.FY_N:.2f}", "" if t.MZ_Nm is None else f"{t.MZ_Nm:.3f}",
+             f"without {t.left_out} files, see --json" if t.left_out else ""]
+            for t in told.drifted_tests[:_SHOWN]
         ]  # fmt: skip
-        yield table(["file", "date", "share", "dFY [N]", "dMZ [N·m]", ""], rows, align="<<>>><")
-        if len(told.drifted) > len(rows):
-            yield f"... and {len(told.drifted) - len(rows)} more; --json tells all of them"
+        yield table(["test", "date", "share", "files", "dFY [N]", "dMZ [N·m]", ""], rows, align="<<>>>><")
+        if len(told.drifted_tests) > len(rows):
+            yield f"... and {len(told.drifted_tests) - len(rows)} more; --json tells all of them"
     if told.copies is not None:
         made = [one for one in told.copies if one.sha256 is not None]
         yield f"{len(made)} corrected copies"

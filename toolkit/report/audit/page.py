@@ -10,6 +10,7 @@ from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from toolkit.audit.since_good import DriftedFile, DriftedTest
 from toolkit.files import atomic_path
 from toolkit.recording.marks import OWN_OUTPUT
 from toolkit.report.audit.svg import COLOURS, rows_of, timeline
@@ -17,7 +18,7 @@ from toolkit.report.audit.svg import COLOURS, rows_of, timeline
 if TYPE_CHECKING:
     from toolkit.audit.archive import ArchiveAudit
     from toolkit.audit.linked import Linked
-    from toolkit.audit.since_good import Drift, DriftedFile
+    from toolkit.audit.since_good import Drift
     from toolkit.audit.timeline import Timeline
     from toolkit.audit.traces import Trace
 
@@ -53,6 +54,7 @@ class AuditView:
     linked: Linked | None = None
     drift: Drift | None = None
     drifted: Sequence[DriftedFile] = ()
+    drifted_tests: Sequence[DriftedTest] = ()
 
 
 def write_page(path: Path, view: AuditView) -> None:
@@ -91,7 +93,7 @@ def page(view: AuditView) -> Iterator[str]:
     yield from _effects(made)
     yield from _unknown(made)
     yield from _reports(view.linked)
-    yield from _drift(view.drift, view.drifted)
+    yield from _drift(view)
     yield from _findings(view)
     yield '</main><script type="application/json" id="data">'
     yield from _data(view)
@@ -264,22 +266,36 @@ def _reports(linked: Linked | None) -> Iterator[str]:
         yield "".join(f"<li>{escape(test)}</li>" for test in linked.unknown) + "</ul></details>"
 
 
-def _drift(drift: Drift | None, files: Sequence[DriftedFile]) -> Iterator[str]:
+def _drift(view: AuditView) -> Iterator[str]:
+    drift, files = view.drift, view.drifted
     if drift is None:
         return
     yield f"<h2>Since the last good as-found, {escape(drift.good)}</h2><p>{escape(drift.told[:1].upper())}"
     yield f"{escape(drift.told[1:])}. After {drift.good_date}, the last day on which it was good, and until "
-    yield f"then, {len(files)} files were recorded. Each has the share of the change that its "
-    yield "day has "
-    yield "of the days between: an estimate, since nobody knows when the change came.</p><div class=scroll>"
-    yield "<table>"
-    yield "<thead><tr><th>file</th><th>date</th><th class=n>share</th><th class=n>ΔFy max [N]</th>"
-    yield "<th class=n>ΔMz max [N·m]</th></tr></thead><tbody>"
-    for one in sorted(files, key=lambda f: (f.date, f.path)):
-        FY = one.reason or "" if one.FY_N is None else f"{one.FY_N:.2f}"
+    yield f"then, {len(files)} files of {len(view.drifted_tests)} tests were recorded. Each has the share "
+    yield "of the change that its day has of the days between: an estimate, since nobody knows when the "
+    yield "change came. The largest of any row:</p>"
+    if not files:
+        return
+    yield from _shares("test", [(one.test, one) for one in view.drifted_tests])
+    yield f"<details><summary>the {len(files)} files</summary>"
+    by_day = sorted(files, key=lambda f: (f.date, f.path))
+    yield from _shares("file", [(one.path, one) for one in by_day])
+    yield "</details>"
+
+
+def _shares(what: str, rows: Sequence[tuple[str, DriftedFile | DriftedTest]]) -> Iterator[str]:
+    yield f"<div class=scroll><table><thead><tr><th>{what}</th><th>date</th><th class=n>share</th>"
+    yield "<th class=n>ΔFy max [N]</th><th class=n>ΔMz max [N·m]</th><th></th></tr></thead><tbody>"
+    for name, one in rows:
+        if isinstance(one, DriftedTest):
+            left_out = f"without {one.left_out} of {one.files} files" if one.left_out else ""
+        else:
+            left_out = one.reason or ""
+        FY = "" if one.FY_N is None else f"{one.FY_N:.2f}"
         MZ = "" if one.MZ_Nm is None else f"{one.MZ_Nm:.3f}"
-        yield f"<tr><td>{escape(one.path)}</td><td class=d>{one.date}</td><td class=n>{one.share:.0%}</td>"
-        yield f"<td class=n>{escape(FY)}</td><td class=n>{MZ}</td></tr>"
+        yield f"<tr><td>{escape(name)}</td><td class=d>{one.date}</td><td class=n>{one.share:.0%}</td>"
+        yield f"<td class=n>{FY}</td><td class=n>{MZ}</td><td>{escape(left_out)}</td></tr>"
     yield "</tbody></table></div>"
 
 
