@@ -36,6 +36,7 @@ _IN_TIME = frozenset(
     ).split()
 )
 _SUBSETS = 8
+_LATE = (1, 4, 12)  # rows
 _SHORT = 0.05  # of the position's spread: the longest distance over which dry friction builds up
 
 
@@ -206,6 +207,11 @@ def _histories(effect: Effect) -> tuple[dict[str, float], ...]:
 
 def _steps(problem: Problem, active: Active, one: EffectParameter) -> tuple[float, ...]:
     """Return where the only amplitude of an effect starts: a unit is taken for one of its own dimension."""
+    if one.unit == "s":
+        # Of a plant whose rows are far apart, some rows: so far off the response is no straight line any more.
+        far = [rows * _row_time(problem) for rows in _LATE]
+        far = [time for time in far if time > max(map(abs, one.starts))]
+        return (*one.starts, *far, *(-time for time in far if min(one.starts) < 0))
     if active.effect.name != "unit_error":
         return one.starts
     try:
