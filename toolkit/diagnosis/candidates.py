@@ -208,7 +208,7 @@ def _histories(effect: Effect) -> tuple[dict[str, float], ...]:
 def _steps(problem: Problem, active: Active, one: EffectParameter) -> tuple[float, ...]:
     """Return where the only amplitude of an effect starts: a unit is taken for one of its own dimension."""
     if one.unit == "s":
-        # Of a plant whose rows are far apart, some rows: so far off the response is no straight line any more.
+        # Of a plant whose rows are far apart, some rows: so far off the response is no straight line.
         far = [rows * _row_time(problem) for rows in _LATE]
         far = [time for time in far if time > max(map(abs, one.starts))]
         return (*one.starts, *far, *(-time for time in far if min(one.starts) < 0))
