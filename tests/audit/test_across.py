@@ -13,6 +13,8 @@ from archive_made import FY, HEADER, dated, recording, write
 
 from toolkit.audit.archive import audit_archive
 from toolkit.calibration.registry.registry import Registry
+from toolkit.machine import load_machine
+from toolkit.recording.labview import write_labview
 
 CALIBRATIONS = Path(__file__).resolve().parents[2] / "calibrations"
 LBF, LBF_FT = 4.4482216152605, 1.3558179483314004
@@ -95,6 +97,14 @@ def test_a_file_saved_long_after_its_test(tmp_path):
     found = rules(audit(tmp_path), "edited-after-test")
     assert list(found) == ["late.xlsx"]
     assert "2019-06-20, 19 days after the test of 2019-06-01" in found["late.xlsx"]
+
+
+def test_a_recording_that_the_toolkit_wrote_has_a_day_once_it_is_edited(tmp_path):
+    dated(tmp_path, "1999-06-01")  # before the stamp that the toolkit gives its own
+    for name in ("as written.xlsx", "edited.xlsx"):
+        write_labview(tmp_path / name, load_machine("m15"), recording(), simulated=True)
+    rewrite(tmp_path / "edited.xlsx", "2026-11-22T08:02:39Z")
+    assert list(rules(audit(tmp_path), "edited-after-test")) == ["edited.xlsx"]
 
 
 def rewrite(path, moment):

@@ -156,8 +156,8 @@ def test_without_such_a_stretch_it_is_refused(home, tmp_path, record, said):
 def test_the_command_tells_each_test_and_its_page_too(home, tmp_path):
     root, registry = home
     _register()
-    given = ["audit", str(root / "archive"), "--calibrations", str(registry.folder), "--known-at", "2022-01-01",
-             "--since-good", "m15-r2", "--out", str(tmp_path)]  # fmt: skip
+    given = ["audit", str(root / "archive"), "--calibrations", str(registry.folder),
+             "--known-at", "2022-01-01", "--since-good", "m15-r2", "--out", str(tmp_path)]  # fmt: skip
     text = CliRunner().invoke(app, given, standalone_mode=False).stdout
     told = json.loads(CliRunner().invoke(app, [*given, "--json"], standalone_mode=False).stdout)["since_good"]
     assert [one["test"] for one in told["tests"]] == ["2020-01-01", "2021-01-01"]

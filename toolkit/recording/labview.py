@@ -16,14 +16,13 @@ from toolkit.errors import OutputError
 from toolkit.files import write_atomic
 from toolkit.machine import Machine
 from toolkit.recording.cells import reference
-from toolkit.recording.marks import GENERATOR, recording_keywords
+from toolkit.recording.marks import GENERATOR, STAMP, recording_keywords
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 SIMULATED_SHEET = "simulated"
 _SHEET = "Sheet1"
-_EPOCH = dt.datetime(2000, 1, 1, tzinfo=dt.UTC)
 _ZIP_STAMP = (1980, 1, 1, 0, 0, 0)
 _MODIFIED = re.compile(rb"(<dcterms:modified[^>]*>)[^<]*(<)")
 _OPTIONAL_ROLES = ("acquired",)
@@ -36,7 +35,7 @@ def write_labview(
     *,
     simulated: bool,
     title: str | None = None,
-    created: dt.datetime = _EPOCH,
+    created: dt.datetime = STAMP,
 ) -> None:
     """Write a recording in the machine's own layout, whole or not at all.
 

@@ -29,6 +29,9 @@ RECORDING = "toolkit-recording"
 SIMULATED = "simulated"
 """Keyword of everything that comes from the virtual machine."""
 
+STAMP = dt.datetime(2000, 1, 1, tzinfo=dt.UTC)
+"""When a recording that the toolkit wrote was saved, by its properties: the same file on every run."""
+
 _HEAD = 4096
 _KEYWORDS = re.compile(rb"<(?:\w+:)?keywords[^<>]{0,500}>([^<]{0,4000})<")
 
@@ -72,16 +75,17 @@ def keywords_of(core_xml: bytes) -> tuple[str, ...]:
 
 
 def saved_on(core_xml: bytes) -> dt.date | None:
-    """Return the day of the last change in ``docProps/core.xml``; None where it has none.
+    """Return the day of the last change in ``docProps/core.xml``; None where it has none, or our `STAMP`.
 
     >>> saved_on(b"<dcterms:modified>2019-06-04T10:00:00Z</dcterms:modified>")
     datetime.date(2019, 6, 4)
     """
     found = _MODIFIED.search(core_xml)
     try:
-        return None if found is None else dt.date.fromisoformat(found.group(1).decode())
+        day = None if found is None else dt.date.fromisoformat(found.group(1).decode())
     except ValueError:
         return None
+    return None if day == STAMP.date() and RECORDING in keywords_of(core_xml) else day
 
 
 def refuse_original(target: Path, *, suffix: str) -> None:

@@ -11,7 +11,7 @@ from toolkit.recording.csvfile import read_csv
 from toolkit.recording.formats import READERS
 from toolkit.recording.formats.vectors import series_of
 from toolkit.recording.gate import gate
-from toolkit.recording.marks import OWN_OUTPUT, RECORDING, SIMULATED, keywords_of, machine_named, saved_on
+from toolkit.recording.marks import OWN_OUTPUT, SIMULATED, keywords_of, machine_named, saved_on
 from toolkit.recording.model import Recording
 from toolkit.recording.table import read_table
 from toolkit.recording.xlsx import read_sheet
@@ -79,7 +79,7 @@ def read_recording(
         series=series,
         simulated=machine.simulated or SIMULATED in keywords,
         format="xlsx",
-        saved=None if RECORDING in keywords else saved_on(properties),  # the toolkit's own stamp is no day
+        saved=saved_on(properties),
     )
 
 
