@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import datetime as dt
+import errno
 import os
 import shutil
 import subprocess
@@ -15,6 +16,7 @@ from template_factory import opened, p, run, sdt, tbl
 
 from toolkit.errors import OutputError, RenderError, TemplateError
 from toolkit.recording.marks import is_own_output
+from toolkit.report import deliver as deliver_module
 from toolkit.report import pdf
 from toolkit.report.build import build_content
 from toolkit.report.deliver import Delivered, deliver
@@ -118,6 +120,35 @@ def fake(folder: Path, script: str) -> Path:
     path.write_text(f"#!/bin/sh\n{script}\n")
     path.chmod(0o755)
     return path
+
+
+@pytest.mark.parametrize("number", [errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO])
+def test_a_disk_that_is_full_while_a_report_is_made(tmp_path: Path, monkeypatch, number: int) -> None:
+    """The place is to blame: an error of its own, which a watch waits for, and nothing is left."""
+    monkeypatch.setenv("TOOLKIT_SOFFICE", str(fake(tmp_path, "exit 0")))
+
+    def full(_filled: Filled) -> list[verify_text.Check]:
+        raise OSError(number, os.strerror(number))
+
+    monkeypatch.setattr(deliver_module, "verify_docx", full)
+    template = opened(tmp_path, p("x"))
+    before = sorted(tmp_path.iterdir())
+    with pytest.raises(OutputError) as caught:
+        deliver(template, content(), tmp_path / "new" / "out")
+    assert (caught.value.rule, caught.value.got) == ("not-writable", os.strerror(number))
+    assert caught.value.where == str(tmp_path / "new" / "out")
+    assert sorted(tmp_path.iterdir()) == before
+
+
+def test_an_error_that_is_not_the_disk_s_stays_what_it_is(tmp_path: Path, monkeypatch) -> None:
+    monkeypatch.setenv("TOOLKIT_SOFFICE", str(fake(tmp_path, "exit 0")))
+
+    def broken(_filled: Filled) -> list[verify_text.Check]:
+        raise OSError(errno.ENOEXEC, os.strerror(errno.ENOEXEC))
+
+    monkeypatch.setattr(deliver_module, "verify_docx", broken)
+    with pytest.raises(OSError, match=os.strerror(errno.ENOEXEC)):
+        deliver(opened(tmp_path, p("x")), content(), tmp_path / "out")
 
 
 @pytest.mark.parametrize(

@@ -6,6 +6,7 @@ Several reports are converted in one call of LibreOffice, whose start is paid fo
 from __future__ import annotations
 
 import contextlib
+import errno
 import shutil
 import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -30,6 +31,11 @@ from toolkit.report.template.verify_text import Check
 if TYPE_CHECKING:
     from toolkit.report.drawer import Drawer
     from toolkit.report.figures import Picture
+
+# What a disk says that is full, over its quota, read only or broken: the place is to blame, not the report.
+_DISK = frozenset(
+    (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EACCES, errno.EPERM, errno.EIO)
+)
 
 Step = Callable[[str], None]
 Writer = Callable[[Path], object]
@@ -210,7 +216,12 @@ class _Run:
         if self.error is not None:
             return
         try:
-            work()
+            try:
+                work()
+            except OSError as error:
+                if error.errno not in _DISK:
+                    raise
+                raise _unwritable("the report cannot be written", self.job.out, error) from error
         except ToolkitError as error:
             self.error, self.filled = error, None
             if self.keep and isinstance(error, RenderError) and self.stage is not None:
@@ -318,14 +329,7 @@ def _staging(out: Path) -> Iterator[Path]:
         parent.mkdir(parents=True, exist_ok=True)
         stage = Path(tempfile.mkdtemp(prefix=".report-", dir=parent))
     except OSError as error:
-        raise OutputError(
-            "the output folder cannot be written",
-            where=out,
-            got=error.strerror or str(error),
-            expected="a folder with write permission and free space",
-            next_step="choose another folder with --out",
-            rule="not-writable",
-        ) from error
+        raise _unwritable("the output folder cannot be written", out, error) from error
     try:
         yield stage
     except BaseException:
@@ -347,15 +351,19 @@ def _hand_over(files: list[Path], out: Path) -> list[Path]:
             source.replace(target)
         sync_folder(out)
     except OSError as error:
-        raise OutputError(
-            "the report cannot be written",
-            where=out,
-            got=error.strerror or str(error),
-            expected="a folder with write permission and free space",
-            next_step="choose another folder with --out",
-            rule="not-writable",
-        ) from error
+        raise _unwritable("the report cannot be written", out, error) from error
     return targets
+
+
+def _unwritable(what: str, out: Path, error: OSError) -> OutputError:
+    return OutputError(
+        what,
+        where=out,
+        got=error.strerror or str(error),
+        expected="a folder with write permission and free space",
+        next_step="free space there, or choose another folder with --out",
+        rule="not-writable",
+    )
 
 
 def _reject(stage: Path, out: Path, name: str, reason: str) -> None:
