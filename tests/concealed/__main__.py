@@ -29,7 +29,7 @@ def _score(given: argparse.Namespace) -> None:
     small = proof_file.path_beside(given.log or given.out / "log", batch)
     proof_file.write(small, proof)
     if given.log:
-        score["log"] = log.scored(given.log, batch, score)
+        score["log"] = log.scored(given.log, batch, score, dict(given.reason))
     real = given.out / "real" / "real.json"
     if real.exists():
         score["real"] = json.loads(real.read_text(encoding="utf-8"))
@@ -131,6 +131,10 @@ def _parser() -> argparse.ArgumentParser:
             )
         if name in ("score", "all"):
             step.add_argument("--proof", type=Path, help="folder of PROOF.md and proof.html (default: --out)")
+            step.add_argument(
+                "--reason", nargs=2, action="append", default=[], metavar=("BAR", "TEXT"),
+                help="why a bar is not met, for the log and the page; with the bar's name as it is printed",
+            )  # fmt: skip
         if name in ("draw", "score", "all"):
             step.add_argument("--log", type=Path, help="file of batches to append to, one JSON object a line")
             step.add_argument(

@@ -141,6 +141,35 @@ def _log(score: dict[str, Any]) -> Table:
     )
 
 
+def _missed(score: dict[str, Any]) -> list[Table]:
+    """Return the bars that this batch does not meet, what every batch reached, and the stated reason."""
+    log = score.get("log") or []
+    reasons = {k: v for row in log for k, v in row.get("reasons", {}).items() if row is log[-1]}
+    rows = [
+        [
+            b.title,
+            "; ".join(
+                f"{row['figures'][b.title]} (`{row['answers_sha256'][:8]}`)"
+                for row in log
+                if b.title in row.get("figures", {})
+            ),
+            reasons.get(b.title, "not stated"),
+        ]
+        for b in score["bars"]
+        if b.met is False
+    ]
+    if not rows:
+        return []
+    return [
+        Table(
+            title="Bars that are not met",
+            sentence="What each batch of the log reached, the last one being this, and why it is not more.",
+            head=("what", "reached, by batch", "reason"),
+            rows=rows,
+        )
+    ]
+
+
 def tables(score: dict[str, Any]) -> list[Table]:
     """Return the proof's tables in order."""
     state = {True: "met", False: "**not met**", None: "too few"}
@@ -152,6 +181,7 @@ def tables(score: dict[str, Any]) -> list[Table]:
             head=("what", "asked", "observed", ""),
             rows=[[b.title, b.asked, b.observed, state[b.met]] for b in score["bars"]],
         ),
+        *_missed(score),
         Table(
             title="All rates",
             sentence="A false name is any name that is not there, alone or beside a true one.",

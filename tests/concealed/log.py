@@ -26,8 +26,16 @@ def drawn(path: Path, batch: dict[str, Any], changed: str) -> None:
         )
 
 
-def scored(path: Path, batch: dict[str, Any], score: dict[str, Any]) -> list[dict[str, Any]]:
-    """Complete a batch's row by its score and return the log; a score that stands is kept."""
+def scored(
+    path: Path, batch: dict[str, Any], score: dict[str, Any], reasons: dict[str, str] | None = None
+) -> list[dict[str, Any]]:
+    """Complete a batch's row by its score and return the log; a score that stands is kept.
+
+    `reasons`: bar -> why it is not met; a bar of another name is an error.
+    """
+    wrong = set(reasons or {}) - {b.title for b in score["bars"] if b.met is False}
+    if wrong:
+        raise ValueError(f"no bar that is not met is called {', '.join(sorted(wrong))}")
     drawn(path, batch, "")
     rows = read(path)
     for row in rows:
@@ -36,6 +44,8 @@ def scored(path: Path, batch: dict[str, Any], score: dict[str, Any]) -> list[dic
             row["scored"] = _today()
             row["bars"] = f"{sum(b.met is True for b in bars)} of {len(bars)}"
             row["figures"] = {b.title: b.observed for b in bars}
+        if row["answers_sha256"] == batch["answers_sha256"] and reasons:
+            row["reasons"] = row.get("reasons", {}) | reasons
     _write(path, rows)
     return rows
 
