@@ -24,6 +24,7 @@ import distributed
 import pytest
 from archive_made import FY, dated, recording, write
 from typer.testing import CliRunner
+from worker_jobs import make
 
 from toolkit import __version__
 from toolkit.audit import archive as archive_module
@@ -158,18 +159,6 @@ def there(archive, two, tmp_path_factory):
     """The command's answer by two workers of the cluster, and the folder of what they told."""
     out = tmp_path_factory.mktemp("there")
     return audit_command(archive, out, "--scheduler", two), out
-
-
-def make():
-    return work
-
-
-def work(name):
-    if name.startswith("die"):
-        os.kill(os.getpid(), signal.SIGKILL)
-    if name.startswith("hang"):
-        time.sleep(600)
-    return os.getpid() if name.startswith("who") else name.upper()
 
 
 def refusing():

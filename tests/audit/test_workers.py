@@ -4,24 +4,16 @@ from __future__ import annotations
 
 import os
 import signal
+import subprocess
+import sys
 import time
+from pathlib import Path
 
 import pytest
+from worker_jobs import make
 
 from toolkit.audit.workers import Lost, run_isolated
 from toolkit.errors import ConfigError
-
-
-def make():
-    return work
-
-
-def work(name):
-    if name.startswith("die"):
-        os.kill(os.getpid(), signal.SIGKILL)
-    if name.startswith("hang"):
-        time.sleep(60)
-    return name.upper()
 
 
 def once():
@@ -73,3 +65,29 @@ def test_workers_that_never_start_end_the_run_with_an_error():
     with pytest.raises(ConfigError) as caught:
         list(run_isolated(stillborn, ["a", "b"], workers=1))
     assert caught.value.rule == "workers"
+
+
+ABANDONED = """
+import os
+from test_workers import slow
+from toolkit.audit.workers import run_isolated
+
+if __name__ == "__main__":
+    next(run_isolated(slow, [str(n) for n in range(40)], workers=2))
+    os._exit(9)
+"""
+
+
+def slow():
+    return lambda name: time.sleep(0.2) or name
+
+
+def test_workers_whose_run_was_killed_end_without_a_word(tmp_path):
+    script = tmp_path / "script.py"
+    script.write_text(ABANDONED)
+    env = {**os.environ, "PYTHONPATH": str(Path(__file__).parent)}
+    # The pipes close when the last worker has ended: a timeout means that one is left.
+    done = subprocess.run(
+        [sys.executable, str(script)], capture_output=True, text=True, timeout=120, env=env, check=False
+    )
+    assert (done.returncode, done.stdout, done.stderr) == (9, "", "")

@@ -195,10 +195,11 @@ def _serve(make: Callable[[], Callable[[str], Result]], pipe: Connection) -> Non
     # What is there now stays, and a file leaves hardly any cycles that would have to be looked for.
     gc.freeze()
     gc.set_threshold(_CYCLES)
-    pipe.send(None)  # ready
+    answer: object = None  # ready
     while True:
         try:
+            pipe.send(answer)
             name = pipe.recv()
         except (EOFError, OSError):
-            return
-        pipe.send(work(name))
+            return  # nobody waits for an answer any more
+        answer = work(name)
