@@ -171,6 +171,18 @@ def test_unsafe_files_are_refused(tmp_path: Path, edit, rule: str) -> None:
 
 
 @pytest.mark.parametrize(
+    ("data", "got"), [(b"", "an empty file"), (b"MZ\x90", "b'MZ"), (b"PK\x03\x04cut", "not a zip")]
+)
+def test_what_is_no_word_file_holds_nothing_to_remove(tmp_path: Path, data: bytes, got: str) -> None:
+    (tmp_path / "x.docx").write_bytes(data)
+    with pytest.raises(TemplateError) as caught:
+        read_template(tmp_path / "x.docx")
+    assert got in str(caught.value.got)
+    assert caught.value.rule in ("not-word", "zip-damaged")
+    assert caught.value.next_step.startswith("copy it again")
+
+
+@pytest.mark.parametrize(
     "code",
     [
         'INCLUDETEXT "/etc/passwd"',

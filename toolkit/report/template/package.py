@@ -116,6 +116,13 @@ def open_package(template: Template) -> Any:
         ) from error
 
 
+# What is no Word file, or a broken one, holds nothing that could be removed.
+_NEXT = dict.fromkeys(
+    ("not-word", "zip-damaged"),
+    "copy it again, or open it in Word and save it as .docx or .dotx",
+)
+
+
 def _refuse(
     path: Path,
     rule: str,
@@ -131,7 +138,7 @@ def _refuse(
         got=got if got is not None else where or path.name,
         expected=expected,
         rule=rule,
-        next_step="remove it in Word and save the template as .docx or .dotx",
+        next_step=_NEXT.get(rule, "remove it in Word and save the template as .docx or .dotx"),
     )
 
 
@@ -139,7 +146,11 @@ def _members(path: Path, raw: bytes) -> dict[str, bytes]:
     word = "a Word file (.docx or .dotx)"
     if not raw.startswith(b"PK"):
         raise _refuse(
-            path, "not-word", "the template is not a Word file", got=f"{raw[:8]!r}...", expected=word
+            path,
+            "not-word",
+            "the template is not a Word file",
+            got=f"{raw[:8]!r}..." if raw else "an empty file",
+            expected=word,
         )
     total, members = 0, {}
     try:
