@@ -9,7 +9,10 @@ stiffnesses agree. Both halves of that remark are simulated through the whole ma
   creeps gives the same tire. The data's findings name it (out of tolerance), the comparison names nothing.
 * What another speed must leave behind is a side force that the contact has not let go, another one forward
   than reversed: no effect of the load alone has such a memory. It is put at the hub (``zero_offset.FY`` by
-  direction of rotation), and then conicity and plysteer differ, and nothing else.
+  direction of rotation), and then conicity and plysteer differ, and nothing else that is read at 0 deg.
+* The source document's PRAT of those plots is half the difference of two moments at 0 deg (its section 6.2.1).
+  By its other definition, the moment where FY is zero (6.1.1), PRAT cannot stay: FY that is larger by dF is
+  zero at an angle further out by dF / C_FY, where MZ is larger by dF C_MZ / C_FY.
 """
 
 from __future__ import annotations
@@ -131,6 +134,31 @@ def test_the_source_s_remark_on_its_five_repeats(
         wanted = {"conicity": 30.0, "plysteer": 40.0}.get(one.name)
         if wanted:
             assert one.factors[0].s_between == pytest.approx(wanted / np.sqrt(2), rel=0.15)
+
+
+def test_a_kept_force_moves_PRAT_at_zero_force_by_the_trail(
+    kept: list[ReducedTest], repeats: list[ReducedTest], record: CalibrationRecord
+) -> None:
+    """40 N of plysteer times the pneumatic trail of each load, by the tests' own two slopes."""
+    found = of_two_days(kept, repeats[2:], record)
+    assert decided_by_day(found)["PRAT_at_FY_zero"] == {True}
+    assert found.repeats is not None
+    slopes = {
+        (one.name, one.rotation, round(one.load_N)): one.mean
+        for one in found.repeats.precisions
+        if one.name.startswith("slope")
+    }
+    seen = 0
+    for one in found.repeats.precisions:
+        if one.name == "PRAT_at_FY_zero":
+            load = round(one.load_N)
+            trail = np.mean([
+                slopes["slope_aligning", way, load] / slopes["slope_cornering", way, load]
+                for way in ("forward", "reverse")
+            ])  # fmt: skip
+            assert one.factors[0].s_between == pytest.approx(40.0 * trail / np.sqrt(2), rel=0.15)
+            seen += 1
+    assert seen == 3
 
 
 def test_a_slow_load_alone_is_told_by_the_data_and_changes_no_characteristic(
