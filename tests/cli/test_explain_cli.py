@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import json
 from pathlib import Path
 
 import pytest
@@ -11,6 +12,7 @@ import toolkit
 from toolkit.audit.model import Grade
 from toolkit.cli.explain import rules_catalogue
 from toolkit.cli.main import run
+from toolkit.effects.catalogue import effects
 from toolkit.report.template.check import RULES
 
 SOURCES = sorted(Path(toolkit.__file__).parent.rglob("*.py"))
@@ -54,3 +56,23 @@ def test_explain_an_unknown_rule_names_the_nearest(capsys: pytest.CaptureFixture
         run(["explain", "no-tar"])
     assert caught.value.code == 2
     assert "no-tare" in capsys.readouterr().err
+
+
+def test_explain_an_effect_that_a_diagnosis_names(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as caught:
+        run(["explain", "coulomb_friction"])
+    assert caught.value.code == 0
+    told = capsys.readouterr().out
+    assert "Dry friction is missing" in told
+    assert "coulomb [unit of force]: size of the friction" in told
+
+
+def test_explain_lists_every_effect_and_names_the_nearest(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit):
+        run(["explain", "--json"])
+    listed = json.loads(capsys.readouterr().out)
+    assert {one["effect"] for one in listed["effects"]} == set(effects())
+    with pytest.raises(SystemExit) as caught:
+        run(["explain", "relaxatoin"])
+    assert caught.value.code == 2
+    assert "relaxation" in capsys.readouterr().err
