@@ -10,9 +10,9 @@ stiffnesses agree. Both halves of that remark are simulated through the whole ma
 * What another speed must leave behind is a side force that the contact has not let go, another one forward
   than reversed: no effect of the load alone has such a memory. It is put at the hub (``zero_offset.FY`` by
   direction of rotation), and then conicity and plysteer differ, and nothing else that is read at 0 deg.
-* The source document's PRAT of those plots is half the difference of two moments at 0 deg (its section 6.2.1).
-  By its other definition, the moment where FY is zero (6.1.1), PRAT cannot stay: FY that is larger by dF is
-  zero at an angle further out by dF / C_FY, where MZ is larger by dF C_MZ / C_FY.
+* The source document's PRAT of those plots is half the difference of two moments at 0 deg (6.2.1). By its
+  other definition, the moment where FY is zero (6.1.1), PRAT cannot stay: FY that is larger by dF is zero at
+  an angle further out by dF / C_FY, where MZ is larger by dF C_MZ / C_FY.
 """
 
 from __future__ import annotations

@@ -142,6 +142,8 @@ def test_of_long_tables_people_see_what_is_significant() -> None:
     rows, which = shown_rows(compare(many), "characteristics")
     assert {one.label for one in rows} == {"t3"}
     assert which == "the 6 significant of 96 rows; the JSON answer holds all"
+    rows, which = shown_rows(compare([entry(f"t{i}", 0.0) for i in range(17)]), "characteristics")
+    assert (rows, which) == ((), "none is significant of 96 rows; the JSON answer holds all")
 
 
 @pytest.mark.parametrize(

@@ -63,7 +63,8 @@ def shown_rows(found: Comparison, part: Part) -> tuple[tuple[Difference, ...], s
     certain = tuple(one for one in mine if one.significant)
     if part == "characteristics" and len(mine) <= MOST_ROWS:
         return mine, f"all {len(mine)} rows"
-    return certain, f"the {len(certain)} significant of {len(mine)} rows; the JSON answer holds all"
+    which = f"the {len(certain)} significant" if certain else "none is significant"
+    return certain, f"{which} of {len(mine)} rows; the JSON answer holds all"
 
 
 def factor_text(one: FactorSpread, factor: float, style: Style) -> str:

@@ -119,5 +119,5 @@ def _results(p: Pieces) -> list[str]:
         ),
         findings_section(p, "comparison_findings", message_mm=76),
         p.block("tk:if.no_findings", paragraph(run("No findings."))),
-        paragraph(run("End of the comparison"), style="Caption"),
+        paragraph(run("End of comparison ") + p.inline("tk:comparison.id", "id"), style="EndMark"),
     ]

@@ -152,5 +152,5 @@ def _rest(p: Pieces) -> list[str]:
             "llrl",
         ),
         findings_section(p, "diagnosis_findings", message_mm=74),
-        paragraph(run("End of the diagnosis"), style="Caption"),
+        paragraph(run("End of diagnosis ") + p.inline("tk:diagnosis.id", "id"), style="EndMark"),
     ]
