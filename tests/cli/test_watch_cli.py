@@ -16,6 +16,7 @@ from typing import Any
 
 import pytest
 
+from toolkit import files
 from toolkit.cli.home import packaged_home
 from toolkit.cli.report import Made
 from toolkit.cli.watch import command
@@ -119,6 +120,29 @@ def test_a_file_that_grows_while_its_test_is_read_makes_one_report(bench: Bench)
     assert bench.reported == []
     bench.look(after=4)
     bench.look(after=4)
+    bench.look(after=4)
+    assert bench.reported == [["one"]]
+
+
+def test_a_disk_too_full_for_the_state_ends_no_watch_and_is_written_later(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(path: Path, _data: str) -> None:
+        raise OutputError("a file cannot be written", where=path, got="No space left on device")
+
+    bench.test("one")
+    bench.test("bad")
+    bench.faults["bad"] = UnreadableError("it is no recording", where="run", rule="not-a-workbook")
+    bench.look()
+    monkeypatch.setattr(files, "write_atomic", full)
+    found = bench.look(after=4)
+    assert [one.test.name for one in found.made] == ["one"]
+    assert {one.test for one in found.waiting} == {STATE, "bad.txt"}
+    assert all("No space left" in one.reason for one in found.waiting)
+    monkeypatch.undo()
+    assert bench.look(after=4).waiting == ()
+    assert "not-a-workbook" in (bench.watcher.out / SET_ASIDE / "bad.txt").read_text()
+    bench.start().look()  # a restart knows what was made
     bench.look(after=4)
     assert bench.reported == [["one"]]
 

@@ -94,6 +94,7 @@ class Watcher:
         self.settle_s, self.patience_s, self.settings = settle_s, patience_s, settings
         self.seen: dict[str, tuple[Listing, float]] = {}
         self.waited: dict[str, tuple[str, str]] = {}
+        self.unwritten: dict[Path, tuple[str, str]] = {}
         self.state = self._load()
 
     def look(self) -> Round:
@@ -102,6 +103,8 @@ class Watcher:
         aside: list[Aside] = []
         ready: dict[Path, Resolved] = {}
         contents: dict[Path, str] = {}
+        for path, (text, _) in list(self.unwritten.items()):
+            self._write(path, text)
         for test in self._tests():
             name = self._name(test)
             listing = self._listing(test)
@@ -141,6 +144,7 @@ class Watcher:
             else:
                 ready[test] = found
         made = self._make(ready, contents, waiting, aside)
+        waiting += [Waiting(test=path.name, reason=why) for path, (_, why) in self.unwritten.items()]
         return Round(made=tuple(made), waiting=tuple(waiting), set_aside=tuple(aside))
 
     def _read(self, test: Path, age: float) -> Resolved | Waiting | Aside:
@@ -179,6 +183,7 @@ class Watcher:
                 self._set_aside(fault, contents[one.test], by=self.settings)
             else:
                 delivered.append(one)
+                self.unwritten.pop(self._note(name), None)
                 self._note(name).unlink(missing_ok=True)
                 self.state[name] = {
                     "state": "made",
@@ -237,7 +242,6 @@ class Watcher:
         return told.get("version") != self.version or told.get("settings", self.settings) != self.settings
 
     def _set_aside(self, fault: Aside, content: str, *, by: str | None = None) -> None:
-        from toolkit.files import write_atomic
         from toolkit.recording.marks import OWN_OUTPUT
 
         self.state[fault.test] = {
@@ -248,7 +252,7 @@ class Watcher:
             "version": self.version,
             **({} if by is None else {"settings": by}),
         }
-        write_atomic(self._note(fault.test), f"{OWN_OUTPUT}\n{fault.test}: {fault.rule}\n\n{fault.reason}\n")
+        self._write(self._note(fault.test), f"{OWN_OUTPUT}\n{fault.test}: {fault.rule}\n\n{fault.reason}\n")
         self._save()
 
     def _load(self) -> dict[str, dict[str, Any]]:
@@ -272,10 +276,18 @@ class Watcher:
         return dict(tests)
 
     def _save(self) -> None:
+        told = {"generator": "toolkit", "schema": 1, "tests": dict(sorted(self.state.items()))}
+        self._write(self.out / STATE, json.dumps(told, ensure_ascii=False, indent=2) + "\n")
+
+    def _write(self, path: Path, text: str) -> None:
+        """Write a file of the watch's own; on a full disk it is written at a later look, and said to wait."""
         from toolkit.files import write_atomic
 
-        told = {"generator": "toolkit", "schema": 1, "tests": dict(sorted(self.state.items()))}
-        write_atomic(self.out / STATE, json.dumps(told, ensure_ascii=False, indent=2) + "\n")
+        self.unwritten.pop(path, None)
+        try:
+            write_atomic(path, text)
+        except OutputError as error:
+            self.unwritten[path] = (text, str(error))
 
 
 def _stands_aside(name: str, told: dict[str, Any]) -> Aside:
