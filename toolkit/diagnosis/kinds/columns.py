@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolkit.diagnosis.kinds.channels import channel_places, slopes, through_channels
-from toolkit.diagnosis.kinds.motion import Motion, motion_of
+from toolkit.diagnosis.kinds.channels import channel_places, through_channels
+from toolkit.diagnosis.kinds.motion import AlongMotion, Motion, motion_of
 from toolkit.diagnosis.kinds.setting import NOMINAL_SPEED, nominal_load, setting
 from toolkit.diagnosis.kinds.surface import Surface
 from toolkit.diagnosis.kinds.tire import base_drive, slip_work_before, through_tire, tire_places, tire_signs
@@ -27,10 +27,9 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from toolkit.diagnosis.case import Case, Run
-    from toolkit.diagnosis.model import Pattern
 
 
-class ColumnsModel:
+class ColumnsModel(AlongMotion):
     """Simulated columns; a parameter ``<output>_gain`` or ``<output>_offset`` scales or shifts one."""
 
     def __init__(self, case: Case) -> None:
@@ -103,27 +102,6 @@ class ColumnsModel:
         if forces and self.motion is not None:
             made = self.motion.disturbed(made, forces, run)
         return through_channels(made, active, run, here, run.columns)
-
-    def way(self, _channel: str | None) -> tuple[float, float]:
-        """Return the longest way of a run and the usual one between rows, nothing where nothing moves."""
-        return (0.0, 0.0) if self.motion is None else self.motion.way()
-
-    def pushed(
-        self,
-        run: Run,
-        p: Mapping[str, float],
-        active: Sequence[Active],
-        _channel: str | None,
-        pattern: Pattern,
-    ) -> dict[str, NDArray[np.float64]]:
-        """Return what small forces of a pattern over the position add to every output, (rows, forces)."""
-        if self.motion is None:
-            return {}
-        made = ColumnsModel.simulate(self, run, p, [one for one in active if one.effect.channel is None])
-        shown = slopes(made, active, run, self.setting(run), run.columns)
-        return {
-            name: shown[name][:, None] * one for name, one in self.motion.pushed(made, run, pattern).items()
-        }
 
     def places(self, effect: Effect) -> list[tuple[str | None, str | None]]:
         """Return where an effect could act."""

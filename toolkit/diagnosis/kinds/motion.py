@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
+from toolkit.diagnosis.kinds.channels import slopes
 from toolkit.diagnosis.kinds.pushed import integrated
 from toolkit.diagnosis.kinds.setting import dimension
 from toolkit.diagnosis.model import Active
@@ -25,6 +26,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from toolkit.diagnosis.case import Case, Run
+    from toolkit.diagnosis.model import Pattern
+    from toolkit.effects.signals import Setting
 
 _LENGTHS, _SPEEDS = ("length", "angle"), ("speed", "rad/s", "angular_speed")
 _SUBSTEPS = 4
@@ -139,6 +142,43 @@ class Motion:
         if is_position and self.velocity in result:
             result[str(self.velocity)] = v
         return result
+
+
+class AlongMotion:
+    """A simulation of which only inputs and outputs are known: what moves in it stands in its recordings."""
+
+    motion: Motion | None
+
+    def setting(self, run: Run) -> Setting:
+        """Return a run's setting."""
+        raise NotImplementedError
+
+    def simulate(
+        self, run: Run, p: Mapping[str, float], active: Sequence[Active]
+    ) -> dict[str, NDArray[np.float64]]:
+        """Return every output of a run with effects in it."""
+        raise NotImplementedError
+
+    def way(self, _channel: str | None) -> tuple[float, float]:
+        """Return the longest way of a run and the usual one between rows, nothing where nothing moves."""
+        return (0.0, 0.0) if self.motion is None else self.motion.way()
+
+    def pushed(
+        self,
+        run: Run,
+        p: Mapping[str, float],
+        active: Sequence[Active],
+        _channel: str | None,
+        pattern: Pattern,
+    ) -> dict[str, NDArray[np.float64]]:
+        """Return what small forces of a pattern over the position add to every output, (rows, forces)."""
+        if self.motion is None:
+            return {}
+        made = self.simulate(run, p, [one for one in active if one.effect.channel is None])
+        shown = slopes(made, active, run, self.setting(run), run.columns)
+        return {
+            name: shown[name][:, None] * one for name, one in self.motion.pushed(made, run, pattern).items()
+        }
 
 
 def _step(

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
-from toolkit.diagnosis.kinds.channels import channel_places, slopes, through_channels
-from toolkit.diagnosis.kinds.motion import Motion, motion_of
+from toolkit.diagnosis.kinds.channels import channel_places, through_channels
+from toolkit.diagnosis.kinds.motion import AlongMotion, Motion, motion_of
 from toolkit.diagnosis.kinds.setting import NOMINAL_SPEED, nominal_load, setting
 from toolkit.diagnosis.kinds.tire import base_drive, slip_work_before, through_tire, tire_places, tire_signs
 from toolkit.diagnosis.model import Active, Output
@@ -28,7 +28,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from toolkit.diagnosis.case import Case, Run
-    from toolkit.diagnosis.model import Pattern
 
 _KEPT = 300  # simulations that are remembered
 _LARGEST = 1e100  # of an output in its unit: the squares of larger ones are no numbers any more
@@ -36,7 +35,7 @@ _LARGEST = 1e100  # of an output in its unit: the squares of larger ones are no 
 _FIELDS = (("SA", ("SA", "SA_CMD")), ("FZ", ("FZ", "FZ_CMD")), ("IA", ("IA",)), ("V", ("V",)))
 
 
-class PythonModel:
+class PythonModel(AlongMotion):
     """A simulator in Python: ``simulate(inputs, p)`` returns one row for each row of inputs."""
 
     def __init__(self, case: Case, function: Callable[..., Any]) -> None:
@@ -131,27 +130,6 @@ class PythonModel:
                 raise _failed(self.case, run, f"values beyond {_LARGEST:.0e} in column {one.name!r}")
             result[one.name] = values
         return result
-
-    def way(self, _channel: str | None) -> tuple[float, float]:
-        """Return the longest way of a run and the usual one between rows, nothing where nothing moves."""
-        return (0.0, 0.0) if self.motion is None else self.motion.way()
-
-    def pushed(
-        self,
-        run: Run,
-        p: Mapping[str, float],
-        active: Sequence[Active],
-        _channel: str | None,
-        pattern: Pattern,
-    ) -> dict[str, NDArray[np.float64]]:
-        """Return what small forces of a pattern over the position add to every output, (rows, forces)."""
-        if self.motion is None:
-            return {}
-        made = PythonModel.simulate(self, run, p, [one for one in active if one.effect.channel is None])
-        shown = slopes(made, active, run, self.setting(run), run.columns)
-        return {
-            name: shown[name][:, None] * one for name, one in self.motion.pushed(made, run, pattern).items()
-        }
 
     def places(self, effect: Effect) -> list[tuple[str | None, str | None]]:
         """Return where an effect could act."""
