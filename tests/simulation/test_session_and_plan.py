@@ -184,3 +184,30 @@ def test_a_plan_that_cannot_be_is_refused_with_its_place(tmp_path, line):
         read_plan(path)
     assert caught.value.rule == "wrong-value"
     assert str(path) in str(caught.value.where)
+
+
+@pytest.mark.parametrize(
+    ("runs", "reversal", "reverse"),
+    [
+        ([("forward", "normal"), ("forward", "turned")], "tire", ["FM_run_2.xlsx"]),
+        ([("forward", "normal"), ("reverse", "normal")], "drum", ["FM_run_2.xlsx"]),
+        ([("forward", "turned"), ("forward", "turned")], "drum", []),
+        ([("forward", "turned"), ("reverse", "normal")], "drum", ["FM_run_2.xlsx"]),
+    ],
+)
+def test_runs_of_a_tire_turned_on_its_hub_are_told_to_the_pipeline(tmp_path, runs, reversal, reverse):
+    plan = tmp_path / "plan.toml"
+    listed = "".join(
+        f'[[run]]\nrotation = "{rotation}"\nmounting = "{mounting}"\n'
+        'slip_angles = { value = [1], unit = "deg" }\n'
+        for rotation, mounting in runs
+    )
+    plan.write_text(
+        f'kind = "test"\ndate = 2026-03-17\nseed = 1\nfile_name = "FM_run_{{number}}.xlsx"\n{listed}'
+    )
+    write_test(simulate(read_plan(plan)), tmp_path / "made")
+    info = read_test_folder(tmp_path / "made").info
+    assert info.reversal == reversal
+    turned = [name for name, rotation in read_toml(tmp_path / "made/test.toml").get("rotations", {}).items()
+              if rotation == "reverse"]  # fmt: skip
+    assert turned == reverse

@@ -89,9 +89,18 @@ def test_toml(test: VirtualTest) -> str:
         "[tire]",
         *(f"{key} = {_text(value)}" for key, value in label.items()),
     ]
-    turned = [file for file in test.files if file.rotation != first]
+    turned = {file.name: file.rotation for file in test.files if file.rotation != first}
+    if on_the_hub := _turned_on_the_hub(test):
+        lines.insert(
+            lines.index(""), 'reversal = "tire"  # "reverse" are the runs of the tire turned round on its hub'
+        )
+        turned = dict.fromkeys(on_the_hub, "reverse")
     if turned:
-        lines += ["", "[rotations]", *(f"{_text(file.name)} = {_text(file.rotation)}" for file in turned)]
+        lines += [
+            "",
+            "[rotations]",
+            *(f"{_text(name)} = {_text(rotation)}" for name, rotation in turned.items()),
+        ]
     values = ", ".join(f"{name} = {value!r}" for name, value in test.tare)
     lines += [
         "",
@@ -99,6 +108,14 @@ def test_toml(test: VirtualTest) -> str:
         f"values = {{ {values} }}",
     ]
     return _MARK + "\n".join(lines) + "\n"
+
+
+def _turned_on_the_hub(test: VirtualTest) -> list[str]:
+    """Return the recordings with the tire turned round on its hub, where that alone tells runs apart."""
+    if any(file.rotation != "forward" for file in test.files):
+        return []
+    turned = [file.name for file in test.files if file.run.mounting == "turned"]
+    return turned if len(turned) < len(test.files) else []
 
 
 def session_toml(session: VirtualSession) -> str:
