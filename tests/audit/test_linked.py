@@ -54,6 +54,16 @@ def test_documents_are_linked_where_their_name_has_the_tests_as_whole_words(made
     assert linked.unknown == ("2019/tire A", "2019/tire A2")
 
 
+def test_recordings_of_the_archive_are_no_reports_where_both_stand_in_one_folder(made, archive):
+    (archive / "2019/tire B" / "tire B.pdf").write_bytes(b"x")
+    try:
+        linked = link(made, read_reports(archive))
+    finally:
+        (archive / "2019/tire B" / "tire B.pdf").unlink()
+    assert list(by_name(linked)) == ["2019/tire B/tire B.pdf"]
+    assert linked.unknown == ("2018/tire A", "2019/tire A", "2019/tire A2")
+
+
 def test_a_manifest_names_the_recordings_and_hides_its_own_outputs(made, archive, tmp_path):
     sha = sha256_file(archive / "2019/tire A" / "one.xlsx")
     folder = tmp_path / "tire B"

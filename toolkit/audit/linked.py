@@ -42,6 +42,7 @@ class PastReport:
 
     report: str
     id: str | None = None
+    path: Path | None = None  # of a document that was found in a folder
     words: str | None = None
     named: set[str] = field(default_factory=set)
     hashes: set[str] = field(default_factory=set)
@@ -105,6 +106,7 @@ def read_reports(source: Path) -> tuple[PastReport, ...]:
 
 def link(made: ArchiveAudit, reports: tuple[PastReport, ...]) -> Linked:
     """Link reports to the tests of an audited archive, each report by all that it says."""
+    reports = _but_recordings(made, reports)
     by_hash: dict[str, list[PastReport]] = {}
     for one in reports:
         for sha256 in one.hashes:
@@ -138,6 +140,15 @@ def link(made: ArchiveAudit, reports: tuple[PastReport, ...]) -> Linked:
             one.in_force |= in_force[test]
     taken = {test for one in reports for test in one.tests}
     return Linked(reports=reports, unknown=tuple(sorted(set(tests) - taken)))
+
+
+def _but_recordings(made: ArchiveAudit, reports: tuple[PastReport, ...]) -> tuple[PastReport, ...]:
+    """Return the reports without the archive's own recordings, which may stand in the same folder."""
+    if all(one.path is None for one in reports):
+        return reports
+    archive = made.archive.resolve()
+    known = {archive / plain["path"] for plain in made.files.plain() if plain["grade"] != "unreadable"}
+    return tuple(one for one in reports if one.path is None or one.path not in known)
 
 
 def _by_name(one: PastReport, names: Mapping[str, list[str]]) -> Iterator[str]:
@@ -200,7 +211,11 @@ def _of_folder(folder: Path) -> Iterator[PastReport]:
             path = Path(place) / name
             if path.suffix.lower() in DOCUMENTS and name not in known and not path.is_symlink():
                 shown = path.relative_to(folder)
-                yield PastReport(report=shown.as_posix(), words=_words(shown.with_suffix("").as_posix()))
+                yield PastReport(
+                    report=shown.as_posix(),
+                    path=path.resolve(),
+                    words=_words(shown.with_suffix("").as_posix()),
+                )
 
 
 def _manifest(path: Path, folder: Path) -> tuple[PastReport, set[str]] | None:
