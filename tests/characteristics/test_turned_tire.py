@@ -37,17 +37,8 @@ def pull_of(plan: Plan, record: CalibrationRecord, folder: Path, *, turned: bool
     road = dataclasses.replace(plan.road, runout_1_N=0.0, runout_2_N=0.0)  # else a few newtons of each mean
     test = simulate(dataclasses.replace(plan, runs=tuple(made.values()), carriage=carriage, road=road))
     write_test(test, folder)
-    if turned:
-        # What the operator writes: both runs went with the drum forward, and the tire stood the other way.
-        toml = (folder / "test.toml").read_text()
-        names = [file.name for file in test.files[len(ANGLES) :]]
-        listed = "".join(f'"{name}" = "reverse"\n' for name in names)
-        (folder / "test.toml").write_text(
-            toml.replace("[tare]", f"[rotations]\n{listed}[tare]").replace(
-                "rated_load", 'reversal = "tire"\nrated_load'
-            )
-        )
     found = read_test_folder(folder)
+    assert found.info.reversal == ("tire" if turned else "drum")
     (pull,) = process(found, read_test(found), record).characteristics.pull
     return pull
 
