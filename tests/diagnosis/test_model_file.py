@@ -173,6 +173,29 @@ def test_small_forces_act_beside_what_a_model_has_in_it(tmp_path):
     np.testing.assert_allclose(linear, moved, atol=0.01 * moved[-1])
 
 
+def test_a_models_effects_are_in_its_motion_once(tmp_path):
+    # The pattern of a small force is read over the position: that of the fall with its drag, once.
+    text = FALL.replace('kind = "ode"', 'kind = "python"')
+    text = "".join(
+        line for line in text.splitlines(keepends=True) if not line.startswith(("states", "force_terms"))
+    )
+    simulator = """
+import pandas as pd
+def simulate(inputs, p):
+    return pd.DataFrame({"h": -p["g"] * inputs["t"] ** 2 / 2})
+"""
+    frames = {f"r{i}__csv": fallen(i) for i in range(2)}
+    case = write_case(tmp_path / "case", text + TWO, simulator=simulator, **frames)
+    found, path = written(case, tmp_path / "answer")
+    assert [one.name for one in found.effects] == ["quadratic_drag"]
+    model = model_of(read_case(case, model=path), None)
+    run, p = model.case.runs[0], {one.name: one.value for one in model.parameters}
+    seen = []
+    model.pushed(run, p, (), "h", lambda x: seen.append(x) or np.ones((len(x), 1)))
+    w = np.sqrt(9.81 / 0.2)
+    np.testing.assert_allclose(seen[0], -(w**2) / 9.81 * np.log(np.cosh(9.81 * run.t / w)), atol=0.03)
+
+
 def test_a_model_file_says_what_it_rests_on(tmp_path, drag):
     model = read_model(tmp_path / "answer" / MODEL)
     read = read_case(tmp_path / "CASE.toml")

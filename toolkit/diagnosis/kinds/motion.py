@@ -10,6 +10,7 @@ alone, as in a free fall).
 from __future__ import annotations
 
 import dataclasses
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, cast
 
@@ -144,20 +145,20 @@ class Motion:
         return result
 
 
-class AlongMotion:
+class AlongMotion(ABC):
     """A simulation of which only inputs and outputs are known: what moves in it stands in its recordings."""
 
     motion: Motion | None
 
+    @abstractmethod
     def setting(self, run: Run) -> Setting:
         """Return a run's setting."""
-        raise NotImplementedError
 
+    @abstractmethod
     def simulate(
         self, run: Run, p: Mapping[str, float], active: Sequence[Active]
     ) -> dict[str, NDArray[np.float64]]:
         """Return every output of a run with effects in it."""
-        raise NotImplementedError
 
     def way(self, _channel: str | None) -> tuple[float, float]:
         """Return the longest way of a run and the usual one between rows, nothing where nothing moves."""
@@ -174,7 +175,8 @@ class AlongMotion:
         """Return what small forces of a pattern over the position add to every output, (rows, forces)."""
         if self.motion is None:
             return {}
-        made = self.simulate(run, p, [one for one in active if one.effect.channel is None])
+        # The class's own: a model file's effects, which wrap that of the instance, are in `active` already.
+        made = type(self).simulate(self, run, p, [one for one in active if one.effect.channel is None])
         shown = slopes(made, active, run, self.setting(run), run.columns)
         return {
             name: shown[name][:, None] * one for name, one in self.motion.pushed(made, run, pattern).items()
