@@ -6,6 +6,7 @@ output at other slip angles and loads: a smooth surface through the simulated co
 
 from __future__ import annotations
 
+import dataclasses
 import difflib
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
@@ -16,7 +17,14 @@ from toolkit.diagnosis.kinds.channels import channel_places, through_channels
 from toolkit.diagnosis.kinds.motion import AlongMotion, Motion, motion_of
 from toolkit.diagnosis.kinds.setting import NOMINAL_SPEED, nominal_load, setting
 from toolkit.diagnosis.kinds.surface import Surface
-from toolkit.diagnosis.kinds.tire import base_drive, slip_work_before, through_tire, tire_places, tire_signs
+from toolkit.diagnosis.kinds.tire import (
+    base_drive,
+    late,
+    slip_work_before,
+    through_tire,
+    tire_places,
+    tire_signs,
+)
 from toolkit.diagnosis.model import Active, Output
 from toolkit.effects.effect import Effect
 from toolkit.effects.signals import Drive, Setting, TireForces
@@ -143,7 +151,7 @@ class ColumnsModel(AlongMotion):
         surface, case = self._surface, self.case
         if surface is None:
             return made
-        start = base_drive(case, run, load_N=self._load)
+        start = base_drive(case, run, load_N=self._load, outputs=False)
         turn, back = tire_signs(case.axes, "machine", run), tire_signs("machine", case.axes, run)
         units = {name: unit(case.unit(name)).factor for name in ("FY", "MZ") if name in made}
         zero = np.zeros(run.rows)
@@ -162,6 +170,10 @@ class ColumnsModel(AlongMotion):
         result = dict(made)
         for name, factor in units.items():
             result[name] = getattr(forces, name) * back[name] / factor
+        if "FZ" in result:
+            loads = dataclasses.replace(start, FZ=made["FZ"])
+            loaded = late(loads, active, run, here, lambda one: steady(one.SA, one))
+            result["FZ"] = result["FZ"] if loaded is None else loaded.FZ
         return result
 
 

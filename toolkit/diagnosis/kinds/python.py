@@ -16,7 +16,14 @@ import numpy as np
 from toolkit.diagnosis.kinds.channels import channel_places, through_channels
 from toolkit.diagnosis.kinds.motion import AlongMotion, Motion, motion_of
 from toolkit.diagnosis.kinds.setting import NOMINAL_SPEED, nominal_load, setting
-from toolkit.diagnosis.kinds.tire import base_drive, slip_work_before, through_tire, tire_places, tire_signs
+from toolkit.diagnosis.kinds.tire import (
+    base_drive,
+    late,
+    slip_work_before,
+    through_tire,
+    tire_places,
+    tire_signs,
+)
 from toolkit.diagnosis.model import Active, Output
 from toolkit.effects.effect import Effect
 from toolkit.effects.signals import Drive, Setting, TireForces
@@ -170,7 +177,7 @@ class PythonModel(AlongMotion):
         self, run: Run, p: Mapping[str, float], active: Sequence[Active], here: Setting
     ) -> dict[str, NDArray[np.float64]]:
         case = self.case
-        start = base_drive(case, run, load_N=self._load)
+        start = base_drive(case, run, load_N=self._load, outputs=False)
         to_case, to_machine = tire_signs("SAE", case.axes, run), tire_signs(case.axes, "machine", run)
         units = {name: unit(case.unit(name)).factor for name in ("FY", "MZ") if name in self._names}
 
@@ -200,6 +207,9 @@ class PythonModel(AlongMotion):
         for name in ("FY", "MZ"):
             if name in made:
                 made[name] = getattr(forces, name) * back[name] / units[name]
+        if "FZ" in made:
+            loaded = late(start, active, run, here, lambda one: steady(one.SA, one))
+            made["FZ"] = made["FZ"] if loaded is None else raw(loaded.SA, loaded)["FZ"]
         return made
 
 

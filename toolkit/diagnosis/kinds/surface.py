@@ -27,7 +27,7 @@ class Surface:
         self._load = nominal_load(case)
         self._fits: dict[tuple[str, str], NDArray[np.float64]] = {}
         self.good = True
-        drives = [(run, base_drive(case, run, load_N=self._load)) for run in case.runs]
+        drives = [(run, base_drive(case, run, load_N=self._load, outputs=False)) for run in case.runs]
         slips = np.concatenate([drive.SA for _, drive in drives])
         margin = 0.25 * (np.ptp(slips) or 0.01)
         self._low, self._high = float(slips.min() - margin), float(slips.max() + margin)

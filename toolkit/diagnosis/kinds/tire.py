@@ -11,7 +11,7 @@ from toolkit.channels import Axes, Rotation, signs
 from toolkit.diagnosis.kinds.setting import NOMINAL_SPEED, si
 from toolkit.diagnosis.model import Active
 from toolkit.effects.effect import STAGES, Effect
-from toolkit.effects.signals import Drive, Setting, TireForces, drive
+from toolkit.effects.signals import Drive, Setting, Tire, TireForces, drive
 from toolkit.effects.similarity import Steady, similar
 
 if TYPE_CHECKING:
@@ -30,24 +30,30 @@ def tire_signs(source: Axes, target: Axes, run: Run) -> dict[str, int]:
     return signs(source, target, rotation(run))
 
 
-def first_of(case: Case, run: Run, *names: str) -> NDArray[np.float64] | None:
+def first_of(case: Case, run: Run, *names: str, outputs: bool = True) -> NDArray[np.float64] | None:
     """Return the first of these drivers, or of these outputs, in SI; None where the run has none."""
+    among = {one.name for one in (case.channels if outputs else case.drivers)}
     for name in names:
-        if name in run.columns and any(one.name == name for one in case.channels):
+        if name in run.columns and name in among:
             values = si(case, name, run.columns[name])
             if np.isfinite(values).all():
                 return values
     return None
 
 
-def base_drive(case: Case, run: Run, *, load_N: float, speed_m_s: float = NOMINAL_SPEED) -> Drive:
-    """Return what drives the tire in a run: measured columns where recorded, else the commanded ones."""
+def base_drive(
+    case: Case, run: Run, *, load_N: float, speed_m_s: float = NOMINAL_SPEED, outputs: bool = True
+) -> Drive:
+    """Return what drives the tire in a run: measured columns where recorded, else the commanded ones.
+
+    Without ``outputs`` only what the simulation is given: a simulator of its own never saw an output.
+    """
     turn = tire_signs(case.axes, "SAE", run)
     zero = np.zeros(run.rows)
-    SA = first_of(case, run, "SA", "SA_CMD")
-    FZ = first_of(case, run, "FZ", "FZ_CMD")
-    IA = first_of(case, run, "IA")
-    V = first_of(case, run, "V")
+    SA = first_of(case, run, "SA", "SA_CMD", outputs=outputs)
+    FZ = first_of(case, run, "FZ", "FZ_CMD", outputs=outputs)
+    IA = first_of(case, run, "IA", outputs=outputs)
+    V = first_of(case, run, "V", outputs=outputs)
     return drive(
         run.t,
         zero if SA is None else turn["SA"] * SA,
@@ -96,6 +102,15 @@ def through_tire(
         if one.effect.drive is not None:
             start = one.effect.drive(start, one.values, setting, tire)
     return tire(start)
+
+
+def late(start: Drive, active: Sequence[Active], run: Run, setting: Setting, tire: Tire) -> Drive | None:
+    """Return the drive with the load as late as the carriage makes it, None where nothing does."""
+    lags = [one for one in active if one.effect.name == "load_lag" and one.acts_in(run)]
+    for one in lags:
+        if one.effect.drive is not None:
+            start = one.effect.drive(start, one.values, setting, tire)
+    return start if lags else None
 
 
 def tire_places(
