@@ -38,7 +38,7 @@ def test_the_variable_that_a_mismatch_depends_on_stands_before_a_narrower_range(
     t = np.linspace(0, 10, 400)
     v = np.where((t > 4) & (t < 5), 3 * np.sin(np.pi * (t - 4)), 0.3 * np.sin(7 * t))
     run = Of(columns={"v": v}, t=t, name="run01.csv", conditions={}, rows=len(t))
-    case = Of(drivers=(Of(name="v", unit="m/s"),), has_time=True)
+    case = Of(drivers=(Of(name="v", unit="m/s"),), channels=(), has_time=True)
     problem = Of(
         case=case, runs=(run,), slices=(slice(0, 400),), kept={"F": np.ones(400, bool)},
         model=Of(outputs=(Of(name="F", unit="N"),)),

@@ -2,8 +2,10 @@
 
 import dataclasses
 import re
+from types import SimpleNamespace
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from tests.diagnosis.cases import carriage, write_case
@@ -11,7 +13,7 @@ from toolkit.diagnosis.case_read import read_case
 from toolkit.diagnosis.diagnose import diagnose
 from toolkit.report.diagnosis import figures
 from toolkit.report.diagnosis.chance import chance
-from toolkit.report.diagnosis.page import HEADLINES, headline, page
+from toolkit.report.diagnosis.page import HEADLINES, condition, headline, page
 
 
 @pytest.fixture(scope="module")
@@ -62,3 +64,69 @@ def test_no_chance_is_zero(dragged):
     assert chance(float("nan")) == "p unknown"
     assert chance(0.0312, decimal_comma=True) == "p = 0,031"
     assert not re.search(r"(p =|is) 0[.)]", page(dragged))
+
+
+def test_a_mean_over_loads_that_repeat_has_no_point_where_none_was_recorded():
+    # Five loads, ten rows each: quantiles between them hold no row, and a bin of none has no mean.
+    loads = np.repeat([250.0, 567.0, 833.0, 1101.0, 1372.0], [4, 10, 3, 17, 6])
+    at, mean = figures.binned(loads, 3.0 + 2.0 * loads)
+    assert all(250 <= one <= 1372 for one in at)
+    np.testing.assert_allclose(mean, 3.0 + 2.0 * at, rtol=1e-12)
+    spread = np.sort(np.random.default_rng(0).uniform(0, 1, 500))
+    assert all(0 < one < 1 for one in figures.binned(spread, spread)[0])
+
+
+def test_the_noise_is_no_larger_than_an_error_that_was_reached(dragged):
+    for one in dragged.diagnosis.held_out:
+        assert one.noise_floor <= one.augmented_rmse
+
+
+def test_the_page_says_on_which_condition_an_effect_acts(dragged):
+    runs = [
+        SimpleNamespace(name=name, conditions={"surface": surface, "order": str(i), "lab": "A"})
+        for i, (name, surface) in enumerate([("a", "steel"), ("b", "sandpaper"), ("c", "steel")])
+    ]
+    result = SimpleNamespace(search=SimpleNamespace(problem=SimpleNamespace(runs=runs)))
+    assert condition(result, ("a", "c")) == " (surface steel)"
+    assert condition(result, ("b",)) == " (surface sandpaper, order 1)"
+    assert condition(result, ("a", "b")) == ""
+
+
+def test_an_effect_that_has_no_place_takes_no_row(dragged):
+    html = page(dragged)
+    hidden = [one.name for one in dragged.diagnosis.not_found if not one.observable]
+    shown = [one.name for one in dragged.diagnosis.not_found if one.observable]
+    assert hidden
+    assert all(f"<td>{name}</td>" not in html for name in hidden)
+    assert all(name in html for name in hidden)
+    assert all(f"<td>{name}</td>" in html for name in shown)
+
+
+def test_time_is_told_in_the_unit_of_the_case(tmp_path):
+    # A resistor that drifts over 100 days: in seconds its place would end at 8553600.
+    days = np.arange(100.0)
+    y = 10.0 + 0.01 * days + np.random.default_rng(1).normal(0, 1e-3, 100)
+    toml = """schema = 1
+[simulation]
+kind = "python"
+path = "sim.py"
+[recording]
+time = "t"
+[recording.channels]
+t = { unit = "day", role = "time" }
+y = { unit = "ohm", role = "output" }
+[[recording.run]]
+file = "r0.csv"
+"""
+    simulator = """
+def simulate(inputs, p):
+    return (10.0 + 0 * inputs["t"]).to_frame("y")
+"""
+    read = read_case(
+        write_case(tmp_path, toml, simulator=simulator, r0__csv=pd.DataFrame({"t": days, "y": y}))
+    )
+    result = diagnose(read, None)
+    places = [at for one in result.diagnosis.mismatch for at in one.where if at.variable == "time"]
+    assert places
+    assert all(at.unit == "day" and 0 <= at.start < at.end <= 99 for at in places)
+    assert "day" in page(result)

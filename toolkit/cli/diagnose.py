@@ -217,8 +217,10 @@ def _text(made: Diagnosis, out: Path) -> str:
         lines.append(f"{channel}: structure that no named effect explains, over {' and '.join(names)}")
     for place in made.mismatch:
         for at in place.where[:1]:
+            much = "over all of" if at.whole else "mostly where"
             lines.append(
-                f"{place.channel}: mismatch mostly where {at.variable} is {_ends(at)} {at.unit}".rstrip()
+                f"{place.channel}: mismatch {much} {at.variable}{',' if at.whole else ' is'} "
+                f"{_ends(at)} {at.unit}".rstrip()
             )
     rows = [
         [

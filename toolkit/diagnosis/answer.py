@@ -16,13 +16,17 @@ Verdict = Literal["named", "equivalent", "unknown", "nothing", "untestable"]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Place:
-    """Where a mismatch is: a range of a channel, of time, or the value of a condition."""
+    """Where a mismatch is: a range of a channel, of time, or the value of a condition.
+
+    ``whole`` says that the range is all that was recorded: the mismatch is everywhere.
+    """
 
     variable: str
     start: float | str | None
     end: float | str | None
     unit: str
     runs: tuple[str, ...]
+    whole: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

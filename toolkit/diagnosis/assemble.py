@@ -302,7 +302,11 @@ def _held_out(found: Search, *, unknown: bool) -> tuple[HeldOutFit, ...]:
                 nominal_rmse=rmse(found.nominal.simulated[output.name]),
                 refitted_rmse=rmse(found.held_refitted.simulated[output.name]),
                 augmented_rmse=rmse(augmented.simulated[output.name]),
-                noise_floor=_floor(found, output.name, output.sd),
+                # No noise is larger than an error that was reached on rows that no fit has seen.
+                noise_floor=min(
+                    _floor(found, output.name, output.sd),
+                    math.inf if output.sd is not None else rmse(augmented.simulated[output.name]),
+                ),
             )
         )
     return tuple(made)

@@ -8,15 +8,18 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from toolkit.diagnosis.answer import Place
+from toolkit.units import unit
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from toolkit.diagnosis.case import Case
     from toolkit.diagnosis.problem import Problem
 
 _BINS = 10
 _HELD = 0.8  # of the mismatch's energy that a range must hold
 _NARROW = 0.7  # of the rows: a range that is wider says nothing
+_WHOLE = 0.95  # of the rows: no range is narrower
 
 
 def places(
@@ -42,7 +45,7 @@ def places(
     rows = problem.kept[name]
     found: list[tuple[float, Place]] = []
     unit_of = {one.name: one.unit for one in problem.model.outputs}
-    for variable, unit, x in [*_variables(problem), (name, unit_of[name], simulated)]:
+    for variable, measure, x in [*_variables(problem), (name, unit_of[name], simulated)]:
         made = _range(x, energy, rows)
         if made is not None:
             share, low, high = made
@@ -54,8 +57,9 @@ def places(
                         variable=variable,
                         start=low,
                         end=high,
-                        unit=unit,
+                        unit=measure,
                         runs=_runs(problem, energy * inside),
+                        whole=share > _WHOLE,
                     ),
                 )
             )
@@ -73,8 +77,15 @@ def _variables(problem: Problem) -> list[tuple[str, str, NDArray[np.float64]]]:
             if np.ptp(x) > 0:
                 made.append((one.name, one.unit, x))
     if problem.case.has_time:
-        made.append(("time", "s", np.concatenate([run.t for run in problem.runs])))
+        text, seconds = time_unit(problem.case)
+        made.append(("time", text, np.concatenate([run.t for run in problem.runs]) / seconds))
     return made
+
+
+def time_unit(case: Case) -> tuple[str, float]:
+    """Return the unit in which a case's people count its time, and its seconds."""
+    text = next((one.unit for one in case.channels if one.role == "time"), "s")
+    return text, unit(text).factor
 
 
 def _range(

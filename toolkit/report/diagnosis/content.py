@@ -157,7 +157,8 @@ def _where(made: Diagnosis, style: Style) -> str | None:
         for at in one.where[:1]:
             numbers = isinstance(at.start, float) and isinstance(at.end, float)
             ends = f"{_n(at.start, style)} to {_n(at.end, style)}" if numbers else str(at.start)  # type: ignore[arg-type]
-            text += f", most of it where {at.variable} is {ends} {at.unit}".rstrip()
+            much = f"over all of {at.variable}," if at.whole else f"most of it where {at.variable} is"
+            text += f", {much} {ends} {_unit(at.unit)}".rstrip()
         told.append(f"{text} ({chance(one.p_value, decimal_comma=style.decimal_comma)}).")
     return " ".join(told) or None
 

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from toolkit.diagnosis.locate import time_unit
+
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
@@ -29,7 +31,9 @@ _RC: Any = {
     "svg.hashsalt": "toolkit",
 }
 _MOST = 4000  # points of a scatter
+_FEW = 300  # rows of a run whose points stand apart
 _BINS = 24
+_WIDE = 200.0  # errors over noise from which a chart goes by powers of ten
 
 
 def error_bars(made: Diagnosis) -> bytes:
@@ -37,6 +41,8 @@ def error_bars(made: Diagnosis) -> bytes:
     names = [one.channel for one in made.held_out]
 
     def draw(figure: Figure) -> None:
+        from matplotlib.patches import Rectangle
+
         axes = figure.add_subplot()
         steps = [("as declared", GREY), ("refitted", ORANGE), ("with the effect", BLUE)]
         if not made.effects:
@@ -52,11 +58,19 @@ def error_bars(made: Diagnosis) -> bytes:
                 bars, labels=[f"{v:#.3g}".rstrip(".") for v in values], padding=4, fontsize=9, color="#333333"
             )
         axes.axvline(1.0, color=GREEN, linewidth=1.6)
+        lengths = [bar.get_width() for bar in axes.patches if isinstance(bar, Rectangle)]
+        # Bars of a millionth of the longest could not be seen beside it.
+        wide = max(lengths, default=1.0) > _WIDE
+        if wide:
+            axes.set_xscale("log")
+            axes.set_xlim(left=0.5 * min(1.0, *lengths))
         top = axes.get_xaxis_transform()
         axes.text(1.0, 1.02, "noise", color=GREEN, transform=top, ha="center")
         axes.set_yticks(range(len(names)), names)
         axes.invert_yaxis()
-        axes.set_xlabel("root mean square error on held-out rows, over the noise")
+        axes.set_xlabel(
+            f"root mean square error on held-out rows, over the noise{' (powers of ten)' if wide else ''}"
+        )
         axes.margins(x=0.12)
         axes.grid(visible=False, axis="y")
         # Above the bars: the longest of them would run through a legend inside.
@@ -111,25 +125,24 @@ def run_in_time(found: Search, channel: str, *, after: bool) -> bytes:
 
     def draw(figure: Figure) -> None:
         upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(1.5, 1))
-        upper.plot(run.t, problem.observed[channel][rows], ".", markersize=2, color=GREY, label="recorded")
-        upper.plot(
-            run.t, found.refitted.simulated[channel][rows], color=ORANGE, linewidth=1.2, label="refitted"
-        )
-        lower.plot(run.t, found.refitted.residual[channel][rows], color=ORANGE, linewidth=0.8)
+        size, second = time_unit(problem.case)
+        t = run.t / second
+        # Large enough to be seen under a line that goes through them.
+        dots = 5.0 if run.rows < _FEW else 2.5
+        upper.plot(t, problem.observed[channel][rows], ".", markersize=dots, color=GREY, label="recorded")
+        fits = [("refitted", ORANGE, found.refitted)]
         if after:
-            upper.plot(
-                run.t,
-                found.augmented.simulated[channel][rows],
-                color=BLUE,
-                linewidth=1.2,
-                label="with the effect",
-            )
-            lower.plot(run.t, found.augmented.residual[channel][rows], color=BLUE, linewidth=0.8)
+            fits.append(("with the effect", BLUE, found.augmented))
+        for label, colour, fit in fits:
+            upper.plot(t, fit.simulated[channel][rows], color=colour, linewidth=1.2, label=label)
+            lower.plot(t, fit.residual[channel][rows], color=colour, linewidth=0.8)
         upper.set_ylabel(f"{channel} [{unit}]")
-        upper.legend(frameon=False, ncols=3, loc="upper right")
+        # Outside: inside it would lie on the curves of a run that rises.
+        figure.legend(loc="outside upper right", ncols=3, frameon=False, markerscale=2)
         lower.axhline(0, color="#333333", linewidth=0.8)
-        lower.set_ylabel("residual")
-        lower.set_xlabel(f"time [s], {run.name}" if problem.case.has_time else f"row, {run.name}")
+        lower.set_ylabel(f"residual [{unit}]")
+        lower.set_xlabel(f"{f'time [{size}]' if problem.case.has_time else 'row'}, {run.name}")
+        figure.align_ylabels()
 
     return _svg((8.6, 4.4), draw)
 
@@ -189,7 +202,7 @@ def variable_of(found: Search, name: str) -> NDArray[np.float64] | None:
     if name in problem.names:
         return found.refitted.simulated[name]
     if name == "time":
-        return np.concatenate([run.t for run in problem.runs])
+        return np.concatenate([run.t for run in problem.runs]) / time_unit(problem.case)[1]
     if all(name in run.columns for run in problem.runs):
         return np.concatenate([run.columns[name] for run in problem.runs])
     return None
@@ -201,9 +214,11 @@ def binned(x: NDArray[np.float64], y: NDArray[np.float64]) -> tuple[NDArray[np.f
     if len(edges) < 3:
         return np.array([float(np.mean(x))]), np.array([float(np.mean(y))])
     at = np.clip(np.searchsorted(edges, x, side="right") - 1, 0, len(edges) - 2)
-    count = np.maximum(np.bincount(at, minlength=len(edges) - 1), 1)
-    centre = np.bincount(at, weights=x, minlength=len(edges) - 1) / count
-    mean = np.bincount(at, weights=y, minlength=len(edges) - 1) / count
+    # Values that repeat leave bins empty: these have no mean, and none is drawn.
+    count = np.bincount(at, minlength=len(edges) - 1)
+    held = count > 0
+    centre = np.bincount(at, weights=x, minlength=len(edges) - 1)[held] / count[held]
+    mean = np.bincount(at, weights=y, minlength=len(edges) - 1)[held] / count[held]
     return centre, mean
 
 

@@ -78,7 +78,7 @@ def page(result: Result) -> str:
             if result.search is not None
             else []
         ),
-        *_effects(made),
+        *_effects(result),
         *_where(result),
         *_held_out(made),
         *_parameters(made),
@@ -111,21 +111,39 @@ def _sentence(made: Diagnosis) -> str:
     return "What is left is noise; the list below says how large each effect would have had to be."
 
 
-def _effects(made: Diagnosis) -> list[str]:
+def _effects(result: Result) -> list[str]:
     parts = []
-    for one in made.effects:
+    for one in result.diagnosis.effects:
         parts.append(f"<h2>{escape(one.name)}{' on ' + escape(one.channel) if one.channel else ''}</h2>")
-        parts.append(f"<p>{escape(one.statement)} <small>Stage: {escape(one.stage)}.</small></p>")
+        parts.append(
+            f"<p>{escape(one.statement)} <small>Stage: {escape(one.stage.replace('_', ' '))}.</small></p>"
+        )
         parts.append(f"<p><code>{escape(one.equation)}</code> <small>{escape(one.reference)}</small></p>")
         rows = [
             (each.name, each.value if isinstance(each.value, str) else f"{each.value:.4g}", each.unit,
              "" if each.ci95 is None else f"{each.ci95[0]:.4g} to {each.ci95[1]:.4g}",
-             "all runs" if each.runs is None else ", ".join(each.runs))
+             "all runs" if each.runs is None else ", ".join(each.runs) + condition(result, each.runs))
             for each in one.parameters
         ]  # fmt: skip
-        parts.append(_table(("parameter", "value", "unit", "95 % interval", "in"), rows, numbers=(1,)))
+        if rows:
+            parts.append(_table(("parameter", "value", "unit", "95 % interval", "in"), rows, numbers=(1,)))
         parts.append(f"<p>{_why(one)}</p>")
     return parts
+
+
+def condition(result: Result, runs: Sequence[str]) -> str:
+    """Return the conditions that these runs have and no other: people know a surface, not a file's name."""
+    if result.search is None:
+        return ""
+    recorded = result.search.problem.runs
+    inside = [run.conditions for run in recorded if run.name in runs]
+    outside = [run.conditions for run in recorded if run.name not in runs]
+    told = [
+        f"{key} {level}"
+        for key, level in (inside[0].items() if inside else ())
+        if all(one.get(key) == level for one in inside) and all(one.get(key) != level for one in outside)
+    ]
+    return f" ({', '.join(told)})" if told else ""
 
 
 def _why(one: FoundEffect) -> str:
@@ -136,8 +154,8 @@ def _why(one: FoundEffect) -> str:
     if one.equivalent_to:
         text += f" {', '.join(one.equivalent_to)} would explain the same: they are one class here."
     if one.rejected:
-        told = ", ".join(f"{name} (log-likelihood {-less:.1f} less)" for name, less in one.rejected[:5])
-        text += f" Rejected in its place: {told}."
+        told = ", ".join(f"{name} (by {-less:.1f})" for name, less in one.rejected[:5])
+        text += f" Rejected, as they explain the recordings worse (log-likelihood less): {told}."
     return escape(text)
 
 
@@ -168,7 +186,8 @@ def _place(one: Mismatch) -> str:
     )
     for at in one.where[:1]:
         ends = f"{at.start:.4g} to {at.end:.4g}" if isinstance(at.start, float) else str(at.start)
-        text += f", most of it where {at.variable} is {ends} {at.unit}"
+        much = f"over all of {at.variable}," if at.whole else f"most of it where {at.variable} is"
+        text += f", {much} {ends} {at.unit}".rstrip()
     return escape(f"{text} ({chance(one.p_value)}).")
 
 
@@ -211,19 +230,31 @@ def _remaining(made: Diagnosis) -> list[str]:
 
 
 def _power(made: Diagnosis) -> list[str]:
+    seen = [one for one in made.not_found if one.observable]
     rows = [
-        (one.name, "" if one.minimum_detectable is None else f"{one.minimum_detectable:.3g}", one.unit,
-         "yes" if one.observable else "no", one.why)
-        for one in made.not_found
-    ]  # fmt: skip
-    head = ("effect", "smallest size seen with 80 % power", "unit", "observable", "")
-    return [
-        "<h2>What was not found</h2>",
-        "<p>“Nothing missing” means no more than this list: below these sizes an effect could be there.</p>",
-        "<details open><summary>effects</summary>",
-        _table(head, rows, numbers=(1,)),
-        "</details>",
+        (one.name, "–" if one.minimum_detectable is None else f"{one.minimum_detectable:.3g}", one.unit)
+        for one in seen
     ]
+    why: dict[str, list[str]] = {}
+    for one in made.not_found:
+        if not one.observable:
+            why.setdefault(one.why or "not told by these recordings", []).append(one.name)
+    parts = ["<h2>What was not found</h2>"]
+    if rows:
+        parts += [
+            "<p>“Nothing missing” means no more than this list: below these sizes an effect could be there."
+            "</p><details open><summary>effects</summary>",
+            _table(("effect", "smallest size seen with 80 % power", "unit"), rows, numbers=(1,)),
+            "</details>",
+        ]
+    # One sentence for each reason: a row for each of thirty effects that have no place here hides the rest.
+    if why:
+        parts.append("<p>Of these the recordings can tell nothing:</p>")
+        items = "".join(
+            f"<li>{escape(reason)}: {escape(', '.join(names))}</li>" for reason, names in why.items()
+        )
+        parts.append(f"<ul>{items}</ul>")
+    return parts
 
 
 def _next(made: Diagnosis) -> list[str]:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from toolkit.diagnosis.locate import time_unit
 from toolkit.report.content import Curve, Plot
 from toolkit.report.diagnosis.figures import binned, variable_of, worst_run
 from toolkit.report.diagnosis.vocabulary import WHERE
@@ -99,13 +100,14 @@ def _where(found: Search, one: Mismatch, made: Diagnosis, style: Style) -> Plot 
                 Curve(label=label, x=tuple(at.tolist()), y=tuple(mean.tolist()), group=group, style="both")
             )
         span = f"{_number(place.start, style)} to {_number(place.end, style)} {place.unit}".rstrip()
+        much = "everywhere from" if place.whole else "mostly at"
         return Plot(
             name="",
             x_label=f"{place.variable} [{place.unit}]" if place.unit else place.variable,
             y_label=f"recorded − simulated {one.channel} [{unit}]",
             curves=tuple(curves),
-            caption=f"{one.channel}: mean residual over {place.variable}; the mismatch is mostly at {span}.",
-            alt=f"Mean of recorded less simulated {one.channel} over {place.variable}, mostly at {span}.",
+            caption=f"{one.channel}: mean residual over {place.variable}; the mismatch is {much} {span}.",
+            alt=f"Mean of recorded less simulated {one.channel} over {place.variable}, {much} {span}.",
             legend_title="simulation",
             decimal_comma=style.decimal_comma,
         )
@@ -118,7 +120,8 @@ def _run(found: Search, made: Diagnosis, style: Style) -> Plot:
     rows, run = problem.slices[which], problem.runs[which]
     some = slice(None, None, max(1, -(-run.rows // _MOST)))
     good = np.isfinite(problem.observed[channel][rows][some])
-    t = run.t[some]
+    clock, seconds = time_unit(problem.case)
+    t = run.t[some] / seconds
 
     def curve(label: str, group: int, y: NDArray[np.float64], *, points: bool = False) -> Curve:
         chosen = good if points else np.ones(len(t), dtype=bool)
@@ -136,7 +139,7 @@ def _run(found: Search, made: Diagnosis, style: Style) -> Plot:
     timed = problem.case.has_time
     return Plot(
         name="diagnosis_run",
-        x_label="time [s]" if timed else "row",
+        x_label=f"time [{clock}]" if timed else "row",
         y_label=f"{channel} [{_unit(found, channel)}]",
         curves=tuple(curves),
         caption=f"{channel} in {run.name}, the run with the largest mismatch.",
