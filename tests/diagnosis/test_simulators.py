@@ -1,5 +1,6 @@
 """Simulators of others: what they may do, and what ends with their file, the run and what they gave."""
 
+import subprocess
 import sys
 from pathlib import Path
 
@@ -98,6 +99,38 @@ def test_inputs_come_under_their_names_in_the_recordings_units_without_outputs(t
     )
     assert case.runs[0].t[1] == pytest.approx(360.0)
     model_of(case, None).simulate(case.runs[0], {}, ())
+
+
+@pytest.mark.parametrize("asking", ["input()", "sys.stdin.read()", "open(0, closefd=False).read()"])
+def test_a_simulator_that_asks_for_input_does_not_wait_for_it(tmp_path, asking):
+    # A pipe that nobody writes into and nobody closes, as a terminal is.
+    text = (
+        "import sys\n"
+        + START.replace("    ", f"    {asking}\n    ", 1)
+        + "return inputs[['v']].set_axis(['F'], axis=1)\n"
+    )
+    case = write_case(tmp_path, simulator=text)
+    run = f"""
+import pathlib
+from toolkit.diagnosis.case_read import read_case
+from toolkit.diagnosis.diagnose import diagnose
+try:
+    print(diagnose(read_case(pathlib.Path({str(case)!r})), None, budget_s=2.0).diagnosis.complete)
+except Exception as error:
+    print(error.got)
+print("left:", input())
+"""
+    with subprocess.Popen(
+        [sys.executable, "-c", run], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    ) as process:
+        assert process.stdin is not None
+        assert process.stdout is not None
+        said = process.stdout.readline()
+        process.stdin.write("mine\n")
+        process.stdin.flush()
+        left = process.communicate(timeout=60)[0]
+    assert ("EOF" in said) if asking == "input()" else said.strip() in ("True", "False")
+    assert left.strip().splitlines()[-1] == "left: mine"
 
 
 def test_the_same_question_is_asked_once(tmp_path):
