@@ -99,6 +99,10 @@ def test_only_a_regular_file_is_read(tmp_path: Path) -> None:
     assert (caught.value.rule, str(caught.value.got)) == ("no-file", "not a regular file")
 
 
+def test_a_mark_of_byte_order_before_toml_changes_nothing() -> None:
+    assert parse_toml(b"\xef\xbb\xbfa = 1\n", where="x.toml") == {"a": 1}
+
+
 @pytest.mark.parametrize("text", ["a = 1" + "0" * 5000, "a = " + "[" * 5000 + "]" * 5000])
 def test_toml_that_no_parser_can_hold_is_an_error_with_a_next_step(text: str) -> None:
     with pytest.raises(ConfigError) as caught:

@@ -141,7 +141,7 @@ def parse_toml(data: bytes, *, where: object) -> dict[str, Any]:
         ``not-toml``
     """
     try:
-        return tomllib.loads(data.decode("utf-8"))
+        return tomllib.loads(data.decode("utf-8-sig"))  # editors of Windows begin a file with a mark
     except (ValueError, RecursionError) as error:  # a number of thousands of digits, arrays without end
         twice = "Cannot overwrite" in str(error) or "Cannot declare" in str(error)
         raise ConfigError(
