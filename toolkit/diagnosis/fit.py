@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING, cast
 import numpy as np
 
 from toolkit.diagnosis.covariance import covariance
+from toolkit.diagnosis.descent import Derivatives, descend
 from toolkit.diagnosis.model import Active
-from toolkit.diagnosis.noise import Layout, Noise, fit_noise, log_likelihood, whiten
-from toolkit.errors import FitError
+from toolkit.diagnosis.noise import Layout, Noise, fit_noise, log_likelihood
+from toolkit.diagnosis.space import Space
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -22,11 +23,8 @@ if TYPE_CHECKING:
     Stacked = dict[str, NDArray[np.float64]]
 
 _OUTER = 4  # times that the noise is estimated anew
-_INNER = 12
 _BETTER = 0.02  # of the log-likelihood: less is no step worth another round
 _SAME = 0.05  # by which the coloured fit's residual variance may exceed the plain one's
-_STEP = 1e-4  # of a parameter's size, for differences
-_WITHIN = 4.0  # prior standard deviations; further off a parameter is not uncertain but imitates an effect
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -59,38 +57,6 @@ class _Solved:
     score: float
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Space:
-    """The vector that is searched: scaled free parameters, then the effects' values over their sizes."""
-
-    problem: Problem
-    active: tuple[Active, ...]
-    sizes: NDArray[np.float64]
-    low: NDArray[np.float64]
-    high: NDArray[np.float64]
-
-    def split(self, x: NDArray[np.float64]) -> tuple[list[float], tuple[Active, ...]]:
-        """Return free parameters and effects with their values."""
-        values = (x * self.sizes).tolist()
-        n = len(self.problem.free)
-        made, at = [], n
-        for one in self.active:
-            names = [each.name for each in one.searched]
-            made.append(replace(one, values={**one.values, **dict(zip(names, values[at:], strict=False))}))
-            at += len(names)
-        return values[:n], tuple(made)
-
-
-def size_of(one: Active, name: str) -> float:
-    """Return the size on which a parameter is searched: its value, or its typical one where that is off."""
-    parameter = next(each for each in one.effect.parameters if each.name == name)
-    value = abs(one.values.get(name, 0.0))
-    scale = one.values.get(f"_size_{name}", 0.0)
-    if value and math.isfinite(value):
-        return max(value, 0.2 * scale)
-    return scale or abs(parameter.typical[0]) or 1.0
-
-
 def fit(
     problem: Problem,
     active: Sequence[Active] = (),
@@ -111,18 +77,17 @@ def fit(
     noise : from which the whitening starts; None for white noise first
     plain : ordinary least squares, or not; None lets a specification test decide
     """
-    space = _space(problem, tuple(active))
+    space = Space.of(problem, tuple(active))
+    known = Derivatives(space)
     layouts = {name: problem.layout(name, rows) for name in problem.names}
-    first = [one.value for one in problem.free] if start is None else list(start)
-    begin = [*first, *(_clipped(one, each.name) for one in active for each in one.searched)]
-    x = np.clip(np.asarray(begin, dtype=np.float64) / space.sizes, space.low, space.high)
-    made = _coloured(space, layouts, x, noise, 2 if plain else rounds)
+    x = space.begin([one.value for one in problem.free] if start is None else start)
+    made = _coloured(space, layouts, x, noise, 2 if plain else rounds, known)
     if plain is None:
-        other = _plain(space, layouts, made)
+        other = _plain(space, layouts, made, known)
         plain = other is not None and _absorbs(made, other, layouts)
         chosen = other if plain and other is not None else made
     else:
-        chosen = _plain(space, layouts, made) or made if plain else made
+        chosen = _plain(space, layouts, made, known) or made if plain else made
     p, found = space.split(chosen.x)
     return Fit(
         p=tuple(p),
@@ -138,19 +103,20 @@ def fit(
 
 
 def _coloured(
-    space: _Space,
+    space: Space,
     layouts: dict[str, Layout],
     x: NDArray[np.float64],
     noise: dict[str, Noise] | None,
     rounds: int,
+    derivatives: Derivatives,
 ) -> _Solved:
     """Return generalised least squares, the noise estimated anew in every round."""
     best: _Solved | None = None
     known = noise
     for turn in range(max(rounds, 1)):
         if known is None:
-            known = _white(space.problem, _run(space, x)[1], layouts)
-        here = _solve(space, layouts, x, known)
+            known = _white(space.problem, space.residual(space.simulated(x)), layouts)
+        here = _solve(space, layouts, x, known, derivatives)
         if best is not None and here.score < best.score + _BETTER:
             return here if here.score > best.score else best
         best, x, known = here, here.x, here.noise
@@ -159,7 +125,7 @@ def _coloured(
     return cast("_Solved", best)
 
 
-def _plain(space: _Space, layouts: dict[str, Layout], from_: _Solved) -> _Solved | None:
+def _plain(space: Space, layouts: dict[str, Layout], from_: _Solved, known: Derivatives) -> _Solved | None:
     """Return ordinary least squares, each output weighed by what its rows are worth; None for white noise."""
     if not len(from_.x) or not any(one.reflection for one in from_.noise.values()):
         return None
@@ -167,7 +133,7 @@ def _plain(space: _Space, layouts: dict[str, Layout], from_: _Solved) -> _Solved
         name: Noise(reflection=(), sd=one.marginal_sd * math.sqrt(one.correlation_rows))
         for name, one in from_.noise.items()
     }
-    return _solve(space, layouts, from_.x, weights)
+    return _solve(space, layouts, from_.x, weights, known)
 
 
 def _absorbs(coloured: _Solved, plain: _Solved, layouts: dict[str, Layout]) -> bool:
@@ -187,39 +153,17 @@ def _absorbs(coloured: _Solved, plain: _Solved, layouts: dict[str, Layout]) -> b
 
 
 def _solve(
-    space: _Space, layouts: dict[str, Layout], x: NDArray[np.float64], weights: dict[str, Noise]
+    space: Space,
+    layouts: dict[str, Layout],
+    x: NDArray[np.float64],
+    weights: dict[str, Noise],
+    known: Derivatives,
 ) -> _Solved:
-    from scipy.optimize import least_squares
-
-    problem = space.problem
-
-    def cost(v: NDArray[np.float64]) -> NDArray[np.float64]:
-        try:
-            return _stack(problem, space, v, _run(space, v)[1], layouts, weights)
-        except FitError:
-            return np.full(sum(one.n for one in layouts.values()) + len(problem.free), 1e6)
-
-    def slope(v: NDArray[np.float64]) -> NDArray[np.float64]:
-        points = _moved(space, v)
-        _prepare(space, [v, *points])
-        here = cost(v)
-        return np.stack([(cost(w) - here) / (w[i] - v[i]) for i, w in enumerate(points)], axis=1)
-
-    if len(x):
-        x = least_squares(
-            cost,
-            x,
-            slope,
-            bounds=(space.low, space.high),
-            x_scale=1.0,
-            max_nfev=_INNER,
-            ftol=1e-6,
-            xtol=1e-5,  # of a parameter's size: the step after it would be smaller by orders
-            gtol=1e-9,
-        ).x
-    simulated, residual = _run(space, x)
-    noise = noise_of(problem, residual, layouts, used=len(x))
-    return _Solved(x, simulated, residual, noise, _score(problem, space, x, residual, layouts, noise))
+    x = descend(space, layouts, x, weights, known)
+    simulated = space.simulated(x)
+    residual = space.residual(simulated)
+    noise = noise_of(space.problem, residual, layouts, used=len(x))
+    return _Solved(x, simulated, residual, noise, _score(space, x, residual, layouts, noise))
 
 
 def replace_effects(problem: Problem, made: Fit, active: tuple[Active, ...]) -> Fit:
@@ -268,58 +212,8 @@ def held_out_score(problem: Problem, made: Fit, rows: NDArray[np.bool_]) -> floa
 
 def jacobian(problem: Problem, made: Fit) -> tuple[dict[str, NDArray[np.float64]], NDArray[np.float64]]:
     """Return d(simulated)/d(x) over all rows of each output, and the sizes of x; x = (p, effects) / sizes."""
-    space = _space(problem, made.active)
-    values = [*made.p, *(one.values[each.name] for one in made.active for each in one.searched)]
-    x = np.asarray(values, dtype=np.float64) / space.sizes
-    return _differences(space, x, made.simulated), space.sizes
-
-
-def _space(problem: Problem, active: tuple[Active, ...]) -> _Space:
-    sizes, low, high = [], [], []
-    for one in problem.free:
-        size = one.sd or abs(one.value) or 1.0
-        sizes.append(size)
-        bounds = one.bounds or (-math.inf, math.inf)
-        reach = _WITHIN * one.sd if one.sd else math.inf
-        low.append(max(bounds[0], one.value - reach) / size)
-        high.append(min(bounds[1], one.value + reach) / size)
-    for each in active:
-        for parameter in each.searched:
-            size = size_of(each, parameter.name)
-            sizes.append(size)
-            low.append(parameter.bounds[0] / size)
-            high.append(parameter.bounds[1] / size)
-    return _Space(problem, active, np.array(sizes), np.array(low), np.array(high))
-
-
-def _clipped(one: Active, name: str) -> float:
-    parameter = next(each for each in one.effect.parameters if each.name == name)
-    low, high = parameter.bounds
-    inside = 1e-9 * max(abs(low) if math.isfinite(low) else 0.0, 1e-9)
-    return min(max(one.values[name], low + inside), high)
-
-
-def _run(space: _Space, x: NDArray[np.float64]) -> tuple[Stacked, Stacked]:
-    p, active = space.split(x)
-    simulated = space.problem.simulate(p, active)
-    return simulated, {name: space.problem.observed[name] - simulated[name] for name in simulated}
-
-
-def _stack(
-    problem: Problem,
-    space: _Space,
-    x: NDArray[np.float64],
-    residual: Stacked,
-    layouts: dict[str, Layout],
-    noise: dict[str, Noise],
-) -> NDArray[np.float64]:
-    parts = [whiten(residual[name][where.index], where, noise[name]) for name, where in layouts.items()]
-    p, _ = space.split(x)
-    parts.append(
-        np.array([(v - one.value) / (one.sd or 1.0) for v, one in zip(p, problem.free, strict=True)])
-    )
-    stacked = np.concatenate(parts)
-    return np.where(np.isfinite(stacked), stacked, 1e6)
+    space = Space.of(problem, made.active)
+    return space.around(space.at(made.p))[1], space.sizes
 
 
 def _white(problem: Problem, residual: Stacked, layouts: dict[str, Layout]) -> dict[str, Noise]:
@@ -332,56 +226,24 @@ def _white(problem: Problem, residual: Stacked, layouts: dict[str, Layout]) -> d
 
 
 def _score(
-    problem: Problem,
-    space: _Space,
+    space: Space,
     x: NDArray[np.float64],
     residual: Stacked,
     layouts: dict[str, Layout],
     noise: dict[str, Noise],
 ) -> float:
     p, _ = space.split(x)
-    total = log_prior(problem, p)
+    total = log_prior(space.problem, p)
     for name, where in layouts.items():
         if where.n:
             total += log_likelihood(residual[name][where.index], where, noise[name])
     return total if math.isfinite(total) else -math.inf
 
 
-def _differences(space: _Space, x: NDArray[np.float64], base: Stacked) -> dict[str, NDArray[np.float64]]:
-    made = {name: np.empty((len(column), len(x))) for name, column in base.items()}
-    points = _moved(space, x)
-    _prepare(space, [x, *points])
-    for i, moved in enumerate(points):
-        try:
-            simulated, _ = _run(space, moved)
-        except FitError:
-            simulated = base
-        for name, column in simulated.items():
-            made[name][:, i] = (column - base[name]) / (moved[i] - x[i])
-    return made
-
-
-def _moved(space: _Space, x: NDArray[np.float64]) -> list[NDArray[np.float64]]:
-    """Return the points of one-sided differences, within the bounds."""
-    points = []
-    for i in range(len(x)):
-        step = min(_STEP * max(abs(x[i]), 1.0), 0.1 * (space.high[i] - space.low[i]))
-        step = -step if x[i] + step > space.high[i] else step
-        moved = x.copy()
-        moved[i] += step
-        points.append(moved)
-    return points
-
-
-def _prepare(space: _Space, points: Sequence[NDArray[np.float64]]) -> None:
-    """Have the simulations of several points made at once."""
-    space.problem.prepare([space.split(one) for one in points])
-
-
 def _covariance(
-    space: _Space, solved: _Solved, layouts: dict[str, Layout], *, plain: bool
+    space: Space, solved: _Solved, layouts: dict[str, Layout], *, plain: bool
 ) -> NDArray[np.float64]:
-    J = _differences(space, solved.x, solved.simulated) if len(solved.x) else {}
+    J = space.around(solved.x)[1] if len(solved.x) else {}
     prior = np.zeros((len(space.problem.free), len(solved.x)))
     for i, one in enumerate(space.problem.free):
         prior[i, i] = space.sizes[i] / (one.sd or 1.0)

@@ -1,7 +1,8 @@
 """Integration from row to row: Dormand and Prince's pair with error control, LSODA where it turns stiff.
 
 Inputs are linear between rows, so that the equation is smooth within an interval and has a kink at each row:
-steps end on rows, and no step ever looks across one.
+steps end on rows, and no step ever looks across one. The rate itself has no jump there: that of a step's end
+is that of the next one's beginning.
 
 Source: Dormand, Prince, J. Comp. Appl. Math. 6 (1980) 19.
 """
@@ -9,10 +10,12 @@ Source: Dormand, Prince, J. Comp. Appl. Math. 6 (1980) 19.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
+
+from toolkit.diagnosis.kinds.slides import Slide, TurnedError, held
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -24,6 +27,7 @@ _MOST = 20_000  # rates that the stiff solver may ask for between two rows
 OFF = 1e100  # in no unit is a state of any plant as large
 _HUGE = 1e300
 MANY = 60  # steps within one interval: the equation is stiff there
+TURNING = 240  # the same where bristles slide: each body that turns takes a run of short steps
 
 # The tableau, row by row: C, A; the fifth order's weights B; what they are off the fourth order's, E.
 C = (1 / 5, 3 / 10, 4 / 5, 8 / 9, 1.0)
@@ -43,7 +47,11 @@ class IntegrationError(Exception):
 
 
 def integrate(
-    rate: Rate, t: NDArray[np.float64], start: NDArray[np.float64], atol: NDArray[np.float64]
+    rate: Rate,
+    t: NDArray[np.float64],
+    start: NDArray[np.float64],
+    atol: NDArray[np.float64],
+    slides: Sequence[Slide] = (),
 ) -> NDArray[np.float64]:
     """Return the states at every row, shape (states, rows).
 
@@ -53,6 +61,7 @@ def integrate(
     t : rising times of the rows [s]
     start : state at the first row
     atol : absolute tolerance of each state; the relative one is 1e-6
+    slides : bristles among the states
 
     Raises
     ------
@@ -65,11 +74,12 @@ def integrate(
     rates = rate(float(t[0]), start)
     if rates.shape != start.shape:
         raise IntegrationError(f"rhs gives {rates.size} rates for {start.size} states")
-    absolute = atol.tolist()
+    absolute, k = atol.tolist(), rates.tolist()
     for i in range(len(t) - 1):
-        x, step, at = _advance(rate, float(t[i]), float(t[i + 1]), x, absolute, step)
+        x, k, step, at = _advance(rate, float(t[i]), float(t[i + 1]), x, k, absolute, step, slides)
         if at < t[i + 1]:
             x = _stiff(rate, at, float(t[i + 1]), x, atol)
+            k = rate(float(t[i + 1]), x).tolist()
         if not (np.abs(x) < OFF).all():
             raise IntegrationError(f"the state has run off at {t[i + 1]:g} s")
         made[:, i + 1] = x
@@ -77,39 +87,53 @@ def integrate(
 
 
 def _advance(
-    rate: Rate, t: float, end: float, x: NDArray[np.float64], atol: list[float], step: float
-) -> tuple[NDArray[np.float64], float, float]:
-    """Go from one row to the next; return the state, the step to go on with, and the time that was reached.
+    rate: Rate,
+    t: float,
+    end: float,
+    x: NDArray[np.float64],
+    k1: list[float],
+    atol: list[float],
+    step: float,
+    slides: Sequence[Slide],
+) -> tuple[NDArray[np.float64], list[float], float, float]:
+    """Go from one row to the next; return state and rate, the step to go on with, the time that was reached.
 
     A time before ``end`` says that the equation is stiff there. In plain numbers, written out: for the few
     states of a plant that takes less than half the time of arrays.
     """
     of = range(len(x))
+    bends = {one.bend for one in slides}
     y: list[float] = x.tolist()
     (a21,), (a31, a32), (a41, a42, a43), (a51, a52, a53, a54), (a61, a62, a63, a64, a65) = A
     b1, _, b3, b4, b5, b6 = B
     e1, _, e3, e4, e5, e6, e7 = E
-    k1 = rate(t, x).tolist()
+    hold = held(slides, y) if slides else None
     h = min(step, end - t)
-    for _ in range(MANY):
+    for _ in range(TURNING if slides else MANY):
         last = t + h >= end - 1e-12 * max(abs(end), h)
         if last:
             h = end - t
-        k2 = _at(rate, t + C[0] * h, [y[i] + h * (a21 * k1[i]) for i in of])
-        k3 = _at(rate, t + C[1] * h, [y[i] + h * (a31 * k1[i] + a32 * k2[i]) for i in of])
-        k4 = _at(rate, t + C[2] * h, [y[i] + h * (a41 * k1[i] + a42 * k2[i] + a43 * k3[i]) for i in of])
-        k5 = _at(
-            rate, t + C[3] * h,
-            [y[i] + h * (a51 * k1[i] + a52 * k2[i] + a53 * k3[i] + a54 * k4[i]) for i in of],
-        )  # fmt: skip
-        k6 = _at(
-            rate, t + h,
-            [y[i] + h * (a61 * k1[i] + a62 * k2[i] + a63 * k3[i] + a64 * k4[i] + a65 * k5[i]) for i in of],
-        )  # fmt: skip
-        z = [y[i] + h * (b1 * k1[i] + b3 * k3[i] + b4 * k4[i] + b5 * k5[i] + b6 * k6[i]) for i in of]
-        k7 = _at(rate, t + h, z)
+        at = [t + c * h for c in C]
+        try:
+            k2 = _at(rate, at[0], [y[i] + h * (a21 * k1[i]) for i in of], hold)
+            k3 = _at(rate, at[1], [y[i] + h * (a31 * k1[i] + a32 * k2[i]) for i in of], hold)
+            x4 = [y[i] + h * (a41 * k1[i] + a42 * k2[i] + a43 * k3[i]) for i in of]
+            k4 = _at(rate, at[2], x4, hold)
+            x5 = [y[i] + h * (a51 * k1[i] + a52 * k2[i] + a53 * k3[i] + a54 * k4[i]) for i in of]
+            k5 = _at(rate, at[3], x5, hold)
+            x6 = [
+                y[i] + h * (a61 * k1[i] + a62 * k2[i] + a63 * k3[i] + a64 * k4[i] + a65 * k5[i]) for i in of
+            ]
+            k6 = _at(rate, at[4], x6, hold)
+            z = [y[i] + h * (b1 * k1[i] + b3 * k3[i] + b4 * k4[i] + b5 * k5[i] + b6 * k6[i]) for i in of]
+            k7 = _at(rate, t + h, z, hold)
+        except TurnedError:
+            hold = None
+            continue
         error = 0.0
         for i in of:
+            if hold is not None and i in bends:
+                continue
             off = e1 * k1[i] + e3 * k3[i] + e4 * k4[i] + e5 * k5[i] + e6 * k6[i] + e7 * k7[i]
             share = h * off / (atol[i] + RTOL * max(abs(y[i]), abs(z[i])))
             error += share * share
@@ -120,13 +144,17 @@ def _advance(
         grow = min(5.0, max(0.2, 0.9 * error**-0.2)) if error > 0 else 5.0
         if error <= 1.0:
             if last:
-                return np.array(z), h * grow, end
+                return np.array(z), k7, h * grow, end
             t, y, k1 = t + h, z, k7
+        if slides:
+            hold = held(slides, y)
         h *= grow
-    return np.array(y), end - t, t
+    return np.array(y), k1, end - t, t
 
 
-def _at(rate: Rate, t: float, y: list[float]) -> list[float]:
+def _at(rate: Rate, t: float, y: list[float], hold: Callable[[list[float]], None] | None) -> list[float]:
+    if hold is not None:
+        hold(y)
     made: list[float] = rate(t, np.array(y)).tolist()
     return made
 

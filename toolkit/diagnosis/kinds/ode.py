@@ -149,7 +149,7 @@ class OdeModel:
             return {}
         fine = self._between(run, p, forces, x)
         rate = self._equation.rates(run, dict(p), acting, len(self.states))
-        sizes = np.array([*(self.scale[name][1] for name in self.states), *[1.0] * acting.added])
+        sizes = np.array([*(self.scale[name][1] for name in self.states), *acting.sizes])
         try:
             with silenced():
                 moved = propagated(
@@ -221,11 +221,12 @@ class OdeModel:
             starts = np.stack([self._equation.start(run, p) for p in sets], axis=1)
             forces = [self._forces(one) for *_, one in listed]
             rates = self._equation.rates_together(run, columns_of(sets), forces, len(self.states))
-            added = max(one.added for one in forces)
-            atol = self._tolerance(starts[:, 0], added)
+            own, added = len(self.states), max(one.added for one in forces)
+            atol = np.stack([self._tolerance(starts[:, 0], one, added) for one in forces], axis=1)
             starts = np.vstack([starts, np.zeros((added, len(sets)))])
+            slides = [(k, slide) for k, one in enumerate(forces) for slide in one.slides(own)]
             with silenced():
-                made = integrate_together(rates, run.t, starts, atol)
+                made = integrate_together(rates, run.t, starts, atol, slides)
         except NotTogetherError:
             middle = len(listed) // 2
             self._together(run, listed[:middle])
@@ -274,16 +275,19 @@ class OdeModel:
         begun = np.concatenate([start, np.zeros(acting.added)])
         try:
             with silenced():
-                return integrate(rate, run.t, begun, self._tolerance(start, acting.added))
+                atol = self._tolerance(start, acting, acting.added)
+                return integrate(rate, run.t, begun, atol, acting.slides(len(self.states)))
         except IntegrationError as error:
             raise failed(self.case, run, f"the integration ended early: {error}") from error
         except (Exception, SystemExit) as error:
             raise failed(self.case, run, f"rhs: {type(error).__name__}: {error}") from error
 
-    def _tolerance(self, start: NDArray[np.float64], added: int = 0) -> NDArray[np.float64]:
+    def _tolerance(self, start: NDArray[np.float64], acting: Forces, added: int) -> NDArray[np.float64]:
+        """Return the absolute tolerance of every state, ``added`` ones among them."""
         if not self.scale:
             return 0.01 * ATOL * np.maximum(np.abs(start), 1.0)
-        return ATOL * np.array([*(self.scale[name][1] for name in self.states), *[10.0] * added])
+        sizes = [self.scale[name][1] for name in self.states]
+        return ATOL * np.array([*sizes, *(10 * one for one in acting.sizes), *[1.0] * (added - acting.added)])
 
     def _forces(self, active: Sequence[Active]) -> Forces:
         return Forces.of(active, self.states, self._derivative_of, self.scale)

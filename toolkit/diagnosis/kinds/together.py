@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from toolkit.diagnosis.kinds.integrate import MANY, OFF, RTOL, A, B, C, E
+from toolkit.diagnosis.kinds.integrate import MANY, OFF, RTOL, TURNING, A, B, C, E
+from toolkit.diagnosis.kinds.slides import HeldColumns, Slide, TurnedError
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -68,7 +69,9 @@ def takes_columns(
     return True
 
 
-def integrate_together(rates: Rates, t: Array, starts: Array, atol: Array) -> Array:
+def integrate_together(
+    rates: Rates, t: Array, starts: Array, atol: Array, slides: Sequence[tuple[int, Slide]] = ()
+) -> Array:
     """Return the states at every row, (rows, states, columns).
 
     Parameters
@@ -76,7 +79,9 @@ def integrate_together(rates: Rates, t: Array, starts: Array, atol: Array) -> Ar
     rates : (time, states (states, columns)) -> their rates, as an array of its own
     t : rising times of the rows [s]
     starts : states at the first row, (states, columns)
-    atol : absolute tolerance of each state; the relative one is that of `integrate`
+    atol : absolute tolerance of each state, (states,) or in each column (states, columns); the relative one
+        is that of `integrate`
+    slides : column and bristle of each that slides
 
     Raises
     ------
@@ -86,38 +91,59 @@ def integrate_together(rates: Rates, t: Array, starts: Array, atol: Array) -> Ar
     x = starts.copy()
     made = np.empty((len(t), *x.shape))
     made[0] = x
+    atol = atol.reshape(len(x), -1)
     h = float(t[1] - t[0]) if len(t) > 1 else 1.0
+    k, held = rates(float(t[0]), x), HeldColumns(slides)
     for i in range(len(t) - 1):
-        x, h = _advance(rates, float(t[i]), float(t[i + 1]), x, atol[:, None], h)
+        x, k, h = _advance(rates, float(t[i]), float(t[i + 1]), x, k, atol, h, held)
         if not (np.abs(x) < OFF).all():
             raise NotTogetherError
         made[i + 1] = x
     return made
 
 
-def _advance(rates: Rates, t: float, end: float, x: Array, atol: Array, step: float) -> tuple[Array, float]:
+def _advance(
+    rates: Rates,
+    t: float,
+    end: float,
+    x: Array,
+    first: Array,
+    atol: Array,
+    step: float,
+    held: HeldColumns,
+) -> tuple[Array, Array, float]:
     """Go from one row to the next as `integrate` does with one state; the worst column rules the step."""
     k = np.empty((7, x.size))
-    k[0] = rates(t, x).ravel()
+    k[0] = first.ravel()
     h = min(step, end - t)
-    for _ in range(MANY):
+    held.begin(x)
+    for _ in range(MANY + (TURNING - MANY) * held.turning):
         last = t + h >= end - 1e-12 * max(abs(end), h)
         if last:
             h = end - t
-        for j, (c, row) in enumerate(zip(C, _ROWS, strict=True), start=1):
-            k[j] = rates(t + c * h, x + h * (row @ k[:j]).reshape(x.shape)).ravel()
-        y = x + h * (_WEIGHTS @ k[:6]).reshape(x.shape)
-        k[6] = rates(t + h, y).ravel()
+        try:
+            for j, (c, row) in enumerate(zip(C, _ROWS, strict=True), start=1):
+                y = x + h * (row @ k[:j]).reshape(x.shape)
+                held.hold(y)
+                k[j] = rates(t + c * h, y).ravel()
+            y = x + h * (_WEIGHTS @ k[:6]).reshape(x.shape)
+            held.hold(y)
+            k[6] = rates(t + h, y).ravel()
+        except TurnedError:
+            continue
         size = atol + RTOL * np.maximum(np.abs(x), np.abs(y))
-        error = float(np.sqrt(np.mean((h * (_ERROR @ k).reshape(x.shape) / size) ** 2, axis=0)).max())
+        share = h * (_ERROR @ k).reshape(x.shape) / size
+        held.known(share)
+        error = float(np.sqrt(np.mean(share**2, axis=0)).max())
         if not np.isfinite(error):
             h *= 0.2
             continue
         grow = min(5.0, max(0.2, 0.9 * error**-0.2)) if error > 0 else 5.0
         if error <= 1.0:
             if last:
-                return y, h * grow
+                return y, k[6].reshape(x.shape).copy(), h * grow
             t, x = t + h, y
             k[0] = k[6]
+        held.begin(x)
         h *= grow
     raise NotTogetherError
