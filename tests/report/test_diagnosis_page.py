@@ -13,6 +13,7 @@ from toolkit.diagnosis.case_read import read_case
 from toolkit.diagnosis.diagnose import diagnose
 from toolkit.report.diagnosis import figures
 from toolkit.report.diagnosis.chance import chance
+from toolkit.report.diagnosis.maps import size_maps, variables
 from toolkit.report.diagnosis.page import HEADLINES, condition, headline, page
 
 
@@ -130,3 +131,37 @@ def simulate(inputs, p):
     assert places
     assert all(at.unit == "day" and 0 <= at.start < at.end <= 99 for at in places)
     assert "day" in page(result)
+
+
+def test_a_residual_is_mapped_over_every_kind_of_variable():
+    n = 60
+    t = np.linspace(0, 6, n)
+    columns = {"SA": np.sin(t), "FZ": 3000 + 500 * np.cos(t), "TIRE_ANGLE": np.rad2deg(7 * t), "IA": 0 * t}
+    units = {"SA": "deg", "FZ": "N", "TIRE_ANGLE": "deg", "IA": "deg"}
+    runs = [
+        SimpleNamespace(
+            columns=columns, t=t, rows=n, name=name, conditions={"rotation": way, "mounting": "normal"}
+        )
+        for name, way in (("a", "forward"), ("b", "reverse"))
+    ]
+    case = SimpleNamespace(
+        drivers=[SimpleNamespace(name=name, unit=unit) for name, unit in units.items()],
+        channels=[SimpleNamespace(role="time", unit="s")], has_time=True,
+    )  # fmt: skip
+    rows = {"FY": np.ones(2 * n, bool)}
+    fit = SimpleNamespace(residual={"FY": np.random.default_rng(2).normal(0, 2.0, 2 * n)})
+    found = SimpleNamespace(
+        problem=SimpleNamespace(case=case, runs=runs, kept=rows), refitted=fit, augmented=fit
+    )
+    mapped = {label: (values, levels) for label, values, levels in variables(found)}
+    # An inclination that never varies tells nothing, nor does a mounting that is one and the same.
+    assert list(mapped) == ["SA [deg]", "FZ [N]", "rotation", "TIRE_ANGLE in one turn [deg]", "time [s]"]
+    assert mapped["rotation"][1] == ("forward", "reverse")
+    turned = mapped["TIRE_ANGLE in one turn [deg]"][0]
+    assert turned.min() >= 0
+    assert turned.max() < 360
+    np.testing.assert_allclose(np.exp(1j * np.deg2rad(turned[:n])), np.exp(7j * t), atol=1e-9)
+    made = SimpleNamespace(held_out=[SimpleNamespace(channel="FY", noise_floor=2.0)])
+    drawn = size_maps(found, made, "FY", after=True)
+    assert drawn is not None
+    assert drawn.startswith(b"<?xml")

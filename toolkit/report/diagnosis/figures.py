@@ -76,7 +76,7 @@ def error_bars(made: Diagnosis) -> bytes:
         # Above the bars: the longest of them would run through a legend inside.
         figure.legend(loc="outside upper right", ncols=3, frameon=False)
 
-    return _svg((8.6, 1.5 + 0.85 * max(len(names), 1)), draw)
+    return draw_svg((8.6, 1.5 + 0.85 * max(len(names), 1)), draw)
 
 
 def mismatch_map(found: Search, channel: str, place: Place, *, after: bool) -> bytes | None:
@@ -106,7 +106,7 @@ def mismatch_map(found: Search, channel: str, place: Place, *, after: bool) -> b
         axes.set_ylabel(f"recorded − simulated {channel} [{unit}]")
         axes.legend(frameon=False)
 
-    return _svg((8.6, 3.6), draw)
+    return draw_svg((8.6, 3.6), draw)
 
 
 def worst_run(found: Search, channel: str) -> int:
@@ -144,7 +144,7 @@ def run_in_time(found: Search, channel: str, *, after: bool) -> bytes:
         lower.set_xlabel(f"{f'time [{size}]' if problem.case.has_time else 'row'}, {run.name}")
         figure.align_ylabels()
 
-    return _svg((8.6, 4.4), draw)
+    return draw_svg((8.6, 4.4), draw)
 
 
 def run_map(found: Search, made: Diagnosis, *, after: bool) -> bytes:
@@ -179,7 +179,7 @@ def run_map(found: Search, made: Diagnosis, *, after: bool) -> bytes:
             rotation=0 if len(problem.runs) < 9 else 90,
         )  # fmt: skip
 
-    return _svg((8.6, 0.9 + len(fits) * (0.5 + 0.42 * len(names))), draw)
+    return draw_svg((8.6, 0.9 + len(fits) * (0.5 + 0.42 * len(names))), draw)
 
 
 def _write_cells(axes: Axes, values: NDArray[np.float64], most: float) -> None:
@@ -208,9 +208,11 @@ def variable_of(found: Search, name: str) -> NDArray[np.float64] | None:
     return None
 
 
-def binned(x: NDArray[np.float64], y: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def binned(
+    x: NDArray[np.float64], y: NDArray[np.float64], *, bins: int = _BINS
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return means of x and y in bins of equal counts."""
-    edges = np.unique(np.quantile(x, np.linspace(0, 1, _BINS + 1)))
+    edges = np.unique(np.quantile(x, np.linspace(0, 1, bins + 1)))
     if len(edges) < 3:
         return np.array([float(np.mean(x))]), np.array([float(np.mean(y))])
     at = np.clip(np.searchsorted(edges, x, side="right") - 1, 0, len(edges) - 2)
@@ -222,7 +224,8 @@ def binned(x: NDArray[np.float64], y: NDArray[np.float64]) -> tuple[NDArray[np.f
     return centre, mean
 
 
-def _svg(size: tuple[float, float], draw: Callable[[Figure], None]) -> bytes:
+def draw_svg(size: tuple[float, float], draw: Callable[[Figure], None]) -> bytes:
+    """Return a figure that is drawn in the page's style, as SVG; the same input makes the same bytes."""
     import matplotlib as mpl
     from matplotlib.backends.backend_svg import FigureCanvasSVG
     from matplotlib.figure import Figure as MadeFigure

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from toolkit.files import write_atomic
 from toolkit.report.diagnosis import figures
 from toolkit.report.diagnosis.chance import chance
+from toolkit.report.diagnosis.maps import size_maps
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -167,10 +168,14 @@ def _where(result: Result) -> list[str]:
     parts = ["<h2>Where</h2>"]
     for one in made.mismatch:
         parts.append(f"<p>{_place(one)}</p>")
-        for place in one.where[:2]:
+        for place in one.where:
             drawn = figures.mismatch_map(found, one.channel, place, after=after)
             if drawn is not None:
                 parts.append(_picture(drawn, f"residual of {one.channel} over {place.variable}"))
+                break
+        sizes = size_maps(found, made, one.channel, after=after)
+        if sizes is not None:
+            parts.append(_picture(sizes, f"size of the residual of {one.channel} over each variable"))
         parts.append(
             _picture(figures.run_in_time(found, one.channel, after=after), f"{one.channel} in one run")
         )
@@ -197,8 +202,17 @@ def _held_out(made: Diagnosis) -> list[str]:
     rows = []
     for one in made.held_out:
         errors = (one.nominal_rmse, one.refitted_rmse, one.augmented_rmse, one.noise_floor)
-        rows.append((one.channel, one.unit, *(f"{value:.4g}" for value in errors)))
-    head = ("output", "unit", "as declared", "refitted", "with the effects", "noise")
+        told = [f"{value:.4g}" for value in errors]
+        # Without an effect there is no error with it.
+        rows.append((one.channel, one.unit, *(told if made.effects else (*told[:2], told[3]))))
+    head = (
+        "output",
+        "unit",
+        "as declared",
+        "refitted",
+        *(["with the effects"] if made.effects else []),
+        "noise",
+    )
     title = "Error on held-out rows" if made.complete or made.effects else "Error as far as it was reached"
     return [f"<h2>{title}</h2>", _table(head, rows, numbers=(2, 3, 4, 5))]
 
