@@ -134,6 +134,7 @@ TABLE = "t,v,a,F\n" + ROWS
         (TABLE + ",1,1,1\n", CellError, "no time"),
         (TABLE.replace("t,v,a,F", "t,v,F,F"), ColumnError, "twice"),
         (TABLE.replace(",", ";"), ColumnError, "commas"),
+        (TABLE.replace(",", ";").replace(".", ","), CellError, "commas"),
         ("t,v,a,F\n" + "".join(f"{i},,1,2\n" for i in range(9)), ColumnError, "no value at all"),
         (b"PK\x03\x04rest", UnreadableError, "workbook"),
     ],
@@ -162,6 +163,26 @@ def test_line_ends_marks_and_blank_rows_change_nothing(tmp_path, content):
     run = read_case(write_case(tmp_path, HEAD + ONE, r0__csv=content)).runs[0]
     assert run.rows == 20
     np.testing.assert_array_equal(run.columns["F"], np.arange(20) % 5)
+
+
+def test_a_copy_of_a_recording_under_another_name_is_refused(tmp_path):
+    table = carriage(seed=3)
+    with pytest.raises(ConfigError, match="stands twice") as caught:
+        read_case(write_case(tmp_path, HEAD + TWO, r0__csv=table, r1__csv=table))
+    assert str(caught.value.where).endswith("recording.run[2].file")
+    assert "r1.csv, the same bytes as r0.csv" in str(caught.value.got)
+    # What stands still may repeat itself: a case without variation is one that is judged.
+    still = table.assign(F=1.0)
+    assert len(read_case(write_case(tmp_path / "b", HEAD + TWO, r0__csv=still, r1__csv=still)).runs) == 2
+
+
+def test_links_in_a_circle_are_told_as_a_file_that_cannot_be_read(tmp_path):
+    case = write_case(tmp_path, HEAD + TWO)
+    (tmp_path / "r1.csv").unlink()
+    (tmp_path / "r1.csv").symlink_to("r1.csv")
+    with pytest.raises(ConfigError, match="cannot be read") as caught:
+        read_case(case)
+    assert str(caught.value.where).endswith("r1.csv")
 
 
 def test_missing_samples_stay_missing_in_outputs_and_are_counted_in_inputs(tmp_path):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
@@ -68,6 +69,7 @@ def read_case(path: Path, *, model: Path | None = None) -> Case:
         )
         for i, entry in enumerate(_list(recording, "run", path), start=1)
     ]
+    _different_content(runs, [one.name for one in channels if one.role == "output"], path)
     if not runs:
         raise wrong(
             "a case has no recording", f"{path}: recording", "no [[recording.run]]", "one run or more"
@@ -235,7 +237,8 @@ def _different_files(entries: list[Any], path: Path) -> None:
         file = entry.get("file") if isinstance(entry, dict) else None
         if not isinstance(file, str):
             continue
-        real = (path.parent / file).resolve()
+        # Links that lead nowhere but in a circle are told where the file is read.
+        real = Path(os.path.realpath(path.parent / file))
         if real in seen:
             raise wrong(
                 "a recording stands twice",
@@ -244,3 +247,18 @@ def _different_files(entries: list[Any], path: Path) -> None:
                 "another file: a run that is held out must not have been seen",
             )
         seen.add(real)
+
+
+def _different_content(runs: list[Run], outputs: list[str], path: Path) -> None:
+    """Refuse a copy of a recording under another name: no noise repeats itself to the last digit."""
+    first: dict[str, str] = {}
+    for i, run in enumerate(runs, start=1):
+        # An output that stands still may well repeat itself.
+        if run.sha256 in first and any(len(set(run.columns.get(one, ()))) > 1 for one in outputs):
+            raise wrong(
+                "a recording stands twice",
+                f"{path}: recording.run[{i}].file",
+                f"{run.name}, the same bytes as {first[run.sha256]}",
+                "another recording: a run that is held out must not have been seen",
+            )
+        first.setdefault(run.sha256, run.name)

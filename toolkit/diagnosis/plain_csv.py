@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 _MISSING = frozenset(("", "nan", "na", "n/a", "null", "none"))
+_COMMAS = "separate the columns by commas, and write decimals with a point"
 _LARGEST = 1e100  # in no unit does an instrument reach it; its square must stay a number
 
 
@@ -58,12 +59,16 @@ def missing_column(where: Path, name: str, names: Iterable[str]) -> ColumnError:
     listed = list(names)
     near = difflib.get_close_matches(name, listed, n=1, cutoff=0.5)
     step = f"did you mean {near[0]!r}?" if near else "correct the case or the file"
-    if len(listed) == 1 and any(mark in listed[0] for mark in ";\t|"):
-        step = "separate the columns by commas, and write decimals with a point"
+    if _otherwise_separated(listed):
+        step = _COMMAS
     return ColumnError(
         f"the recording has no column {name!r}", where=where, got=", ".join(listed) or "no columns",
         expected=f"a column {name!r} in the header row", next_step=step, rule="case-column",
     )  # fmt: skip
+
+
+def _otherwise_separated(header: list[str]) -> bool:
+    return len(header) == 1 and any(mark in header[0] for mark in ";\t|")
 
 
 def header_of(data: bytes) -> list[str]:
@@ -105,8 +110,8 @@ def _careful(
         if len(row) != len(header):
             raise CellError(
                 "a row has another number of cells than the header", where=f"{where}, line {number}",
-                got=f"{len(row)} cells", expected=f"{len(header)}", next_step="correct the row",
-                rule="case-run",
+                got=f"{len(row)} cells", expected=f"{len(header)}",
+                next_step=_COMMAS if _otherwise_separated(header) else "correct the row", rule="case-run",
             )  # fmt: skip
         made.append(
             [
