@@ -93,9 +93,10 @@ def test_no_load_no_force(tmp_path):
 
 
 def test_a_reversed_drum_turns_FY_and_keeps_MZ(tmp_path):
-    same = sweep("machine", seed=0)
+    forward = sweep("machine", seed=0)
+    reverse = forward.assign(FY=-forward["FY"])
     runs = '[[recording.run]]\nfile = "r0.csv"\n[[recording.run]]\nfile = "r1.csv"\nrotation = "reverse"\n'
-    case = machine(tmp_path, frames={"r0__csv": same, "r1__csv": same}, runs=runs)
+    case = machine(tmp_path, frames={"r0__csv": forward, "r1__csv": reverse}, runs=runs)
     model = model_of(case, None)
     one, other = (model.simulate(run, {"LMUY": 1.0}, ()) for run in case.runs)
     np.testing.assert_allclose(other["FY"], -one["FY"])
@@ -143,7 +144,9 @@ def test_a_lag_of_the_load_acts_once(tmp_path, measured):
     text = toml('kind = "machine"\ntire = "tire.tir"', axes="machine", mu="LMUY", channels=channels)
     load = 'FZ = { unit = "N", role = "input" }\n'
     text = text.replace(load, load.replace("input", "output") if measured else "")
-    case = read_case(write_case(tmp_path, text, simulator=None, tire__tir=TIR, r0__csv=rows, r1__csv=rows))
+    case = read_case(
+        write_case(tmp_path, text, simulator=None, tire__tir=TIR, r0__csv=rows, r1__csv=rows[1:])
+    )
     model = model_of(case, None)
     late = Active(effect=effects()["load_lag"], values={"time_constant": 0.5})
     plain, made = (model.simulate(case.runs[0], {"LMUY": 1.0}, one) for one in ((), (late,)))
