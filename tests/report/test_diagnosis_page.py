@@ -14,6 +14,7 @@ from toolkit.diagnosis.diagnose import diagnose
 from toolkit.report.diagnosis import figures
 from toolkit.report.diagnosis.chance import chance
 from toolkit.report.diagnosis.maps import size_maps, variables
+from toolkit.report.diagnosis.numbers import few
 from toolkit.report.diagnosis.page import HEADLINES, condition, headline, page
 
 
@@ -165,3 +166,19 @@ def test_a_residual_is_mapped_over_every_kind_of_variable():
     drawn = size_maps(found, made, "FY", after=True)
     assert drawn is not None
     assert drawn.startswith(b"<?xml")
+
+
+def test_the_first_line_says_that_a_name_is_not_the_whole(dragged):
+    whole = dataclasses.replace(dragged.diagnosis, remaining="nothing")
+    part = dataclasses.replace(dragged.diagnosis, remaining="unknown")
+    assert headline(whole) == HEADLINES[whole.verdict]
+    assert headline(part) == f"{HEADLINES[part.verdict]} More is left that no known effect explains."
+
+
+@pytest.mark.parametrize(
+    ("value", "digits", "told"),
+    [(1112.4, 3, "1112"), (2.5e6, 4, "2500000"), (0.012345, 3, "0.0123"), (-469.68, 4, "-469.7"),
+     (0.0, 3, "0"), (float("nan"), 3, "nan")],
+)  # fmt: skip
+def test_a_load_in_newton_is_no_power_of_ten(value, digits, told):
+    assert few(value, digits) == told

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 from toolkit import __version__
 from toolkit.report.content import Cell, ReportContent, Table, Value
 from toolkit.report.diagnosis.chance import chance
+from toolkit.report.diagnosis.numbers import few
 from toolkit.report.diagnosis.page import headline
 from toolkit.report.diagnosis.plots import diagnosis_plots
 from toolkit.report.diagnosis.vocabulary import DIAGNOSIS, TABLES
@@ -156,7 +157,7 @@ def _where(made: Diagnosis, style: Style) -> str | None:
         text = f"{one.channel}: {share} % of the residual's variance is structure"
         for at in one.where[:1]:
             numbers = isinstance(at.start, float) and isinstance(at.end, float)
-            ends = f"{_n(at.start, style)} to {_n(at.end, style)}" if numbers else str(at.start)  # type: ignore[arg-type]
+            ends = f"{_n(at.start, style, 4)} to {_n(at.end, style, 4)}" if numbers else str(at.start)  # type: ignore[arg-type]
             much = f"over all of {at.variable}," if at.whole else f"most of it where {at.variable} is"
             text += f", {much} {ends} {_unit(at.unit)}".rstrip()
         told.append(f"{text} ({chance(one.p_value, decimal_comma=style.decimal_comma)}).")
@@ -256,5 +257,5 @@ def _unit(text: str) -> str:
 def _n(value: float, style: Style, digits: int = 3) -> str:
     if not math.isfinite(value):
         return "-"
-    text = f"{value:.{digits}g}"
+    text = few(value, digits)
     return text.replace(".", ",") if style.decimal_comma else text

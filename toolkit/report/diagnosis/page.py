@@ -11,6 +11,7 @@ from toolkit.files import write_atomic
 from toolkit.report.diagnosis import figures
 from toolkit.report.diagnosis.chance import chance
 from toolkit.report.diagnosis.maps import size_maps
+from toolkit.report.diagnosis.numbers import few
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -50,6 +51,9 @@ def headline(made: Diagnosis) -> str:
 
     if made.verdict == "unknown" and cut_short(made.skipped):
         return "Something is missing; the budget was spent before every known effect was tried."
+    if made.effects and made.remaining == "unknown":
+        # Who reads the first line alone must not take a name for the whole of it.
+        return f"{HEADLINES[made.verdict]} More is left that no known effect explains."
     return HEADLINES[made.verdict]
 
 
@@ -157,6 +161,8 @@ def _why(one: FoundEffect) -> str:
     if one.rejected:
         told = ", ".join(f"{name} (by {-less:.1f})" for name, less in one.rejected[:5])
         text += f" Rejected, as they explain the recordings worse (log-likelihood less): {told}."
+    elif not one.equivalent_to and one.name != "quantisation":
+        text += " No other effect came near enough in the screening to be tried in its place."
     return escape(text)
 
 
@@ -190,7 +196,8 @@ def _place(one: Mismatch) -> str:
         f"{one.channel}: {100 * one.share_of_variance:.0f} % of the refitted residual's variance is structure"
     )
     for at in one.where[:1]:
-        ends = f"{at.start:.4g} to {at.end:.4g}" if isinstance(at.start, float) else str(at.start)
+        numbers = isinstance(at.start, float) and isinstance(at.end, float)
+        ends = f"{few(at.start, 4)} to {few(at.end, 4)}" if numbers else str(at.start)  # type: ignore[arg-type]
         much = f"over all of {at.variable}," if at.whole else f"most of it where {at.variable} is"
         text += f", {much} {ends} {at.unit}".rstrip()
     return escape(f"{text} ({chance(one.p_value)}).")

@@ -10,8 +10,8 @@ import numpy as np
 from toolkit.diagnosis.locate import time_unit
 from toolkit.report.content import Curve, Plot
 from toolkit.report.diagnosis.figures import binned, variable_of, worst_run
+from toolkit.report.diagnosis.numbers import few
 from toolkit.report.diagnosis.vocabulary import WHERE
-from toolkit.report.tags import format_number
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -161,4 +161,5 @@ def _unit(found: Search, channel: str) -> str:
 
 
 def _number(value: float, style: Style) -> str:
-    return format_number(value, ".3g", decimal_comma=style.decimal_comma)
+    text = few(value)
+    return text.replace(".", ",") if style.decimal_comma else text
