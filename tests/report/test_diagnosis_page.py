@@ -14,7 +14,7 @@ from toolkit.diagnosis.diagnose import diagnose
 from toolkit.report.diagnosis import figures
 from toolkit.report.diagnosis.chance import chance
 from toolkit.report.diagnosis.maps import size_maps, variables
-from toolkit.report.diagnosis.numbers import few
+from toolkit.report.diagnosis.numbers import few, over
 from toolkit.report.diagnosis.page import HEADLINES, condition, headline, page
 
 
@@ -182,3 +182,16 @@ def test_the_first_line_says_that_a_name_is_not_the_whole(dragged):
 )  # fmt: skip
 def test_a_load_in_newton_is_no_power_of_ten(value, digits, told):
     assert few(value, digits) == told
+
+
+def test_a_residual_that_is_only_too_large_depends_on_nothing(dragged):
+    cause = ("more than its stated noise",)
+    large = dataclasses.replace(dragged.diagnosis.mismatch[0], share_of_variance=0.0, where=())
+    made = dataclasses.replace(
+        dragged.diagnosis, verdict="unknown", effects=(), mismatch=(large,), depends_on=(("F", cause),)
+    )
+    html = page(dataclasses.replace(dragged, diagnosis=made))
+    assert "F is off by more than its stated noise" in html
+    assert "over more than" not in html
+    assert ": 0 %" not in html
+    assert over("F", ("v", "dv/dt")) == "F over v and dv/dt"

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 from toolkit import __version__
 from toolkit.report.content import Cell, ReportContent, Table, Value
 from toolkit.report.diagnosis.chance import chance
-from toolkit.report.diagnosis.numbers import few
+from toolkit.report.diagnosis.numbers import few, over
 from toolkit.report.diagnosis.page import headline
 from toolkit.report.diagnosis.plots import diagnosis_plots
 from toolkit.report.diagnosis.vocabulary import DIAGNOSIS, TABLES
@@ -155,6 +155,8 @@ def _where(made: Diagnosis, style: Style) -> str | None:
     for one in made.mismatch:
         share = _n(100 * one.share_of_variance, style)
         text = f"{one.channel}: {share} % of the residual's variance is structure"
+        if one.share_of_variance < 0.005:
+            text = f"{one.channel}: the residual is more than noise, and no variable alone explains it"
         for at in one.where[:1]:
             numbers = isinstance(at.start, float) and isinstance(at.end, float)
             ends = f"{_n(at.start, style, 4)} to {_n(at.end, style, 4)}" if numbers else str(at.start)  # type: ignore[arg-type]
@@ -166,7 +168,7 @@ def _where(made: Diagnosis, style: Style) -> str | None:
 
 def _remains(made: Diagnosis) -> str:
     if made.depends_on:
-        listed = "; ".join(f"{channel} over {' and '.join(names)}" for channel, names in made.depends_on[:6])
+        listed = "; ".join(over(channel, names) for channel, names in made.depends_on[:6])
         return f"Structure that no named effect explains, a description and not physics: {listed}."
     if made.remaining == "unknown":
         return "Not judged: no search was made, or none to its end."

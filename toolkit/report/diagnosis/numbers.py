@@ -1,8 +1,9 @@
-"""Numbers in the text of a diagnosis: few digits, and powers of ten only where a reader needs them."""
+"""Words and numbers in the text of a diagnosis: few digits, and powers of ten only where they are needed."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 _PLAIN = 1e7
 
@@ -16,3 +17,13 @@ def few(value: float, digits: int = 3) -> str:
     if math.isfinite(value) and 10.0**digits <= abs(value) < _PLAIN:
         return f"{value:.0f}"
     return f"{value:.{digits}g}"
+
+
+def over(channel: str, variables: Sequence[str]) -> str:
+    """Return what an output's mismatch depends on; where only its size tells, that it is too large.
+
+    >>> over("FY", ["SA", "FZ"]), over("FY", ["more than its stated noise"])
+    ('FY over SA and FZ', 'FY is off by more than its stated noise')
+    """
+    told = " and ".join(variables)
+    return f"{channel} is off by {told}" if told.startswith("more than") else f"{channel} over {told}"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import math
 from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -11,7 +12,7 @@ from toolkit.files import write_atomic
 from toolkit.report.diagnosis import figures
 from toolkit.report.diagnosis.chance import chance
 from toolkit.report.diagnosis.maps import size_maps
-from toolkit.report.diagnosis.numbers import few
+from toolkit.report.diagnosis.numbers import few, over
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -107,8 +108,8 @@ def _sentence(made: Diagnosis) -> str:
             told.append(f"<b>{escape(one.name + where + also)}</b>: {escape(one.statement)}")
         return "<br>".join(told)
     if made.verdict == "unknown":
-        told = [f"{channel} over {' and '.join(names)}" for channel, names in made.depends_on[:3]]
-        return escape(f"The mismatch depends on: {'; '.join(told)}.")
+        told = [over(channel, names) for channel, names in made.depends_on[:3]]
+        return escape(f"What remains: {'; '.join(told)}.")
     if made.skipped and made.verdict == "untestable":
         return escape(f"The budget was spent at: {made.skipped[0]}. Nothing can be said yet.")
     if made.verdict == "untestable":
@@ -192,9 +193,10 @@ def _where(result: Result) -> list[str]:
 
 
 def _place(one: Mismatch) -> str:
-    text = (
-        f"{one.channel}: {100 * one.share_of_variance:.0f} % of the refitted residual's variance is structure"
-    )
+    share = 100 * one.share_of_variance
+    text = f"{one.channel}: {share:.0f} % of the refitted residual's variance is structure"
+    if share < 0.5:
+        text = f"{one.channel}: the refitted residual is more than noise, and no variable alone explains it"
     for at in one.where[:1]:
         numbers = isinstance(at.start, float) and isinstance(at.end, float)
         ends = f"{few(at.start, 4)} to {few(at.end, 4)}" if numbers else str(at.start)  # type: ignore[arg-type]
@@ -209,7 +211,7 @@ def _held_out(made: Diagnosis) -> list[str]:
     rows = []
     for one in made.held_out:
         errors = (one.nominal_rmse, one.refitted_rmse, one.augmented_rmse, one.noise_floor)
-        told = [f"{value:.4g}" for value in errors]
+        told = [f"{value:.4g}" if math.isfinite(value) else "–" for value in errors]
         # Without an effect there is no error with it.
         rows.append((one.channel, one.unit, *(told if made.effects else (*told[:2], told[3]))))
     head = (
