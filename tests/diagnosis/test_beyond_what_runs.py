@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 
 from tests.diagnosis.cases import HEAD, TWO, carriage, write_case
 from toolkit.cli import diagnose as command
-from toolkit.diagnosis import search
+from toolkit.diagnosis import search, step
 from toolkit.diagnosis.case_read import read_case
 from toolkit.diagnosis.diagnose import diagnose
 from toolkit.errors import FitError
@@ -101,7 +101,8 @@ def test_a_fold_that_cannot_run_takes_its_candidate_away_and_no_other(tmp_path, 
         asked.append([one.effect.name for one in active])
         return refused() if "coulomb_friction" in asked[-1] else whole(problem, folds, active, made)
 
-    monkeypatch.setattr(search, "hold_out", without_friction)
+    for module in (search, step):
+        monkeypatch.setattr(module, "hold_out", without_friction)
     found = names(tmp_path)
     assert ["coulomb_friction"] in asked
     assert asked.index(["coulomb_friction"]) > 0  # after the simulation without effects
@@ -124,6 +125,7 @@ def test_an_effect_without_which_nothing_runs_is_kept(tmp_path, monkeypatch, can
         return made
 
     frames = {f"r{i}__csv": carriage(seed=i).assign(F=lambda df: df["F"] + 15) for i in range(2)}
-    monkeypatch.setattr(search, cannot, only_together)
+    for module in (search, step):
+        monkeypatch.setattr(module, cannot, only_together)
     assert sorted(names(tmp_path, **frames)) == ["coulomb_friction", "zero_offset"]
     assert left

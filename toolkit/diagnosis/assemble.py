@@ -19,12 +19,13 @@ from toolkit.diagnosis.answer import (
     recorded,
 )
 from toolkit.diagnosis.case import Case
-from toolkit.diagnosis.classes import equivalent_to
+from toolkit.diagnosis.classes import apart, equivalent_to
 from toolkit.diagnosis.locate import places
 from toolkit.diagnosis.model import Active
 from toolkit.diagnosis.power import not_found
-from toolkit.diagnosis.search import ALPHA, Search, Step
+from toolkit.diagnosis.search import ALPHA, Search
 from toolkit.diagnosis.sense import sense
+from toolkit.diagnosis.step import Step
 from toolkit.diagnosis.units_of import unit_of
 from toolkit.effects.creep import FROM_REST
 from toolkit.findings import Finding
@@ -326,16 +327,11 @@ def _floor(found: Search, name: str, sd: float | None) -> float:
 
 
 def _next(found: Search, effects: tuple[FoundEffect, ...], verdict: Verdict) -> tuple[str, ...]:
-    from toolkit.effects.catalogue import effects as catalogue
-
-    said = []
-    for one in effects:
-        if one.equivalent_to:
-            apart = dict.fromkeys(catalogue()[name].separates for name in (one.name, *one.equivalent_to))
-            said.append(
-                f"To tell {one.name} from {', '.join(one.equivalent_to)}: "
-                f"{'; '.join(text for text in apart if text)}."
-            )
+    said = [
+        f"To tell {one.name} from {', '.join(one.equivalent_to)}: {apart(one)}."
+        for one in effects
+        if one.equivalent_to
+    ]
     if verdict == "unknown":
         said += _to_find_it(found)
         beside = ", ".join(dict.fromkeys(one.active.effect.name for one in found.steps))

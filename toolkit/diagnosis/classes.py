@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from toolkit.diagnosis.answer import FoundEffect
 from toolkit.diagnosis.model import Active
 from toolkit.diagnosis.problem import Problem
-from toolkit.diagnosis.search import Step
+from toolkit.diagnosis.step import Step
+from toolkit.effects.catalogue import effects as catalogue
 
 _CLOSE = 3.0  # log-likelihood within which the data prefer neither
 _PULL = ("conicity", "camber_offset", "crosstalk")
@@ -17,6 +19,14 @@ def equivalent_to(problem: Problem, step: Step) -> tuple[str, ...]:
     names += _always(problem, step.active)
     own = step.active.effect.name
     return tuple(dict.fromkeys(name for name in names if name != own))
+
+
+def apart(found: FoundEffect) -> str:
+    """Return the measurements that would tell an effect from its class, and of which names each speaks."""
+    told: dict[str, list[str]] = {}
+    for name in (found.name, *found.equivalent_to):
+        told.setdefault(catalogue()[name].separates, []).append(name)
+    return "; ".join(f"{text} ({', '.join(names)})" for text, names in told.items() if text)
 
 
 def _always(problem: Problem, active: Active) -> list[str]:

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 
 _OUTER = 4  # times that the noise is estimated anew
 _BETTER = 0.02  # of the log-likelihood: less is no step worth another round
+_APART = 2.0  # of its own standard deviation: a larger difference of two solutions is none of chance
 _SAME = 0.05  # by which the coloured fit's residual variance may exceed the plain one's
 
 
@@ -82,6 +83,7 @@ def fit(
     layouts = {name: problem.layout(name, rows) for name in problem.names}
     x = space.begin([one.value for one in problem.free] if start is None else start)
     made = _coloured(space, layouts, x, noise, 2 if plain else rounds, known)
+    other = None
     if plain is None:
         other = _plain(space, layouts, made, known)
         plain = other is not None and _absorbs(made, other, layouts)
@@ -96,7 +98,7 @@ def fit(
         simulated=chosen.simulated,
         noise=chosen.noise,
         log_posterior=chosen.score,
-        covariance=_covariance(space, chosen, layouts, plain=plain),
+        covariance=_covariance(space, chosen, None if plain else other, layouts, plain=plain),
         rows=rows,
         plain=plain,
     )
@@ -241,10 +243,23 @@ def _score(
 
 
 def _covariance(
-    space: Space, solved: _Solved, layouts: dict[str, Layout], *, plain: bool
+    space: Space, solved: _Solved, other: _Solved | None, layouts: dict[str, Layout], *, plain: bool
 ) -> NDArray[np.float64]:
-    J = space.around(solved.x)[1] if len(solved.x) else {}
+    """Return the covariance of a solution, with what the plain ``other`` disagrees with it beside.
+
+    Under the right model the two differ as far as the plain one is the less sure. A parameter by which they
+    differ by more depends on what the noise was taken for, and its uncertainty has that difference in it.
+    """
+    if not len(solved.x):
+        return np.zeros((0, 0))
+    J = space.around(solved.x)[1]
     prior = np.zeros((len(space.problem.free), len(solved.x)))
     for i, one in enumerate(space.problem.free):
         prior[i, i] = space.sizes[i] / (one.sd or 1.0)
-    return covariance(J, prior, space.sizes, layouts, solved.noise, plain=plain)
+    made = covariance(J, prior, space.sizes, layouts, solved.noise, plain=plain)
+    if other is not None:
+        unsure = np.diag(covariance(J, prior, space.sizes, layouts, other.noise, plain=True))
+        apart = ((other.x - solved.x) * space.sizes) ** 2
+        expected = np.maximum(unsure - np.diag(made), 0.0)
+        made = made + np.diag(np.where(apart > _APART**2 * expected, apart, 0.0))
+    return made

@@ -9,18 +9,18 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolkit.diagnosis.absorbed import Key, absorbed
+from toolkit.diagnosis.absorbed import absorbed
 from toolkit.diagnosis.candidates import Candidate, candidates
 from toolkit.diagnosis.fit import Fit, fit, replace_effects
 from toolkit.diagnosis.folds import Folds, HeldOut, folds_of, hold_out, matters
 from toolkit.diagnosis.lattice import lattice_of
-from toolkit.diagnosis.model import Active
 from toolkit.diagnosis.nuisance import INPUT_NOISE
 from toolkit.diagnosis.null import search_p_values
 from toolkit.diagnosis.problem import Problem, without_outliers
 from toolkit.diagnosis.refine import refined, without
 from toolkit.diagnosis.remainder import NOTICED, StructureFound, remainder
 from toolkit.diagnosis.screen import Scored, Screen, best_of
+from toolkit.diagnosis.step import LEAST_GAIN, Step, best_step, joint_fits, place, step_groups
 from toolkit.errors import FitError
 
 if TYPE_CHECKING:
@@ -29,31 +29,7 @@ if TYPE_CHECKING:
 ALPHA = 0.003  # of the whole search, a step
 MOST_EFFECTS = 4
 _SHARPENED = 30  # starts whose gain is computed with the noise estimated anew
-_FAR_BEHIND = 0.25  # of the best gain: a candidate below cannot win a joint fit
 _LATER = 0.05  # of the held-out mean square: what an effect beside others must take away
-_MOST = 0.5  # of the held-out mean square: what a candidate far behind must take away
-_REFINED = 8  # candidates that are fitted jointly, of those that screening ranks first
-_BOUND = 1e-3
-_LEAST_GAIN = 1.5  # of the held-out log score
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Rival:
-    """A candidate fitted jointly in an effect's place: its log-likelihood less that of the chosen one."""
-
-    active: Active
-    difference: float
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Step:
-    """An effect that was found: its evidence, and what else would explain the same."""
-
-    active: Active
-    p_value: float
-    held_out_gain: float
-    gain: float
-    rivals: tuple[Rival, ...]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -130,8 +106,8 @@ def search(problem: Problem, *, seed: int, budget: Budget) -> Search:
         for turn in range(MOST_EFFECTS + 1):
             budget.check(f"step {turn + 1}: screening {len(listed)} candidates")
             screen = Screen.of(problem, base)
-            taken = {_place(one) for one in base.active}
-            left = [each for each in listed if _place(each.active) not in taken and _is_sought(each, turn)]
+            taken = {place(one) for one in base.active}
+            left = [each for each in listed if place(each.active) not in taken and _is_sought(each, turn)]
             screen.prepare(left)
             scored = screen.sharpened([one for each in left for one in screen.score(each)], _SHARPENED)
             ranked = best_of(scored)
@@ -148,10 +124,11 @@ def search(problem: Problem, *, seed: int, budget: Budget) -> Search:
             found = None
             significant = [one for one in ranked if p_of[id(one)] < ALPHA]
             hidden = absorbed(problem, base, left) if significant else frozenset()
-            for promising, least in _groups(significant, hidden, _LATER if turn else 2 * NOTICED):
+            for promising, least in step_groups(significant, hidden, _LATER if turn else 2 * NOTICED):
                 told = ", ".join(dict.fromkeys(one.candidate.name for one in promising))
                 budget.check(f"step {turn + 1}: joint fits of {told}")
-                found = _best_step(problem, folds, base, held_base, promising, p_of, least)
+                joint = joint_fits(problem, base, promising)
+                found = best_step(problem, folds, base, held_base, joint, p_of, least)
                 if found is not None:
                     break
             if found is None:
@@ -167,8 +144,8 @@ def search(problem: Problem, *, seed: int, budget: Budget) -> Search:
     except BudgetSpentError as error:
         skipped.append(str(error))
     # Every effect with its values of the last joint fit, not of the step that found it.
-    values = {_place(one): one for one in base.active}
-    steps = [replace(one, active=values[_place(one.active)]) for one in steps]
+    values = {place(one): one for one in base.active}
+    steps = [replace(one, active=values[place(one.active)]) for one in steps]
     return Search(
         problem=problem,
         folds=folds,
@@ -202,23 +179,6 @@ def _is_nuisance(step: Step, steps: Sequence[Step]) -> bool:
     )
 
 
-def _shapes(one: Active) -> int:
-    """Return how many parameters only shape an effect: they make it no less able to imitate another."""
-    return sum(each.off is None and not each.ends_count for each in one.searched)
-
-
-def _at_bound(one: Active) -> bool:
-    """Tell whether a parameter ends at a bound other than zero: then the effect only imitates another."""
-    for parameter in one.searched:
-        if parameter.ends_count:
-            continue
-        value = one.values[parameter.name]
-        for bound in parameter.bounds:
-            if math.isfinite(bound) and bound != 0 and abs(value - bound) < _BOUND * abs(bound):
-                return True
-    return False
-
-
 def _is_sought(one: Candidate, turn: int) -> bool:
     """Tell whether a candidate is searched for.
 
@@ -226,91 +186,6 @@ def _is_sought(one: Candidate, turn: int) -> bool:
     comes first or second.
     """
     return one.name != "quantisation" and not (one.discrete and turn > 1)
-
-
-def _groups(
-    ranked: Sequence[Scored], hidden: frozenset[Key], least: float
-) -> list[tuple[Sequence[Scored], float]]:
-    """Return candidates in the order of joint fits, with the least share of the error that each must take.
-
-    Those far behind the first cannot win against it; where none of the first can be fitted, they stand for
-    themselves, and have to explain most of what is left. A later effect has to be seen beside the first,
-    whose own model is never exact.
-    """
-    if not ranked:
-        return []
-    near = min(_FAR_BEHIND * ranked[0].gain, ranked[0].gain - 40)
-    first = [one for one in ranked if one.gain > near][:_REFINED]
-    # What the refit may have absorbed is fitted with the first, however small it looks from there.
-    first += [one for one in ranked if one.candidate.key in hidden and all(one is not each for each in first)]
-    behind = [one for one in ranked if all(one is not each for each in first)][:_REFINED]
-    return [(first, least), *([(behind, _MOST)] if behind else [])]
-
-
-def _best_step(
-    problem: Problem,
-    folds: Folds,
-    base: Fit,
-    held_base: HeldOut,
-    promising: Sequence[Scored],
-    p_of: dict[int, float],
-    least: float,
-) -> tuple[Fit, HeldOut, Step] | None:
-    weight = 0.5 * math.log(sum(int(one.sum()) for one in problem.kept.values()))
-    tried: list[tuple[float, Scored, Fit]] = []
-    for one in promising:
-        made = _fitted(problem, base, one.active)
-        if made is None:
-            continue
-        penalty = weight * sum(not each.ends_count for each in one.active.searched)
-        tried.append((made.log_posterior - penalty, one, made))
-    tried.sort(key=lambda each: -each[0])
-    for score, one, made in tried[:3]:
-        try:
-            held = hold_out(problem, folds, made.active, made)
-        except FitError:
-            continue
-        gain = held.total - held_base.total
-        if gain < _LEAST_GAIN or score - base.log_posterior < _LEAST_GAIN:
-            continue
-        # One that a later effect drives to its bound is no better than one that starts there.
-        if any(_at_bound(each) for each in made.active) or not matters(problem, held_base, held, least):
-            continue
-        rivals = tuple(
-            Rival(
-                active=other_fit.active[-1],
-                difference=other_score - score + weight * (_shapes(other.active) - _shapes(one.active)),
-            )
-            for other_score, other, other_fit in tried
-            if other is not one and other.candidate.name != INPUT_NOISE.name
-        )
-        step = Step(
-            active=made.active[-1],
-            p_value=p_of[id(one)],
-            held_out_gain=gain,
-            gain=made.log_posterior - base.log_posterior,
-            rivals=rivals,
-        )
-        return made, held, step
-    return None
-
-
-def _fitted(problem: Problem, base: Fit, added: Active) -> Fit | None:
-    """Return the joint fit with one effect more, None where the simulation runs with no part of it.
-
-    Screening is linear: the size to which it leads may be beyond what a simulation can run with, where the
-    true one is not.
-    """
-    for share in (1.0, 0.5, 0.25, 0.125) if added.searched else (1.0,):
-        values = dict(added.values)
-        for one in added.searched:
-            if one.off is not None and math.isfinite(one.off):
-                values[one.name] = one.off + share * (added.values[one.name] - one.off)
-        try:
-            return fit(problem, (*base.active, replace(added, values=values)), start=base.p)
-        except FitError:
-            continue
-    return None
 
 
 def _stepped(
@@ -361,16 +236,12 @@ def _pruned(
             held = hold_out(problem, folds, made.active, made)
         except FitError:  # what is left cannot be simulated: the effect is needed
             continue
-        if held_base.total - held.total < _LEAST_GAIN:
+        if held_base.total - held.total < LEAST_GAIN:
             base, held_base = made, held
-            kept = {_place(one) for one in rest}
-            steps = [one for one in steps if _place(one.active) in kept]
+            kept = {place(one) for one in rest}
+            steps = [one for one in steps if place(one.active) in kept]
             return _pruned(problem, folds, base, held_base, steps)
     return base, held_base, steps
-
-
-def _place(one: Active) -> tuple[object, ...]:
-    return (one.effect.name, one.channel, one.source, one.runs)
 
 
 def _as_declared(problem: Problem) -> Fit:
