@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from toolkit.diagnosis.assemble import _to_find_it
+from toolkit.diagnosis.classes import apart
 from toolkit.diagnosis.locate import places
 
 
@@ -46,3 +47,11 @@ def test_the_variable_that_a_mismatch_depends_on_stands_before_a_narrower_range(
     signal = v * np.abs(v)
     first = [places(problem, "F", signal, np.cos(t), depends)[0].variable for depends in ((), ("time",))]
     assert first == ["v", "time"]
+
+
+def test_a_measurement_names_the_effects_that_it_is_for():
+    told = apart(Of(name="viscous_damping", equivalent_to=("quadratic_drag", "coulomb_friction")))
+    # Both need what physics asks of a law of speed: three speeds, said once.
+    assert told.count("three speeds") == 1
+    assert "(viscous_damping, quadratic_drag)" in told
+    assert told.endswith("(coulomb_friction)")

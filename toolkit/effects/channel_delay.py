@@ -25,7 +25,7 @@ EFFECT = Effect(
     equation="y = y_model(t - delay)",
     reference="Ljung, System Identification, 1999, 4.2",
     signature="like a lag, but the same time at all loads and speeds; may be negative",
-    separates="two steering rates part it from backlash, two speeds from relaxation",
+    separates="motion at two rates: a delay is one time at both; a second speed parts it from relaxation",
     parameters=(
         EffectParameter(
             name="delay",
