@@ -11,6 +11,7 @@ from scipy.optimize import brentq
 
 from tests.diagnosis.cases import write_case
 from toolkit.diagnosis.case_read import read_case
+from toolkit.diagnosis.diagnose import diagnose
 from toolkit.diagnosis.load import model_of
 from toolkit.diagnosis.model import Active
 from toolkit.effects.catalogue import effects
@@ -81,3 +82,55 @@ def test_less_than_the_friction_only_bends_the_bristle(tmp_path, share):
 def test_more_than_the_friction_pulls_it_along(tmp_path):
     t, _, v = slid(tmp_path, 1.5 * COULOMB, 0.0)
     assert np.gradient(v, t)[t > 1][:-1] == pytest.approx(0.5 * COULOMB, rel=1e-3)
+
+
+TORSION = """
+def rhs(t, x, u, p):
+    return [x[1], u["M"] / p["J"] - p["k"] / p["J"] * x[0] - p["c"] / p["J"] * x[1]]
+def outputs(x, u, p):
+    return {"th": x[0]}
+def initial(p):
+    return [0.0, 0.0]
+"""
+TORSION_CASE = """schema = 1
+[simulation]
+kind = "ode"
+path = "sim.py"
+states = ["th", "om"]
+force_terms = { om = "rad/s^2" }
+[simulation.parameters]
+J = { value = 0.5, unit = "kg*m^2" }
+k = { value = 20.0, unit = "N*m/rad", sd = 1.0 }
+c = { value = 0.3, unit = "N*m*s/rad", sd = 0.1 }
+[recording]
+time = "t"
+[recording.channels]
+t = { unit = "s", role = "time" }
+M = { unit = "N*m", role = "input" }
+th = { unit = "rad", role = "output", sd = 0.004 }
+"""
+
+
+def test_friction_that_a_refitted_damping_hides_is_found(tmp_path):
+    # A torsion pendulum, driven below and above its resonance. By steps of a thousandth of a period, the
+    # torque of 0.24 rad/s^2 against the motion, on a body that never rests.
+    frames, text = {}, TORSION_CASE
+    for i in range(2):
+        t = np.arange(0, 12, 0.04)
+        fine = np.linspace(0, t[-1], 60 * (t.size - 1) + 1)
+        torque = np.interp(fine, t, 1.5 * np.sin(2.2 * t + i) + 0.9 * np.sin(7.1 * t + 2 * i))
+        th, om, path = 0.0, 0.0, []
+        h = fine[1]
+        for m in torque:
+            path.append(th)
+            om += h * (m / 0.5 - 20.6 / 0.5 * th - 0.34 / 0.5 * om - 0.24 * np.tanh(om / 2e-3))
+            th += h * om
+        noise = np.random.default_rng(i).normal(0, 0.004, t.size)
+        frames[f"r{i}__csv"] = pd.DataFrame({"t": t, "M": torque[::60], "th": np.array(path)[::60] + noise})
+        text += f'[[recording.run]]\nfile = "r{i}.csv"\n'
+    made = diagnose(read_case(write_case(tmp_path, text, simulator=TORSION, **frames)), None).diagnosis
+    (one,) = made.effects
+    assert one.name == "coulomb_friction"
+    low, high = one.parameters[0].ci95
+    assert low - (high - low) / 2 < 0.24 < high + (high - low) / 2
+    assert made.held_out[0].augmented_rmse == pytest.approx(0.004, rel=0.1)

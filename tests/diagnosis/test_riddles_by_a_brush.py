@@ -113,6 +113,19 @@ def test_a_makers_flat_table_against_a_drum_is_its_curvature(tmp_path):
         assert one.augmented_rmse < 1.1 * one.noise_floor < 0.5 * one.nominal_rmse
 
 
+def test_a_soft_carcass_loses_more_of_its_moment_to_the_drum_and_no_other_of_its_force(tmp_path):
+    # Slopes of the force by 0.86, of the moment by 0.86^1.9: a carcass that bends takes from the trail too.
+    frame, left = steps(), 0.86
+    FY, MZ = brush(frame["SA"], frame["FZ"], shorter=np.sqrt(left))
+    runs = [noisy(20 + i, frame, FY, MZ * left ** (1.9 - 1.5)) for i in range(3)]
+    found = diagnose(read_case(case(tmp_path, runs)), None).diagnosis
+    effect, _, parameters = only(found)
+    assert effect.name == "drum_curvature"
+    # the shorter patch slides a little earlier too, which is no part of a slope
+    assert parameters["reduction"].value == pytest.approx(1 - left, rel=0.1)
+    assert parameters["moment_exponent"].value == pytest.approx(1.9, rel=0.1)
+
+
 def test_the_same_brush_on_the_flat_road_misses_nothing(tmp_path):
     frame = steps()
     runs = [noisy(10 + i, frame, *brush(frame["SA"], frame["FZ"])) for i in range(3)]

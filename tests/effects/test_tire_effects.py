@@ -69,6 +69,13 @@ def test_drum_curvature_scales_the_slopes_and_leaves_the_peak():
     # force as the patch length squared, moment as its cube: 0.8 and 0.8 ^ 1.5
     assert slope(made.FY) / slope(base.FY) == pytest.approx(0.8, rel=5e-3)
     assert slope(made.MZ) / slope(base.MZ) == pytest.approx(0.8**1.5, rel=1e-2)
+    soft = forces(
+        effect("drum_curvature"),
+        {"reduction": 0.2, "moment_exponent": 1.9},
+        driven(ANGLES, t=np.arange(float(len(ANGLES)))),
+    )
+    assert slope(soft.FY) / slope(base.FY) == pytest.approx(0.8, rel=5e-3)
+    assert slope(soft.MZ) / slope(base.MZ) == pytest.approx(0.8**1.9, rel=1e-2)
     far = driven(np.full(1, 1.2), t=np.zeros(1))
     peak = forces(effect("drum_curvature"), {"reduction": 0.2}, far).FY
     assert peak == pytest.approx(-PEAK * NOMINAL, rel=1e-9)

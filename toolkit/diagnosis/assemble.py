@@ -21,9 +21,10 @@ from toolkit.diagnosis.answer import (
 from toolkit.diagnosis.case import Case
 from toolkit.diagnosis.classes import apart, equivalent_to
 from toolkit.diagnosis.locate import places
+from toolkit.diagnosis.look import ALPHA
 from toolkit.diagnosis.model import Active
 from toolkit.diagnosis.power import not_found
-from toolkit.diagnosis.search import ALPHA, Search
+from toolkit.diagnosis.search import Search
 from toolkit.diagnosis.sense import sense
 from toolkit.diagnosis.step import Step
 from toolkit.diagnosis.units_of import unit_of
@@ -64,7 +65,7 @@ def answer_of(case: Case, found: Search, told: tuple[Finding, ...]) -> Diagnosis
         effects=effects,
         nominal_parameters=nominal,
         held_out=_held_out(found, unknown=unknown),
-        held_out_by="run" if found.folds.by_run else "contiguous blocks of one run",
+        held_out_by=found.folds.told(len(found.problem.runs)),
         depends_on=tuple((one.output, one.variables) for one in found.structure),
         not_found=not_found(found.screen, found.scored, named, alpha=ALPHA / tests, units=units),
         next_measurements=_next(found, effects, verdict),

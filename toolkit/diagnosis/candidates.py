@@ -17,6 +17,7 @@ from toolkit.diagnosis.nuisance import INPUT_NOISE
 from toolkit.diagnosis.units_of import channel_unit
 from toolkit.effects.catalogue import effects
 from toolkit.effects.creep import FROM_REST
+from toolkit.effects.drum_curvature import EXPONENT
 from toolkit.effects.effect import Effect, EffectParameter
 from toolkit.effects.thermal_friction import TEMPERATURES
 from toolkit.effects.unit_error import factors_for
@@ -117,6 +118,8 @@ def _as_known(problem: Problem, effect: Effect) -> Effect:
     if effect.name == "load_friction" and getattr(problem.model, "nominal_load_N", None) is not None:
         needless = {"reference"}  # the tire's own file states the load
         effect = replace(effect, equation="friction = 1 + sensitivity * (FZ - FZ0)/FZ0, FZ0 the nominal load")
+    if effect.name == "drum_curvature" and all(one.name != "MZ" for one in problem.model.outputs):
+        needless = {EXPONENT}
     if effect.name == "thermal_friction":
         recorded = {one.name for one in problem.case.drivers} & set(TEMPERATURES)
         needless = {"time_constant" if recorded else "reference"}
@@ -172,17 +175,32 @@ def _starts(problem: Problem, active: Active) -> tuple[Start, ...]:
                 values = fixed | {one.name: value * scales[one.name]}
                 made.append(Start(values=values, directions=(values,), amplitudes=(one.name,)))
             continue
-        directions, names = [], []
-        for one in amplitudes:
-            alone = fixed | off | {one.name: _middle(one) * scales[one.name]}
-            for turned in (0.0, 90.0) if one.name in phases else (None,):
-                directions.append(alone if turned is None else alone | {phases[one.name]: turned})
-                names.append(one.name)
-        values = fixed | {one.name: _middle(one) * scales[one.name] for one in amplitudes}
-        made.append(
-            Start(values=values, directions=tuple(directions), amplitudes=tuple(names), phases=phases)
-        )
+        for share in _shares(problem, effect):
+            sizes = {one.name: share * _middle(one) * scales[one.name] for one in amplitudes}
+            directions, names = [], []
+            for one in amplitudes:
+                alone = fixed | off | {one.name: sizes[one.name]}
+                for turned in (0.0, 90.0) if one.name in phases else (None,):
+                    directions.append(alone if turned is None else alone | {phases[one.name]: turned})
+                    names.append(one.name)
+            made.append(
+                Start(
+                    values=fixed | sizes, directions=tuple(directions), amplitudes=tuple(names), phases=phases
+                )
+            )
     return tuple(made)
+
+
+def _shares(problem: Problem, effect: Effect) -> tuple[float, ...]:
+    """Return the shares of an effect's usual size at which its response is taken.
+
+    A motion answers a small force in proportion; one that is as large as it may ever be has another phase, or
+    comes to rest.
+    """
+    from toolkit.diagnosis.kinds.ode import OdeModel
+
+    moves = isinstance(problem.model, OdeModel) and effect.stage == "dynamics"
+    return (1.0, 0.1) if moves and effect.name not in (ripple.NAME, "overflow") else (1.0,)
 
 
 def _tried(problem: Problem, active: Active, one: EffectParameter, scale: float) -> list[float]:
@@ -196,8 +214,8 @@ def _grid(problem: Problem, one: EffectParameter) -> tuple[float, ...]:
     from toolkit.diagnosis.kinds.ode import OdeModel
 
     starts = one.starts or (_middle(one),)
-    # So short a bristle is stiff to integrate, and a longer one finds its way to it.
-    return starts[1:2] if one.name == "presliding" and isinstance(problem.model, OdeModel) else starts
+    # The longest bristle of an equation that turns at every row is a spring.
+    return starts[:2] if one.name == "presliding" and isinstance(problem.model, OdeModel) else starts
 
 
 def _histories(effect: Effect) -> tuple[dict[str, float], ...]:

@@ -171,12 +171,22 @@ def _solve(
 def replace_effects(problem: Problem, made: Fit, active: tuple[Active, ...]) -> Fit:
     """Return a fit with other effects in it that nothing is fitted of: its covariance has them as known."""
     simulated = problem.simulate(made.p, active)
-    width = len(problem.free) + sum(len(one.searched) for one in active)
-    covariance = np.zeros((width, width))
-    n = len(made.covariance)
-    covariance[:n, :n] = made.covariance
+    before, after = _columns(problem, made.active), _columns(problem, active)
+    covariance = np.zeros((len(after), len(after)))
+    there = [i for i, one in enumerate(after) if one in before]
+    known = [before.index(after[i]) for i in there]
+    covariance[np.ix_(there, there)] = made.covariance[np.ix_(known, known)]
     residual = {name: problem.observed[name] - one for name, one in simulated.items()}
     return replace(made, active=active, simulated=simulated, residual=residual, covariance=covariance)
+
+
+def _columns(problem: Problem, active: Sequence[Active]) -> list[tuple[object, ...]]:
+    """Return what tells the parameters of a fit apart, in the order of its covariance."""
+    made: list[tuple[object, ...]] = [(one.name,) for one in problem.free]
+    for one in active:
+        at = (one.effect.name, one.channel, one.source, one.runs)
+        made += [(*at, each.name) for each in one.searched]
+    return made
 
 
 def noise_of(

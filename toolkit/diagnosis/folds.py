@@ -26,6 +26,12 @@ class Folds:
     held: tuple[NDArray[np.bool_], ...]
     by_run: bool
 
+    def told(self, runs: int) -> str:
+        """Return what is held out, in words."""
+        if self.by_run:
+            return "run"
+        return "contiguous blocks of one run" if runs == 1 else "contiguous blocks of the runs"
+
 
 def folds_of(problem: Problem, made: Fit) -> Folds:
     """Return the folds of a problem, at most five, runs dealt out in turn.
@@ -102,5 +108,23 @@ def matters(problem: Problem, before: HeldOut, after: HeldOut, least: float) -> 
         observed = problem.observed[name][kept]
         one, other = (observed - each.simulated[name][kept] for each in (before, after))
         if np.mean(other**2) < np.mean(one**2) * (1 - least) or np.var(other) < np.var(one) * (1 - least):
+            return True
+    return False
+
+
+def beyond_form(problem: Problem, refitted: HeldOut, before: HeldOut, after: HeldOut, form: float) -> bool:
+    """Tell whether some output's error falls by more than the form of what was found before may leave.
+
+    Parameters
+    ----------
+    refitted, before : without any effect, and with those that were found
+    form : how far an effect's form is off, as a share of what the effect is
+    """
+    for name, kept in problem.kept.items():
+        observed = problem.observed[name][kept]
+        none, one, other = (
+            float(np.mean((observed - each.simulated[name][kept]) ** 2)) for each in (refitted, before, after)
+        )
+        if one - other > form**2 * max(none - one, 0.0):
             return True
     return False

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 _GAP = 3.0  # median steps of time, beyond which a series begins anew
 _FEWEST = 24  # values of a segment below which nothing can be told of its colour
 _ORDERS = 8
+_MISMATCH = 3.0  # times a stated noise: a larger residual is mostly no noise
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -127,6 +128,10 @@ def fit_noise(
     if n == 0:
         return Noise(reflection=(), sd=floor)
     variance = float(np.mean(residual**2))
+    if sd is not None and variance > (_MISMATCH * sd) ** 2:
+        # Most of it is none of the sensor's. Taken as coloured noise, a smooth mismatch foretells itself, and
+        # what mends all but a jagged rest of it would look worse than nothing.
+        return Noise(reflection=(), sd=math.sqrt(variance * n / max(n - used, 1)))
     reflection: list[float] = []
     best, best_score = 0, math.log(max(variance, 1e-300))
     usable = [one for one in where.segments if one.stop - one.start >= _FEWEST]

@@ -10,25 +10,24 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from toolkit.diagnosis.absorbed import absorbed
-from toolkit.diagnosis.candidates import Candidate, candidates
+from toolkit.diagnosis.candidates import candidates
 from toolkit.diagnosis.fit import Fit, fit, replace_effects
 from toolkit.diagnosis.folds import Folds, HeldOut, folds_of, hold_out, matters
 from toolkit.diagnosis.lattice import lattice_of
+from toolkit.diagnosis.look import look
 from toolkit.diagnosis.nuisance import INPUT_NOISE
-from toolkit.diagnosis.null import search_p_values
 from toolkit.diagnosis.problem import Problem, without_outliers
 from toolkit.diagnosis.refine import refined, without
 from toolkit.diagnosis.remainder import NOTICED, StructureFound, remainder
-from toolkit.diagnosis.screen import Scored, Screen, best_of
+from toolkit.diagnosis.screen import Scored, Screen
 from toolkit.diagnosis.step import LEAST_GAIN, Step, best_step, joint_fits, place, step_groups
 from toolkit.errors import FitError
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-ALPHA = 0.003  # of the whole search, a step
 MOST_EFFECTS = 4
-_SHARPENED = 30  # starts whose gain is computed with the noise estimated anew
+_SEEN = 0.01  # of the noise: an effect that never moves an output by more is not there
 _LATER = 0.05  # of the held-out mean square: what an effect beside others must take away
 
 
@@ -99,22 +98,14 @@ def search(problem: Problem, *, seed: int, budget: Budget) -> Search:
     base = refitted
     held_base = held_refitted = hold_out(problem, folds, (), refitted)
     screen = Screen.of(problem, base)
-    scored: list[Scored] = []
+    scored: tuple[Scored, ...] = ()
     before: tuple[StructureFound, ...] = ()
     structure: tuple[StructureFound, ...] = ()
     try:
         for turn in range(MOST_EFFECTS + 1):
             budget.check(f"step {turn + 1}: screening {len(listed)} candidates")
-            screen = Screen.of(problem, base)
-            taken = {place(one) for one in base.active}
-            left = [each for each in listed if place(each.active) not in taken and _is_sought(each, turn)]
-            screen.prepare(left)
-            scored = screen.sharpened([one for each in left for one in screen.score(each)], _SHARPENED)
-            ranked = best_of(scored)
-            p_values = search_p_values(
-                screen, [one.block for one in scored], [one.gain * one.trust for one in scored], seed + turn
-            )
-            p_of = {id(one): p for one, p in zip(scored, p_values, strict=True)}
+            seen = look(problem, base, listed, turn=turn, seed=seed + turn)
+            screen, scored = seen.screen, seen.scored
             budget.check(f"step {turn + 1}: structure of the residual")
             structure = remainder(problem, screen, base, seed + 100 + turn)
             if turn == 0:
@@ -122,13 +113,12 @@ def search(problem: Problem, *, seed: int, budget: Budget) -> Search:
             if turn == MOST_EFFECTS:
                 break
             found = None
-            significant = [one for one in ranked if p_of[id(one)] < ALPHA]
-            hidden = absorbed(problem, base, left) if significant else frozenset()
-            for promising, least in step_groups(significant, hidden, _LATER if turn else 2 * NOTICED):
+            hidden = absorbed(problem, base, seen.left) if seen.significant else frozenset()
+            for promising, least in step_groups(seen.significant, hidden, _LATER if turn else 2 * NOTICED):
                 told = ", ".join(dict.fromkeys(one.candidate.name for one in promising))
                 budget.check(f"step {turn + 1}: joint fits of {told}")
                 joint = joint_fits(problem, base, promising)
-                found = best_step(problem, folds, base, held_base, joint, p_of, least)
+                found = best_step(problem, folds, base, held_base, joint, seen.p_of, least, held_refitted)
                 if found is not None:
                     break
             if found is None:
@@ -143,6 +133,7 @@ def search(problem: Problem, *, seed: int, budget: Budget) -> Search:
             base, held_base, steps = _pruned(problem, folds, base, held_base, steps)
     except BudgetSpentError as error:
         skipped.append(str(error))
+    base, steps = _with_a_size(problem, base, steps)
     # Every effect with its values of the last joint fit, not of the step that found it.
     values = {place(one): one for one in base.active}
     steps = [replace(one, active=values[place(one.active)]) for one in steps]
@@ -158,7 +149,7 @@ def search(problem: Problem, *, seed: int, budget: Budget) -> Search:
         held_refitted=held_refitted,
         held_augmented=held_base,
         screen=screen,
-        scored=tuple(scored),
+        scored=scored,
         skipped=tuple(skipped),
     )
 
@@ -177,15 +168,6 @@ def _is_nuisance(step: Step, steps: Sequence[Step]) -> bool:
         or (one.effect.name == "hysteresis" and offset <= 0.5 * one.values["width"])
         for one in beside
     )
-
-
-def _is_sought(one: Candidate, turn: int) -> bool:
-    """Tell whether a candidate is searched for.
-
-    Coarse steps have a test of their own; what is there or not (a sign, a swap, a unit) is so gross that it
-    comes first or second.
-    """
-    return one.name != "quantisation" and not (one.discrete and turn > 1)
 
 
 def _stepped(
@@ -242,6 +224,25 @@ def _pruned(
             steps = [one for one in steps if place(one.active) in kept]
             return _pruned(problem, folds, base, held_base, steps)
     return base, held_base, steps
+
+
+def _with_a_size(problem: Problem, base: Fit, steps: list[Step]) -> tuple[Fit, list[Step]]:
+    """Return a hypothesis without effects that a later one left nothing to do."""
+    for step in steps:
+        rest = without(base.active, step.active)
+        try:
+            bare = problem.simulate(base.p, rest)
+        except (FitError, BudgetSpentError):  # the simulation needs it, or there is no time to look
+            continue
+        moved = {name: one - bare[name] for name, one in base.simulated.items()}
+        if all(
+            float(np.abs(one[problem.kept[name]]).max(initial=0.0)) < _SEEN * base.noise[name].marginal_sd
+            for name, one in moved.items()
+        ):
+            kept = {place(one) for one in rest}
+            left = [one for one in steps if place(one.active) in kept]
+            return _with_a_size(problem, replace_effects(problem, base, rest), left)
+    return base, steps
 
 
 def _as_declared(problem: Problem) -> Fit:

@@ -6,9 +6,11 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from toolkit.diagnosis.absorbed import Key
 from toolkit.diagnosis.fit import Fit, fit
-from toolkit.diagnosis.folds import Folds, HeldOut, hold_out, matters
+from toolkit.diagnosis.folds import Folds, HeldOut, beyond_form, hold_out, matters
 from toolkit.diagnosis.model import Active
 from toolkit.diagnosis.nuisance import INPUT_NOISE
 from toolkit.diagnosis.problem import Problem
@@ -20,6 +22,16 @@ _MOST = 0.5  # of the held-out mean square: what a candidate far behind must tak
 _REFINED = 8  # candidates that are fitted jointly, of those that screening ranks first
 _TRIED = 3  # of the joint fits
 _BOUND = 1e-3
+# By how much of what it does an effect's law may be off: what it leaves then is no effect of its own. One
+# factor and one exponent for a patch on a drum are off by up to a tenth beside bristles on a carcass.
+_FORM = {"drum_curvature": 0.1} | dict.fromkeys(
+    (
+        "relaxation thermal_friction wear load_friction speed_friction viscoelastic_settling turn_slip "
+        "surface_friction pressure_change coulomb_friction viscous_damping quadratic_drag cubic_stiffness"
+    ).split(),
+    0.03,
+)
+_SIGNAL = 0.5  # of an output in its right unit: what else it may have in it
 LEAST_GAIN = 1.5  # of the held-out log score
 
 
@@ -90,6 +102,7 @@ def best_step(
     joint: Sequence[Joint],
     p_of: Mapping[int, float],
     least: float,
+    refitted: HeldOut,
 ) -> tuple[Fit, HeldOut, Step] | None:
     """Return the first of some joint fits that stands on what it has not seen, None where none does.
 
@@ -98,7 +111,9 @@ def best_step(
     joint : the best first; three of them are tried
     p_of : p-value of every candidate, by the identity of its entry
     least : share of an output's held-out mean square that it must take away
+    refitted : the held-out rows without any effect
     """
+    form = max((_FORM.get(one.effect.name, 0.0) for one in base.active), default=0.0)
     for one in joint[:_TRIED]:
         made = one.fit
         try:
@@ -111,6 +126,10 @@ def best_step(
         # One that a later effect drives to its bound is no better than one that starts there.
         if any(at_bound(each) for each in made.active) or not matters(problem, held_base, held, least):
             continue
+        if not beyond_form(problem, refitted, held_base, held, form):
+            continue
+        if made.active[-1].effect.name == "unit_error" and not _shows(problem, held, made.active[-1]):
+            continue
         step = Step(
             active=made.active[-1],
             p_value=p_of[id(one.scored)],
@@ -120,6 +139,17 @@ def best_step(
         )
         return made, held, step
     return None
+
+
+def _shows(problem: Problem, held: HeldOut, one: Active) -> bool:
+    """Tell whether an output in another unit has the signal in it, and is not only made small by a factor."""
+    name = str(one.channel)
+    if name not in problem.names:
+        return True
+    kept = problem.kept[name]
+    simulated = held.simulated[name][kept]
+    left = problem.observed[name][kept] - simulated
+    return float(np.mean(left**2)) < _SIGNAL**2 * float(np.mean(simulated**2))
 
 
 def rivals(problem: Problem, chosen: Joint, joint: Sequence[Joint]) -> tuple[Rival, ...]:

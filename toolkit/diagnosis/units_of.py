@@ -43,7 +43,8 @@ def _motion(case: Case, model: Model, active: Active) -> tuple[str, str, str]:
         state = str(active.channel)
         position = model.position_of(state)  # type: ignore[attr-defined]
         force = forces.get(state) or f"{channel_unit(case, model, state)}/s"
-        speed = _state(case, model, state, f"{force}*s")
+        rate = "m/s^2" if force == "N/kg" else force
+        speed = _state(case, model, state, reduced(f"{rate}*s"))
         return force, speed, speed if position is None else _state(case, model, position, f"{speed}*s")
     motion = getattr(model, "motion", None)
     own = channel_unit(case, model, active.channel)

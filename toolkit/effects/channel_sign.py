@@ -27,5 +27,5 @@ EFFECT = Effect(
     separates="a known load in a known direction",
     parameters=(),
     channel=_negated,
-    confined_by=("date", ANY_OTHER),
+    confined_by=("date", "rotation", "mounting", ANY_OTHER),
 )

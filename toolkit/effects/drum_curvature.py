@@ -5,18 +5,20 @@ from __future__ import annotations
 import dataclasses
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from toolkit.effects.effect import Effect, EffectParameter, Values
 
 if TYPE_CHECKING:
     from toolkit.effects.signals import Drive, Setting, Tire
 
+EXPONENT = "moment_exponent"
+_OF_A_BRUSH = 1.5  # force as the patch length squared, moment as its cube
+
 
 def _curved(drive: Drive, values: Values, setting: Setting, tire: Tire) -> Drive:
     left = max(1 - values["reduction"], 0.01)
-    # Slope of the force as the patch length squared, of the moment as its cube.
-    return dataclasses.replace(drive, stiffness=drive.stiffness * left, trail=drive.trail * np.sqrt(left))
+    # The moment's slope is force times trail: what the exponent has above one is the trail's.
+    trail = drive.trail * left ** (values.get(EXPONENT, _OF_A_BRUSH) - 1)
+    return dataclasses.replace(drive, stiffness=drive.stiffness * left, trail=trail)
 
 
 EFFECT = Effect(
@@ -26,8 +28,8 @@ EFFECT = Effect(
         "The road is a drum: the shorter contact patch lowers the slopes, the moment's more than the force's."
     ),
     equation=(
-        "stiffness = 1 - reduction (patch length squared); moment's slope in proportion to (1 "
-        "- reduction)^1.5"
+        "stiffness in proportion to 1 - reduction (patch length squared); moment's slope to (1 - "
+        "reduction)^moment_exponent (1.5 of a brush: patch length cubed)"
     ),
     reference=(
         "Pacejka, Tire and Vehicle Dynamics, 3rd ed. 2012, 3.2; contact length factor sqrt(Rd/(Rd+Rt))"
@@ -41,6 +43,16 @@ EFFECT = Effect(
             text="reduction of the cornering stiffness",
             typical=(0.03, 0.25),
             bounds=(-0.5, 0.9),
+        ),
+        EffectParameter(
+            name=EXPONENT,
+            unit="1",
+            text="by which the moment's slope falls with the force's; a soft carcass has more than a brush",
+            typical=(1.4, 1.9),
+            off=None,
+            starts=(_OF_A_BRUSH,),
+            bounds=(0.5, 3.0),
+            absent=_OF_A_BRUSH,
         ),
     ),
     drive=_curved,
