@@ -15,9 +15,9 @@ if TYPE_CHECKING:
 
 
 def case_findings(problem: Problem) -> tuple[Finding, ...]:
-    """Return notes on the recordings: one run only, and inputs that were interpolated."""
+    """Return notes on the recordings, one run only or inputs interpolated, and what the model has to tell."""
     case = problem.case
-    made = []
+    made: list[Finding] = list(getattr(problem.model, "findings", ()))
     if len(problem.runs) == 1:
         made.append(
             Finding(

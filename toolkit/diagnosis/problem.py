@@ -28,7 +28,8 @@ class Problem:
     """What is fitted and judged.
 
     ``kept`` masks the rows that count, for each output over all runs in their order; ``slices`` are the
-    rows of each run; ``floor`` is the resolution of each output's numbers, below which no noise is known.
+    rows of each run; ``floor`` is the resolution of each output's numbers, or what the simulation itself is
+    unsure by, below which no noise is known.
     """
 
     case: Case
@@ -111,6 +112,7 @@ def problem_of(case: Case, model: Model) -> Problem:
         for name, column in observed.items():
             column.append(made.get(name, np.full(run.rows, np.nan)))
     stacked = {name: np.concatenate(columns) for name, columns in observed.items()}
+    unsure: dict[str, float] = getattr(model, "unsure", {})
     ends = np.cumsum([run.rows for run in runs])
     slices = tuple(slice(int(end - run.rows), int(end)) for end, run in zip(ends, runs, strict=True))
     return Problem(
@@ -121,7 +123,7 @@ def problem_of(case: Case, model: Model) -> Problem:
         known={one.name: one.value for one in model.parameters},
         observed=stacked,
         kept={name: np.isfinite(column) for name, column in stacked.items()},
-        floor={name: _resolution(column) for name, column in stacked.items()},
+        floor={name: max(_resolution(column), unsure.get(name, 0.0)) for name, column in stacked.items()},
         slices=slices,
     )
 

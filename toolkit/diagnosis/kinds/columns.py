@@ -2,6 +2,7 @@
 
 Effects on single channels act on the recorded output as it is. Effects on road, carriage and tire need the
 output at other slip angles and loads: a smooth surface through the simulated columns gives the difference.
+Where the columns have too few slip angles for that, nothing below the surface's own error is judged.
 """
 
 from __future__ import annotations
@@ -82,6 +83,8 @@ class ColumnsModel(AlongMotion):
         drivers = {one.name for one in case.drivers}
         is_tire = bool(drivers & {"SA", "SA_CMD"}) and bool({"FY", "MZ"} & set(named))
         self._surface = Surface(case) if is_tire else None
+        self.findings = () if self._surface is None else self._surface.too_coarse()
+        self.unsure = {} if self._surface is None else self._surface.unsure
         self.motion: Motion | None = None if is_tire else motion_of(case)
 
     def observed(self, run: Run) -> dict[str, NDArray[np.float64]]:
