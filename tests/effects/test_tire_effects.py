@@ -147,6 +147,11 @@ def test_relaxation_follows_the_cornering_stiffness_and_keeps_a_steady_angle():
     ramp = driven(1e-3 * t, 2000.0, t=t, V=1.0)
     late = effect("relaxation").drive(ramp, {"relaxation_length": 0.5, "falling": 0.0}, setting(t), tire)
     assert (ramp.SA - late.SA)[-1] == pytest.approx(1e-3 * 0.25, rel=1e-3)  # rate * sigma / V
+    # the same length at all loads, and one that goes with the square of the stiffness
+    for power, length in ((0.0, 0.5), (2.0, 0.125)):
+        values = {"relaxation_length": 0.5, "falling": 0.0, "with_load": power}
+        late = effect("relaxation").drive(ramp, values, setting(t), tire)
+        assert (ramp.SA - late.SA)[-1] == pytest.approx(1e-3 * length, rel=1e-3)
 
 
 @pytest.mark.parametrize("rate", [0.5, 5.0])

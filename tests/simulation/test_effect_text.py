@@ -25,14 +25,17 @@ def one(text):
     return made[0]
 
 
+SIGMA = {"relaxation_length": 0.5, "falling": 0.0, "with_load": 1.0}
+
+
 @pytest.mark.parametrize(
     ("text", "channel", "parameters"),
     [
-        ("relaxation=0.5m", None, {"relaxation_length": 0.5, "falling": 0.0}),
-        ("relaxation=500mm", None, {"relaxation_length": 0.5, "falling": 0.0}),
-        ("relaxation=0.5", None, {"relaxation_length": 0.5, "falling": 0.0}),
-        ("relaxation.relaxation_length=0.5 m", None, {"relaxation_length": 0.5, "falling": 0.0}),
-        ("relaxation = relaxation_length:5e-1m", None, {"relaxation_length": 0.5, "falling": 0.0}),
+        ("relaxation=0.5m", None, SIGMA),
+        ("relaxation=500mm", None, SIGMA),
+        ("relaxation=0.5", None, SIGMA),
+        ("relaxation.relaxation_length=0.5 m", None, SIGMA),
+        ("relaxation = relaxation_length:5e-1m", None, SIGMA),
         ("zero_offset.D51=0.002mV/V", "D51", {"offset": 0.002}),
         ("zero_offset.D51=2e-6 V/V", "D51", {"offset": 0.002}),
         ("zero_offset.FY=10lbf", "FY", {"offset": 44.482216152605}),
@@ -45,7 +48,7 @@ def one(text):
         ("turn_slip=300 N*m", None, {"force": 300.0}),
         ("channel_delay.FY=-20 ms", "FY", {"delay": -0.02}),
         ("unit_error.FZ=lbf read as N", "FZ", {"factor": 1 / 4.4482216152605}),
-        ("drum_curvature=15%", None, {"reduction": 0.15}),
+        ("drum_curvature=15%", None, {"reduction": 0.15, "moment_exponent": 1.5}),
         ("pressure_change=-2 psi", None, {"pressure_error": -13.789514}),
     ],
 )

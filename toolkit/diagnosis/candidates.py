@@ -19,6 +19,7 @@ from toolkit.effects.catalogue import effects
 from toolkit.effects.creep import FROM_REST
 from toolkit.effects.drum_curvature import EXPONENT
 from toolkit.effects.effect import Effect, EffectParameter
+from toolkit.effects.relaxation import WITH_LOAD
 from toolkit.effects.thermal_friction import TEMPERATURES
 from toolkit.effects.unit_error import factors_for
 from toolkit.errors import UnitError
@@ -37,6 +38,7 @@ _IN_TIME = frozenset(
     ).split()
 )
 _SUBSETS = 8
+_LOADS = 0.2  # of the largest load: less tells nothing of what goes with it
 _LATE = (1, 4, 12)  # rows
 _SHORT = 0.05  # of the position's spread: the longest distance over which dry friction builds up
 
@@ -120,10 +122,17 @@ def _as_known(problem: Problem, effect: Effect) -> Effect:
         effect = replace(effect, equation="friction = 1 + sensitivity * (FZ - FZ0)/FZ0, FZ0 the nominal load")
     if effect.name == "drum_curvature" and all(one.name != "MZ" for one in problem.model.outputs):
         needless = {EXPONENT}
+    if effect.name == "relaxation" and not _several_loads(problem):
+        needless = {WITH_LOAD}
     if effect.name == "thermal_friction":
         recorded = {one.name for one in problem.case.drivers} & set(TEMPERATURES)
         needless = {"time_constant" if recorded else "reference"}
     return replace(effect, parameters=tuple(one for one in effect.parameters if one.name not in needless))
+
+
+def _several_loads(problem: Problem) -> bool:
+    loads = _values(problem, "FZ")
+    return len(loads) > 0 and float(np.ptp(loads)) > _LOADS * float(np.abs(loads).max())
 
 
 def _within_reach(problem: Problem, active: Active) -> Active:

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from toolkit.effects.signals import Drive, Setting, Tire
 
 
+WITH_LOAD = "with_load"
 _STEP = 1e-3  # rad, for a slope
 _TURNS = 3  # after which the slip angle at which the slope is taken changes no more
 _LEAST = 0.05  # of the length at zero slip: beyond the peak the slope has no sense as a length
@@ -27,13 +28,14 @@ def _relaxed(drive: Drive, values: Values, setting: Setting, tire: Tire) -> Driv
     straight = dataclasses.replace(drive, SA=np.zeros_like(drive.SA))
     nominal = _slope(tire, dataclasses.replace(straight, FZ=np.full_like(drive.FZ, setting.nominal_load_N)))
     at_zero = _over(_slope(tire, straight), nominal)
+    by_load = np.maximum(at_zero, _LEAST) ** values.get(WITH_LOAD, 1.0)
     falling, slip = values["falling"], drive.SA
     for _ in range(_TURNS if falling else 1):
-        ratio = at_zero
+        ratio = np.ones_like(at_zero)
         if falling:
-            here = _over(_slope(tire, dataclasses.replace(drive, SA=slip)), nominal)
-            ratio = np.maximum(at_zero + falling * (here - at_zero), _LEAST * at_zero)
-        length = values["relaxation_length"] * ratio
+            here = _slope(tire, dataclasses.replace(drive, SA=slip))
+            ratio = np.maximum(1 + falling * (_over(here, at_zero * nominal) - 1), _LEAST)
+        length = values["relaxation_length"] * ratio * by_load
         slip = lag(drive.t, drive.SA, length / np.maximum(np.abs(drive.V), 1e-6))
     return dataclasses.replace(drive, SA=slip)
 
@@ -54,8 +56,8 @@ EFFECT = Effect(
     stage="tire",
     statement=("The tire answers a change of slip angle only after it has rolled a relaxation length."),
     equation=(
-        "(sigma/V) * alpha' + alpha = SA; sigma in proportion to the cornering stiffness at the load, and by "
-        "the share `falling` to the slope of FY at alpha"
+        "(sigma/V) * alpha' + alpha = SA; sigma in proportion to the cornering stiffness at the load to the "
+        "power `with_load`, and by the share `falling` to the slope of FY at alpha"
     ),
     reference="Pacejka, Tire and Vehicle Dynamics, 3rd ed. 2012, 7.1 to 7.3",
     signature="a loop in proportion to the steering rate and to 1/V, closed at high slip",
@@ -78,6 +80,17 @@ EFFECT = Effect(
             bounds=(0.0, 1.0),
             starts=(0.0, 1.0),
             absent=0.0,
+            ends_count=True,
+        ),
+        EffectParameter(
+            name=WITH_LOAD,
+            unit="1",
+            text="how it goes with the load: 0 one length at all loads, 1 as the cornering stiffness does",
+            typical=(0.0, 1.0),
+            off=None,
+            bounds=(0.0, 2.0),
+            starts=(1.0,),
+            absent=1.0,
             ends_count=True,
         ),
     ),
