@@ -90,8 +90,8 @@ class Surface:
                         where=f"{self._case.path.name}: simulation.simulated",
                         message=f"between the slip angles of the simulated {name} the tire is known to "
                         f"{between:.2g} {self._case.unit(name)}, the recording to {noise:.2g}: nothing "
-                        "smaller than the first is judged, and small effects may be named for an error of the "
-                        "table; simulate at more slip angles, or give the simulation as kind python",
+                        "smaller than the first is judged, and small effects may be named for an error of "
+                        "the table; simulate at more slip angles, or give the simulation as kind python",
                     )
                 )
         return tuple(made)
