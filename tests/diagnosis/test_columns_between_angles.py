@@ -14,6 +14,7 @@ from toolkit.diagnosis.kinds.tire import base_drive
 from toolkit.diagnosis.model import Active
 from toolkit.diagnosis.problem import problem_of
 from toolkit.effects.catalogue import effects
+from toolkit.errors import ConfigError
 
 ANGLES = np.array([-0.3, 1, -1, -2, 2, 4, -4, -6, 6, 8, -8, -10, 10.0])
 LOADS = np.array([1112, 2522, 3705, 4897, 6103.0])
@@ -158,3 +159,12 @@ def test_an_effect_of_no_size_leaves_the_columns_as_they_are(tmp_path):
     curved = Active(effect=effects()["drum_curvature"], values={"reduction": 0.0})
     made = ColumnsModel(case).simulate(case.runs[0], {}, [curved])
     np.testing.assert_allclose(made["FY"], case.runs[0].simulated["FY"], atol=1e-9)
+
+
+def test_a_direction_that_no_run_has_is_not_predicted(tmp_path):
+    path = written(tmp_path, table(noise=2.0)).path
+    table(noise=2.0, seed=1).to_csv(tmp_path / "ahead.csv", index=False)
+    with path.open("a", encoding="utf-8") as file:
+        file.write('[[recording.predict]]\nfile = "ahead.csv"\nrotation = "reverse"\n')
+    with pytest.raises(ConfigError, match="not known in this direction"):
+        diagnose(read_case(path), None)

@@ -10,6 +10,7 @@ from toolkit.diagnosis.kinds.process import Process, cells_of, likeliest, thinne
 from toolkit.diagnosis.kinds.setting import nominal_load
 from toolkit.diagnosis.kinds.tire import base_drive, rotation
 from toolkit.effects.signals import Drive
+from toolkit.errors import ConfigError
 from toolkit.findings import Finding
 
 if TYPE_CHECKING:
@@ -44,6 +45,7 @@ class Surface:
         self.unsure: dict[str, float] = {}
         self._case = case
         drives = [(run, base_drive(case, run, load_N=self._load, outputs=False)) for run in case.runs]
+        _refuse_other_ways(case)
         slips = np.concatenate([drive.SA for _, drive in drives])
         margin = 0.25 * (np.ptp(slips) or 0.01)
         self._slips = (float(slips.min() - margin), float(slips.max() + margin))
@@ -113,6 +115,20 @@ class Surface:
             return np.zeros(run.rows)
         before = self._over(start.FZ) * table.at(self._points(start.SA, start.FZ))
         return self._over(FZ) * table.at(self._points(SA, FZ)) - before
+
+
+def _refuse_other_ways(case: Case) -> None:
+    ways = {rotation(run) for run in case.runs}
+    for run in case.predict:
+        if rotation(run) not in ways:
+            raise ConfigError(
+                "a tire of simulated columns is not known in this direction",
+                where=f"{case.path}: {run.name}",
+                got=f"rotation {rotation(run)}",
+                expected=f"one of {', '.join(sorted(ways))}, as the recorded runs have",
+                next_step="leave the prediction out, or add a recorded run in its direction",
+                rule="case",
+            )
 
 
 class _Table:
