@@ -162,12 +162,12 @@ def emps_truth(data: Path) -> dict[str, np.ndarray]:
 def emps_loop(data: Path, out: Path) -> None:
     """Write the positioning system in its loop, kind `ode`: reference in, position and voltage out.
 
-    Ten seconds of it, every fourth row. The controller answers within 6 ms: between rows 10 ms apart a
+    Eight seconds of it, every fourth row. The controller answers within 6 ms: between rows 10 ms apart a
     straight reference would miss 6 % of the voltage.
     """
     m = io.loadmat(data / "emps" / "DATA_EMPS.mat")
     table = pd.DataFrame({k: m[n].ravel() for k, n in (("t", "t"), ("R", "qg"), ("X", "qm"), ("U", "vir"))})
-    table = table.iloc[600:10600:4]  # from where the first speed is reached
+    table = table.iloc[600:8600:4]  # from where the first speed is reached
     first = table.iloc[:12]
     write_csv(table, out / "run01.csv")
     (out / "sim.py").write_text(source(drive), encoding="utf-8")
@@ -176,7 +176,7 @@ def emps_loop(data: Path, out: Path) -> None:
     _toml(
         out, title="A positioning system under its controller",
         simulation={
-            "kind": "ode", "path": "sim.py", "states": ["x", "v", "w", "u"],
+            "kind": "ode", "path": "sim.py", "states": ["x", "v", "w"],
             "force_terms": {"v": "N/kg"},
         },
         parameters={
