@@ -1,23 +1,17 @@
-"""A positioning drive under its controller: reference R [m], position X [m], control voltage U [V].
-
-The controller works at 1 kHz. It takes its speed from positions two samples apart, which is late by one
-sample, and its voltage stands for a sample, which is late by half of one more: a lag of the speed it sees.
-"""
+"""A positioning drive under its controller: reference R [m], position X [m], control voltage U [V]."""
 
 import numpy as np
-
-LATE = 1.5e-3  # s
 
 
 def voltage(x, u, p):
     """Return the controller's output."""
-    return p["kv"] * (p["kp"] * (u["R"] - x[0]) - x[2])
+    return p["kv"] * (p["kp"] * (u["R"] - x[0]) - x[1])
 
 
 def rhs(t, x, u, p):
-    """Return the rates of position and speed, and of the speed that the controller sees."""
+    """Return the rates of position and velocity."""
     force = p["gain"] * voltage(x, u, p) - p["viscous"] * x[1]
-    return np.array([x[1], force / p["mass"], (x[1] - x[2]) / LATE])
+    return np.array([x[1], force / p["mass"]])
 
 
 def outputs(x, u, p):
@@ -26,5 +20,5 @@ def outputs(x, u, p):
 
 
 def initial(p):
-    """Return place and even speed of the carriage in the first row."""
-    return np.array([p["x0"], p["v0"], p["v0"]])
+    """Return the carriage at rest at the zero of the scale."""
+    return np.array([0.0, 0.0])
