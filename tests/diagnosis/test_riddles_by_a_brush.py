@@ -178,3 +178,7 @@ def test_five_repeats_of_which_two_had_a_slower_actuator(tmp_path):
     assert parameter.value == pytest.approx(3500 / 1200 / 2, rel=0.25)
     # that the ramp's shape stays is said
     assert found.remaining == "unknown"
+    # and which measurement would part it from a tire that settles slowly
+    (told,) = [one for one in found.next_measurements if one.startswith("To tell load_lag from ")]
+    assert "viscoelastic_settling" in told
+    assert "the load recorded beside its command" in told

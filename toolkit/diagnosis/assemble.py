@@ -19,7 +19,7 @@ from toolkit.diagnosis.answer import (
     recorded,
 )
 from toolkit.diagnosis.case import Case
-from toolkit.diagnosis.classes import apart, equivalent_to
+from toolkit.diagnosis.classes import equivalent_to, parted
 from toolkit.diagnosis.locate import places
 from toolkit.diagnosis.look import ALPHA
 from toolkit.diagnosis.model import Active
@@ -328,11 +328,7 @@ def _floor(found: Search, name: str, sd: float | None) -> float:
 
 
 def _next(found: Search, effects: tuple[FoundEffect, ...], verdict: Verdict) -> tuple[str, ...]:
-    said = [
-        f"To tell {one.name} from {', '.join(one.equivalent_to)}: {apart(one)}."
-        for one in effects
-        if one.equivalent_to
-    ]
+    said = [text for one in effects if (text := parted(one))]
     if verdict == "unknown":
         said += _to_find_it(found)
         beside = ", ".join(dict.fromkeys(one.active.effect.name for one in found.steps))

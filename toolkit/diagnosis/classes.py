@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from toolkit.diagnosis.answer import FoundEffect
 from toolkit.diagnosis.model import Active
 from toolkit.diagnosis.problem import Problem
@@ -11,6 +13,8 @@ from toolkit.effects.catalogue import effects as catalogue
 _CLOSE = 3.0  # log-likelihood within which the data prefer neither
 _PULL = ("conicity", "camber_offset", "crosstalk")
 _ANGLE = ("plysteer", "steer_offset")
+# A load that is slow to come and a tire that is slow to settle: one may always be taken for the other.
+_AKIN = {"load_lag": ("viscoelastic_settling",), "viscoelastic_settling": ("load_lag",)}
 
 
 def equivalent_to(problem: Problem, step: Step) -> tuple[str, ...]:
@@ -27,6 +31,14 @@ def apart(found: FoundEffect) -> str:
     for name in (found.name, *found.equivalent_to):
         told.setdefault(catalogue()[name].separates, []).append(name)
     return "; ".join(f"{text} ({', '.join(names)})" for text, names in told.items() if text)
+
+
+def parted(found: FoundEffect) -> str:
+    """Return the sentence that says what would tell an effect from its class, or from what is like it."""
+    others = found.equivalent_to or _AKIN.get(found.name, ())
+    if not others:
+        return ""
+    return f"To tell {found.name} from {', '.join(others)}: {apart(replace(found, equivalent_to=others))}."
 
 
 def _always(problem: Problem, active: Active) -> list[str]:
