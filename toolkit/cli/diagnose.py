@@ -12,7 +12,7 @@ from toolkit.cli.console import Calibrations, Home, Json, Quiet, answer, finding
 from toolkit.cli.home import calibrations_folder
 
 if TYPE_CHECKING:
-    from toolkit.diagnosis.answer import Diagnosis, Place
+    from toolkit.diagnosis.answer import Diagnosis
     from toolkit.report.template.package import Template
 
 NAME = "diagnose"
@@ -220,7 +220,7 @@ def _text(made: Diagnosis, out: Path) -> str:
             much = "over all of" if at.whole else "mostly where"
             lines.append(
                 f"{place.channel}: mismatch {much} {at.variable}{',' if at.whole else ' is'} "
-                f"{_ends(at)} {at.unit}".rstrip()
+                f"{at.ends('{:.4g}'.format)} {at.unit}".rstrip()
             )
     rows = [
         [
@@ -247,13 +247,6 @@ def _text(made: Diagnosis, out: Path) -> str:
     if made.findings:
         lines += ["", "findings (toolkit explain RULE tells more):", *finding_lines(made.findings)]
     return "\n".join([*lines, "", f"written to {out}"])
-
-
-def _ends(at: Place) -> str:
-    """Return the ends of a range in few digits; a condition's one value as it stands."""
-    if isinstance(at.start, float) and isinstance(at.end, float):
-        return f"{at.start:.4g} to {at.end:.4g}"
-    return str(at.start)
 
 
 _CUT = "something is missing; the budget was spent before every known effect was tried"

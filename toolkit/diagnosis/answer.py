@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
@@ -27,6 +27,12 @@ class Place:
     unit: str
     runs: tuple[str, ...]
     whole: bool = False
+
+    def ends(self, number: Callable[[float], str]) -> str:
+        """Return the ends of a range, each as ``number`` writes it; a condition's one value as it stands."""
+        if isinstance(self.start, float) and isinstance(self.end, float):
+            return f"{number(self.start)} to {number(self.end)}"
+        return str(self.start)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-LEAST_REACH = "least_presliding"  # among an effect's values: a shorter bristle only makes an equation stiff
+LEAST_REACH = "least_presliding"  # among an effect's values: a shorter bristle shows in no row
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -158,8 +158,7 @@ def _where(made: Diagnosis, style: Style) -> str | None:
         if one.share_of_variance < 0.005:
             text = f"{one.channel}: the residual is more than noise, and no variable alone explains it"
         for at in one.where[:1]:
-            numbers = isinstance(at.start, float) and isinstance(at.end, float)
-            ends = f"{_n(at.start, style, 4)} to {_n(at.end, style, 4)}" if numbers else str(at.start)  # type: ignore[arg-type]
+            ends = at.ends(lambda value: _n(value, style, 4))
             much = f"over all of {at.variable}," if at.whole else f"most of it where {at.variable} is"
             text += f", {much} {ends} {_unit(at.unit)}".rstrip()
         told.append(f"{text} ({chance(one.p_value, decimal_comma=style.decimal_comma)}).")

@@ -198,8 +198,7 @@ def _place(one: Mismatch) -> str:
     if share < 0.5:
         text = f"{one.channel}: the refitted residual is more than noise, and no variable alone explains it"
     for at in one.where[:1]:
-        numbers = isinstance(at.start, float) and isinstance(at.end, float)
-        ends = f"{few(at.start, 4)} to {few(at.end, 4)}" if numbers else str(at.start)  # type: ignore[arg-type]
+        ends = at.ends(lambda value: few(value, 4))
         much = f"over all of {at.variable}," if at.whole else f"most of it where {at.variable} is"
         text += f", {much} {ends} {at.unit}".rstrip()
     return escape(f"{text} ({chance(one.p_value)}).")
