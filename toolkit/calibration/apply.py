@@ -39,9 +39,9 @@ def apply_record(
 
     Notes
     -----
-    With a tare, a record with ``zero = "tared"`` was fitted to tared indications: load = f(x - tare), and
-    its intercept applies. One with ``zero = "included"`` was fitted to indications as they come:
-    load = f(x) - f(tare), in which the intercept cancels. Without a tare load = f(x).
+    With a tare, a record with ``zero = "tared"`` or ``"run"`` was fitted to indications from their zero:
+    load = f(x - tare), and its intercept applies. One with ``zero = "included"`` was fitted to indications
+    as they come: load = f(x) - f(tare), in which the intercept cancels. Without a tare load = f(x).
 
     Raises
     ------
@@ -117,7 +117,7 @@ def _terms(
     values = {name: np.asarray(indications[name], dtype=np.float64) for name in record.indications}
     if tare is None:
         return term_matrix(one.terms, values)
-    if record.zero == "tared":
+    if record.zero != "included":
         return term_matrix(one.terms, {name: values[name] - tare[name] for name in values})
     unloaded = {name: np.array([tare[name]]) for name in values}
     return term_matrix(one.terms, values) - term_matrix(one.terms, unloaded)

@@ -23,7 +23,7 @@ def errors_by(record: CalibrationRecord, table: Table, *, zero: Zero) -> dict[st
     indication or unit, or indications that were not tared where the record needs that. Tared rows under a
     record that includes the zero are compared without its intercept.
     """
-    if record.zero == "tared" and zero == "included":
+    if record.zero != "included" and zero == "included":
         return f"{record.id} was fitted to tared indications, the session's are not tared"
     missing = [name for name in record.indications if not table.has(name)]
     if missing:
@@ -36,7 +36,7 @@ def errors_by(record: CalibrationRecord, table: Table, *, zero: Zero) -> dict[st
     loads = [one.load for one in record.loads if table.has(one.load)]
     if not loads:
         return f"{record.id} has none of the session's loads"
-    tare = dict.fromkeys(units, 0.0) if record.zero != zero else None
+    tare = dict.fromkeys(units, 0.0) if (record.zero == "included") != (zero == "included") else None
     try:
         fitted = apply_record(
             record, in_units.columns(record.indications), units=units, tare=tare, only=loads

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -13,6 +14,8 @@ from toolkit.calibration.fit.diagnostics import Diagnostics, diagnose, replicate
 from toolkit.calibration.fit.gls import fit_gls
 from toolkit.calibration.fit.odr import fit_odr
 from toolkit.calibration.fit.regression import TermFit, fit_loads, fit_terms
+from toolkit.calibration.fit.run_scatter import SessionRows, estimate
+from toolkit.calibration.records.scatter import RunScatter, rows_of
 from toolkit.calibration.session.known_errors import KnownErrors, known_errors, row_uncertainty
 from toolkit.calibration.session.settings import wrong
 from toolkit.calibration.session.statements import Statements, parse_statements
@@ -28,13 +31,16 @@ LLF_FACTOR = 2.4
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class LoadResult:
-    """One load. ``llf`` and ``check_residuals`` (fitted - reference, check rows,) in the load's unit.
+    """One load. ``fit.covariance`` is that of `records.scatter` where the session's runs tell ``scatter``.
+
+    ``llf`` and ``check_residuals`` (fitted - reference, check rows,) in the load's unit.
 
     ``check_max_percent_fs`` is None where the session has no check loads.
     """
 
     setting: LoadSetting
     fit: TermFit
+    scatter: RunScatter | None
     diagnostics: Diagnostics
     llf: float
     check_residuals: NDArray[np.float64] | None
@@ -125,6 +131,15 @@ def _result(
 ) -> LoadResult:
     table = session.table
     load = table.column(setting.name)
+    scatter = None
+    if session.method == "ols":
+        # Other methods are given by the session what every row's uncertainty is, and what rows share.
+        design = term_matrix(session.terms, table.columns(session.indications))
+        rows = SessionRows.of(design, load, table, session.zero)
+        scatter = estimate(rows)
+        if scatter is not None:
+            covariance = rows_of(design, rows.relative, rows.group).covariance(scatter)
+            fit = dataclasses.replace(fit, covariance=covariance)
     residuals, percent = None, None
     if session.check is not None:
         check = session.check
@@ -134,6 +149,7 @@ def _result(
     return LoadResult(
         setting=setting,
         fit=fit,
+        scatter=scatter,
         diagnostics=diagnose(fit, cells=cells, load=load, up=table.up, replicates=groups),
         llf=max(LLF_FACTOR * fit.residual_sd, _resolution(session, fit)),
         check_residuals=residuals,

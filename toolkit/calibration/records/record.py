@@ -9,13 +9,15 @@ from __future__ import annotations
 
 import json
 import re
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any, Literal, cast
 
+from toolkit.calibration.records.scatter import MODEL, RunScatter
 from toolkit.errors import RecordError
 from toolkit.files import sha256_bytes
 
-Zero = Literal["included", "tared"]
+Zero = Literal["included", "tared", "run"]
+ZEROS: tuple[Zero, ...] = ("included", "tared", "run")
 Kind = Literal["fit", "legacy"]
 SCHEMA = 1
 
@@ -53,6 +55,8 @@ class LoadFit:
     and ``polarity`` (-1, 0, +1) stand in the same order, the intercept last. ``covariance`` is a square of
     the same order, empty for a legacy import, whose ``dof`` and ``residual_sd`` are None.
     ``tolerance`` is that of the check loads, ``minimum`` and ``maximum`` the range of the fitted loads.
+    ``scatter`` is what the covariance was made of where the session's runs tell it (`records.scatter`); None:
+    the covariance takes every row for independent, as that of one run alone and of records made before.
     """
 
     load: str
@@ -69,6 +73,7 @@ class LoadFit:
     minimum: float | None = None
     maximum: float | None = None
     tolerance: float | None = None
+    scatter: RunScatter | None = None
 
     @property
     def largest(self) -> float:
@@ -200,7 +205,21 @@ def _cell_content(one: Indication) -> dict[str, Any]:
 
 
 def _load_content(one: LoadFit) -> dict[str, Any]:
-    return {key: getattr(one, key) for key in _LOAD_KEYS}
+    content = {key: getattr(one, key) for key in _LOAD_KEYS}
+    # As with cells: records made without it keep their hash.
+    return content if one.scatter is None else content | {"scatter": asdict(one.scatter)}
+
+
+def _scatter(entry: Any) -> RunScatter | None:
+    if entry is None:
+        return None
+    found = RunScatter(**entry)
+    _floats((found.within, found.zero, found.gain, found.correlation))
+    if found.model != MODEL:
+        raise ValueError(f"the scatter's model is not known: {found.model}")
+    for count in (found.groups, found.dof):
+        _optional(count, int)
+    return found
 
 
 def content_hash(content: dict[str, Any]) -> str:
@@ -308,13 +327,14 @@ def _from_content(
                 "n": _optional(entry["n"], int),
                 "dof": _optional(entry["dof"], int),
                 "residual_sd": _optional(entry["residual_sd"], float),
+                "scatter": _scatter(entry.get("scatter")),
             }
         )
         if not len(one.terms) == len(one.coefficients) == len(one.issued) == len(one.polarity):
             raise ValueError(f"{one.load}: terms and coefficients differ in number")
         loads.append(one)
     golden = content["golden"]
-    if content["kind"] not in ("fit", "legacy") or content["zero"] not in ("included", "tared"):
+    if content["kind"] not in ("fit", "legacy") or content["zero"] not in ZEROS:
         raise ValueError("kind or zero is not known")
     return CalibrationRecord(
         id=content["id"],

@@ -238,6 +238,7 @@ def _load_fit(session: Session, one: LoadResult) -> LoadFit:
         minimum=float(values.min()),
         maximum=float(values.max()),
         tolerance=one.setting.tolerance,
+        scatter=one.scatter,
     )
 
 

@@ -18,7 +18,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from toolkit.calibration.fit.run_scatter import SessionRows, is_lowest
 from toolkit.calibration.records.issue import issued_value, term_reach
+from toolkit.calibration.records.scatter import Rows
 from toolkit.calibration.registry.whitening import Whitener, errors_of, linearise, whitener
 from toolkit.calibration.session.table import Table
 from toolkit.calibration.terms import INTERCEPT, term_matrix
@@ -69,7 +71,7 @@ def check_reproduces(record: CalibrationRecord, table: Table) -> None:
         _same_unit(record, one.load, table.unit(one.load), one.unit)
         if one.method in ("gls", "odr"):
             known = _known_errors_solver(record, one, table, points)
-            _check_load(record, at, one, known, table.column(one.load))
+            _check_load(record, at, one, known, table)
             continue
         weights = _weights(one, table)
         solver = shared.get(one.terms) if weights is None else None
@@ -78,7 +80,7 @@ def check_reproduces(record: CalibrationRecord, table: Table) -> None:
             solver = _solver(terms, weights, one.terms[-1] == INTERCEPT, term_matrix(one.terms, points))
             if weights is None:
                 shared[one.terms] = solver
-        _check_load(record, at, one, solver, table.column(one.load))
+        _check_load(record, at, one, solver, table)
 
 
 def _known_errors_solver(
@@ -118,10 +120,8 @@ def _weights(one: LoadFit, table: Table) -> NDArray[np.float64] | None:
     return weights
 
 
-def _check_load(
-    record: CalibrationRecord, at: int, one: LoadFit, solver: _Solver, loads: NDArray[np.float64]
-) -> None:
-    where = one.load
+def _check_load(record: CalibrationRecord, at: int, one: LoadFit, solver: _Solver, table: Table) -> None:
+    where, loads = one.load, table.column(one.load)
     coefficients = np.asarray(one.coefficients)
     low, high = float(loads.min()), float(loads.max())
     largest = max(abs(low), abs(high))
@@ -145,15 +145,14 @@ def _check_load(
         repr(one.residual_sd), repr(sd),
     )  # fmt: skip
     stored = np.asarray(one.covariance)
-    # By the record's own residual sd, which was just held against the refit's: of noise-free data it is
-    # rounding, and the covariance is that rounding squared.
-    scale = (one.residual_sd or 0.0) ** 2 if not solver.known else 1.0
+    expected = _covariance(record, one, solver, table)
+    errors = np.sqrt(expected.diagonal())
     # Its rounding grows with the square of the terms' condition number.
     slack = SPREAD + 10 * np.finfo(float).eps * solver.condition**2
     _demand(
         record, where, "covariance",
-        stored.shape == solver.inverse.shape
-        and bool((np.abs(stored - scale * solver.inverse) <= slack * scale * solver.spread).all()),
+        stored.shape == expected.shape
+        and bool((np.abs(stored - expected) <= slack * np.outer(errors, errors)).all()),
         "another matrix in the record", "that of the refit",
     )  # fmt: skip
     wanted = np.asarray(record.golden.outputs[at])
@@ -171,12 +170,44 @@ def _check_load(
             )  # fmt: skip
 
 
+def _covariance(
+    record: CalibrationRecord, one: LoadFit, solver: _Solver, table: Table
+) -> NDArray[np.float64]:
+    """Return the covariance by the model that the record names (terms, terms)."""
+    if solver.known:
+        return solver.inverse
+    if one.scatter is None:
+        # By the record's own residual sd, which was just held against the refit's: of noise-free data it is
+        # rounding, and the covariance is that rounding squared.
+        return (one.residual_sd or 0.0) ** 2 * solver.inverse
+    found = scatter_covariance(record, one, solver.back @ solver.pseudo @ solver.left.T, table)
+    if found is None:
+        raise _refused(
+            record, f"{one.load}, scatter", "another scatter in the record", "the likeliest", "refit"
+        )
+    return found
+
+
+def scatter_covariance(
+    record: CalibrationRecord, one: LoadFit, operator: NDArray[np.float64], table: Table
+) -> NDArray[np.float64] | None:
+    """Return the covariance (terms, terms) that a record's scatter makes; None where it is not its rows'.
+
+    ``operator`` (terms, rows) is what made the coefficients of the loads.
+    """
+    design = term_matrix(one.terms, table.columns(record.indications))
+    rows = SessionRows.of(design, table.column(one.load), table, record.zero)
+    if one.scatter is None or not is_lowest(rows, one.scatter):
+        return None
+    return Rows(operator=operator, relative=rows.relative, group=rows.group).covariance(one.scatter)
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class _Solver:
     """One decomposition, for every load that shares terms and weights.
 
     ``design`` (rows, terms) is centred and scaled; raw coefficients = ``back`` @ solution. ``inverse`` is
-    the unscaled covariance in the raw terms and ``spread`` the products of its standard errors. ``golden``
+    the unscaled covariance in the raw terms. ``golden``
     are the golden inputs' raw terms and ``golden_design`` the same in the columns of the design. ``reach``
     and ``extent`` are each term's range and largest absolute value. ``whiten`` takes the place of the weights
     where rows share errors; ``solved`` is the answer where another iteration found it.
@@ -188,7 +219,6 @@ class _Solver:
     pseudo: NDArray[np.float64]
     back: NDArray[np.float64]
     inverse: NDArray[np.float64]
-    spread: NDArray[np.float64]
     condition: float
     golden: NDArray[np.float64]
     golden_design: NDArray[np.float64]
@@ -243,7 +273,6 @@ def _solver(
     golden_design[:, :k] = (golden[:, :k] - centre) / scale
     root = (right.T / values).T @ back.T
     inverse = root.T @ root
-    errors = np.sqrt(inverse.diagonal())
     return _Solver(
         design=design,
         weights=weights,
@@ -252,7 +281,6 @@ def _solver(
         pseudo=right.T / values,
         back=back,
         inverse=inverse,
-        spread=np.outer(errors, errors),
         condition=float(values[0] / values[-1]),
         golden=golden,
         golden_design=golden_design,

@@ -1,8 +1,9 @@
 """The load-time refit of many records at once: the criteria of `refit`, on stacks of records of one shape.
 
 It only ever says yes. A record that misses any criterion here, that has another method than ordinary least
-squares, or stands alone in its shape, is left to `refit.check_reproduces`, which decides and names what is
-wrong. Each record of a stack is decomposed by itself, by the same algorithm: what is shared is Python's time.
+squares, or that stands alone in its shape, is left to `refit.check_reproduces`, which
+decides and names what is wrong. Each record of a stack is decomposed by itself, by the same algorithm: what
+is shared is Python's time.
 """
 
 from __future__ import annotations
@@ -13,7 +14,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from toolkit.calibration.records.issue import issued_value
-from toolkit.calibration.registry.refit import CRITERION, GOLDEN, GOLDEN_REFIT, RESIDUAL, SPREAD
+from toolkit.calibration.registry.refit import (
+    CRITERION,
+    GOLDEN,
+    GOLDEN_REFIT,
+    RESIDUAL,
+    SPREAD,
+    scatter_covariance,
+)
 from toolkit.calibration.terms import INTERCEPT, evaluate, parse_term
 
 if TYPE_CHECKING:
@@ -122,13 +130,18 @@ def _accepted(pairs: Sequence[Pair]) -> NDArray[np.bool_]:
     good &= (np.abs(stored_sd - sd) <= SPREAD * sd + RESIDUAL * largest).all(axis=1)
 
     root = back @ pseudo
-    inverse = root @ root.transpose(0, 2, 1)
-    errors = np.sqrt(np.einsum("mii->mi", inverse))
+    expected = (stored_sd**2)[:, :, None, None] * (root @ root.transpose(0, 2, 1))[:, None]
+    operators = root @ left.transpose(0, 2, 1)
+    for i, (record, table) in enumerate(pairs):
+        for j, one in enumerate(record.loads):
+            if one.scatter is not None:
+                likeliest = scatter_covariance(record, one, operators[i], table)
+                expected[i, j] = np.nan if likeliest is None else likeliest
+    errors = np.sqrt(np.einsum("mqii->mqi", expected))
     covariance = _numbers([[f.covariance for f in one.loads] for one in records])
     slack = SPREAD + 10 * _EPS * (singular[:, 0] / singular[:, -1]) ** 2
-    square = (stored_sd**2)[:, :, None, None]
-    allowed = slack[:, None, None, None] * square * (errors[:, :, None] * errors[:, None])[:, None]
-    good &= (np.abs(covariance - square * inverse[:, None]) <= allowed).all(axis=(1, 2, 3))
+    allowed = slack[:, None, None, None] * errors[:, :, :, None] * errors[:, :, None]
+    good &= (np.abs(covariance - expected) <= allowed).all(axis=(1, 2, 3))
 
     inputs = _numbers([one.golden.inputs for one in records])
     outputs = _numbers([one.golden.outputs for one in records])

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 from toolkit.calibration.session.bridge import Bridge, bridges_of, converted
 from toolkit.calibration.session.known_errors import group_column
+from toolkit.calibration.session.run_zero import without_read_zeros, without_run_zeros
 from toolkit.calibration.session.table import Table, read_table
 from toolkit.errors import RecordError, RegistryError, ToolkitError
 from toolkit.units import unit
@@ -43,7 +44,8 @@ def stored_check(registry: Path, record: CalibrationRecord) -> Table | None:
     units = dict(zip(record.indications, record.indication_units, strict=True))
     other = [n for n, text in units.items() if unit(table.unit(n)).dimension != unit(text).dimension]
     table = converted(table, _bridges(record, other), units, where=path)
-    return table.in_units(units | {one.load: one.unit for one in record.loads})
+    table = table.in_units(units | {one.load: one.unit for one in record.loads})
+    return without_read_zeros(table, record.indications, loads, path) if record.zero == "run" else table
 
 
 def parse_loads(record: CalibrationRecord, data: bytes, folder: Path) -> Table:
@@ -62,7 +64,9 @@ def parse_loads(record: CalibrationRecord, data: bytes, folder: Path) -> Table:
         named = '"shared_group"' in record.settings
         group = group_column(json.loads(record.settings).get("reference", {})) if named else ()
         table = read_table(data, where=where, required=needed, optional=uncertainties, labels=group)
-        return _as_fitted(record, table, where)
+        table = _as_fitted(record, table, where)
+        loads = [one.load for one in record.loads]
+        return without_run_zeros(table, record.indications, loads) if record.zero == "run" else table
     except RegistryError:
         raise
     except ToolkitError as error:

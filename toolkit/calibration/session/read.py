@@ -11,6 +11,7 @@ from typing import Any
 from toolkit.calibration.records.record import Zero
 from toolkit.calibration.session.bridge import Bridge, bridges_of, converted, fit_units
 from toolkit.calibration.session.known_errors import group_column
+from toolkit.calibration.session.run_zero import without_read_zeros, without_run_zeros
 from toolkit.calibration.session.settings import (
     Settings,
     date_of,
@@ -119,6 +120,8 @@ def read_session(path: Path) -> Session:
     check_statements(raw, recorded, loads, path)
     bridges = bridges_of(raw.get("cells", {}), indications, where=path)
     table = converted(recorded, bridges, fit_units(recorded, bridges), where=path)
+    if settings.zero == "run":
+        table = without_run_zeros(table, indications, loads)
     check_keys(dict(settings.tolerances), loads, where=f"{path}: check.tolerance")
     check_name = _check_name(settings, path)
     check_bytes = None if check_name is None else _file(path, check_name, "check")
@@ -165,7 +168,10 @@ def _check_table(
     check = read_table(data, where=where, required=[*settings.indications, *settings.loads], runs=False)
     # The check file may be in other units than the data; it is brought to those of the fit.
     units = {name: table.unit(name) for name in check.names}
-    return converted(check, bridges, units, where=where).in_units(units)
+    check = converted(check, bridges, units, where=where).in_units(units)
+    if settings.zero == "run":
+        check = without_read_zeros(check, settings.indications, settings.loads, where)
+    return check
 
 
 def _load(name: str, settings: Settings, table: Table, path: Path) -> LoadSetting:

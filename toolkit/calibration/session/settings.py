@@ -14,7 +14,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, cast
 
-from toolkit.calibration.records.record import Zero, canonical
+from toolkit.calibration.records.record import ZEROS, Zero, canonical
 from toolkit.calibration.session.plain_toml import plain_toml
 from toolkit.calibration.terms import INTERCEPT, MODELS, NAME, model_terms
 from toolkit.errors import ConfigError, ToolkitError
@@ -150,7 +150,7 @@ def settings_of(raw: Mapping[str, Any], *, where: object) -> Settings:
         degree=degree,
         method=_choice(raw, "method", METHODS, "ols", where),
         terms=model_terms(model, indications, degree=degree, drop=drop),
-        zero=cast("Zero", _choice(raw, "zero", ("included", "tared"), "included", where)),
+        zero=cast("Zero", _choice(raw, "zero", ZEROS, "included", where)),
         phase=None if "phase" not in raw else _choice(raw, "phase", ("as_found", "as_left"), "", where),
         check=check,
         check_table=isinstance(raw.get("check"), dict),

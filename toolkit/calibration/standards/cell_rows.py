@@ -130,7 +130,7 @@ def cell_rows(source: CellSource, load: str, indication: str) -> tuple[CellRows,
                     runs=tuple(runs),
                     resolution=source.statements.cell(indication).resolution,
                     creep=creep,
-                    zero_read=source.zero == "tared" or all(one.zero_before is not None for one in runs),
+                    zero_read=source.zero != "included" or all(one.zero_before is not None for one in runs),
                     left_out=int((acting & ~alone).sum()),
                 )
             )

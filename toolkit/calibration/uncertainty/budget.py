@@ -5,7 +5,8 @@ The measurand is the load that the record gives for one reading in later use: an
     L = f(x + e_x; c + e_c) + e_reference + e_repeat + e_between + e_creep + e_zero + e_rev + e_misfit + e_T
 
 with u(L)^2 = sum of u_i^2 (JCGM 100, eq. 10: the terms are independent), effective degrees of freedom by
-Welch-Satterthwaite (G.2b), U = k u with k = t_95(dof) (G.6.4). Which parts a force calibration has:
+Welch-Satterthwaite (G.2b; what the rows give together counts as one estimate), U = k u with k = t_95(dof)
+(G.6.4). Which parts a force calibration has:
 ISO 376:2011 annex C and EURAMET cg-4; their forms are those of a deflection, ours of the load.
 """
 
@@ -153,13 +154,16 @@ def _budget(
     temperature: Temperature | None,
     probability: float,
 ) -> Budget:
-    parts = components_of(
+    parts, scatter_dof = components_of(
         record, statements_of(record), loads, check, one, value=value, point=point, temperature=temperature
     )
-    u, dof, k, U = combine([(part.u, part.dof) for part in parts], probability)
+    joint = math.sqrt(math.fsum(part.u**2 for part in parts if part.joint))
+    apart = [(part.u, part.dof) for part in parts if not part.joint]
+    u, dof, k, U = combine([(joint, scatter_dof), *apart], probability)
     return Budget(
         record=record.id, load=one.load, unit=one.unit, at=value, indications=tuple(point.tolist()),
         components=parts, u=u, dof=dof, k=k, U=U, probability=probability,
+        scatter_dof=scatter_dof,
     )  # fmt: skip
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,8 +17,7 @@ from toolkit.calibration.uncertainty.readings import (
     sensitivities,
     zero_drift,
 )
-from toolkit.calibration.uncertainty.scatter import Scatter, split_scatter
-from toolkit.estimate import effective_dof
+from toolkit.calibration.uncertainty.scatter import Scatter, scatter_of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from toolkit.calibration.session.table import Table
 
 ROOT3 = math.sqrt(3.0)
+_READING = np.array([1.0, 0.0, 0.0, 0.0])
 
 
 def components_of(
@@ -39,16 +40,24 @@ def components_of(
     value: float,
     point: NDArray[np.float64],
     temperature: Temperature | None,
-) -> tuple[Component, ...]:
-    """Return every component at a point (indications,), whose load is ``value`` [the load's unit]."""
+) -> tuple[tuple[Component, ...], float]:
+    """Return every component at a point (indications,), whose load is ``value`` [the load's unit].
+
+    With them the degrees of freedom of those that the session's rows give together: u^2 of their sum is
+    linear in the variances within and between runs, and Satterthwaite's formula holds for it as a whole.
+    """
     scatter = scatter_of(record, loads, one)
     slope = sensitivities(record, one, point.tolist())
     share = abs(value) / one.largest
+    curve = _curve(record, one, scatter, point)
+    new = _new_run(scatter, share)
+    total = (curve.variance if one.method == "ols" else 0.0) + scatter.runs.within**2 + new.variance
+    dof = scatter.dof(curve.gradient + _READING + new.gradient, total)
     return (
-        _reference(statements, one),
-        _fit(record, one, point),
+        _reference(statements, one, value),
+        _fit(record, one, point, curve),
         _repeatability(scatter),
-        _reproducibility(scatter, share),
+        _reproducibility(scatter, new),
         _interpolation(record, scatter, check, one),
         _reversibility(scatter),
         _resolution(record, statements, slope),
@@ -56,78 +65,94 @@ def components_of(
         _zero(record, slope),
         _creep(record, one, value),
         _temperature(statements, temperature, slope, point, value),
-    )
+    ), dof
 
 
-def scatter_of(record: CalibrationRecord, loads: Table, one: LoadFit) -> Scatter:
-    """Return the scatter of a record's own residuals, taken apart."""
-    design = term_matrix(one.terms, loads.columns(record.indications))
-    load = loads.column(one.load)
-    return split_scatter(
-        residuals=load - design @ np.asarray(one.coefficients),
-        design=design,
-        load=load,
-        loads=loads.matrix([each.load for each in record.loads]),
-        table=loads,
-    )
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Variance:
+    """A variance [unit of the load, squared] and its gradient (4,) by the scatter's components."""
+
+    variance: float
+    gradient: NDArray[np.float64]
+    dof: float
 
 
-def fit_u(record: CalibrationRecord, one: LoadFit, point: NDArray[np.float64]) -> float:
-    """Return sqrt(J V J^T), the standard uncertainty of the curve at a point (JCGM 100 eq. 13, H.3.4)."""
+def _curve(record: CalibrationRecord, one: LoadFit, s: Scatter, point: NDArray[np.float64]) -> _Variance:
+    """Return the variance of the curve at a point, J C J^T (JCGM 100 eq. 13, H.3.4)."""
     J = term_matrix(one.terms, dict(zip(record.indications, point[:, None], strict=True)))[0]
-    return math.sqrt(max(float(J @ np.asarray(one.covariance) @ J), 0.0))
+    stored = max(float(J @ np.asarray(one.covariance) @ J), 0.0)
+    if one.method != "ols":  # it follows from stated uncertainties alone
+        return _Variance(variance=stored, gradient=np.zeros(4), dof=math.inf)
+    if s.runs.groups < 2:
+        share = stored / (one.residual_sd or 1.0) ** 2
+        dof = math.inf if one.dof is None else float(one.dof)
+        return _Variance(variance=stored, gradient=np.array([share, 0.0, 0.0, 0.0]), dof=dof)
+    variance, gradient = s.rows.variance(s.runs, J)
+    return _Variance(variance=variance, gradient=gradient, dof=s.dof(gradient, variance))
 
 
-def _reference(statements: Statements, one: LoadFit) -> Component:
+def _new_run(s: Scatter, share: float) -> _Variance:
+    """Return the variance of another run's zero and gain at a share of the largest load."""
+    gradient = np.array([0.0, 1.0, share**2, 0.0])
+    variance = float(gradient[:3] @ s.runs.variances)
+    return _Variance(variance=variance, gradient=gradient, dof=s.dof(gradient, variance) if variance else 1.0)
+
+
+def _reference(statements: Statements, one: LoadFit, value: float) -> Component:
     u = statements.reference.u(one.load)
     if u is None:
         return _absent("reference", "no uncertainty of the reference standard is stated", "session")
     if one.method == "gls" and statements.reference.shared_group is not None:
         text = "held by the fit's covariance: its rows share the reference's error (gls)"
         return _part("reference", text, "B", "normal", 0.0, math.inf, "session")
-    stated = next(s for s in statements.reference.uncertainties if s.load == one.load)
-    text = f"certificate: U = {stated.U:.4g} {one.unit} with k = {stated.k:g}, u = U/k at every load"
-    return _part("reference", text, "B", "normal", u, math.inf, "session")
+    text = f"certificate: u = U/k = {u:.4g} {one.unit} at the largest load, in proportion to the load"
+    return _part("reference", text, "B", "normal", u * abs(value) / one.largest, math.inf, "session")
 
 
-def _fit(record: CalibrationRecord, one: LoadFit, point: NDArray[np.float64]) -> Component:
+def _fit(record: CalibrationRecord, one: LoadFit, point: NDArray[np.float64], curve: _Variance) -> Component:
     known = one.method != "ols"  # the covariance follows from stated uncertainties alone
     text = f"J V J^T of the {len(one.terms)} coefficients at {_point(record, point)}"
     return _part(
-        "fit", text, "B" if known else "A", "normal" if known else "student", fit_u(record, one, point),
-        math.inf if known or one.dof is None else one.dof, "data",
+        "fit", text, "B" if known else "A", "normal" if known else "student", math.sqrt(curve.variance),
+        curve.dof, "data", joint=not known,
     )  # fmt: skip
 
 
 def _repeatability(s: Scatter) -> Component:
-    text = f"scatter of a reading at one load within a {s.factor}, all levels pooled"
-    if not s.levels:
-        text = f"scatter about the curve within a {s.factor}; it holds the misfit, as no load was repeated"
-    return _part("repeatability", text, "A", "student", s.within, s.within_dof, "data")
+    runs = s.runs
+    text = f"scatter of a reading within a {runs.factor}"
+    if runs.correlation > 0:
+        text += f", correlated by {runs.correlation:.2f} from row to row"
+    if not s.misfit_dof:
+        text += "; it holds the misfit of the curve, which so few rows cannot tell apart"
+    dof = s.dof(_READING, runs.within**2)
+    return _part("repeatability", text, "A", "student", runs.within, dof, "data", joint=True)
 
 
-def _reproducibility(s: Scatter, share: float) -> Component:
-    parts = [(s.offset, s.offset_dof), (s.gain * share, s.gain_dof)]
-    if s.groups < 2 or not s.offset_dof + s.gain_dof:
-        return _absent("reproducibility", f"one {s.factor} tells nothing of the next", "data")
-    used = [(u, float(dof)) for u, dof in parts if u > 0]
-    u = math.sqrt(sum(u * u for u, _ in used))
-    dof = effective_dof(used) if used else float(max(s.offset_dof, s.gain_dof))
-    text = f"between {s.groups} {s.factor}s, free of the scatter within: zero {s.offset:.3g}, " \
-        f"gain {s.gain:.3g} at full scale"  # fmt: skip
-    return _part("reproducibility", text, "A", "student", u, dof, "data")
+def _reproducibility(s: Scatter, new: _Variance) -> Component:
+    runs = s.runs
+    if runs.groups < 2:
+        return _absent("reproducibility", f"one {runs.factor} tells nothing of the next", "data")
+    text = (
+        f"between {runs.groups} {runs.factor}s, free of the scatter within: zero {runs.zero:.3g}, "
+        f"gain {runs.gain:.3g} at full scale"
+    )
+    u = math.sqrt(new.variance)
+    return _part("reproducibility", text, "A", "student", u, new.dof, "data", joint=True)
 
 
 def _interpolation(record: CalibrationRecord, s: Scatter, check: Table | None, one: LoadFit) -> Component:
     """Return the misfit of the level means, else of the check loads (ISO 376 C: interpolation)."""
     if s.misfit_dof:
-        text = f"distance of the level means from the curve (rms), free of the scatter; {s.misfit_dof} dof"
+        text = f"distance of a smooth curve from the equation (rms), free of the scatter; {s.misfit_dof} dof"
         return _part("interpolation", text, "A", "normal", s.misfit, s.misfit_dof, "data")
     if check is None:
-        return _absent("interpolation", "no load was repeated and there are no check loads", "data")
+        return _absent(
+            "interpolation", "too few rows to tell it from scatter, and there are no check loads", "data"
+        )
     design = term_matrix(one.terms, check.columns(record.indications))
     off = design @ np.asarray(one.coefficients) - check.column(one.load)
-    expected = s.within**2 + np.einsum("ij,jk,ik->i", design, np.asarray(one.covariance), design)
+    expected = s.runs.within**2 + np.einsum("ij,jk,ik->i", design, np.asarray(one.covariance), design)
     u = math.sqrt(max(float(np.mean(off**2 - expected)), 0.0))
     text = f"distance of {check.rows} check loads from the curve (rms), free of scatter and fit"
     return _part("interpolation", text, "A", "normal", u, check.rows, "check loads")
@@ -135,10 +160,8 @@ def _interpolation(record: CalibrationRecord, s: Scatter, check: Table | None, o
 
 def _reversibility(s: Scatter) -> Component:
     if not s.reversal_dof:
-        return _absent("reversibility", "no load was applied in both directions", "data")
-    text = (
-        f"half the difference of the directions (rms of {s.reversal_dof} levels) {s.reversal:.3g}, / sqrt(3)"
-    )
+        return _absent("reversibility", "too few rows were loaded and unloaded", "data")
+    text = f"half the difference of the directions (rms over the loads) {s.reversal:.3g}, / sqrt(3)"
     return _part("reversibility", text, "A", "rectangular", s.reversal / ROOT3, s.reversal_dof, "data")
 
 
@@ -214,11 +237,19 @@ def _temperature(
 
 
 def _part(
-    name: str, text: str, kind: Evaluation, distribution: Distribution, u: float, dof: float, source: str
+    name: str,
+    text: str,
+    kind: Evaluation,
+    distribution: Distribution,
+    u: float,
+    dof: float,
+    source: str,
+    *,
+    joint: bool = False,
 ) -> Component:
     return Component(
         name=name, description=text, type=kind, distribution=distribution, u=float(u), dof=float(dof),
-        source=source,
+        source=source, joint=joint,
     )  # fmt: skip
 
 

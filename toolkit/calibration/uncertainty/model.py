@@ -6,6 +6,7 @@ has been applied, so that the shares u_i^2 / u^2 add up to one.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Literal
 
@@ -29,6 +30,8 @@ class Component:
     dof : degrees of freedom; infinite where a type B statement is taken as certain
     source : where the figure comes from: data, session, conditions of use
     stated : False where nothing was stated or measured: u is then 0, and is no claim that it is small
+    joint : True for what one estimate from the session's rows gives together; the degrees of freedom of
+        their sum are `Budget.scatter_dof`, since each by itself is no independent estimate
     """
 
     name: str
@@ -39,6 +42,7 @@ class Component:
     dof: float
     source: str
     stated: bool = True
+    joint: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -46,8 +50,9 @@ class Budget:
     """The budget of one load at one value.
 
     ``at`` the load value, ``u`` combined standard and ``U`` expanded uncertainty, all in ``unit``; ``dof``
-    effective (Welch-Satterthwaite), ``k`` from Student's t for ``probability``. ``indications`` is the
-    point, in the record's order and units, at which the equation's sensitivities were taken.
+    effective (Welch-Satterthwaite), ``k`` from Student's t for ``probability``. ``scatter_dof`` are those of
+    all components that are estimated together from the session's rows (`Component.joint`). ``indications``
+    is the point, in the record's order and units, at which the equation's sensitivities were taken.
     """
 
     record: str
@@ -61,6 +66,7 @@ class Budget:
     k: float
     U: float
     probability: float
+    scatter_dof: float = math.inf
 
     @property
     def not_stated(self) -> tuple[str, ...]:

@@ -1,7 +1,8 @@
 """Monte Carlo check of a budget: propagation of distributions (JCGM 101:2008).
 
-Every trial refits the calibration: the rows of the session get new errors, the coefficients follow by the
-pseudo-inverse, X^+ (y + e), and the load is computed from them at indications that have errors of their own.
+Every trial refits the calibration: the rows of the session get new errors, within their runs and between
+them, the coefficients follow, X^+ (y + e), and the load is computed from them at indications that have errors
+of their own.
 Nothing is linearised. What the budget knows only as an amount of load is drawn as such, from its own
 distribution: normal (6.4.7), scaled and shifted t (6.4.9), rectangular (6.4.2).
 
@@ -23,6 +24,7 @@ from toolkit.calibration.session.statements import statements_of
 from toolkit.calibration.terms import term_matrix
 from toolkit.calibration.uncertainty.readings import indication_errors
 from toolkit.calibration.uncertainty.rounding import last_place
+from toolkit.calibration.uncertainty.scatter import scatter_of
 from toolkit.errors import SessionError
 
 if TYPE_CHECKING:
@@ -36,6 +38,7 @@ if TYPE_CHECKING:
     from toolkit.calibration.uncertainty.readings import IndicationError
 
     Draw = Callable[[np.random.Generator, int], NDArray[np.float64]]
+    Refit = Callable[[np.random.Generator, int, NDArray[np.float64]], NDArray[np.float64]]
 
 BATCH = 20_000
 MOST_BATCHES = 500
@@ -150,12 +153,17 @@ def _model(record: CalibrationRecord, loads: Table, budget: Budget) -> Draw:
     refit = _refits(record, loads, budget)
     errors = indication_errors(record, statements_of(record))
     exact = not any(e.u or e.half_width for e in errors)
+    joint = [part.u for part in budget.components if part.joint and part.name not in _AT_SOURCE]
+    scatter = math.sqrt(math.fsum(u * u for u in joint))
     point = np.asarray(budget.indications)
     here = term_matrix(one.terms, dict(zip(record.indications, point[:, None], strict=True)))[0]
-    amounts = [part for part in budget.components if part.u > 0 and part.name not in _AT_SOURCE]
+    apart = [part for part in budget.components if not part.joint and part.name not in _AT_SOURCE]
+    amounts = [part for part in apart if part.u > 0]
 
     def draw(generator: np.random.Generator, size: int) -> NDArray[np.float64]:
-        c = refit(generator, size)
+        # What one estimate from the rows gives is drawn by one scale (6.4.9.4).
+        scale = _scale(generator, size, budget.scatter_dof)
+        c = refit(generator, size, scale)
         if exact:
             total: NDArray[np.float64] = c @ here
         else:
@@ -164,6 +172,7 @@ def _model(record: CalibrationRecord, loads: Table, budget: Budget) -> Draw:
                 for name, x, e in zip(record.indications, point.tolist(), errors, strict=True)
             }
             total = np.einsum("ij,ij->i", term_matrix(one.terms, cells), c)
+        total = total + scale * generator.normal(0.0, scatter, size)
         for part in amounts:
             total = total + _amount(generator, size, part)
         return total
@@ -171,29 +180,23 @@ def _model(record: CalibrationRecord, loads: Table, budget: Budget) -> Draw:
     return draw
 
 
-def _refits(record: CalibrationRecord, loads: Table, budget: Budget) -> Draw:
-    """Return what refits a number of trials at once: coefficients (trials, terms)."""
+def _refits(record: CalibrationRecord, loads: Table, budget: Budget) -> Refit:
+    """Return what refits a number of trials at once: coefficients (trials, terms).
+
+    A linear fit of rows whose errors are normal moves its coefficients by normal amounts, exactly: they are
+    drawn from their covariance in place of the rows, whose number then costs nothing.
+    """
     one = record.load(budget.load)
-    design = term_matrix(one.terms, loads.columns(record.indications))
-    scale = np.abs(design).max(axis=0)
-    scale[scale == 0] = 1.0
     coefficients = np.asarray(one.coefficients)
     part = budget.component("fit")
-    if one.method != "ols":
-        # Other methods weigh or correlate the rows; their own covariance is what a refit would scatter by.
-        root = _root(np.asarray(one.covariance))
-        return lambda generator, size: (
-            coefficients
-            + _student(generator, generator.standard_normal((size, len(coefficients))) @ root.T, part.dof)
-        )
-    # X = U S V', and X^+ e = V S^-1 (U' e). Of independent normal errors of the rows U' e is again p
-    # independent ones, exactly: they are drawn in place of the rows, whose number then costs nothing.
-    _, values, right = np.linalg.svd(design / scale, full_matrices=False)
-    root = (right.T / values) / scale[:, None] * (one.residual_sd or 0.0)
+    scatter = scatter_of(record, loads, one)
+    spread = scatter.rows.parts(scatter.runs.correlation)
+    own = np.einsum("k,kij->ij", scatter.runs.variances, spread)
+    root = _root(own if part.joint and scatter.runs.groups > 1 else np.asarray(one.covariance))
 
-    def refit(generator: np.random.Generator, size: int) -> NDArray[np.float64]:
+    def refit(generator: np.random.Generator, size: int, scale: NDArray[np.float64]) -> NDArray[np.float64]:
         moved = generator.standard_normal((size, len(coefficients))) @ root.T
-        found: NDArray[np.float64] = coefficients + _student(generator, moved, part.dof)
+        found: NDArray[np.float64] = coefficients + (moved * scale[:, None] if part.joint else moved)
         return found
 
     return refit
@@ -206,23 +209,17 @@ def _root(covariance: NDArray[np.float64]) -> NDArray[np.float64]:
     return root
 
 
-def _student(generator: np.random.Generator, normal: NDArray[np.float64], dof: float) -> NDArray[np.float64]:
-    """Return draws of the t distribution from normal ones; rows of one trial share the scale (6.4.9.4)."""
-    if math.isinf(dof):
-        return normal
-    scale = np.sqrt(dof / generator.chisquare(dof, len(normal)))
-    return normal * (scale[:, None] if normal.ndim > 1 else scale)
+def _scale(generator: np.random.Generator, size: int, dof: float) -> NDArray[np.float64]:
+    """Return what makes normal draws those of Student's t with ``dof`` degrees of freedom (6.4.9.4)."""
+    return np.ones(size) if math.isinf(dof) else np.sqrt(dof / generator.chisquare(dof, size))
 
 
 def _amount(generator: np.random.Generator, size: int, part: Component) -> NDArray[np.float64]:
     if part.distribution == "rectangular":
         half = part.u * math.sqrt(3.0)
         return generator.uniform(-half, half, size)
-    return _student(
-        generator,
-        generator.normal(0.0, part.u, size),
-        part.dof if part.distribution == "student" else math.inf,
-    )
+    drawn = generator.normal(0.0, part.u, size)
+    return drawn * _scale(generator, size, part.dof) if part.distribution == "student" else drawn
 
 
 def _misread(generator: np.random.Generator, size: int, error: IndicationError) -> NDArray[np.float64]:

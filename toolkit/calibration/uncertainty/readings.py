@@ -39,7 +39,7 @@ def indication_errors(record: CalibrationRecord, statements: Statements) -> tupl
     A load from a tared record is a difference of two readings, each rounded by itself: the standard
     uncertainty of the rounding is then r/sqrt(6) of a resolution r, as in ISO 376 annex C, else r/sqrt(12).
     """
-    readings = 2 if record.zero == "tared" else 1
+    readings = 1 if record.zero == "included" else 2
     return tuple(
         IndicationError(
             name=cell.name,

@@ -260,7 +260,11 @@ def _withdrawn(status: RecordStatus) -> str | None:
 def _model(record: CalibrationRecord) -> str:
     terms = record.loads[0].terms
     fit = _METHODS.get(record.loads[0].method, record.loads[0].method)
-    zero = "indications tared before each run" if record.zero == "tared" else "zero of the cells included"
+    zero = {
+        "tared": "indications tared before each run",
+        "run": "indications from the zero of each run",
+        "included": "zero of the cells included",
+    }[record.zero]
     return f"load = sum of coefficient x term, {len(terms)} terms a load, fitted by {fit}; {zero}"
 
 

@@ -1,0 +1,135 @@
+"""Scatter of a load about its curve: within a run, and between runs; and the covariance that follows from it.
+
+Reference loads y of a session against its terms X:
+
+    y_i = X_i c + z_r + g_r l_i + e_i,   l_i = (X c)_i / largest load,   r the run (or mounting) of row i
+
+with a zero z_r ~ N(0, zero^2) and a gain g_r ~ N(0, gain^2) of every run, both in the unit of the load (the
+gain at the largest load), and e_i ~ N(0, within^2), correlated with the row before it in its run by
+``correlation``. The coefficients are those of the session's fit, a linear map A of the loads: their
+covariance is A V A^T with V that of the rows (JCGM 100:2008, 5.2; Searle, Casella and McCulloch, Variance
+Components, 1992). `fit.run_scatter` estimates the components; what is computed from them stands here, in
+numpy alone, because every command that loads a record computes it again.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from toolkit.estimate import coverage_factor
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+MODEL = "run-effects-1"
+_NEGLIGIBLE = 1e-18
+_STEP = 1e-4
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RunScatter:
+    """Standard deviations in the load's unit, as restricted likelihood estimates them.
+
+    ``factor`` is what tells the groups of rows apart, run or mounting; ``groups`` their number; ``within``,
+    ``zero``, ``gain`` and ``correlation`` as above; ``dof`` the degrees of freedom that are left for
+    ``within`` by the mean and the runs. ``zero`` is 0 by definition where each run has its own zero.
+    """
+
+    factor: str
+    groups: int
+    within: float
+    zero: float
+    gain: float
+    correlation: float
+    dof: int
+    model: str = MODEL
+
+    @property
+    def variances(self) -> NDArray[np.float64]:
+        """within^2, zero^2, gain^2 (3,)."""
+        return np.array([self.within, self.zero, self.gain]) ** 2
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Rows:
+    """What of a session's rows decides how scatter reaches its coefficients.
+
+    ``operator`` (terms, rows) is A; ``relative`` (rows,) the loads l; ``group`` (rows,) the run of each row,
+    whole numbers from 0.
+    """
+
+    operator: NDArray[np.float64]
+    relative: NDArray[np.float64]
+    group: NDArray[np.int64]
+
+    def parts(self, correlation: float) -> NDArray[np.float64]:
+        """Return A V_k A^T of a unit of within^2, zero^2 and gain^2 (3, terms, terms)."""
+        order = np.argsort(self.group, kind="stable")
+        A, group, relative = self.operator[:, order], self.group[order], self.relative[order]
+        runs = int(group[-1]) + 1
+        zero = np.stack([np.bincount(group, weights=row, minlength=runs) for row in A])
+        gain = np.stack([np.bincount(group, weights=row * relative, minlength=runs) for row in A])
+        return np.stack([_within(A, group, correlation), zero @ zero.T, gain @ gain.T])
+
+    def covariance(self, scatter: RunScatter) -> NDArray[np.float64]:
+        """Return the covariance of the coefficients (terms, terms) that a normal interval may be built on.
+
+        A component on nu degrees of freedom enters (t_nu / t_inf)^2 times as large, t at 95 %: who is handed
+        a covariance takes k = 1.96, and with three runs the sizes of their zeros are known to two degrees of
+        freedom only. The within part counts rows that correlation leaves independent,
+        (1 - phi^2) / (1 + phi^2) of them (Bayley and Hammersley, J. R. Stat. Soc. Suppl. 8 (1946) 184).
+        """
+        phi2 = scatter.correlation**2
+        within = max(scatter.dof * (1 - phi2) / (1 + phi2), 1.0)
+        between = float(max(scatter.groups - 1, 1))
+        factor = np.array([within, between, between])
+        widened = scatter.variances * [_expansion(dof) for dof in factor.tolist()]
+        total = np.einsum("k,kij->ij", widened, self.parts(scatter.correlation))
+        return np.asarray((total + total.T) / 2)
+
+    def variance(self, scatter: RunScatter, J: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]:
+        """Return J C J^T, unexpanded, of one vector J (terms,), and its gradient (4,).
+
+        The gradient is by within^2, zero^2, gain^2 and the correlation.
+        """
+        alone = Rows(operator=(J @ self.operator)[None, :], relative=self.relative, group=self.group)
+        share = alone.parts(scatter.correlation)[:, 0, 0]
+        phi = scatter.correlation
+        near = [max(phi - _STEP, 0.0), phi + _STEP]
+        moved = [float(alone.parts(value)[0, 0, 0]) for value in near]
+        turned = scatter.within**2 * (moved[1] - moved[0]) / (near[1] - near[0])
+        return float(scatter.variances @ share), np.append(share, turned)
+
+
+def rows_of(design: NDArray[np.float64], relative: NDArray[np.float64], group: NDArray[np.int64]) -> Rows:
+    """Return the rows of a least-squares fit on a design (rows, terms) with relative loads (rows,)."""
+    # Columns of one length: the pseudo-inverse of raw terms loses digits to their units.
+    length = np.sqrt(np.einsum("ij,ij->j", design, design))
+    length = np.where(length > 0, length, 1.0)
+    q, r = np.linalg.qr(design / length)
+    operator = np.linalg.solve(r, q.T) / length[:, None]
+    return Rows(operator=operator, relative=relative, group=group)
+
+
+def _within(A: NDArray[np.float64], group: NDArray[np.int64], correlation: float) -> NDArray[np.float64]:
+    """Return A R A^T with R_ij = correlation^|i - j| inside a run; rows of a run stand together."""
+    product = A @ A.T
+    if correlation <= 0:
+        return np.asarray(product)
+    # R = L + L^T - 1 with L the sum over all rows before; its geometric series doubles at every step.
+    filtered, lag, weight = A.copy(), 1, correlation
+    while lag < A.shape[1] and weight > _NEGLIGIBLE:
+        same = group[lag:] == group[:-lag]
+        before = filtered[:, :-lag] * same
+        filtered = filtered.copy()
+        filtered[:, lag:] += weight * before
+        lag, weight = 2 * lag, weight * weight
+    half = filtered @ A.T
+    return np.asarray(half + half.T - product)
+
+
+def _expansion(dof: float) -> float:
+    return float((coverage_factor(dof) / coverage_factor(float("inf"))) ** 2)
