@@ -10,7 +10,7 @@ JOBS   ?= 2
 
 APT_PACKAGES := libreoffice-writer-nogui fonts-crosextra-carlito fonts-crosextra-caladea fonts-liberation2 poppler-utils
 
-.PHONY: demo test check bench proof setup lock clean
+.PHONY: demo test check bench coverage proof setup lock clean
 
 setup: $(STAMP) $(SYSTEM)
 
@@ -28,6 +28,12 @@ check: $(STAMP)
 
 bench: setup
 	$(BIN)/python -m tests.benchmarks
+
+# How often printed intervals hold the truth: tables with exact binomial intervals, some minutes.
+REPETITIONS ?= 60
+coverage: setup
+	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m tests.coverage --workers $(JOBS) \
+	  --repetitions $(REPETITIONS)
 
 # A new sealed batch of concealed effects, the tool once on every case, then the answers opened. Resumable.
 CASES ?= 400

@@ -134,10 +134,14 @@ def test_the_parts_of_such_a_budget_add_up(tmp_path: Path, method: str, tail: st
     budget = case.budget(600.0)
     parts = [one for one in budget.components if one.u > 0]
     assert {"reference", "fit", "repeatability"} <= {one.name for one in parts}
-    assert budget.component("reference").u == pytest.approx(0.4)
+    # U = 0.8 N with k = 2 at the largest load of 800 N, in proportion to the load.
+    assert budget.component("reference").u == pytest.approx(0.3)
     total = math.sqrt(sum(one.u**2 for one in parts))
     assert budget.u == pytest.approx(total, rel=1e-12)
-    dof = total**4 / sum(one.u**4 / one.dof for one in parts)
+    # What the rows' scatter gives together is one estimate, with degrees of freedom of its own.
+    joint = sum(one.u**2 for one in parts if one.joint)
+    apart = sum(one.u**4 / one.dof for one in parts if not one.joint)
+    dof = total**4 / (joint**2 / budget.scatter_dof + apart)
     assert budget.dof == pytest.approx(dof, rel=1e-9)
     # GUM G.6.4 takes the next lower whole number; between the two lies Student's t by interpolation.
     assert t.ppf(0.975, math.ceil(dof)) - 1e-9 <= budget.k <= t.ppf(0.975, math.floor(dof)) + 1e-9

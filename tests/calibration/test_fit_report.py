@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -67,7 +68,11 @@ def test_influence_against_statsmodels(make_session: Make) -> None:
     from statsmodels.stats.outliers_influence import OLSInfluence, variance_inflation_factor
 
     values = hub_data(60, 1)
-    report = reported(make_session(values))[0]
+    path = make_session(values)
+    # One run: the rows' errors are independent, as the peer takes them to be.
+    one_run = re.sub(r"(?m),\d+,(up|down)$", r",1,\1", (path.parent / "loads.csv").read_text())
+    (path.parent / "loads.csv").write_text(one_run)
+    report = reported(path)[0]
     cells, load = np.round(values[:, :3], 7), np.round(values[:, 3], 7)
     design = sm.add_constant(cells)
     peer = sm.OLS(load, design).fit()

@@ -15,6 +15,7 @@ from toolkit.calibration.fit.diagnostics import repeated_share
 from toolkit.calibration.fit.levels import lack_of_fit, load_levels
 from toolkit.calibration.fit.recommend import NEGLIGIBLE_PERCENT, recommend_drop, recommend_wider
 from toolkit.calibration.fit.robust import hidden_outliers, robust_weights
+from toolkit.calibration.fit.run_scatter import groups_of
 from toolkit.calibration.fit.session_fit import session_statements
 from toolkit.calibration.session.known_errors import undeclared_standard
 from toolkit.findings import Finding
@@ -55,6 +56,13 @@ def _data_findings(session: Session) -> list[Finding]:
     if share > REPEATED:
         message = f"{100 * share:.0f} % of the rows repeat another row, indications and loads alike"
         found.append(Finding(rule="duplicates", where=where, message=message))
+    factor, group = groups_of(table)
+    if session.method == "ols" and not group.any():
+        message = (
+            f"one {factor}: how {factor}s differ in zero and gain is unknown, and no uncertainty holds it; "
+            f"a second {factor} of the same loads would tell, a third and more tell it better"
+        )
+        found.append(Finding(rule="one-run", where=where, message=message, level="note"))
     if session.check is None:
         message = "no check loads: no term can be verified on approval"
         found.append(Finding(rule="no-check", where=where, message=message, level="note"))
