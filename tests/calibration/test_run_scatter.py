@@ -97,8 +97,8 @@ def test_the_covariance_is_that_of_dense_algebra() -> None:
     x, load, run = x[order], load[order], run[order]
     design = np.column_stack([x, np.ones(len(x))])
     scatter = RunScatter(factor="run", groups=3, within=0.8, zero=3.0, gain=2.0, correlation=0.6, dof=28)
-    relative = load / 4000
-    rows = rows_of(design, relative, run.astype(np.int64))
+    relative = design @ np.linalg.lstsq(design, load, rcond=None)[0] / load.max()
+    rows = rows_of(design, load, run.astype(np.int64))
     place = np.array([np.sum(run[:i] == run[i]) for i in range(len(run))])
     same = run[:, None] == run
     R = np.where(same, 0.6 ** np.abs(place[:, None] - place), 0.0)

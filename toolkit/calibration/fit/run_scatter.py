@@ -14,10 +14,9 @@ McCulloch, Variance Components, 1992, 6.6).
 
 from __future__ import annotations
 
-import itertools
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -31,13 +30,15 @@ if TYPE_CHECKING:
 # Rows over which the mean may bend and rows may be correlated: with fewer, both take what is scatter.
 ENOUGH_DOF = 20
 HIGHEST_POWER = 4
-MOST_GROUPS = 5000
+MOST_GROUPS = 100
+MOST_ROWS = 4000
 _DENSE = 800
 _LARGEST_RATIO = 1e3
 _LARGEST_CORRELATION = 0.97
 # None begins at 0: the deviance is even in a ratio, hence level there whatever lies beyond.
 _GRID = (0.03, 0.3, 0.6, 0.9)
 _DEPENDENT = 1e-9
+_STEP = 1e-7
 # Scatter below this share of the largest load is rounding, which has no runs.
 ROUNDING = 1e-13
 # Fall of the deviance from which rows count as correlated: chi-square, one-sided 5 %.
@@ -63,9 +64,10 @@ class SessionRows:
     """The rows of one load: its reference loads (rows,), their mean, and the runs.
 
     ``relative`` (rows,) is the load that the equation gives, by the largest: an effect in proportion to the
-    reference loads themselves could take them up whole.
-    ``group`` numbers from 0 what tells the rows apart (``factor``: run or mounting); ``own_zeros``: the mean
-    holds a zero of every run, so that differences of zeros are no scatter.
+    reference loads themselves could take them up whole. ``group`` numbers from 0 what tells the rows apart
+    (``factor``: run or mounting); ``own_zeros``: the mean holds a zero of every run, so that differences of
+    zeros are no scatter. Of long sessions a sample stands for all: `MOST_GROUPS` runs, and of each every
+    ``stride``-th row, so that rows are `MOST_ROWS` at most; more would narrow estimates that are narrow.
     """
 
     load: NDArray[np.float64]
@@ -74,6 +76,7 @@ class SessionRows:
     factor: str
     group: NDArray[np.int64]
     own_zeros: bool
+    stride: int = 1
 
     @classmethod
     def of(
@@ -81,16 +84,21 @@ class SessionRows:
     ) -> SessionRows:
         """Return the rows of a load (rows,) with the terms of its equation (rows, terms)."""
         factor, group = groups_of(table)
+        sample, stride = _sample(group)
+        group = _numbered(group[sample])
+        design, load = design[sample], load[sample]
+        up = None if table.up is None else table.up[sample]
         zeros = np.empty((len(load), 0))
         if zero == "run" and table.run is not None:
-            run = _numbered(table.run)
+            run = _numbered(table.run[sample])
             zeros = (run[:, None] == np.arange(int(run.max()) + 1)).astype(np.float64)
-        terms = _orthonormal(design)
+        terms = _basis([design])[0]
         relative = terms @ (terms.T @ load) / (float(np.abs(load).max()) or 1.0)
-        mean = mean_of(np.column_stack([design, zeros]), relative, table.up)
+        mean = mean_of(np.column_stack([design, zeros]), relative, up)
         return cls(
-            load=load, relative=relative, mean=mean, factor=factor, group=group, own_zeros=bool(zeros.size)
-        )
+            load=load, relative=relative, mean=mean, factor=factor, group=group,
+            own_zeros=bool(zeros.size), stride=stride,
+        )  # fmt: skip
 
     @property
     def groups(self) -> int:
@@ -128,38 +136,32 @@ def groups_of(table: Table) -> tuple[str, NDArray[np.int64]]:
 def mean_of(design: NDArray[np.float64], relative: NDArray[np.float64], up: NDArray[np.bool_] | None) -> Mean:
     """Return the columns of the mean for a design (rows, terms) and relative loads (rows,)."""
     n = len(relative)
-    blocks = [design]
-    wide = n - design.shape[1] >= ENOUGH_DOF
-    blocks.append(
-        np.stack([relative**k for k in range(2, HIGHEST_POWER + 1)], axis=1) if wide else np.empty((n, 0))
-    )
-    if wide and up is not None and 0 < int(np.count_nonzero(up)) < n:
-        side = np.where(up, 1.0, -1.0)
-        blocks.append(np.stack([side, side * relative, side * relative**2], axis=1))
-    else:
-        blocks.append(np.empty((n, 0)))
-    taken = [_orthonormal(np.column_stack(blocks[: k + 1])).shape[1] for k in range(2)]
-    columns = _orthonormal(np.column_stack(blocks))
-    return Mean(
-        columns=columns, misfit=slice(taken[0], taken[1]), direction=slice(taken[1], columns.shape[1])
-    )
+    misfit, direction = np.empty((n, 0)), np.empty((n, 0))
+    if n - design.shape[1] >= ENOUGH_DOF:
+        misfit = np.stack([relative**k for k in range(2, HIGHEST_POWER + 1)], axis=1)
+        if up is not None and 0 < int(np.count_nonzero(up)) < n:
+            side = np.where(up, 1.0, -1.0)
+            direction = np.stack([side, side * relative, side * relative**2], axis=1)
+    columns, sizes = _basis([design, misfit, direction])
+    ends = np.cumsum(sizes).tolist()
+    return Mean(columns=columns, misfit=slice(ends[0], ends[1]), direction=slice(ends[1], ends[2]))
 
 
 def estimate(rows: SessionRows) -> RunScatter | None:
-    """Return the scatter of a load; None where one run, or too many, cannot tell how runs differ."""
+    """Return the scatter of a load; None where one run cannot tell how runs differ, or nothing scatters."""
     n, p = rows.mean.columns.shape
     groups = rows.groups
     left = n - p - (groups - 1) * (1 if rows.own_zeros else 2)
-    if not 1 < groups <= MOST_GROUPS or left < 1:
+    if groups < 2 or left < 1:
         return None
     problem, size = _problem(rows)
     if size <= ROUNDING * rows.largest:
         return None
     zero, gain, correlation = ratios = _lowest(problem, rows.bounds)
-    within = size * math.sqrt(problem.deviance(ratios)[1])
+    within = size * math.sqrt(float(problem.deviance(np.array([ratios]))[1][0]))
     return RunScatter(
         factor=rows.factor, groups=groups, within=within, zero=within * zero, gain=within * gain,
-        correlation=correlation, dof=left,
+        correlation=correlation ** (1 / rows.stride), dof=left,
     )  # fmt: skip
 
 
@@ -172,30 +174,25 @@ def is_lowest(rows: SessionRows, scatter: RunScatter) -> bool:
     if not scatter.within > 0:
         return False
     problem, size = _problem(rows)
-    ratios = (scatter.zero / scatter.within, scatter.gain / scatter.within, scatter.correlation)
-    if not all(low <= value <= high for value, (low, high) in zip(ratios, rows.bounds, strict=True)):
+    correlation = scatter.correlation**rows.stride
+    ratios = np.array([scatter.zero / scatter.within, scatter.gain / scatter.within, correlation])
+    low, high = np.array(rows.bounds).T
+    if (ratios < low).any() or (ratios > high).any():
         return False
-    lowest, variance = problem.deviance(ratios)
-    if abs(scatter.within / (size * math.sqrt(variance)) - 1) > _SAME:
-        return False
-    for at, (low, high) in enumerate(rows.bounds):
-        for step in (-_NEIGHBOUR, _NEIGHBOUR):
-            near = list(ratios)
-            near[at] = min(max(near[at] + step * max(near[at], 1.0), low), high)
-            allowed = CORRELATED if at == 2 and not scatter.correlation else _GAIN
-            if problem.deviance((near[0], near[1], near[2]))[0] < lowest - allowed:
-                return False
-    return True
+    steps = _NEIGHBOUR * np.maximum(ratios, 1.0) * np.vstack([np.zeros((1, 3)), np.eye(3), -np.eye(3)])
+    deviance, variance = problem.deviance(np.clip(ratios + steps, low, high))
+    allowed = np.array([_GAIN, _GAIN, _GAIN if correlation else CORRELATED])
+    return bool(
+        abs(scatter.within / (size * math.sqrt(float(variance[0]))) - 1) <= _SAME
+        and (deviance[1:] >= deviance[0] - np.tile(allowed, 2)).all()
+    )
 
 
 def spread(rows: SessionRows, scatter: RunScatter) -> NDArray[np.float64]:
-    """Return the covariance (4, 4) of the estimates of within^2, zero^2, gain^2 and the correlation.
-
-    Of long sessions every so many rows are taken: a correlation from row to row becomes its power, and what
-    is left out would only narrow a spread that is narrow already.
-    """
-    step = max(math.ceil(len(rows.group) / _DENSE), 1)
-    order = np.argsort(rows.group, kind="stable")[::step]
+    """Return the covariance (4, 4) of the estimates of within^2, zero^2, gain^2 and the correlation."""
+    thin = max(math.ceil(len(rows.group) / _DENSE), 1)
+    order = np.argsort(rows.group, kind="stable")[::thin]
+    step = thin * rows.stride
     group, relative, mean = rows.group[order], rows.relative[order], rows.mean.columns[order]
     place = np.arange(len(group)) - np.searchsorted(group, group)
     same = group[:, None] == group
@@ -254,35 +251,45 @@ class _Problem:
         order = np.argsort(group, kind="stable")
         # Orthonormal columns of unit mean square: products of one size.
         whole = np.column_stack([mean * math.sqrt(len(load)), np.ones(len(load)), relative, load])[order]
-        ends = np.cumsum(np.bincount(group))[:-1]
-        runs = np.split(whole, ends)
-        crossed = [run[1:].T @ run[:-1] for run in runs]
+        counts = np.bincount(group)
+        starts = np.concatenate([[0], np.cumsum(counts)[:-1]])
+        # Of the first row of a run nothing stands before.
+        before = np.concatenate([np.zeros((1, whole.shape[1])), whole[:-1]])
+        before[starts] = 0.0
+        own = np.add.reduceat(whole[:, :, None] * whole[:, None, :], starts)
+        first = whole[starts][:, :, None] * whole[starts][:, None, :]
+        crossed = np.add.reduceat(whole[:, :, None] * before[:, None, :], starts)
         return cls(
-            first=np.stack([np.outer(run[0], run[0]) for run in runs]),
-            own=np.stack([run[1:].T @ run[1:] for run in runs]),
-            crossed=np.stack([one + one.T for one in crossed]),
-            before=np.stack([run[:-1].T @ run[:-1] for run in runs]),
-            counts=np.array([len(run) for run in runs]),
+            first=first,
+            own=own - first,
+            crossed=crossed + crossed.transpose(0, 2, 1),
+            before=np.add.reduceat(before[:, :, None] * before[:, None, :], starts),
+            counts=counts,
             rows=len(load),
             columns=mean.shape[1],
         )
 
-    def deviance(self, ratios: tuple[float, float, float]) -> tuple[float, float]:
-        """Return the restricted deviance and within^2 at (zero, gain) / within and the correlation."""
-        *effects, phi = ratios
-        p, white = self.columns, 1 - phi * phi
+    def deviance(self, points: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return the restricted deviance (points,) and within^2 (points,) of a number of points at once.
+
+        ``points`` (points, 3) are zero and gain by within, and the correlation.
+        """
+        p, phi = self.columns, points[:, 2, None, None, None]
+        white = 1 - phi * phi
         products = self.first + (self.own - phi * self.crossed + phi * phi * self.before) / white
-        root = np.array(effects)
-        inner = np.eye(2) + root[:, None] * products[:, p:-1, p:-1] * root
-        across = products[:, :, p:-1] * root
-        reduced = (products - across @ np.linalg.solve(inner, across.transpose(0, 2, 1))).sum(axis=0)
-        lower = np.linalg.cholesky(reduced[:p, :p])
-        told = np.linalg.solve(lower, reduced[:p, -1])
+        root = points[:, None, None, :2]
+        inner = np.eye(2) + root.transpose(0, 1, 3, 2) * products[:, :, p:-1, p:-1] * root
+        across = products[:, :, :, p:-1] * root
+        told = np.linalg.solve(inner, across.transpose(0, 1, 3, 2))
+        reduced = (products - across @ told).sum(axis=1)
+        lower = np.linalg.cholesky(reduced[:, :p, :p])
+        seen = np.linalg.solve(lower, reduced[:, :p, -1:])[:, :, 0]
         dof = self.rows - p
-        variance = max(float(reduced[-1, -1] - told @ told), 1e-300) / dof
-        logs = float(np.linalg.slogdet(inner)[1].sum()) + 2 * float(np.log(np.diag(lower)).sum())
-        logs += float((self.counts - 1).sum()) * math.log(white)
-        return dof * math.log(variance) + logs, variance
+        variance = np.maximum(reduced[:, -1, -1] - np.sum(seen**2, axis=1), 1e-300) / dof
+        logs = np.linalg.slogdet(inner)[1].sum(axis=1)
+        logs += 2 * np.log(np.diagonal(lower, axis1=1, axis2=2)).sum(axis=1)
+        logs += (self.counts - 1).sum() * np.log(white[:, 0, 0, 0])
+        return dof * np.log(variance) + logs, variance
 
 
 def _lowest(problem: _Problem, bounds: list[tuple[float, float]]) -> tuple[float, float, float]:
@@ -308,34 +315,62 @@ def _search(problem: _Problem, bounds: list[tuple[float, float]]) -> tuple[tuple
     low, high = np.array(bounds).T
     top = np.array([high[0] / (1 + high[0]), high[1] / (1 + high[1]), high[2]])
 
-    def ratios(values: NDArray[np.float64]) -> tuple[float, float, float]:
-        zero, gain, correlation = np.clip(values, low, top).tolist()
-        return zero / (1 - zero), gain / (1 - gain), correlation
+    def ratios(values: NDArray[np.float64]) -> NDArray[np.float64]:
+        clipped = np.clip(values, low, top)
+        return np.column_stack([clipped[:, :2] / (1 - clipped[:, :2]), clipped[:, 2]])
 
-    def deviance(values: NDArray[np.float64]) -> float:
-        return problem.deviance(ratios(values))[0]
+    def slope(values: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]:
+        # Inwards at an upper end: beyond it nothing is computed.
+        step = np.where(values + _STEP <= top, _STEP, -_STEP)
+        near = problem.deviance(ratios(values + np.vstack([np.zeros((1, 3)), np.diag(step)])))[0]
+        return float(near[0]), (near[1:] - near[0]) / step
 
-    grid = itertools.product(*(sorted({min(x, end) for x in _GRID}) for end in top.tolist()))
-    start = min((np.array(point) for point in grid), key=deviance)
-    found = minimize(deviance, start, bounds=Bounds(low, top), method="L-BFGS-B")
+    axes = [np.unique(np.minimum(_GRID, end)) for end in top]
+    grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+    start = grid[int(np.argmin(problem.deviance(ratios(grid))[0]))]
+    found = minimize(slope, start, jac=True, bounds=Bounds(low, top), method="L-BFGS-B").x
     # A ratio that is not told apart from none is none.
-    nothing = [np.where(np.arange(3) == at, 0.0, found.x) for at in range(3)]
-    best = min((np.where(found.x < _GRID[0], 0.0, found.x), *nothing, found.x, start), key=deviance)
-    return ratios(best), deviance(best)
+    candidates = np.vstack(
+        [np.where(found < _GRID[0], 0.0, found), *np.where(np.eye(3, dtype=bool), 0.0, found), found, start]
+    )
+    deviance = problem.deviance(ratios(candidates))[0]
+    best = int(np.argmin(deviance))
+    zero, gain, correlation = ratios(candidates)[best].tolist()
+    return (zero, gain, correlation), float(deviance[best])
 
 
-def _orthonormal(columns: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return what each column has beyond those before it, at unit length; none where it has nothing."""
-    basis = np.empty((len(columns), 0))
-    for column in columns.T:
-        rest = column / (float(np.sqrt(column @ column)) or 1.0)
-        for _ in range(2):  # the second time takes out what rounding left
-            rest = rest - basis @ (basis.T @ rest)
-        length = float(np.sqrt(rest @ rest))
-        if length > _DEPENDENT:
-            basis = np.column_stack([basis, rest / length])
-    return basis
+def _sample(group: NDArray[np.int64]) -> tuple[NDArray[np.int64], int]:
+    """Return which rows stand for all (rows,), and how many rows of a run each of them stands for."""
+    groups = int(group.max()) + 1
+    every = np.arange(len(group))
+    if groups <= MOST_GROUPS and len(group) <= MOST_ROWS:
+        return every, 1
+    picked = np.unique(np.linspace(0, groups - 1, min(groups, MOST_GROUPS)).round().astype(np.int64))
+    rows = every[np.isin(group, picked)]
+    stride = max(math.ceil(len(rows) / MOST_ROWS), 1)
+    order = rows[np.argsort(group[rows], kind="stable")]
+    sorted_group = group[order]
+    place = np.arange(len(order)) - np.searchsorted(sorted_group, sorted_group)
+    return np.sort(order[place % stride == 0]), stride
 
 
-def _numbered(values: NDArray[np.float64]) -> NDArray[np.int64]:
+def _basis(blocks: list[NDArray[np.float64]]) -> tuple[NDArray[np.float64], list[int]]:
+    """Return an orthonormal basis of columns in their order (rows, columns), and how many each block gave.
+
+    A column that those before it make up gives none.
+    """
+    columns = np.column_stack(blocks)
+    owner = np.repeat(np.arange(len(blocks)), [block.shape[1] for block in blocks])
+    while True:
+        length = np.sqrt(np.einsum("ij,ij->j", columns, columns))
+        q, r = np.linalg.qr(columns / np.where(length > 0, length, 1.0))
+        spare = np.abs(np.diag(r)) <= _DEPENDENT
+        if not spare.any():
+            return q, np.bincount(owner, minlength=len(blocks)).tolist()
+        # One at a time: those behind it were judged against a direction that is none.
+        keep = np.arange(columns.shape[1]) != int(np.argmax(spare))
+        columns, owner = columns[:, keep], owner[keep]
+
+
+def _numbered(values: NDArray[Any]) -> NDArray[np.int64]:
     return np.asarray(np.unique(values, return_inverse=True)[1].ravel(), dtype=np.int64)

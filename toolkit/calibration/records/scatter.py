@@ -104,13 +104,23 @@ class Rows:
         return float(scatter.variances @ share), np.append(share, turned)
 
 
-def rows_of(design: NDArray[np.float64], relative: NDArray[np.float64], group: NDArray[np.int64]) -> Rows:
-    """Return the rows of a least-squares fit on a design (rows, terms) with relative loads (rows,)."""
-    # Columns of one length: the pseudo-inverse of raw terms loses digits to their units.
-    length = np.sqrt(np.einsum("ij,ij->j", design, design))
-    length = np.where(length > 0, length, 1.0)
-    q, r = np.linalg.qr(design / length)
-    operator = np.linalg.solve(r, q.T) / length[:, None]
+def rows_of(
+    design: NDArray[np.float64],
+    load: NDArray[np.float64],
+    group: NDArray[np.int64],
+    operator: NDArray[np.float64] | None = None,
+) -> Rows:
+    """Return the rows of a least-squares fit of a load (rows,) on a design (rows, terms).
+
+    ``operator`` (terms, rows) is what makes the coefficients, where it is known.
+    """
+    if operator is None:
+        # Columns of one length: the pseudo-inverse of raw terms loses digits to their units.
+        length = np.sqrt(np.einsum("ij,ij->j", design, design))
+        length = np.where(length > 0, length, 1.0)
+        q, r = np.linalg.qr(design / length)
+        operator = np.linalg.solve(r, q.T) / length[:, None]
+    relative = design @ (operator @ load) / (float(np.abs(load).max()) or 1.0)
     return Rows(operator=operator, relative=relative, group=group)
 
 

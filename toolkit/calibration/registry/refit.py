@@ -18,9 +18,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolkit.calibration.fit.run_scatter import SessionRows, is_lowest
+from toolkit.calibration.fit.run_scatter import SessionRows, groups_of, is_lowest
 from toolkit.calibration.records.issue import issued_value, term_reach
-from toolkit.calibration.records.scatter import Rows
+from toolkit.calibration.records.scatter import rows_of
 from toolkit.calibration.registry.whitening import Whitener, errors_of, linearise, whitener
 from toolkit.calibration.session.table import Table
 from toolkit.calibration.terms import INTERCEPT, term_matrix
@@ -196,10 +196,10 @@ def scatter_covariance(
     ``operator`` (terms, rows) is what made the coefficients of the loads.
     """
     design = term_matrix(one.terms, table.columns(record.indications))
-    rows = SessionRows.of(design, table.column(one.load), table, record.zero)
-    if one.scatter is None or not is_lowest(rows, one.scatter):
+    load = table.column(one.load)
+    if one.scatter is None or not is_lowest(SessionRows.of(design, load, table, record.zero), one.scatter):
         return None
-    return Rows(operator=operator, relative=rows.relative, group=rows.group).covariance(one.scatter)
+    return rows_of(design, load, groups_of(table)[1], operator).covariance(one.scatter)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolkit.calibration.fit.run_scatter import SessionRows, estimate, spread
+from toolkit.calibration.fit.run_scatter import SessionRows, estimate, groups_of, spread
 from toolkit.calibration.records.scatter import Rows, RunScatter, rows_of
 from toolkit.calibration.terms import term_matrix
 
@@ -63,7 +63,7 @@ def scatter_of(record: CalibrationRecord, loads: Table, one: LoadFit) -> Scatter
     return Scatter(
         runs=runs,
         spread=known,
-        rows=rows_of(design, rows.relative, rows.group),
+        rows=rows_of(design, load, groups_of(loads)[1]),
         misfit=misfit[0],
         misfit_dof=misfit[1],
         reversal=reversal[0],
