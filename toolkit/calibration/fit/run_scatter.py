@@ -30,13 +30,14 @@ if TYPE_CHECKING:
 # Rows over which the mean may bend and rows may be correlated: with fewer, both take what is scatter.
 ENOUGH_DOF = 20
 HIGHEST_POWER = 4
-MOST_GROUPS = 100
-MOST_ROWS = 4000
+MOST_GROUPS = 60
+MOST_ROWS = 2000
 _DENSE = 800
 _LARGEST_RATIO = 1e3
 _LARGEST_CORRELATION = 0.97
 # None begins at 0: the deviance is even in a ratio, hence level there whatever lies beyond.
 _GRID = (0.03, 0.3, 0.6, 0.9)
+_CORRELATIONS = (0.1, 0.4, 0.8)
 _DEPENDENT = 1e-9
 _STEP = 1e-7
 # Scatter below this share of the largest load is rounding, which has no runs.
@@ -297,15 +298,18 @@ def _lowest(problem: _Problem, bounds: list[tuple[float, float]]) -> tuple[float
 
     Bounded below by 0 it would be positive by chance in half of all sessions, and take the scatter with it.
     """
-    alone, without = _search(problem, [*bounds[:2], (0.0, 0.0)])
+    alone, without = _search(problem, [*bounds[:2], (0.0, 0.0)], [_GRID, _GRID, (0.0,)])
     if not bounds[2][1]:
         return alone
-    together, lowest = _search(problem, bounds)
+    near = [(max(ratio / (1 + ratio), _GRID[0]),) for ratio in alone[:2]]
+    together, lowest = _search(problem, bounds, [*near, _CORRELATIONS])
     return together if lowest < without - CORRELATED else alone
 
 
-def _search(problem: _Problem, bounds: list[tuple[float, float]]) -> tuple[tuple[float, float, float], float]:
-    """Return the ratios of lowest deviance and that deviance, from the best point of a grid.
+def _search(
+    problem: _Problem, bounds: list[tuple[float, float]], starts: list[tuple[float, ...]]
+) -> tuple[tuple[float, float, float], float]:
+    """Return the ratios of lowest deviance and that deviance, from the best point of a grid of ``starts``.
 
     A ratio of standard deviations r is searched as r / (1 + r): half of the way is where runs differ by as
     much as the rows of a run do.
@@ -325,7 +329,7 @@ def _search(problem: _Problem, bounds: list[tuple[float, float]]) -> tuple[tuple
         near = problem.deviance(ratios(values + np.vstack([np.zeros((1, 3)), np.diag(step)])))[0]
         return float(near[0]), (near[1:] - near[0]) / step
 
-    axes = [np.unique(np.minimum(_GRID, end)) for end in top]
+    axes = [np.unique(np.minimum(start, end)) for start, end in zip(starts, top, strict=True)]
     grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
     start = grid[int(np.argmin(problem.deviance(ratios(grid))[0]))]
     found = minimize(slope, start, jac=True, bounds=Bounds(low, top), method="L-BFGS-B").x
