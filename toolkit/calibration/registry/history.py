@@ -155,7 +155,11 @@ def compared(
         load, name = one.where.split(", ")
         settled = one.rule == "sign" and (load, name) in confirmed
         allowed = one.rule == "span" and _within(new, last, load, name)
-        told = "; the cell is a replacement" + (" and its sign is confirmed" if settled else "")
+        told = "; the cell is a replacement"
+        if one.rule == "sign":
+            told += " and its sign is confirmed" if settled else (
+                ": the machine definition or a polarity reading must confirm the new sign"
+            )  # fmt: skip
         results.append(
             dataclasses.replace(
                 one, message=one.message + told, effect="tells" if settled or allowed else "blocks"

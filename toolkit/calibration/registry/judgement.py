@@ -74,8 +74,9 @@ def judge(
     tables = [table for table in (loads, check) if table is not None]
     by_machine, stated = machine_polarity(record, machine)
     by_reading, read = reading_polarity(record, readings, tables)
-    confirmed = stated.pairs | {
-        (one.load, name) for one in record.loads for name in read.indications if one.load in read.loads
+    # A wire turns an indication in every load: where load and indication are confirmed, their pair is.
+    confirmed = {
+        (load, name) for load in stated.loads | read.loads for name in stated.indications | read.indications
     }
     results = [
         *compared(record, history, confirmed=confirmed, reasons=_reasons(record, reason)),
@@ -84,11 +85,15 @@ def judge(
         *plausible(record, history.last, machine),
     ]
     if not confirmed_before:
-        past = agreeing(record, history, results)
+        # What has the wrong sign by one of them is not asked for: it is answered.
+        pairs = {
+            *agreeing(record, history, results), *stated.pairs,
+            *(tuple(one.where.split(", ")) for one in results if one.rule in ("sign", "polarity")),
+        }  # fmt: skip
         results += unconfirmed(
             record,
-            loads={*(load for load, _ in past), *stated.loads, *read.loads},
-            indications={*(name for _, name in past), *stated.indications, *read.indications},
+            loads={*(load for load, _ in pairs), *read.loads},
+            indications={*(name for _, name in pairs), *read.indications},
         )
     if loads is not None:
         u = statements_of(record).reference

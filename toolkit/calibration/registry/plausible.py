@@ -11,7 +11,7 @@ import math
 from typing import TYPE_CHECKING
 
 from toolkit.calibration.registry.gates import GateResult
-from toolkit.calibration.registry.response import largest_load, same_dimension
+from toolkit.calibration.registry.response import largest_load, response, same_dimension
 from toolkit.units import unit
 
 if TYPE_CHECKING:
@@ -23,14 +23,16 @@ if TYPE_CHECKING:
 RANGE = 20.0
 # Metal foil bridges give 1 to 4 mV/V at capacity, semiconductor bridges some ten times that.
 BRIDGE_V_V = (1e-5, 0.1)
+# A published lever of this field differs from its drawing's by 1.8 (47.8 mm against a half-side of 86.6 mm).
+LEVER = 2.0
 TOLERANCE = 0.1  # of the largest load: check loads within a tolerance above it check nothing
 
 
 def plausible(
     new: CalibrationRecord, old: CalibrationRecord | None, machine: Machine | None
 ) -> tuple[GateResult, ...]:
-    """Return the sizes that cannot be: rules ``range``, ``bridge-range`` and ``check-tolerance``."""
-    failed: list[GateResult] = []
+    """Return the sizes that cannot be: rules ``range``, ``lever``, ``bridge-range``, ``check-tolerance``."""
+    failed: list[GateResult] = [] if machine is None else _levers(new, machine)
     rated = {} if machine is None else dict(machine.rated_loads)
     for one in new.loads:
         size, si = largest_load(one), unit(one.unit).si
@@ -61,6 +63,38 @@ def plausible(
         if old is not None and before is not None and same_dimension(cell.unit, before.unit):
             failed += _range(cell.name, size, _largest(before), read.si, f"in {old.id}")
     return tuple(failed)
+
+
+def _levers(new: CalibrationRecord, machine: Machine) -> list[GateResult]:
+    """Hold the ratio of a cell's moment to its force against the machine's geometry [m].
+
+    It needs no history: one of two units that slipped moves a lever by 4.45 (lbf, N), 305 or 1000.
+    """
+    loads = {one.load: one for one in new.loads}
+    if "FY" not in loads:
+        return []
+    failed = []
+    drawn = {name: abs(lever) for name, lever in machine.overturning_lever_m}
+    pitch = machine.cell_pitch_diameter_m
+    for cell in new.cells:
+        stated = machine.cell(cell.name)
+        limits = {
+            "MX": (drawn[cell.name] / LEVER, drawn[cell.name] * LEVER) if drawn.get(cell.name) else None,
+            "MZ": (pitch / RANGE, pitch) if stated is not None and stated.sign("MZ") else None,
+        }
+        force = abs(response(new, loads["FY"], cell).value)
+        for load, between in limits.items():
+            if load not in loads or between is None or force == 0:
+                continue
+            lever = abs(response(new, loads[load], cell).value) / force
+            if not between[0] <= lever <= between[1]:
+                message = (
+                    f"its moment and its force make a lever of {1e3 * lever:.4g} mm, where machine "
+                    f"{machine.name} has {1e3 * between[0]:.4g} to {1e3 * between[1]:.4g} mm: is the unit of "
+                    f"{load} or of FY right?"
+                )
+                failed.append(GateResult(rule="lever", where=f"{load}, {cell.name}", message=message))
+    return failed
 
 
 def _range(name: str, size: float, other: float, si: str, where: str) -> list[GateResult]:

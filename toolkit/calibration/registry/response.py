@@ -39,6 +39,9 @@ class Response:
         return None if self.extent is None else abs(self.value) * self.extent
 
     def __str__(self) -> str:
+        if self.per.endswith("/(V/V)"):
+            # Nobody reads a bridge in volts per volt.
+            return f"{1e-3 * self.value:.6g} {self.per.removesuffix('(V/V)')}(mV/V)"
         return f"{self.value:.6g} {self.per}"
 
 
