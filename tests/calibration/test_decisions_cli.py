@@ -181,7 +181,7 @@ def test_a_difference_across_units_is_that_in_si_and_told_in_words(tmp_path: Pat
     found = differences(plain, kilo)
     assert [(t.change, t.unit, t.differs) for t in found] == [(1998.0, "N", True), (999.0, "N", True)]
     assert found[0].change_percent == pytest.approx(99900)
-    assert found[0].note == "F in N, then in kN; in SI 2000, then 2e+06"
+    assert found[0].note == "F in N, then in kN; that is 2000 N/(V/V), then 2e+06 N/(V/V)"
     assert [(t.term, t.change, t.effect, t.note) for t in differences(plain, three)] == [
         ("S", 1.0, None, None), ("intercept", 0.0, 0.0, None),
     ]  # fmt: skip

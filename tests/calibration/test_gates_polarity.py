@@ -70,7 +70,7 @@ def test_a_first_session_as_it_should_be_is_approved_by_the_machine(empty: Regis
     made, decision = judged(empty, write_virtual(tmp_path / "s"))
     assert rules(made) == rules(made, "note") == set()
     assert decision.done
-    assert "signs as machine m15-virtual states them: FY D51" in decision.evidence[0]
+    assert "signs as machine m15-virtual, version 1, states them: FY D51" in decision.evidence[0]
 
 
 @pytest.mark.parametrize(

@@ -120,12 +120,12 @@ def _note(
         if not same_dimension(x, y):
             parts[-1] += ", which is another kind of quantity: no change can be given"
     values = [
-        f"{_coefficients(load)[term] * _scale(record, load, term):.6g}"
+        f"{_coefficients(load)[term] * _scale(record, load, term):.6g} {_si(record, load, term)}"
         for record, load in zip((one, other), loads, strict=True)
         if load is not None and term in load.terms
     ]
     if changed and len(values) == 2 and all(same_dimension(x, y) for _, x, y in changed):
-        parts.append(f"in SI {values[0]}, then {values[1]}")
+        parts.append(f"that is {values[0]}, then {values[1]}")
     return "; ".join(parts) or None
 
 
@@ -133,6 +133,15 @@ def _scale(record: CalibrationRecord, load: LoadFit, term: str) -> float:
     """Return the factor from a coefficient as written to SI."""
     units = {cell.name: unit(cell.unit).factor for cell in record.cells}
     return unit(load.unit).factor / float(evaluate(parse_term(term), units, 1.0))
+
+
+def _si(record: CalibrationRecord, load: LoadFit, term: str) -> str:
+    """Return the SI unit of a coefficient, such as N/(V/V)."""
+    parsed = parse_term(term)
+    units = {cell.name: unit(cell.unit).si for cell in record.cells}
+    below = [f"({units[name]})" + (f"^{power}" if power > 1 else "") for name, power in parsed.powers]
+    below += [f"({units[name]})" for name in parsed.absolutes]
+    return "/".join([unit(load.unit).si, *below])
 
 
 def _load(record: CalibrationRecord, name: str) -> LoadFit | None:

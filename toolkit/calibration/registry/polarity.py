@@ -65,7 +65,11 @@ def machine_polarity(
             else:
                 pairs.add((one.load, cell.name))
     text = ", ".join(f"{load} {name}" for load, name in sorted(pairs))
-    evidence = (f"signs as machine {machine.name} states them: {text}",) if machine and pairs else ()
+    evidence = (
+        (f"signs as machine {machine.name}, version {machine.version}, states them: {text}",)
+        if machine and pairs
+        else ()
+    )
     return tuple(failed), Confirmed(
         pairs=frozenset(pairs), loads=frozenset(load for load, _ in pairs),
         indications=frozenset(name for _, name in pairs), evidence=evidence,

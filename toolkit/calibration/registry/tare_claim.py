@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from toolkit.calibration.records.record import CalibrationRecord, LoadFit
     from toolkit.calibration.session.table import Table
 
-AT_ZERO = 1e-3  # of the largest load: what a reference shows without load
+AT_ZERO = 0.1  # of the check loads' tolerance: what a reference may show without load
 _SIGMAS, _ROW_SIGMAS = 3.0, 4.0
 _MAD = 1.4826  # standard deviation of a normal scatter by its median absolute deviation
 
@@ -45,10 +45,11 @@ def tare_claim(
     if record.zero != "tared" or record.kind != "fit" or not tables:
         return ()
     failed = [one for load in record.loads for one in _intercept(load)]
-    rows = [_zero_rows(record, table, tuple(u_reference) or (None,) * len(record.loads)) for table in tables]
+    noise = [_SIGMAS * (u or 0.0) for u in tuple(u_reference) or (None,) * len(record.loads)]
+    rows = [_zero_rows(record, table, noise) for table in tables]
     zeros = np.vstack([table.matrix(record.indications)[at] for table, at in zip(tables, rows, strict=True)])
     if len(zeros):
-        failed += _offsets(record, tables[0], zeros)
+        failed += _offsets(record, tables[0], zeros, noise)
     elif not all(INTERCEPT in one.terms for one in record.loads):
         message = (
             'zero = "tared" cannot be seen to hold: no row is at zero load and no intercept is fitted; '
@@ -63,7 +64,7 @@ def _intercept(one: LoadFit) -> list[GateResult]:
         return []
     at = one.terms.index(INTERCEPT)
     value, u = one.coefficients[at], one.standard_errors[at]
-    limit = tolerance(one) / unit(one.unit).factor
+    limit = _limit(one)
     if abs(value) <= max(limit, _SIGMAS * u):
         return []
     message = (
@@ -74,25 +75,33 @@ def _intercept(one: LoadFit) -> list[GateResult]:
     return [GateResult(rule="tared", where=f"{one.load}, {INTERCEPT}", message=message)]
 
 
-def _zero_rows(
-    record: CalibrationRecord, table: Table, u_reference: Sequence[float | None]
-) -> NDArray[np.bool_]:
+def _zero_rows(record: CalibrationRecord, table: Table, noise: Sequence[float]) -> NDArray[np.bool_]:
     """Return which rows have every reference load at zero within its own uncertainty (rows,)."""
     at = np.ones(table.rows, dtype=bool)
-    for one, u in zip(record.loads, u_reference, strict=True):
-        at &= np.abs(table.column(one.load)) <= max(AT_ZERO * one.largest, _SIGMAS * (u or 0.0))
+    for one, least in zip(record.loads, noise, strict=True):
+        at &= np.abs(table.column(one.load)) <= max(AT_ZERO * _limit(one), least)
     return at
 
 
-def _offsets(record: CalibrationRecord, table: Table, zeros: NDArray[np.float64]) -> list[GateResult]:
-    """Return each cell's worst offset at zero load, judged in the load that it moves most."""
+def _limit(one: LoadFit) -> float:
+    """Return the check loads' tolerance in the load's own unit."""
+    return tolerance(one) / unit(one.unit).factor
+
+
+def _offsets(
+    record: CalibrationRecord, table: Table, zeros: NDArray[np.float64], noise: Sequence[float]
+) -> list[GateResult]:
+    """Return each cell's worst offset at zero load, judged in the load that it moves most.
+
+    ``noise`` is what each reference itself may be off by without load.
+    """
     failed = []
     for column, cell in enumerate(record.cells):
         judged = []
-        for one in record.loads:
+        for one, least in zip(record.loads, noise, strict=True):
             found = response(record, one, cell)
             slope = found.value * unit(cell.unit).factor / unit(one.unit).factor
-            limit = tolerance(one) / unit(one.unit).factor
+            limit = max(_limit(one), least)
             if slope != 0:
                 judged.append((abs(slope) / limit, slope, limit, one))
         if not judged:
