@@ -172,6 +172,39 @@ def test_without_history_machine_or_reading_nothing_is_approved(empty: Registry,
         assert name in decision.failed[0].message
 
 
+def test_a_new_cell_of_a_rig_needs_a_reading_too(empty: Registry, make_session: Make) -> None:
+    assert approved(empty, make_session(tail='[cells.E5]\nserial = "1"\n')).done
+    path = make_session(
+        hub_data(60, 4), name="new", polarity="-", tail='[cells.E5]\nserial = "2"\nreplacement = "broken"\n'
+    )
+    made = calibrate(path, empty)
+    decision = approve(empty, made.record.id, in_force_from=dt.date(2026, 2, 2), checked_by="B")
+    assert failed(decision) == {"polarity-reading"}
+    assert "nothing confirms the sign of indication E5:" in decision.failed[0].message
+
+
+def test_another_kind_of_unit_needs_a_reading_too(empty: Registry, make_session: Make) -> None:
+    assert approved(empty, make_session()).done
+
+    def session(name: str, turned: float) -> Path:
+        path = make_session(hub_data(60, 4), name=name, polarity="-")
+        for file in (path.parent / "loads.csv", path.parent / "check.csv"):
+            header, *rows = file.read_text().strip().split("\n")
+            cells = [row.split(",") for row in rows]
+            for row in cells:
+                row[2] = repr(turned * 5e4 * float(row[2]))
+            body = [",".join(row) for row in cells]
+            file.write_text("\n".join([header.replace("E5 [mV/V]", "E5 [count]"), *body]) + "\n")
+        return path
+
+    for name, turned, expected in (("counts", 1.0, set()), ("turned", -1.0, {"sign"})):
+        made = calibrate(session(name, turned), empty)
+        (told,) = [one.message for one in made.findings if one.rule == "unit-changed"]
+        assert "different kinds of quantity" in told
+        decision = approve(empty, made.record.id, in_force_from=dt.date(2026, 2, 2), checked_by="B")
+        assert failed(decision) == {*expected, *(() if expected else ("polarity-reading",))}
+
+
 def test_a_reading_may_come_in_a_file_of_its_own(empty: Registry, make_session: Make, tmp_path: Path) -> None:
     file = tmp_path / "readings.toml"
     file.write_text(f"polarity = {polarity_text()}\n")

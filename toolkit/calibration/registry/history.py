@@ -107,14 +107,22 @@ def replaced(new: CalibrationRecord, history: History) -> tuple[str, ...]:
 def agreeing(
     new: CalibrationRecord, history: History, results: Collection[GateResult]
 ) -> frozenset[tuple[str, str]]:
-    """Return the pairs of a load and a main indication that the last record has too, with the same sign.
+    """Return the pairs of a load and a main indication that its own history has too, with the same sign.
 
-    ``results`` are those of `compared`.
+    ``results`` are those of `compared`. A replacement has no history of its own: that the cell before it had
+    the same sign says nothing about how the new one was wired. Nor has an indication in another kind of unit.
     """
     if history.last is None:
         return frozenset()
     units = {one.load: one.unit for one in history.last.loads}
-    cells = {cell.name for cell in history.last.cells}
+    before = {cell.name: cell.unit for cell in history.last.cells}
+    cells = {
+        cell.name
+        for cell in new.cells
+        if cell.name in before
+        and same_dimension(cell.unit, before[cell.name])
+        and cell.name not in replaced(new, history)
+    }
     changed = {one.where for one in results if one.rule == "sign"}
     return frozenset(
         (one.load, name)
