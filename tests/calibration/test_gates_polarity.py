@@ -97,6 +97,35 @@ def test_a_new_serial_does_not_hide_a_sign(used: Registry, tmp_path: Path) -> No
     assert {"sign", "polarity"} <= failed(decision)
 
 
+def test_a_cell_that_hardly_moves_does_not_hide_its_sign(empty: Registry, tmp_path: Path) -> None:
+    # Of two cells side by side the second is loaded in full once, and then by a thousandth with its sign
+    # turned: that moves FY by less than the tolerance of its session.
+    def session(name: str, share: float, tail: str) -> Path:
+        rng = np.random.default_rng(7)
+        folder = tmp_path / name
+        folder.mkdir()
+        for file, rows in (("loads", 40), ("check", 8)):
+            a, b = rng.uniform(-1, 1, rows), abs(share) * rng.uniform(-1, 1, rows)
+            force = 500 * a + np.sign(share) * 300 * b
+            lines = ["A [mV/V],B [mV/V],FY [N]" + (",run,direction" if file == "loads" else "")]
+            for i, row in enumerate(np.column_stack([a, b, force + rng.normal(0, 1e-3, rows)]).tolist()):
+                more = [str(i // 20 + 1), "up"] if file == "loads" else []
+                lines.append(",".join([*(f"{x:.7f}" for x in row), *more]))
+            (folder / f"{file}.csv").write_text("\n".join(lines) + "\n")
+        (folder / "SESSION.toml").write_text(
+            'schema = 1\ninstrument = "pair"\ndate = 2026-01-05\noperator = "A"\nloads = ["FY"]\n'
+            'indications = ["A", "B"]\ndata = "loads.csv"\ncheck = "check.csv"\n' + tail
+        )
+        return folder / "SESSION.toml"
+
+    known = (
+        '[[polarity]]\nload = "FY"\nvalue = { value = 403, unit = "N" }\n'
+        'indications = { A = { value = 0.5, unit = "mV/V" }, B = { value = 0.5, unit = "mV/V" } }\n'
+    )
+    assert approved(empty, session("first", 1.0, known)).done
+    assert failed(approved(empty, session("small", -1e-3, ""))) == {"sign", "range"}
+
+
 def test_a_withdrawn_history_does_not_hide_a_sign(used: Registry, tmp_path: Path) -> None:
     withdraw(used, "m15-virtual-r1", on=dt.date(2026, 11, 2), reason="to make room")
     _, decision = judged(used, write_virtual(tmp_path / "s", columns(E5=-1.0)))

@@ -25,14 +25,15 @@ def now() -> str:
 
 
 def moment(text: str) -> datetime:
-    """Return the time of an entry.
+    """Return the time of an entry; one without a zone is UTC.
 
     Raises
     ------
     ValueError
         the text is no time
     """
-    return datetime.fromisoformat(text)
+    found = datetime.fromisoformat(text)
+    return found if found.tzinfo is not None else found.replace(tzinfo=UTC)
 
 
 def begun(day: date, at: datetime | None = None) -> bool:

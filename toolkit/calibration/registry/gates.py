@@ -93,7 +93,11 @@ def _change(new: _Place, old: _Place) -> GateResult | None:
             return GateResult(rule="sign", where=where, message=f"the sign changed: {text}")
         return None
     change = abs(now.value - before.value)
-    if _negligible(now, change, (new[1], old[1]), 3 * math.hypot(now.u, before.u)):
+    # A sign counts over the range in which the instrument was used so far: a session that hardly moves a
+    # cell must not hide it.
+    had = range_of(old[2])
+    used = None if had is None else had[1] - had[0]
+    if _negligible(now, change, (new[1], old[1]), 3 * math.hypot(now.u, before.u), used):
         return None
     if flipped:
         return GateResult(rule="sign", where=where, message=f"the sign changed: {text}")
@@ -104,20 +108,23 @@ def _change(new: _Place, old: _Place) -> GateResult | None:
     return None
 
 
-def _negligible(now: Response, change: float, loads: tuple[LoadFit, ...], noise: float) -> bool:
+def _negligible(
+    now: Response, change: float, loads: tuple[LoadFit, ...], noise: float, used: float | None = None
+) -> bool:
     """Tell whether a change of response [SI] is inside the tolerance, or inside its own uncertainty.
 
     The tolerance is the smallest that any of the records states, and never more than the span's own part of
     a largest load: a tolerance in a wrong unit must not switch the gate off. The uncertainty excuses a change
     no larger than that part either: a main response that is not known does not pass for an unchanged one.
+    ``used`` is the indication's range in the earlier record.
     """
     scale = [SPAN * largest_load(one) for one in loads if not math.isnan(one.largest)]
     limits = [tolerance(one) for one in loads if not math.isnan(tolerance(one))] + scale
     # A legacy record has no range of its own: all that is left to compare is the response itself.
     if now.extent is None or not limits:
         return change <= noise
-    moved = change * now.extent
-    return moved <= min(limits) or (change <= noise and moved <= min(scale))
+    moved = change * max(now.extent, used or 0.0)
+    return moved <= min(limits) or (change <= noise and change * now.extent <= min(scale))
 
 
 def layout(new: CalibrationRecord, old: CalibrationRecord) -> tuple[GateResult, ...]:
