@@ -12,14 +12,13 @@ from typing import TYPE_CHECKING, Any
 from toolkit.calibration.records.record import from_bytes
 from toolkit.calibration.registry import gates
 from toolkit.calibration.registry.clock import check_begun, now, today, untimely
-from toolkit.calibration.registry.history import history_of
 from toolkit.calibration.registry.interval import parse_interval
-from toolkit.calibration.registry.judgement import judge, machine_of, read_polarity_file
+from toolkit.calibration.registry.judgement import judge_stored, machine_of, read_polarity_file
 from toolkit.calibration.registry.names import check_names
 from toolkit.calibration.registry.registry import Registry, instrument_of
 from toolkit.calibration.registry.status import RecordStatus, status_of
 from toolkit.calibration.registry.store import Change, commit
-from toolkit.calibration.registry.stored import stored_check, stored_loads
+from toolkit.calibration.registry.stored import stored_check
 from toolkit.errors import RegistryError, ToolkitError
 from toolkit.files import read_regular
 from toolkit.findings import Finding
@@ -126,19 +125,9 @@ def approve(
                 f"not after {status.in_force_from.isoformat()}; a withdrawal makes days void",
                 "approval",
             )  # fmt: skip
-        loads, check = stored_loads(registry.folder, record), stored_check(registry.folder, record)
-        judged = judge(
-            record,
-            history=history_of(registry, record, ledger, but=record_id),
-            machine=definition,
-            readings=readings,
-            loads=loads,
-            check=check,
-            reason=reason,
-            confirmed_before=status.in_force_from is not None,
-        )
+        judged = judge_stored(registry, record, ledger, machine=definition, readings=readings, reason=reason)
         failed = judged.failed
-        terms = gates.unverifiable(record, check)
+        terms = gates.unverifiable(record, stored_check(registry.folder, record))
         findings = tuple(Finding(rule=one.rule, where=one.where, message=one.message) for one in failed)
         evidence = (*judged.evidence, *(f"{one.rule}: {one.where}: {one.message}" for one in judged.told))
         decided.append(

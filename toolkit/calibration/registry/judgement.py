@@ -6,15 +6,18 @@ as findings; an approval is blocked by what blocks or asks, and its ledger entry
 
 from __future__ import annotations
 
+import datetime as dt
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from toolkit.calibration.registry.gates import GateResult, check_loads
-from toolkit.calibration.registry.history import NO_HISTORY, History, agreeing, compared
+from toolkit.calibration.registry.history import NO_HISTORY, History, agreeing, compared, history_of
 from toolkit.calibration.registry.plausible import plausible
 from toolkit.calibration.registry.polarity import machine_polarity, reading_polarity, unconfirmed
+from toolkit.calibration.registry.status import status_of
+from toolkit.calibration.registry.stored import stored_check, stored_loads
 from toolkit.calibration.registry.tare_claim import tare_claim
 from toolkit.calibration.session.polarity import PolarityReading, polarity_readings
 from toolkit.calibration.session.statements import scope_of, statements_of
@@ -26,6 +29,8 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from toolkit.calibration.records.record import CalibrationRecord
+    from toolkit.calibration.registry.ledger import Ledger
+    from toolkit.calibration.registry.registry import Registry
     from toolkit.calibration.session.table import Table
     from toolkit.machine.definition import Machine
 
@@ -103,6 +108,35 @@ def judge(
     return Judgement(results=tuple(results), evidence=(*stated.evidence, *read.evidence))
 
 
+def judge_stored(
+    registry: Registry,
+    record: CalibrationRecord,
+    ledger: Ledger,
+    *,
+    machine: Machine | None = None,
+    readings: Sequence[PolarityReading] = (),
+    reason: str | None = None,
+) -> Judgement:
+    """Return what every gate says about a record of the registry, with its stored data and its history.
+
+    Raises
+    ------
+    RecordError
+        a record that it is compared with fails a gate
+    """
+    status = status_of(record.id, ledger.of(record.id), dt.date.max)
+    return judge(
+        record,
+        history=history_of(registry, record, ledger, but=record.id),
+        machine=machine,
+        readings=readings,
+        loads=stored_loads(registry.folder, record),
+        check=stored_check(registry.folder, record),
+        reason=reason,
+        confirmed_before=status.in_force_from is not None,
+    )
+
+
 def _reasons(record: CalibrationRecord, reason: str | None) -> dict[str, str]:
     """Return why each cell was replaced: by its session, else by the approval."""
     cells: Mapping[str, Mapping[str, object]] = json.loads(record.settings).get("cells", {})
@@ -156,8 +190,3 @@ def machine_of(instrument: str, name_or_path: str | None = None) -> Machine | No
             next_step="name the definition of the machine that the instrument belongs to",
         )  # fmt: skip
     return machine
-
-
-__all__ = [
-    "Judgement", "judge", "machine_of", "read_polarity_file", "session_readings",
-]  # fmt: skip
