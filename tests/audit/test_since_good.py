@@ -57,7 +57,7 @@ def home(tmp_path_factory):
     registry = Registry(root / "calibrations")
     first = calibrate(session(root / "s1", dt.date(2018, 1, 1)), registry).record
     day = dt.date(2018, 1, 1)
-    assert approve(registry, first.id, in_force_from=day, checked_by="B", known_on=day).done
+    assert approve(registry, first.id, in_force_from=day, checked_by="B", known_on=day, reason="late").done
     calibrate(session(root / "s2", dt.date(2019, 1, 1), phase="as_found"), registry)
     calibrate(session(root / "s3", dt.date(2021, 1, 1), phase="as_found", growth=GROWTH), registry)
     for number, date in enumerate(("2018-06-01", "2019-01-01", "2020-01-01", "2021-01-01", "2021-02-01")):

@@ -13,6 +13,20 @@ LOADS = ("FY", "MZ", "MX")
 UNITS = {"FY": "lbf", "MZ": "lbf*ft", "MX": "lbf*ft"}
 
 
+def polarity_text(share: float = 0.8) -> str:
+    """Return readings of one load each of known direction, a share of full scale, read to 0.1 %."""
+    readings = []
+    for at, (load, largest) in enumerate(zip(LOADS, (500.0, 100.0, 150.0), strict=True)):
+        value = share * largest
+        cells = zip(CELLS, (1.001 * SENSITIVITY[:, at] * value + ZERO).tolist(), strict=True)
+        inner = ", ".join(f'{name} = {{ value = {one:.7f}, unit = "mV/V" }}' for name, one in cells)
+        readings.append(
+            f'{{ load = "{load}", value = {{ value = {value}, unit = "{UNITS[load]}" }}, '
+            f"indications = {{ {inner} }} }}"
+        )
+    return f"[{', '.join(readings)}]"
+
+
 def csv_text(names: list[str], values: NDArray[np.float64], *, runs: bool, digits: int = 7) -> str:
     header = names + (["run", "direction"] if runs else [])
     lines = [",".join(header)]
@@ -47,4 +61,7 @@ def session_text(**changes: str) -> str:
         "data": '"loads.csv"',
         "check": '"check.csv"',
     } | changes
+    # A reading names loads and cells: a session of others states its own.
+    if not {"loads", "indications"} & changes.keys():
+        entries.setdefault("polarity", polarity_text())
     return "\n".join(f"{key} = {value}" for key, value in entries.items() if value != "-") + "\n"

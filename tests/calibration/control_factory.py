@@ -45,6 +45,9 @@ def write_session(
     path.write_text(
         f'schema = 1\ninstrument = "cell"\ndate = {day.isoformat()}\noperator = "A"\nindications = ["S"]\n'
         f'loads = ["FY"]\ndata = "loads.csv"\nzero = "{zero}"\n'
+        # A load of known direction that is no row of the session, read to a percent.
+        + 'polarity = [{ load = "FY", value = { value = 500.0, unit = "N" }, indications = '
+        + f'{{ S = {{ value = {1.01 * span * 500 / GAIN:.6f}, unit = "mV/V" }} }} }}]\n'
         + (f'phase = "{phase}"\n' if phase else "")
         + f'[check]\nfile = "check.csv"\n{tail}'
     )
@@ -59,6 +62,8 @@ def enter(registry: Registry, folder: Path, day: dt.date, **changes: object) -> 
 def put_in_force(registry: Registry, made: Candidate, recall: str | None = None) -> None:
     """Approve a candidate from its session's day on, decided on that day."""
     day = dt.date.fromisoformat(made.record.date)
-    assert approve(
-        registry, made.record.id, in_force_from=day, checked_by="B", known_on=day, recall=recall
-    ).done
+    decision = approve(
+        registry, made.record.id, in_force_from=day, checked_by="B", known_on=day, recall=recall,
+        reason="entered from paper",
+    )  # fmt: skip
+    assert decision.done, decision.findings

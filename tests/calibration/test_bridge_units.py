@@ -49,7 +49,8 @@ def write(
     file("loads.csv", hub_data(60, 1), unit, per_mV_V, True)
     file("check.csv", hub_data(9, 2), check_unit, check_per, False)
     path = folder / "SESSION.toml"
-    path.write_text(session_text(**changes) + tail)
+    # No reading: the cells' units are what changes here.
+    path.write_text(session_text(polarity="-", **changes) + tail)
     return path
 
 

@@ -62,22 +62,50 @@ def test_a_serial_that_returns_with_another_span_is_named_and_not_approved(
     assert "in cell-r1" in told
     decision = approve(
         exchanged, made.record.id, in_force_from=dt.date(2026, 2, 1), checked_by="B",
-        known_on=dt.date(2026, 2, 1),
+        known_on=dt.date(2026, 2, 1), reason="late",
     )  # fmt: skip
     assert not decision.done
     assert [one.rule for one in decision.failed] == ["span"]
 
 
-def test_a_new_serial_begins_a_history(exchanged: Registry, tmp_path: Path) -> None:
+def refusals(registry: Registry, made: Candidate, reason: str | None = None) -> set[str]:
+    """Return the rules that keep a candidate from being approved today; none where it is approved."""
+    day = dt.date(2026, 2, 1)
+    return {
+        one.rule
+        for one in approve(registry, made.record.id, in_force_from=day, checked_by="B", reason=reason).failed
+    }
+
+
+def test_a_replacement_is_compared_and_needs_a_reason(exchanged: Registry, tmp_path: Path) -> None:
     made = entered(exchanged, tmp_path, 2026, "C", 1.3)
     (told,) = messages(made, "serial")
-    assert "a new sign and span history begins" in told
-    assert messages(made, "span") == []
+    assert "a replacement: serial B in cell-r2, now C" in told
+    # 1.3 against 1.1 mV/V per N: the response in N/(mV/V) falls by 1 - 1.1/1.3.
+    (told,) = messages(made, "span")
+    assert "-15.38 %" in told
+    assert refusals(exchanged, made) == {"replacement"}
+    assert refusals(exchanged, made, "B broke on 5 January") == set()
 
 
-def test_a_cell_without_a_serial_has_no_older_history(exchanged: Registry, tmp_path: Path) -> None:
-    (told,) = messages(entered(exchanged, tmp_path, 2026, None, 1.3), "serial")
-    assert "a new sign and span history begins" in told
+def test_the_session_may_state_the_reason_itself(exchanged: Registry, tmp_path: Path) -> None:
+    tail = cell("C") + 'replacement = "B broke"\n'
+    made = enter(exchanged, tmp_path / "s", FIRST.replace(year=2026), span=1.3, tail=tail)
+    assert refusals(exchanged, made) == set()
+    (entry,) = [e for e in exchanged.ledger("cell").of(made.record.id) if e.event == "approved"]
+    assert any("reason: B broke" in text for text in entry.evidence)
+
+
+def test_ten_times_the_output_is_no_replacement(exchanged: Registry, tmp_path: Path) -> None:
+    made = entered(exchanged, tmp_path, 2026, "C", 12.0)
+    assert refusals(exchanged, made, "B broke") == {"span"}
+
+
+def test_a_serial_that_is_no_longer_stated_is_a_replacement(exchanged: Registry, tmp_path: Path) -> None:
+    made = entered(exchanged, tmp_path, 2026, None, 1.3)
+    (told,) = messages(made, "serial")
+    assert "serial B in cell-r2, now not stated" in told
+    assert refusals(exchanged, made) == {"replacement"}
 
 
 def test_a_withdrawn_record_is_no_history(exchanged: Registry, tmp_path: Path) -> None:
@@ -85,7 +113,7 @@ def test_a_withdrawn_record_is_no_history(exchanged: Registry, tmp_path: Path) -
 
     withdraw(exchanged, "cell-r1", on=dt.date(2025, 6, 1), reason="the standard was wrong")
     (told,) = messages(entered(exchanged, tmp_path, 2026, "A", 1.3), "serial")
-    assert "a new sign and span history begins" in told
+    assert "a replacement" in told
 
 
 def test_a_session_is_found_again_by_its_ledger_line_without_reading_others(

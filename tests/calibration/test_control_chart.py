@@ -6,8 +6,9 @@ import datetime as dt
 from pathlib import Path
 
 import pytest
-from control_factory import CHECKS, enter, put_in_force
+from control_factory import CHECKS, enter, put_in_force, write_session
 
+from toolkit.calibration.control.calibrate import calibrate
 from toolkit.calibration.control.chart import chart_findings, control_chart
 from toolkit.calibration.registry.registry import Registry
 
@@ -98,3 +99,36 @@ def test_near_reference_loads_are_one_check_load_and_an_as_left_session_has_no_p
     # Within 35 % of full scale 150 N and 450 N are one load, whose rows are averaged session by session.
     wide = control_chart(registry, "cell", same_percent=35.0).series
     assert {point.rows for point in wide[0].points} == {2}
+
+
+def test_a_chart_goes_on_where_the_unit_changes(tmp_path: Path) -> None:
+    # The same six sessions in N, and with the last two written in lbf: physically one chart.
+    lbf = 0.45359237 * 9.80665
+    charts = []
+    for name, units in (("plain", "NNNNNN"), ("mixed", "NNNNLL")):
+        registry = Registry(tmp_path / name / "cal")
+        for at, unit in enumerate(units):
+            path = write_session(
+                tmp_path / name / f"s{at}",
+                dt.date(2020, 1, 1 + at),
+                check_errors=(0.1 * (-1) ** at, 0.0, 0.0),
+            )
+            if unit == "L":
+                for file in (path.parent / "loads.csv", path.parent / "check.csv"):
+                    header, *rows = file.read_text().strip().split("\n")
+                    cells = [row.split(",") for row in rows]
+                    for row in cells:
+                        row[1] = repr(float(row[1]) / lbf)
+                    body = [",".join(row) for row in cells]
+                    file.write_text("\n".join([header.replace("FY [N]", "FY [lbf]"), *body]) + "\n")
+            made = calibrate(path, registry)
+            if at == 0:
+                put_in_force(registry, made)
+        charts.append(control_chart(registry, "cell"))
+    plain, mixed = charts
+    assert len(plain.series) == len(mixed.series) == 3
+    for one, other in zip(plain.series, mixed.series, strict=True):
+        assert (one.unit, other.unit) == ("N", "lbf")
+        assert len(one.points) == len(other.points) == 5
+        for a, b in zip(one.points, other.points, strict=True):
+            assert b.error * lbf == pytest.approx(a.error, abs=1e-6)

@@ -167,13 +167,24 @@ def test_diff_tells_what_a_change_moves(
     )
 
 
-def test_no_difference_is_taken_across_units_and_no_effect_without_a_range(tmp_path: Path) -> None:
+def test_a_difference_across_units_is_that_in_si_and_told_in_words(tmp_path: Path) -> None:
     registry = Registry(tmp_path / "cal")
-    for at, text in enumerate((GOOD, GOOD.replace('"N"', '"kN"'), GOOD.replace("S = 2", "S = 3"))):
+    sources = (
+        GOOD, GOOD.replace('unit = "N"', 'unit = "kN"'), GOOD.replace("S = 2", "S = 3"),
+        GOOD.replace('unit = "mV/V"', 'unit = "count"'),
+    )  # fmt: skip
+    for at, text in enumerate(sources):
         (tmp_path / f"{at}.toml").write_text(text)
         import_legacy(tmp_path / f"{at}.toml", registry)
-    plain, kilo, three = (registry.load(f"old-r{n}") for n in (1, 2, 3))
-    assert [(t.change, t.differs) for t in differences(plain, kilo)] == [(None, True), (None, True)]
-    assert [(t.term, t.change, t.effect) for t in differences(plain, three)] == [
-        ("S", 1.0, None), ("intercept", 0.0, 0.0),
+    plain, kilo, three, counts = (registry.load(f"old-r{n}") for n in (1, 2, 3, 4))
+    # 2 kN/(mV/V) are 2000 N/(mV/V): 1998 more than 2, and the intercept of 1 kN is 999 N more than 1 N.
+    found = differences(plain, kilo)
+    assert [(t.change, t.unit, t.differs) for t in found] == [(1998.0, "N", True), (999.0, "N", True)]
+    assert found[0].change_percent == pytest.approx(99900)
+    assert found[0].note == "F in N, then in kN; that is 2000 N/(V/V), then 2e+06 N/(V/V)"
+    assert [(t.term, t.change, t.effect, t.note) for t in differences(plain, three)] == [
+        ("S", 1.0, None, None), ("intercept", 0.0, 0.0, None),
     ]  # fmt: skip
+    (term, _) = differences(plain, counts)
+    assert (term.change, term.differs) == (None, True)
+    assert "S in mV/V, then in count, which is another kind of quantity" in str(term.note)

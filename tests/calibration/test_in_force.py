@@ -23,7 +23,7 @@ def two(registry: Registry, make_session: Callable[..., Path]) -> Registry:
     """hub-r1 in force from 2026-02-01, hub-r2 from 2026-04-01, each decided on its day."""
     calibrate(make_session(hub_data(60, 3), name="later"), registry)
     for record_id, day in (("hub-r1", date(2026, 2, 1)), ("hub-r2", date(2026, 4, 1))):
-        done = approve(registry, record_id, in_force_from=day, checked_by="B", known_on=day)
+        done = approve(registry, record_id, in_force_from=day, checked_by="B", known_on=day, reason="late")
         assert done.done, done.failed
     return registry
 
@@ -107,17 +107,18 @@ def test_a_flipped_sign_blocks_and_changes_nothing(
     flipped[:, 2] *= -1
     check[:, 2] *= -1
     made = calibrate(make_session(flipped, check_rows=check, name="flipped"), registry)
-    assert {f.rule for f in made.findings} == {"sign"}
+    # The polarity readings, taken apart from the rows, know better too.
+    assert {f.rule for f in made.findings} == {"sign", "polarity-reading"}
     head = registry.head("hub")
     decision = approve(registry, "hub-r2", in_force_from=date(2026, 3, 1), checked_by="B")
     assert not decision.done
-    assert {(one.rule, one.where) for one in decision.failed} == {
+    assert {(one.rule, one.where) for one in decision.failed if one.rule != "polarity-reading"} == {
         ("sign", "FY, E5"), ("sign", "MZ, E5"), ("sign", "MX, E5"),
     }  # fmt: skip
     assert registry.head("hub") == head
 
 
-def test_span_and_check_loads_block_too_and_another_serial_starts_anew(
+def test_span_and_check_loads_block_too_and_another_span_of_a_replacement_needs_a_reason(
     registry: Registry, make_session: Callable[..., Path]
 ) -> None:
     approve(registry, "hub-r1", in_force_from=date(2026, 2, 1), checked_by="B")
@@ -129,7 +130,16 @@ def test_span_and_check_loads_block_too_and_another_serial_starts_anew(
     assert {one.rule for one in decision.failed} == {"span", "check-load"}
     check[:, 0] *= 1.05
     other = make_session(scaled, check_rows=check, name="serial", tail='[cells.D51]\nserial = "new"\n')
-    assert {f.rule for f in calibrate(other, registry).findings} == {"serial"}
+    made = calibrate(other, registry)
+    assert {f.rule for f in made.findings if f.level == "warning"} == {"serial", "span"}
+    assert {f.rule for f in made.findings if f.level == "note"} == {"replacement"}
+    words = {"in_force_from": date(2026, 3, 1), "checked_by": "B"}
+    assert {one.rule for one in approve(registry, made.record.id, **words).failed} == {"replacement"}
+    decision = approve(registry, made.record.id, **words, reason="D51 was overloaded on 2 February")
+    assert decision.done
+    (entry,) = [e for e in registry.ledger("hub").of(made.record.id) if e.event == "approved"]
+    assert any("reason: D51 was overloaded" in text for text in entry.evidence)
+    assert sum(text.startswith("span: ") for text in entry.evidence) == 3
 
 
 def test_terms_that_the_check_loads_cannot_verify_are_listed_and_do_not_block(
@@ -162,7 +172,12 @@ def test_a_date_from_the_session_on_is_noted_and_one_before_it_needs_a_reason(re
         approve(registry, "hub-r1", in_force_from=date(2026, 1, 4), checked_by="B", known_on=decided)
     assert caught.value.rule == "approval"
     assert "2026-01-05" in str(caught.value)
-    done = approve(registry, "hub-r1", in_force_from=date(2026, 1, 6), checked_by="B", known_on=decided)
+    with pytest.raises(RegistryError) as caught:
+        approve(registry, "hub-r1", in_force_from=date(2026, 1, 6), checked_by="B", known_on=decided)
+    assert caught.value.rule == "time"
+    done = approve(
+        registry, "hub-r1", in_force_from=date(2026, 1, 6), checked_by="B", known_on=decided, reason="late"
+    )
     assert done.note == "in force from 319 days before the decision"
     assert registry.ledger("hub").entries[-1].note == done.note
     assert all(row.ok for row in verify_registry(registry))
@@ -170,7 +185,7 @@ def test_a_date_from_the_session_on_is_noted_and_one_before_it_needs_a_reason(re
 
 def test_a_decision_on_its_day_has_no_note(registry: Registry) -> None:
     day = date(2026, 2, 1)
-    done = approve(registry, "hub-r1", in_force_from=day, checked_by="B", known_on=day)
+    done = approve(registry, "hub-r1", in_force_from=day, checked_by="B", known_on=day, reason="late")
     assert (done.note, registry.ledger("hub").entries[-1].note) == (None, None)
 
 

@@ -50,6 +50,11 @@ def session(tmp_path: Path) -> Path:
     path.write_text(
         'schema = 1\ninstrument = "pair"\ndate = 2026-02-01\noperator = "A"\nindications = ["A", "B"]\n'
         'loads = ["FY", "MZ"]\ndata = "loads.csv"\ncheck = "check.csv"\n'
+        # Apart from the rows, read to half a percent: FY = 100 A + 20 B + 1.5, MZ = 3 A - 50 B - 2.
+        'polarity = [{ load = "FY", value = { value = 151, unit = "N" }, indications = { '
+        'A = { value = 1.3, unit = "mV/V" }, B = { value = 1.0, unit = "mV/V" } } }, '
+        '{ load = "MZ", value = { value = -48, unit = "N*m" }, indications = { '
+        'A = { value = 1.3, unit = "mV/V" }, B = { value = 1.0, unit = "mV/V" } } }]\n'
     )
     return path
 

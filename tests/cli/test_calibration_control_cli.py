@@ -37,6 +37,8 @@ def session(folder: Path, year: int, error: float) -> Path:
         f'schema = 1\ninstrument = "cell"\ndate = {year}-03-01\noperator = "A"\nindications = ["S"]\n'
         'loads = ["FY"]\ndata = "loads.csv"\nzero = "tared"\n[check]\nfile = "check.csv"\n'
         "[cells.S]\nresolution = 0.0000001\n"
+        '[[polarity]]\nload = "FY"\nvalue = { value = 500, unit = "N" }\n'
+        'indications = { S = { value = 1.01, unit = "mV/V" } }\n'
     )
     return path
 

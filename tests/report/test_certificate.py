@@ -23,7 +23,7 @@ from toolkit.report.certificate.template import build_certificate
 from toolkit.report.style import Style
 
 CHECKOUT = Path(__file__).resolve().parents[2]
-DAY, LATER = dt.date(2026, 3, 1), dt.date(2027, 3, 1)
+DAY, LATER = dt.date(2026, 3, 1), dt.date(2026, 7, 1)
 STYLE = Style(laboratory="Bench laboratory", country="US")
 FULL = (
     '[certificate]\nnumber = "CAL-17"\ncustomer = "Customer & Co <x>"\naddress = "1 Drum Road"\n'
@@ -51,7 +51,12 @@ def registry_of(folder: Path, more: str = FULL.format(""), *, approved: bool = T
     (folder / "SESSION.toml").write_text(
         'schema = 1\ninstrument = "pair"\ndate = 2026-02-01\noperator = "A"\nindications = ["A", "B"]\n'
         'temperature = { value = 20.5, unit = "degC" }\nloads = ["FY", "MZ"]\ndata = "loads.csv"\n'
-        'check = "check.csv"\n' + more
+        'check = "check.csv"\n'
+        # Apart from the rows, read to half a percent: FY = 100 A + 20 B + 1.5, MZ = 3 A - 50 B - 2.
+        'polarity = [{ load = "FY", value = { value = 151, unit = "lbf" }, indications = { '
+        'A = { value = 1.3, unit = "mV/V" }, B = { value = 1.0, unit = "mV/V" } } }, '
+        '{ load = "MZ", value = { value = -48, unit = "lbf*ft" }, indications = { '
+        'A = { value = 1.3, unit = "mV/V" }, B = { value = 1.0, unit = "mV/V" } } }]\n' + more
     )
     (folder / "cal").mkdir()
     registry = Registry(folder / "cal")
@@ -59,7 +64,7 @@ def registry_of(folder: Path, more: str = FULL.format(""), *, approved: bool = T
     if approved:
         done = approve(
             registry, "pair-r1", in_force_from=dt.date(2026, 2, 2), checked_by="B", approved_by="C",
-            known_on=dt.date(2026, 2, 2),
+            known_on=dt.date(2026, 2, 2), reason="late",
         )  # fmt: skip
         assert done.done, done.findings
     return registry
@@ -76,12 +81,14 @@ def adjusted(folder: Path) -> Registry:
         for row in rows:
             row[:2] = [repr(drift * float(cell)) for cell in row[:2]]
         (there / "loads.csv").write_text("\n".join([columns[0], *(",".join(row) for row in rows)]) + "\n")
-        text = session.replace("2026-02-01", "2027-02-01").replace("CAL-17", "CAL-18")
+        text = session.replace("2026-02-01", "2026-06-01").replace("CAL-17", "CAL-18")
         text = text.replace('check = "check.csv"\n', "")
         text = text.replace('data = "loads.csv"', f'data = "loads.csv"\nphase = "{phase}"')
         (there / "SESSION.toml").write_text(text.replace("U = 0.02", f"U = {U}"))
         calibrate(there / "SESSION.toml", registry)
-    approve(registry, "pair-r3", in_force_from=dt.date(2027, 2, 2), checked_by="B", known_on=LATER)
+    approve(
+        registry, "pair-r3", in_force_from=dt.date(2026, 6, 2), checked_by="B", known_on=LATER, reason="late"
+    )
     return registry
 
 

@@ -80,7 +80,7 @@ def audit_archive(
     OutputError
         ``out`` cannot be written to, or another audit writes there
     """
-    from toolkit.calibration.registry.registry import today
+    from toolkit.calibration.registry.clock import today
 
     if workers < 1:
         raise ConfigError(

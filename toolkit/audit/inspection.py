@@ -96,7 +96,7 @@ def choose(
 
     ``offered``: the choice of another day, whose records need not be read and checked again.
     """
-    from toolkit.calibration.registry.registry import today
+    from toolkit.calibration.registry.clock import today
 
     now = known_at or today()
     if offered is not None:

@@ -7,7 +7,17 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from toolkit.cli.console import Calibrations, Home, Json, Quiet, answer, exit_code, finding_lines, table
+from toolkit.cli.console import (
+    Calibrations,
+    Home,
+    Json,
+    Machine,
+    Quiet,
+    answer,
+    exit_code,
+    finding_lines,
+    table,
+)
 from toolkit.cli.fit_report import Figures, Full, check_folder, tell
 from toolkit.cli.home import registry_to_write
 from toolkit.errors import ConfigError
@@ -22,6 +32,7 @@ def command(
     session: Annotated[Path, typer.Argument(help="SESSION.toml, with its CSV files beside it.")],
     calibrations: Calibrations = None,
     out: Annotated[Path | None, typer.Option("--out", help="Another name for --calibrations.")] = None,
+    machine: Machine = None,
     full: Full = False,
     figures: Figures = None,
     home: Home = None,
@@ -49,7 +60,7 @@ def command(
         )
     registry = Registry(registry_to_write(calibrations or out, home))
     check_folder(figures)
-    made = calibrate(session, registry)
+    made = calibrate(session, registry, machine=machine)
     status = registry.status(made.record.id).state
     payload, text = _payload(made, status), _text(made, status)
     if full or as_json or figures is not None:

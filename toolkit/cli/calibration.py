@@ -17,7 +17,17 @@ from toolkit.cli import (
     calibration_report,
     calibration_standard,
 )
-from toolkit.cli.console import Calibrations, Home, Json, Quiet, answer, exit_code, finding_lines, table
+from toolkit.cli.console import (
+    Calibrations,
+    Home,
+    Json,
+    Machine,
+    Quiet,
+    answer,
+    exit_code,
+    finding_lines,
+    table,
+)
 from toolkit.cli.home import calibrations_folder, registry_to_write
 from toolkit.errors import ConfigError
 
@@ -142,16 +152,16 @@ def history(
     registry = _registry(calibrations, home)
     instrument = name if name in registry.instruments() else _instrument_of(name)
     ledger = registry.ledger(instrument)
+    entries = [entry for entry in ledger.entries if name in (instrument, entry.id)]
     events = [
         {
             "seq": e.seq, "id": e.id, "event": e.event, "time": e.time, "by": e.by,
             "approved_by": e.approved_by,
             "known_on": e.known_on and e.known_on.isoformat(), "since": e.since and e.since.isoformat(),
             "reason": e.reason, "note": e.note, "recall": e.recall,
-            "unverifiable": list(e.unverifiable), "sha256": e.sha256,
+            "unverifiable": list(e.unverifiable), "evidence": list(e.evidence), "sha256": e.sha256,
         }
-        for e in ledger.entries
-        if name in (instrument, e.id)
+        for e in entries
     ]  # fmt: skip
     lines = [
         f"{e['seq']:>3}  {e['time']}  {e['id']}  {e['event']:<10}by {e['by']}"
@@ -160,7 +170,8 @@ def history(
         + (f", {e['note']}" if e["note"] else "")
         + (f", recall after {e['recall']}" if e["recall"] else "")
         + (f"\n     {e['reason']}" if e["reason"] else "")
-        for e in events
+        + "".join(f"\n     {text}" for text in entry.evidence)
+        for e, entry in zip(events, entries, strict=True)
     ]
     lines += [f"head {ledger.head}", *([f"DAMAGED: {ledger.damage}"] if ledger.damage else [])]
     payload = {"events": events, "head": ledger.head, "damage": ledger.damage}
@@ -204,9 +215,20 @@ def approve(
     approved_by: Annotated[str | None, typer.Option("--approved-by", help="Who approved.")] = None,
     reason: Annotated[
         str | None,
-        typer.Option("--reason", help="Why; asked for where the date lies before the session's own."),
+        typer.Option(
+            "--reason",
+            help="Why; asked for where a date lies in the past, or a cell was replaced.",
+        ),
     ] = None,
-    on: Annotated[str | None, typer.Option("--on", help="Day of the decision; default: today.")] = None,
+    on: Annotated[
+        str | None,
+        typer.Option("--on", help="Day of the decision; default: today. In the past it needs --reason."),
+    ] = None,
+    polarity: Annotated[
+        Path | None,
+        typer.Option("--polarity", help="TOML with [[polarity]]: readings of one load of known direction."),
+    ] = None,
+    machine: Machine = None,
     recall: Annotated[
         str | None, typer.Option("--recall", help='Recall interval after the session, such as "12 months".')
     ] = None,
@@ -215,7 +237,7 @@ def approve(
     as_json: Json = False,
     quiet: Quiet = False,
 ) -> int:
-    """Put a record in force; a failed sign, span or check load blocks and changes nothing.
+    """Put a record in force; a failed gate (sign, span, polarity, range, check load) blocks it.
 
     Example: toolkit calibration approve m15-r2 --in-force-from 2026-03-02 --checked-by "second person"
     """
@@ -226,10 +248,12 @@ def approve(
     decision = decide(
         registry, record_id, in_force_from=since or dt.date.max, checked_by=checked_by,
         approved_by=approved_by, reason=reason, known_on=_day(on, "--on"), recall=recall,
+        polarity=polarity, machine=machine,
     )  # fmt: skip
     lines = [f"{record_id}  " + (f"approved, in force from {since}" if decision.done else "NOT approved")]
     lines += ["failed gates:", *finding_lines(decision.findings)] if decision.findings else []
     lines += [f"note: {decision.note}"] if decision.note else []
+    lines += ["evidence:", *(f"  {text}" for text in decision.evidence)] if decision.evidence else []
     if decision.unverifiable:
         lines += ["terms that the check loads cannot verify:", *(f"  {t}" for t in decision.unverifiable)]
     payload = {
@@ -239,6 +263,7 @@ def approve(
         "findings": [finding.as_dict() for finding in decision.findings],
         "unverifiable": list(decision.unverifiable),
         "note": decision.note,
+        "evidence": list(decision.evidence),
         "recall": registry.status(record_id).recall,
         "head": registry.head(_instrument_of(record_id)),
     }

@@ -37,19 +37,22 @@ def command(
             {**{k: v for k, v in row.items() if k not in ("one", "other")}, one: term.one, other: term.other}
         )
     text = table(
-        ["load", "term", one, other, "change", "moves at most", "% of full scale"],
+        ["load", "term", one, other, "change", "change %", "moves at most", "% of full scale"],
         [
             [
                 t.load, t.term, _digits(t.one), _digits(t.other), _digits(t.change),
+                "-" if t.change_percent is None else f"{t.change_percent:+.3g}",
                 "-" if t.effect is None else f"{t.effect:.4g} {t.unit}",
                 "-" if t.effect_percent_fs is None else f"{t.effect_percent_fs:.3g}",
             ]
             for t in found
         ],
-        align="<<>>>>>",
+        align="<<>>>>>>",
     )  # fmt: skip
-    if any(t.change is None and None not in (t.one, t.other) for t in found):
-        text += "\n\nno change is given where the units of load or indication differ"
+    notes = [f"{t.load}, {t.term}: {t.note}" for t in found if t.note]
+    text += "".join(f"\n{note}" for note in ("", *notes)) if notes else ""
+    if any("then in" in note for note in notes):
+        text += f"\n\nwhere a unit changed, the change is in the units of {one}"
     if any(t.change and t.effect is None for t in found):
         text += "\n\nno effect is given where neither record holds a range: a legacy import has none"
     answer({"records": [one, other], "terms": rows}, text, as_json=as_json, quiet=quiet)

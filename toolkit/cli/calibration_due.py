@@ -37,7 +37,8 @@ def command(
     Example: toolkit calibration due --on 2026-12-01
     """
     from toolkit.calibration.control.recall import due_findings, due_of
-    from toolkit.calibration.registry.registry import Registry, today
+    from toolkit.calibration.registry.clock import today
+    from toolkit.calibration.registry.registry import Registry
     from toolkit.errors import ToolkitError
 
     registry = Registry(calibrations_folder(calibrations, home))

@@ -23,6 +23,14 @@ Calibrations = Annotated[
     Path | None,
     typer.Option("--calibrations", help="Registry folder; default: calibrations/ of the laboratory's home."),
 ]
+Machine = Annotated[
+    str | None,
+    typer.Option(
+        "--machine",
+        help="Machine definition that states the cells' polarity; default: the packaged one of the "
+        "instrument's name.",
+    ),
+]
 Home = Annotated[
     Path | None,
     typer.Option("--home", help="Laboratory's home; default: the nearest folder upward with calibrations/."),

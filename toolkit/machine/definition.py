@@ -12,12 +12,14 @@ from toolkit.channels import AXES, ROTATIONS, Axes, Rotation
 from toolkit.errors import ConfigError
 from toolkit.files import check_keys, is_number, read_toml
 from toolkit.machine.correction import Correction, read_corrections
+from toolkit.machine.polarity import CellPolarity, read_polarity, read_rated_loads
 from toolkit.machine.protocol import KEYS as PROTOCOL_KEYS
 from toolkit.machine.protocol import Protocol, build_protocol
 from toolkit.machine.quantity import one_of, quantity
 from toolkit.units import si_scale, unit
 
 __all__ = [
+    "CellPolarity",
     "Column",
     "Correction",
     "Drum",
@@ -34,7 +36,7 @@ Role = Literal["load", "indication", "slip_angle", "acquired", "time", "angle", 
 
 _PACKAGED = Path(__file__).parent
 _KEYS = (
-    "schema name extends title kind axes rotations column drum cells protocol type_b "
+    "schema name extends title kind axes rotations column drum cell cells rated_load protocol type_b "
     "indication_unit sample_rate version supersedes correction"
 ).split()
 
@@ -86,7 +88,8 @@ class Machine:
     """A tire test machine as data.
 
     ``version`` counts its definitions; ``supersedes`` is the SHA-256 of the file that this one was made from,
-    and ``corrections`` what the reduction of every test on it puts right.
+    and ``corrections`` what the reduction of every test on it puts right. ``cells`` are the signs that its
+    load cells must have, ``rated_loads`` pairs of a load and its rated value [N, N*m].
     """
 
     name: str
@@ -104,11 +107,17 @@ class Machine:
     version: int = 1
     supersedes: str | None = None
     corrections: tuple[Correction, ...] = ()
+    cells: tuple[CellPolarity, ...] = ()
+    rated_loads: tuple[tuple[str, float], ...] = ()
 
     @property
     def indications(self) -> tuple[Column, ...]:
         """The load cells' columns, in file order."""
         return tuple(column for column in self.columns if column.role == "indication")
+
+    def cell(self, name: str) -> CellPolarity | None:
+        """Return the stated signs of a cell; None where the definition states none."""
+        return next((one for one in self.cells if one.name == name), None)
 
     def column(self, symbol: str) -> Column:
         """Return the column of a symbol; KeyError where the machine has none."""
@@ -225,6 +234,12 @@ def _build(table: dict[str, Any], path: Path) -> Machine:
             version=_version(table.get("version", 1), path),
             supersedes=table.get("supersedes"),
             corrections=read_corrections(table.get("correction", []), f"{path}: correction"),
+            cells=read_polarity(
+                table.get("cell", []),
+                [one.symbol for one in columns if one.role == "indication"],
+                f"{path}: cell",
+            ),
+            rated_loads=read_rated_loads(table.get("rated_load", {}), f"{path}: rated_load"),
         )
     except KeyError as error:
         raise ConfigError(

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from toolkit.calibration.registry.registry import Registry
 
 
-def calibrate(session_file: Path, registry: Registry) -> Candidate:
+def calibrate(session_file: Path, registry: Registry, *, machine: str | None = None) -> Candidate:
     """Enter a session's candidate record and judge it against the instrument's history.
 
     The history is judged after the record was entered: where it cannot be, that is a finding, not an error.
@@ -30,7 +30,7 @@ def calibrate(session_file: Path, registry: Registry) -> Candidate:
     ToolkitError
         as `registry.candidate.calibrate`; nothing is written
     """
-    made = enter(session_file, registry)
+    made = enter(session_file, registry, machine=machine)
     return dataclasses.replace(made, findings=made.findings + control_findings(registry, made.record))
 
 

@@ -24,6 +24,7 @@ from toolkit.calibration.registry.status import status_of
 from toolkit.calibration.registry.stored import stored_check
 from toolkit.errors import ToolkitError
 from toolkit.findings import Finding
+from toolkit.units import si_scale
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -37,7 +38,7 @@ SAME_PERCENT = 1.0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ChartPoint:
-    """One session: ``error`` in the load's unit by ``record``, which was in force before it."""
+    """One session: ``error`` in the unit of the series by ``record``, which was in force before it."""
 
     session_record: str
     date: dt.date
@@ -62,7 +63,8 @@ class Series:
     """The chart of one load's error at one check load.
 
     ``limits`` is None where fewer than the least number of points are there to take them from; ``breaks``
-    are at indices of ``points``. ``baseline`` points, from the first on, made the limits.
+    are at indices of ``points``. ``baseline`` points, from the first on, made the limits. ``unit`` is that of
+    the newest session.
     """
 
     check_load: CheckLoad
@@ -91,11 +93,17 @@ class Chart:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class _Session:
+    """Reference loads and errors in SI: the sessions of a history may be in several units."""
+
     record: CalibrationRecord
     before: str
     names: tuple[str, ...]
     references: NDArray[np.float64]
     errors: NDArray[np.float64]
+
+    def scale(self, load: str) -> float:
+        """Return the factor from a load's unit to SI."""
+        return si_scale(self.record.load(load).unit)
 
 
 def control_chart(
@@ -125,7 +133,7 @@ def control_chart(
         first, row = group[0]
         check_load = CheckLoad(
             loads=tuple(
-                (name, float(first.references[row, j]), first.record.load(name).unit)
+                (name, float(first.references[row, j]) / first.scale(name), first.record.load(name).unit)
                 for j, name in enumerate(first.names)
             )
         )
@@ -197,12 +205,13 @@ def _session(
     errors = errors_by(before, check, zero=record.zero)
     if isinstance(errors, str):
         return errors
+    scale = np.array([si_scale(record.load(name).unit) for name in errors])
     return _Session(
         record=record,
         before=before.id,
         names=tuple(errors),
-        references=check.matrix(tuple(errors)),
-        errors=np.column_stack(list(errors.values())),
+        references=check.matrix(tuple(errors)) * scale,
+        errors=np.column_stack(list(errors.values())) * scale,
     )
 
 
@@ -221,9 +230,9 @@ def _groups(sessions: list[_Session], same_percent: float) -> list[list[tuple[_S
 
 def _same(one: tuple[_Session, int], other: tuple[_Session, int], same_percent: float) -> bool:
     (a, i), (b, j) = one, other
-    if a.names != b.names or any(a.record.load(n).unit != b.record.load(n).unit for n in a.names):
+    if a.names != b.names:
         return False
-    full = np.array([max(a.record.load(n).largest, b.record.load(n).largest) for n in a.names])
+    full = np.array([max(one.record.load(n).largest * one.scale(n) for one in (a, b)) for n in a.names])
     return bool((np.abs(a.references[i] - b.references[j]) <= same_percent / 100 * full).all())
 
 
@@ -233,6 +242,8 @@ def _series(
     rows: dict[str, list[tuple[_Session, int]]] = {}
     for session, row in group:
         rows.setdefault(session.record.id, []).append((session, row))
+    name = group[0][0].names[column]
+    newest, scale = group[-1][0].record.load(name), group[-1][0].scale(name)
     points = []
     for record_id, members in rows.items():
         session = members[0][0]
@@ -241,11 +252,10 @@ def _series(
                 session_record=record_id,
                 date=dt.date.fromisoformat(session.record.date),
                 record=session.before,
-                error=float(np.mean([session.errors[row, column] for _, row in members])),
+                error=float(np.mean([session.errors[row, column] for _, row in members])) / scale,
                 rows=len(members),
             )
         )
-    newest = group[-1][0].record.load(group[0][0].names[column])
     values = np.array([one.error for one in points])
     count = min(baseline, len(values)) if baseline is not None else max(len(values) - 1, 0)
     limits = limits_of(values[:count])

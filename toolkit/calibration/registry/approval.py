@@ -9,19 +9,24 @@ import datetime as dt
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from toolkit.calibration.records.record import from_bytes
 from toolkit.calibration.registry import gates
-from toolkit.calibration.registry.candidate import now
-from toolkit.calibration.registry.history import compared, history_of
+from toolkit.calibration.registry.clock import check_begun, now, today, untimely
 from toolkit.calibration.registry.interval import parse_interval
+from toolkit.calibration.registry.judgement import judge_stored, machine_of, read_polarity_file
 from toolkit.calibration.registry.names import check_names
-from toolkit.calibration.registry.registry import Registry, instrument_of, today
+from toolkit.calibration.registry.registry import Registry, instrument_of
 from toolkit.calibration.registry.status import RecordStatus, status_of
 from toolkit.calibration.registry.store import Change, commit
 from toolkit.calibration.registry.stored import stored_check
-from toolkit.errors import RegistryError
+from toolkit.errors import RegistryError, ToolkitError
+from toolkit.files import read_regular
 from toolkit.findings import Finding
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
+    from toolkit.calibration.records.record import CalibrationRecord
     from toolkit.calibration.registry.ledger import Ledger
 
 
@@ -29,7 +34,8 @@ if TYPE_CHECKING:
 class Decision:
     """The outcome of an approval: ``done`` is False where a gate blocked, and then nothing was changed.
 
-    ``note`` tells that the record is in force from a day before the decision; it stands in the ledger too.
+    ``note`` tells that the record is in force from a day before the decision, and ``evidence`` by what its
+    signs are confirmed and what the gates said that did not stand in the way; both are in the ledger too.
     """
 
     id: str
@@ -38,6 +44,7 @@ class Decision:
     unverifiable: tuple[str, ...]
     findings: tuple[Finding, ...]
     note: str | None = None
+    evidence: tuple[str, ...] = ()
 
 
 def approve(
@@ -50,10 +57,14 @@ def approve(
     reason: str | None = None,
     known_on: dt.date | None = None,
     recall: str | None = None,
+    polarity: Path | None = None,
+    machine: str | None = None,
 ) -> Decision:
-    """Put a record in force, where its gates let it through.
+    """Put a record in force, where its gates let it through (`judgement`).
 
-    ``known_on`` is the day of the decision (default today). A second approval of a record moves its
+    ``known_on`` is the day of the decision (default today); a day before today needs a reason, which says why
+    the entry is dated back. ``polarity`` is a file of polarity readings, ``machine`` names the machine
+    definition (default: the packaged one of the instrument's name). A second approval of a record moves its
     in-force date back or sets its recall interval anew, with a reason. ``recall`` is the interval after the
     session's date, such as "12 months"; it stands in the ledger and changes nothing about the record.
 
@@ -67,22 +78,27 @@ def approve(
     RegistryError
         ``names``: entered, checked and approved by do not differ; ``approval``: a date before the
         session's without a reason, a record that is withdrawn or approved already, or a
-        later date than before; ``recall``: no interval
+        later date than before; ``recall``: no interval; ``time``: a decision in the future, before its
+        session, or in the past without a reason
+    ConfigError, UnitError
+        the polarity readings or the machine definition cannot be used
     """
     folder = registry.folder / instrument_of(record_id)
     day = known_on or today()
     record = registry.load(record_id)
     check_names(record, checked_by, approved_by)
+    definition = machine_of(record.instrument, machine)
+    readings = () if polarity is None else read_polarity_file(polarity, record)
     if in_force_from < day and not reason and in_force_from < dt.date.fromisoformat(record.date):
         raise _refused(
             record_id, "an in-force date before the session's own date needs a reason",
             f"in force from {in_force_from.isoformat()}, session of {record.date}",
             f"a date from {record.date} on, or --reason TEXT, which the ledger keeps", "approval",
         )  # fmt: skip
+    _check_day(record, day, reason)
     interval = None if recall is None else str(parse_interval(recall))
-    check = stored_check(registry.folder, record)
     early = (day - in_force_from).days
-    note = f"in force from {early} day{'' if early == 1 else 's'} before the decision" if early > 0 else None
+    note = f"in force from {_days(early)} before the decision" if early > 0 else None
     decided: list[Decision] = []
 
     def build(ledger: Ledger) -> Change | None:
@@ -109,11 +125,11 @@ def approve(
                 f"not after {status.in_force_from.isoformat()}; a withdrawal makes days void",
                 "approval",
             )  # fmt: skip
-        failed = compared(record, history_of(registry, record, ledger, but=record_id))
-        if check is not None:
-            failed += gates.check_loads(record, check)
-        terms = gates.unverifiable(record, check)
+        judged = judge_stored(registry, record, ledger, machine=definition, readings=readings, reason=reason)
+        failed = judged.failed
+        terms = gates.unverifiable(record, stored_check(registry.folder, record))
         findings = tuple(Finding(rule=one.rule, where=one.where, message=one.message) for one in failed)
+        evidence = (*judged.evidence, *(f"{one.rule}: {one.where}: {one.message}" for one in judged.told))
         decided.append(
             Decision(
                 id=record_id,
@@ -122,6 +138,7 @@ def approve(
                 unverifiable=terms,
                 findings=findings,
                 note=None if failed else note,
+                evidence=evidence,
             )
         )
         if failed:
@@ -135,7 +152,10 @@ def approve(
             "since": in_force_from.isoformat(),
             "unverifiable": list(terms),
         }
-        more = {"approved_by": approved_by, "reason": reason, "note": note, "recall": interval}
+        more = {
+            "approved_by": approved_by, "reason": reason, "note": note, "recall": interval,
+            "evidence": list(evidence),
+        }  # fmt: skip
         event |= {key: value for key, value in more.items() if value}
         return Change(files={}, event=event)
 
@@ -154,20 +174,23 @@ def withdraw(
 ) -> RecordStatus:
     """Withdraw a record: ``on`` is when the fault became known, ``void_from`` the first void day.
 
-    Without ``void_from`` the record is void from its in-force date, hence on every day.
+    Without ``void_from`` the record is void from its in-force date, hence on every day. Where ``on`` lies
+    before today, the ledger notes by how many days the entry is dated back.
 
     Raises
     ------
     RegistryError
-        no such record, no reason, or withdrawn already
+        no such record, no reason, or withdrawn already; ``time``: a day in the future, or before the session
     """
     folder = registry.folder / instrument_of(record_id)
     if not reason.strip():
         raise _refused(record_id, "a withdrawal needs a reason", "nothing", "--reason TEXT", "withdrawal")
+    check_begun(on, "the day on which the fault became known", record_id)
 
     def build(ledger: Ledger) -> Change:
         if record_id not in ledger.entered():
             raise _refused(record_id, "no such record", record_id, ", ".join(ledger.entered()), "missing")
+        _check_not_before(_read(folder, record_id), on)
         if any(entry.event == "withdrawn" for entry in ledger.of(record_id)):
             raise _refused(
                 record_id,
@@ -184,12 +207,51 @@ def withdraw(
             "known_on": on.isoformat(),
             "reason": reason,
         }
-        return Change(files={}, event=event | ({"since": void_from.isoformat()} if void_from else {}))
+        late = (today() - on).days
+        more = {
+            "since": void_from and void_from.isoformat(),
+            "note": f"entered {_days(late)} after it became known" if late > 0 else None,
+        }
+        return Change(files={}, event=event | {key: value for key, value in more.items() if value})
 
     if not folder.is_dir():
         raise _refused(record_id, "no such record", record_id, ", ".join(registry.instruments()), "missing")
     commit(folder, build)
     return registry.status(record_id, known_at=max(on, today()))
+
+
+def _check_day(record: CalibrationRecord, day: dt.date, reason: str | None) -> None:
+    """Refuse a decision in the future, before its session, or dated back without a reason."""
+    check_begun(day, "the day of the decision", record.id)
+    _check_not_before(record, day)
+    if day < today() and not (reason and reason.strip()):
+        raise _refused(
+            record.id, "a decision that is dated back needs a reason",
+            f"decided on {day.isoformat()}, entered on {today().isoformat()}",
+            "--reason TEXT, which says why it was not entered on its day; the ledger keeps both days", "time",
+        )  # fmt: skip
+
+
+def _check_not_before(record: CalibrationRecord | None, day: dt.date) -> None:
+    # A legacy record has no session: its date is that of the source that names its coefficients.
+    if record is not None and record.kind == "fit" and day < dt.date.fromisoformat(record.date):
+        raise untimely(
+            "a decision lies before the session that it is about", record.id,
+            f"decided on {day.isoformat()}, session of {record.date}", f"a day from {record.date} on",
+        )  # fmt: skip
+
+
+def _read(folder: Path, record_id: str) -> CalibrationRecord | None:
+    """Return a record as its file stands; None where it cannot be read, which its withdrawal survives."""
+    path = folder / f"{record_id}.json"
+    try:
+        return from_bytes(read_regular(path), where=path)
+    except (ToolkitError, OSError):
+        return None
+
+
+def _days(count: int) -> str:
+    return f"{count} day{'' if count == 1 else 's'}"
 
 
 def _refused(record_id: str, what: str, got: str, expected: str, rule: str) -> RegistryError:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 from dataclasses import dataclass
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -34,7 +33,9 @@ from toolkit.calibration.records.record import (
     to_bytes,
 )
 from toolkit.calibration.registry.agreement import check_agrees, check_inputs
-from toolkit.calibration.registry.history import history_findings, history_of
+from toolkit.calibration.registry.clock import check_begun, now
+from toolkit.calibration.registry.history import history_of
+from toolkit.calibration.registry.judgement import judge, machine_of
 from toolkit.calibration.registry.ledger import Ledger
 from toolkit.calibration.registry.refit import check_reproduces, polarity
 from toolkit.calibration.registry.registry import ID, Registry, load_checked
@@ -64,20 +65,23 @@ class Candidate:
     findings: tuple[Finding, ...]
 
 
-def calibrate(session_file: Path, registry: Registry) -> Candidate:
+def calibrate(session_file: Path, registry: Registry, *, machine: str | None = None) -> Candidate:
     """Fit a session and enter its record as a candidate.
 
-    The findings never change the fit. A session whose data and settings are already recorded returns that
-    record and writes nothing.
+    ``machine`` names or is the file of the machine definition whose polarity is held against the record;
+    default: the packaged one of the instrument's name. The findings never change the fit. A session whose
+    data and settings are already recorded returns that record and writes nothing.
 
     Raises
     ------
     ConfigError, SessionError, UnitError
         the session cannot be used; nothing is written
     RegistryError
-        the ledger is damaged; nothing is written
+        the ledger is damaged, or the session lies in the future; nothing is written
     """
     session = read_session(session_file)
+    check_begun(session.date, "the session's date", f"{session_file}: date")
+    definition = machine_of(session.instrument, machine)
     folder = registry.folder / session.instrument
     fit = fit_session(session)
     existing = _recorded(folder, session, registry.ledger(session.instrument))
@@ -114,7 +118,11 @@ def calibrate(session_file: Path, registry: Registry) -> Candidate:
     written = commit(folder, build)
     record = made[0]
     if written:
-        findings += history_findings(record, history)
+        judged = judge(
+            unnumbered, history=history, machine=definition, loads=session.table, check=session.check
+        )
+        said = {(one.rule, one.where) for one in findings}
+        findings += tuple(one.finding() for one in judged.results if (one.rule, one.where) not in said)
     return Candidate(
         record=record,
         path=folder / f"{record.id}.json",
@@ -148,11 +156,6 @@ def next_id(folder: Path, instrument: str, ledger: Ledger) -> str:
     names |= {path.name.split(".json")[0] for path in folder.glob(f"{instrument}-r*.json")}
     numbers = [int(m["number"]) for m in map(ID.match, names) if m and m["instrument"] == instrument]
     return f"{instrument}-r{max(numbers, default=0) + 1}"
-
-
-def now() -> str:
-    """Return the time of an entry, UTC to the second."""
-    return datetime.now(tz=UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
 
 
 def _recorded(folder: Path, session: Session, ledger: Ledger) -> CalibrationRecord | None:

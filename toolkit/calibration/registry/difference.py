@@ -1,4 +1,8 @@
-"""What changes from one record to another: each coefficient, and what it moves in the load."""
+"""What changes from one record to another: each coefficient, and what it moves in the load.
+
+Records in other units are compared as they are in SI: the change is given in the units of the first one, and
+a note says which unit changed and what both responses are in SI.
+"""
 
 from __future__ import annotations
 
@@ -6,7 +10,9 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from toolkit.calibration.registry.response import same_dimension, same_unit
 from toolkit.calibration.terms import evaluate, parse_term
+from toolkit.units import unit
 
 if TYPE_CHECKING:
     from toolkit.calibration.records.record import CalibrationRecord, LoadFit
@@ -14,11 +20,13 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TermDifference:
-    """One term of one load: its coefficients (None where a record has no such term).
+    """One term of one load: its coefficients as written (None where a record has no such term).
 
-    ``change`` is other - one; None where a term is missing or the units differ, so that a difference would
-    mean nothing. ``effect`` is the largest load [unit] that the change moves over the indications' range,
-    and ``effect_percent_fs`` the same in percent of the largest load; None where neither record has a range.
+    ``change`` is other - one in the units of ``one``, ``change_percent`` the same of its coefficient; None
+    where a term is missing or a unit measures another kind of quantity. ``effect`` is the largest load
+    [``unit``, that of ``one``] that the change moves over the indications' range, ``effect_percent_fs`` the
+    same in percent of the largest load; None where neither record has a range. ``note`` says in words what
+    changed in units, loads or terms, with both coefficients in SI.
     """
 
     load: str
@@ -27,44 +35,113 @@ class TermDifference:
     one: float | None
     other: float | None
     change: float | None
+    change_percent: float | None
     effect: float | None
     effect_percent_fs: float | None
     differs: bool
+    note: str | None
 
 
 def differences(one: CalibrationRecord, other: CalibrationRecord) -> tuple[TermDifference, ...]:
     """Compare two records term by term, in the order of the first."""
-    found: list[TermDifference] = []
     names = dict.fromkeys(load.load for record in (one, other) for load in record.loads)
+    found: list[TermDifference] = []
     for name in names:
-        a, b = _load(one, name), _load(other, name)
-        before, after = _coefficients(a), _coefficients(b)
-        unit = " against ".join(dict.fromkeys(load.unit for load in (a, b) if load is not None))
-        largest = max((x.largest for x in (a, b) if x is not None and x.largest > 0), default=math.nan)
-        for term in dict.fromkeys([*before, *after]):
-            first, second = before.get(term), after.get(term)
-            comparable = (
-                a is not None and b is not None and a.unit == b.unit and _same_units(one, other, term)
-            )
-            change = None if first is None or second is None or not comparable else second - first
-            extent = _extent(term, one, other)
-            effect = None if change is None or extent is None else abs(change) * extent
-            found.append(
-                TermDifference(
-                    load=name,
-                    term=term,
-                    unit=unit,
-                    one=first,
-                    other=second,
-                    change=change,
-                    effect=effect,
-                    effect_percent_fs=None
-                    if effect is None or math.isnan(largest)
-                    else 100 * effect / largest,
-                    differs=first != second or not comparable,
-                )
-            )
+        terms = (_coefficients(_load(record, name)) for record in (one, other))
+        found += [_difference(one, other, name, term) for term in dict.fromkeys(t for x in terms for t in x)]
     return tuple(found)
+
+
+def _difference(one: CalibrationRecord, other: CalibrationRecord, name: str, term: str) -> TermDifference:
+    a, b = _load(one, name), _load(other, name)
+    first, second = _coefficients(a).get(term), _coefficients(b).get(term)
+    unit_of_load = next(x.unit for x in (a, b) if x is not None)
+    changed = _changed_units(one, other, a, b, term)
+    comparable = a is not None and b is not None and all(same_dimension(x, y) for _, x, y in changed)
+    change = percent = effect = None
+    if first is not None and second is not None and a is not None and b is not None and comparable:
+        factor = _scale(other, b, term) / _scale(one, a, term) if changed else 1.0
+        change = second * factor - first
+        percent = 100 * change / abs(first) if first else None
+        extent = _extent(term, one, other)
+        effect = None if extent is None else abs(change) * extent
+    scale = unit(unit_of_load).factor
+    largest = max(
+        (x.largest * unit(x.unit).factor / scale for x in (a, b) if x is not None and x.largest > 0),
+        default=math.nan,
+    )
+    return TermDifference(
+        load=name,
+        term=term,
+        unit=unit_of_load,
+        one=first,
+        other=second,
+        change=change,
+        change_percent=percent,
+        effect=effect,
+        effect_percent_fs=None if effect is None or math.isnan(largest) else 100 * effect / largest,
+        differs=first != second or bool(changed),
+        note=_note(one, other, (a, b), term, changed),
+    )
+
+
+_Changed = list[tuple[str, str, str]]
+
+
+def _changed_units(
+    one: CalibrationRecord, other: CalibrationRecord, a: LoadFit | None, b: LoadFit | None, term: str
+) -> _Changed:
+    """Return the load and the term's indications whose unit differs: (name, unit in one, in other)."""
+    pairs = [] if a is None or b is None else [(a.load, a.unit, b.unit)]
+    units = [{cell.name: cell.unit for cell in record.cells} for record in (one, other)]
+    pairs += [
+        (name, units[0][name], units[1][name])
+        for name in sorted(_indications(term))
+        if name in units[0] and name in units[1]
+    ]
+    return [pair for pair in pairs if not same_unit(pair[1], pair[2])]
+
+
+def _note(
+    one: CalibrationRecord,
+    other: CalibrationRecord,
+    loads: tuple[LoadFit | None, LoadFit | None],
+    term: str,
+    changed: _Changed,
+) -> str | None:
+    parts = []
+    for record, load in zip((one, other), loads, strict=True):
+        if load is None:
+            parts.append(f"{record.id} does not have the load")
+        elif term not in load.terms:
+            parts.append(f"{record.id} does not have the term")
+    for name, x, y in changed:
+        parts.append(f"{name} in {x}, then in {y}")
+        if not same_dimension(x, y):
+            parts[-1] += ", which is another kind of quantity: no change can be given"
+    values = [
+        f"{_coefficients(load)[term] * _scale(record, load, term):.6g} {_si(record, load, term)}"
+        for record, load in zip((one, other), loads, strict=True)
+        if load is not None and term in load.terms
+    ]
+    if changed and len(values) == 2 and all(same_dimension(x, y) for _, x, y in changed):
+        parts.append(f"that is {values[0]}, then {values[1]}")
+    return "; ".join(parts) or None
+
+
+def _scale(record: CalibrationRecord, load: LoadFit, term: str) -> float:
+    """Return the factor from a coefficient as written to SI."""
+    units = {cell.name: unit(cell.unit).factor for cell in record.cells}
+    return unit(load.unit).factor / float(evaluate(parse_term(term), units, 1.0))
+
+
+def _si(record: CalibrationRecord, load: LoadFit, term: str) -> str:
+    """Return the SI unit of a coefficient, such as N/(V/V)."""
+    parsed = parse_term(term)
+    units = {cell.name: unit(cell.unit).si for cell in record.cells}
+    below = [f"({units[name]})" + (f"^{power}" if power > 1 else "") for name, power in parsed.powers]
+    below += [f"({units[name]})" for name in parsed.absolutes]
+    return "/".join([unit(load.unit).si, *below])
 
 
 def _load(record: CalibrationRecord, name: str) -> LoadFit | None:
@@ -80,18 +157,16 @@ def _indications(term: str) -> set[str]:
     return {name for name, _ in parsed.powers} | set(parsed.absolutes)
 
 
-def _same_units(one: CalibrationRecord, other: CalibrationRecord, term: str) -> bool:
-    units = [{cell.name: cell.unit for cell in record.cells} for record in (one, other)]
-    return all(units[0].get(name) == units[1].get(name) for name in _indications(term))
-
-
-def _extent(term: str, *records: CalibrationRecord) -> float | None:
-    """Return the largest absolute value of a term over the ranges of both records."""
+def _extent(term: str, one: CalibrationRecord, other: CalibrationRecord) -> float | None:
+    """Return the largest absolute value of a term over the ranges of both records, in units of ``one``."""
     ranges: dict[str, float] = {}
-    for record in records:
-        for cell in record.cells:
-            if cell.minimum is not None and cell.maximum is not None:
-                ranges[cell.name] = max(ranges.get(cell.name, 0.0), abs(cell.minimum), abs(cell.maximum))
+    units = {cell.name: cell.unit for cell in one.cells}
+    for cell in (*one.cells, *other.cells):
+        if cell.minimum is not None and cell.maximum is not None and cell.name in units:
+            same = same_unit(cell.unit, units[cell.name])
+            factor = 1.0 if same else unit(cell.unit).factor / unit(units[cell.name]).factor
+            largest = max(abs(cell.minimum), abs(cell.maximum)) * factor
+            ranges[cell.name] = max(ranges.get(cell.name, 0.0), largest)
     if not _indications(term) <= ranges.keys():
         return None
     return float(evaluate(parse_term(term), ranges, 1.0))

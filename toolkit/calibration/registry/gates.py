@@ -1,86 +1,161 @@
-"""Activation gates: sign and span against the last approved record, and the check loads.
+"""Activation gates: what a record says in SI against an earlier one, and the check loads.
 
-A sign is a fault only where it matters: a coefficient whose contribution over the session's range is
-inside the check loads' tolerance has a sign that noise decides.
+Sign and span are compared as responses (`response`), so that a unit that was written wrongly changes the span
+by its factor, and one that was changed on purpose changes nothing. A sign is a fault only where it matters: a
+response whose contribution over the session's range is inside the check loads' tolerance has a sign that
+noise decides.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
+from toolkit.calibration.registry.response import (
+    Response,
+    largest_load,
+    range_of,
+    response,
+    same_dimension,
+    same_unit,
+    tolerance,
+)
 from toolkit.calibration.terms import INTERCEPT, term_matrix
+from toolkit.findings import Finding
 
 if TYPE_CHECKING:
-    from toolkit.calibration.records.record import CalibrationRecord, LoadFit
+    from toolkit.calibration.records.record import CalibrationRecord, Indication, LoadFit
     from toolkit.calibration.session.table import Table
 
 SPAN = 0.02
 VERIFIED = 5.0
 _RANK = 1e-8
 
+Effect = Literal["blocks", "asks", "tells"]
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GateResult:
-    """One failed gate: ``rule`` is sign, span or check-load; ``where`` names load and term or row."""
+    """One gate: ``rule`` such as sign, span or check-load; ``where`` names load and indication or row.
+
+    ``effect``: ``blocks`` an approval; ``asks`` for something that an approval needs; ``tells`` what does
+    not stand in its way, and is written to the ledger with it.
+    """
 
     rule: str
     where: str
     message: str
+    effect: Effect = "blocks"
+
+    def finding(self) -> Finding:
+        """Return the finding of a session: what is only asked for on approval is a note."""
+        level: Literal["warning", "note"] = "note" if self.effect == "asks" else "warning"
+        return Finding(rule=self.rule, where=self.where, message=self.message, level=level)
 
 
 def sign_and_span(
     new: CalibrationRecord, old: CalibrationRecord, *, only: Collection[str] | None = None
 ) -> tuple[GateResult, ...]:
-    """Compare a record's coefficients with those of an earlier one, per serial and unit.
+    """Compare a record's responses with those of an earlier one, in SI, indication by indication.
 
-    An indication with another serial or unit is not compared (`new_history`); ``only`` names those that are.
+    ``only`` names the indications to compare; default: all that both have. Where an indication's dimension
+    changed (mV/V to counts), its sign is compared and its span cannot be.
     """
     failed: list[GateResult] = []
-    fresh = set(new_history(new, old))
-    if only is not None:
-        fresh |= {cell.name for cell in new.cells} - set(only)
-    cells = {cell.name: cell for cell in new.cells}
+    before = {cell.name: cell for cell in old.cells}
     for one in new.loads:
-        other = next((o for o in old.loads if o.load == one.load and o.unit == one.unit), None)
-        if other is None:
+        other = next((o for o in old.loads if o.load == one.load), None)
+        if other is None or not same_dimension(one.unit, other.unit):
             continue
-        before = dict(zip(other.terms, other.coefficients, strict=True))
-        for at, (term, value) in enumerate(zip(one.terms, one.coefficients, strict=True)):
-            cell = cells.get(term)
-            if cell is None or term in fresh or term not in before:
-                continue
-            reach = 1.0 if cell.maximum is None or cell.minimum is None else cell.maximum - cell.minimum
-            change = abs(value - before[term])
-            tolerance = one.tolerance or 1e-3 * one.largest
-            # A legacy record has no range of its own: all that is left to compare is the sign.
-            if np.isfinite(tolerance) and change * reach <= tolerance:
-                continue
-            if change <= 3 * _u_change(one, other, at, term):
-                continue
-            text = f"{value:.6g} against {before[term]:.6g} in {old.id}"
-            where = f"{one.load}, {term}"
-            if value * before[term] < 0:
-                failed.append(GateResult(rule="sign", where=where, message=f"the sign changed: {text}"))
-            elif change > SPAN * abs(before[term]):
-                percent = 100 * (value / before[term] - 1) if before[term] else np.inf
-                message = f"the span changed by {percent:+.2f} %: {text}"
-                failed.append(GateResult(rule="span", where=where, message=message))
+        for cell in new.cells:
+            if cell.name in before and (only is None or cell.name in only):
+                found = _change((new, one, cell), (old, other, before[cell.name]))
+                failed += [] if found is None else [found]
     return tuple(failed)
 
 
-def new_history(new: CalibrationRecord, old: CalibrationRecord) -> tuple[str, ...]:
-    """Return the indications whose serial or unit differs: their sign and span have no history."""
-    before = {cell.name: cell for cell in old.cells}
-    return tuple(
-        cell.name
-        for cell in new.cells
-        if cell.name not in before
-        or (before[cell.name].serial, before[cell.name].unit) != (cell.serial, cell.unit)
+_Place = tuple["CalibrationRecord", "LoadFit", "Indication"]
+
+
+def _change(new: _Place, old: _Place) -> GateResult | None:
+    comparable = same_dimension(new[2].unit, old[2].unit)
+    over = range_of(new[2])
+    now, before = response(*new, over), response(*old, over if comparable else None)
+    where = f"{new[1].load}, {new[2].name}"
+    text = f"{now} against {before} in {old[0].id}"
+    flipped = now.value * before.value < 0
+    if not comparable:
+        if flipped and not _negligible(now, abs(now.value), (new[1],), 3 * now.u):
+            return GateResult(rule="sign", where=where, message=f"the sign changed: {text}")
+        return None
+    change = abs(now.value - before.value)
+    # A sign counts over the range in which the instrument was used so far: a session that hardly moves a
+    # cell must not hide it.
+    had = range_of(old[2])
+    used = None if had is None else had[1] - had[0]
+    if _negligible(now, change, (new[1], old[1]), 3 * math.hypot(now.u, before.u), used):
+        return None
+    if flipped:
+        return GateResult(rule="sign", where=where, message=f"the sign changed: {text}")
+    if change > SPAN * abs(before.value):
+        ratio = now.value / before.value if before.value else math.inf
+        told = f"by {100 * (ratio - 1):+.2f} %" if 0.1 < ratio < 10 else f"by a factor of {ratio:.4g}"
+        return GateResult(rule="span", where=where, message=f"the span changed {told}: {text}")
+    return None
+
+
+def _negligible(
+    now: Response, change: float, loads: tuple[LoadFit, ...], noise: float, used: float | None = None
+) -> bool:
+    """Tell whether a change of response [SI] is inside the tolerance, or inside its own uncertainty.
+
+    The tolerance is the smallest that any of the records states, and never more than the span's own part of
+    a largest load: a tolerance in a wrong unit must not switch the gate off. The uncertainty excuses a change
+    no larger than that part either: a main response that is not known does not pass for an unchanged one.
+    ``used`` is the indication's range in the earlier record.
+    """
+    scale = [SPAN * largest_load(one) for one in loads if not math.isnan(one.largest)]
+    limits = [tolerance(one) for one in loads if not math.isnan(tolerance(one))] + scale
+    # A legacy record has no range of its own: all that is left to compare is the response itself.
+    if now.extent is None or not limits:
+        return change <= noise
+    moved = change * max(now.extent, used or 0.0)
+    return moved <= min(limits) or (change <= noise and change * now.extent <= min(scale))
+
+
+def layout(new: CalibrationRecord, old: CalibrationRecord) -> tuple[GateResult, ...]:
+    """Return what changed in units, loads and indications: no fault by itself, and always told."""
+    told: list[GateResult] = []
+    kinds = (
+        ("load", {o.load: (o.unit, None) for o in new.loads}, {o.load: (o.unit, None) for o in old.loads}),
+        (
+            "indication",
+            {c.name: (c.unit, c.column_unit) for c in new.cells},
+            {c.name: (c.unit, c.column_unit) for c in old.cells},
+        ),
     )
+    for kind, now, before in kinds:
+        for name, units in now.items():
+            if name not in before:
+                message = f"the {kind} is new: {old.id} does not have it"
+                told.append(GateResult(rule="layout-changed", where=name, message=message, effect="tells"))
+                continue
+            unit_now, unit_before = (one[1] or one[0] for one in (units, before[name]))
+            if same_unit(unit_now, unit_before) and same_unit(units[0], before[name][0]):
+                continue
+            message = f"the unit changed: {unit_now}, in {old.id} {unit_before}"
+            if not same_dimension(units[0], before[name][0]):
+                message += "; they measure different kinds of quantity, so that the span cannot be compared"
+            told.append(GateResult(rule="unit-changed", where=name, message=message, effect="tells"))
+        for name in before:
+            if name not in now:
+                message = f"the {kind} of {old.id} is missing"
+                told.append(GateResult(rule="layout-changed", where=name, message=message, effect="tells"))
+    return tuple(told)
 
 
 def check_loads(record: CalibrationRecord, check: Table) -> tuple[GateResult, ...]:
@@ -132,11 +207,3 @@ def _undetermined(matrix: np.ndarray[tuple[int, ...], np.dtype[np.float64]]) -> 
     rank = int(np.sum(values > _RANK * values[0])) if len(values) else 0
     null = right[rank:]
     return [bool(np.any(np.abs(null[:, j]) > 1e-6)) or bool(length[j] == 0) for j in range(matrix.shape[1])]
-
-
-def _u_change(one: LoadFit, other: LoadFit, at: int, term: str) -> float:
-    u = one.covariance[at][at] if one.covariance else 0.0
-    if other.covariance:
-        j = other.terms.index(term)
-        u += other.covariance[j][j]
-    return float(np.sqrt(u))

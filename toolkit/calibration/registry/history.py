@@ -1,28 +1,34 @@
-"""What a new record says against the instrument's history: sign and span of every cell, by its serial.
+"""What a new record says against the instrument's history: every cell, by its serial.
 
 A cell is compared with the last approved record that it stood in. That is the instrument's last one, unless
-the cell was exchanged: a serial that nobody has seen begins a new history, one that returns goes on with its
-own.
+the cell was exchanged: one that returns goes on with its own history. A serial that nobody has seen is a
+replacement. It is held against the cell before it all the same: another span is what a replacement may have,
+once somebody wrote why; another sign is not, unless something else confirms it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import dataclasses
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from toolkit.calibration.records.record import from_bytes
-from toolkit.calibration.registry.gates import GateResult, new_history, sign_and_span
-from toolkit.calibration.registry.registry import load_checked, today
+from toolkit.calibration.registry.clock import today
+from toolkit.calibration.registry.gates import GateResult, layout, sign_and_span
+from toolkit.calibration.registry.registry import load_checked
+from toolkit.calibration.registry.response import main_indications, response, same_dimension
 from toolkit.calibration.registry.status import status_of
 from toolkit.errors import ToolkitError
 from toolkit.files import read_regular
-from toolkit.findings import Finding
 
 if TYPE_CHECKING:
     from toolkit.calibration.records.record import CalibrationRecord
     from toolkit.calibration.registry.ledger import Ledger
     from toolkit.calibration.registry.registry import Registry
+
+# Another cell for the same loads may be of another capacity; ten times the output is a slip of a unit.
+REPLACED_SPAN = 10.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -31,6 +37,9 @@ class History:
 
     last: CalibrationRecord | None
     returned: Mapping[str, CalibrationRecord]
+
+
+NO_HISTORY = History(last=None, returned={})
 
 
 def approved_ids(ledger: Ledger, *, but: str = "") -> list[str]:
@@ -56,11 +65,11 @@ def history_of(registry: Registry, record: CalibrationRecord, ledger: Ledger, *,
     """
     folder, ids = registry.folder / record.instrument, approved_ids(ledger, but=but)
     if not ids:
-        return History(last=None, returned={})
+        return NO_HISTORY
     last = load_checked(folder, ids[0], ledger)
-    units = {cell.name: (cell.serial, cell.unit) for cell in record.cells}
+    serials = {cell.name: cell.serial for cell in record.cells}
     # Without a serial nobody knows which cell it is.
-    sought = {name for name in new_history(record, last) if units[name][0] is not None}
+    sought = {name for name in exchanged(record, last) if serials[name] is not None}
     returned: dict[str, CalibrationRecord] = {}
     for record_id in ids[1:] if sought else ():
         path = folder / f"{record_id}.json"
@@ -69,7 +78,7 @@ def history_of(registry: Registry, record: CalibrationRecord, ledger: Ledger, *,
         except (ToolkitError, OSError):
             # `verify` names it; what it held cannot be told.
             continue
-        found = {cell.name for cell in had.cells if units.get(cell.name) == (cell.serial, cell.unit)} & sought
+        found = {cell.name for cell in had.cells if serials.get(cell.name) == cell.serial} & sought
         if found:
             checked = load_checked(folder, record_id, ledger)
             returned |= dict.fromkeys(found, checked)
@@ -79,36 +88,136 @@ def history_of(registry: Registry, record: CalibrationRecord, ledger: Ledger, *,
     return History(last=last, returned=returned)
 
 
-def compared(record: CalibrationRecord, history: History) -> tuple[GateResult, ...]:
-    """Return the coefficients whose sign or span is not that of their cell's history."""
+def exchanged(new: CalibrationRecord, old: CalibrationRecord) -> tuple[str, ...]:
+    """Return the indications whose serial is not that of an earlier record, or that it did not have."""
+    before = {cell.name: cell.serial for cell in old.cells}
+    return tuple(c.name for c in new.cells if c.name not in before or before[c.name] != c.serial)
+
+
+def replaced(new: CalibrationRecord, history: History) -> tuple[str, ...]:
+    """Return the indications whose place in the last record held another cell, which does not return."""
     if history.last is None:
         return ()
-    failed = sign_and_span(record, history.last)
-    for name, older in history.returned.items():
-        failed += sign_and_span(record, older, only=(name,))
-    return failed
+    before = {cell.name for cell in history.last.cells}
+    return tuple(
+        name for name in exchanged(new, history.last) if name in before and name not in history.returned
+    )
 
 
-def history_findings(record: CalibrationRecord, history: History) -> tuple[Finding, ...]:
-    """Return the findings against the instrument's approved records."""
+def agreeing(
+    new: CalibrationRecord, history: History, results: Collection[GateResult]
+) -> frozenset[tuple[str, str]]:
+    """Return the pairs of a load and a main indication that its own history has too, with the same sign.
+
+    ``results`` are those of `compared`. A replacement has no history of its own: that the cell before it had
+    the same sign says nothing about how the new one was wired. Nor has an indication in another kind of unit.
+    """
+    if history.last is None:
+        return frozenset()
+    units = {one.load: one.unit for one in history.last.loads}
+    before = {cell.name: cell.unit for cell in history.last.cells}
+    cells = {
+        cell.name
+        for cell in new.cells
+        if cell.name in before
+        and same_dimension(cell.unit, before[cell.name])
+        and cell.name not in replaced(new, history)
+    }
+    changed = {one.where for one in results if one.rule == "sign"}
+    return frozenset(
+        (one.load, name)
+        for one in new.loads
+        if one.load in units and same_dimension(one.unit, units[one.load])
+        for name in main_indications(new, one)
+        if name in cells and f"{one.load}, {name}" not in changed
+    )
+
+
+def compared(
+    new: CalibrationRecord,
+    history: History,
+    *,
+    confirmed: Collection[tuple[str, str]] = (),
+    reasons: Mapping[str, str] | None = None,
+) -> tuple[GateResult, ...]:
+    """Return what the history of its cells says about a record.
+
+    Parameters
+    ----------
+    confirmed : pairs of load and indication whose sign a machine definition or a reading confirms; for a
+        replacement that settles a changed sign
+    reasons : why a cell was replaced, by indication
+    """
     last = history.last
     if last is None:
         return ()
-    found = [
-        Finding(rule=one.rule, where=one.where, message=one.message) for one in compared(record, history)
-    ]
-    before = {cell.name: cell for cell in last.cells}
-    for name in new_history(record, last):
-        cell = next(c for c in record.cells if c.name == name)
-        old, older = before.get(name), history.returned.get(name)
-        told = "it has no history" if old is None else (
-            f"serial {old.serial or 'not stated'} [{old.unit}] in {last.id}, "
-            f"now {cell.serial or 'not stated'} [{cell.unit}]"
-        )  # fmt: skip
-        message = f"a new sign and span history begins: {told}"
-        if older is not None:
-            message = (
-                f"serial {cell.serial} returns: its sign and span history goes on from {older.id}; {told}"
+    out = replaced(new, history)
+    results = list(layout(new, last))
+    stay = [c.name for c in new.cells if c.name not in out and c.name not in history.returned]
+    results += sign_and_span(new, last, only=stay)
+    for name, older in history.returned.items():
+        results += sign_and_span(new, older, only=(name,))
+        message = f"serial {_serial(new, name)} returns: its sign and span history goes on from {older.id}"
+        results.append(GateResult(rule="serial", where=name, message=message, effect="tells"))
+    for one in sign_and_span(new, last, only=out):
+        load, name = one.where.split(", ")
+        settled = one.rule == "sign" and (load, name) in confirmed
+        allowed = one.rule == "span" and _within(new, last, load, name)
+        told = "; the cell is a replacement"
+        if one.rule == "sign":
+            told += " and its sign is confirmed" if settled else (
+                ": the machine definition or a polarity reading must confirm the new sign"
+            )  # fmt: skip
+        results.append(
+            dataclasses.replace(
+                one, message=one.message + told, effect="tells" if settled or allowed else "blocks"
             )
-        found.append(Finding(rule="serial", where=name, message=message))
-    return tuple(found)
+        )
+    for name in out:
+        results += _replacement(new, last, name, (reasons or {}).get(name))
+    return (*results, *_twice(new))
+
+
+def _replacement(
+    new: CalibrationRecord, last: CalibrationRecord, name: str, reason: str | None
+) -> list[GateResult]:
+    serial = _serial(new, name)
+    message = f"a replacement: serial {_serial(last, name)} in {last.id}, now {serial}"
+    stood = next((c.name for c in last.cells if c.serial is not None and c.serial == serial), None)
+    if stood is not None:
+        message += f", which stood at {stood} in {last.id}: were two cells or two serials exchanged?"
+    if reason:
+        return [GateResult(rule="serial", where=name, message=f"{message}; reason: {reason}", effect="tells")]
+    needed = (
+        "a replaced cell needs a reason: approve --reason TEXT, or replacement = TEXT in "
+        f"[cells.{name}] of SESSION.toml"
+    )
+    return [
+        GateResult(rule="serial", where=name, message=message, effect="tells"),
+        GateResult(rule="replacement", where=name, message=needed, effect="asks"),
+    ]
+
+
+def _within(new: CalibrationRecord, last: CalibrationRecord, load: str, name: str) -> bool:
+    before, now = (
+        response(record, record.load(load), next(c for c in record.cells if c.name == name)).value
+        for record in (last, new)
+    )
+    return before != 0 and 1 / REPLACED_SPAN < abs(now / before) < REPLACED_SPAN
+
+
+def _twice(new: CalibrationRecord) -> list[GateResult]:
+    serials = [cell.serial for cell in new.cells if cell.serial is not None]
+    return [
+        GateResult(
+            rule="serial",
+            where=", ".join(cell.name for cell in new.cells if cell.serial == serial),
+            message=f"serial {serial} is stated for more than one cell",
+        )
+        for serial in dict.fromkeys(serials)
+        if serials.count(serial) > 1
+    ]
+
+
+def _serial(record: CalibrationRecord, name: str) -> str:
+    return next((c.serial for c in record.cells if c.name == name), None) or "not stated"

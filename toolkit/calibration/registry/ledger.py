@@ -6,6 +6,7 @@ certificates and reports print that hash: a chain by itself cannot see that its 
 
 from __future__ import annotations
 
+import itertools
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -15,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from toolkit.calibration.records.record import canonical
+from toolkit.calibration.registry.clock import moment
 from toolkit.files import read_regular, sha256_bytes
 
 LEDGER = "ledger.jsonl"
@@ -31,8 +33,10 @@ class Entry:
     its session's data and settings, by which the session is found again; older lines have none).
     ``approved``: ``known_on``, ``since`` (in force from), ``by`` (checked by), ``approved_by``, ``reason``,
     ``unverifiable`` terms as "load: term", ``note`` where ``since`` lies before ``known_on``, ``recall`` the
-    recall interval such as "12 months", where one was set.
-    ``withdrawn``: ``known_on``, ``since`` (void from; None is the in-force date), ``by``, ``reason``.
+    recall interval such as "12 months", where one was set; ``evidence``: by what the signs were confirmed,
+    and what the gates said that did not stand in the way.
+    ``withdrawn``: ``known_on``, ``since`` (void from; None is the in-force date), ``by``, ``reason``, and a
+    ``note`` where the entry is dated back.
     """
 
     seq: int
@@ -52,6 +56,7 @@ class Entry:
     note: str | None = None
     recall: str | None = None
     unverifiable: tuple[str, ...] = ()
+    evidence: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -68,6 +73,16 @@ class Ledger:
     def head(self) -> str:
         """The last line's hash; zeros where there is none."""
         return self.entries[-1].sha256 if self.entries else START
+
+    def disorder(self) -> str | None:
+        """Say which entry's time lies before that of the one before it; None where none does."""
+        for last, entry in itertools.pairwise(self.entries):
+            if moment(entry.time) < moment(last.time):
+                return (
+                    f"line {entry.seq} was entered at {entry.time}, before line {last.seq} at {last.time}: "
+                    "a clock was set back"
+                )
+        return None
 
     def of(self, record_id: str) -> tuple[Entry, ...]:
         """Return the events of one record, oldest first."""
@@ -155,8 +170,10 @@ def _entry(line: bytes, number: int, prev: str) -> Entry:
         raise ValueError("it does not follow the line before")
     if body["event"] not in EVENTS:
         raise ValueError(f"unknown event {body['event']!r}")
+    moment(body["time"])
     for key in ("known_on", "since"):
         if body.get(key) is not None:
             body[key] = date.fromisoformat(body[key])
-    body["unverifiable"] = tuple(body.get("unverifiable", ()))
+    for key in ("unverifiable", "evidence"):
+        body[key] = tuple(body.get(key, ()))
     return Entry(**{**body, "sha256": stated})

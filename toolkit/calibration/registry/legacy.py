@@ -27,6 +27,7 @@ from pathlib import Path
 from toolkit.calibration.records.record import CalibrationRecord, DataFile, sealed
 from toolkit.calibration.registry.agreement import check_transcribed
 from toolkit.calibration.registry.candidate import entering, next_id
+from toolkit.calibration.registry.clock import check_begun
 from toolkit.calibration.registry.ledger import Ledger
 from toolkit.calibration.registry.legacy_file import check_possible, read_legacy
 from toolkit.calibration.registry.registry import Registry, load_checked
@@ -44,13 +45,16 @@ def import_legacy(path: Path, registry: Registry) -> tuple[CalibrationRecord, bo
         the file: unknown key, missing value, unknown unit, a term that cannot be read, or what no
         calibration can have given (`check_possible`)
     RegistryError
-        the ledger is damaged
+        the ledger is damaged, or the source is dated in the future
     """
+    import datetime as dt
+
     import toolkit
 
     source = read_bytes(path)
     unnumbered = read_legacy(source, where=path)
     check_possible(unnumbered, where=path)
+    check_begun(dt.date.fromisoformat(unnumbered.date), "the source's date", f"{path}: date")
     unnumbered = dataclasses.replace(unnumbered, software=(("toolkit", toolkit.__version__),))
     folder = registry.folder / unnumbered.instrument
     made: list[CalibrationRecord] = []

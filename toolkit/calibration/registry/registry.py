@@ -9,12 +9,13 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
-from datetime import UTC, date, datetime
+from datetime import date
 from pathlib import Path
 
 from toolkit.calibration.records.record import CalibrationRecord, from_bytes
 from toolkit.calibration.registry import store
 from toolkit.calibration.registry.agreement import check_agrees, check_inputs, check_transcribed
+from toolkit.calibration.registry.clock import today
 from toolkit.calibration.registry.ledger import HEAD, LEDGER, Ledger
 from toolkit.calibration.registry.refit import check_reproduces
 from toolkit.calibration.registry.refit_many import reproducing
@@ -35,11 +36,6 @@ class Refused:
     id: str
     rule: str
     reason: str
-
-
-def today() -> date:
-    """Return the day in UTC: the default day of knowledge."""
-    return datetime.now(tz=UTC).date()
 
 
 def instrument_of(record_id: str) -> str:

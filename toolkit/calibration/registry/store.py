@@ -30,6 +30,7 @@ from pathlib import Path
 from typing import Any
 
 from toolkit.calibration.records.record import canonical
+from toolkit.calibration.registry.clock import check_after
 from toolkit.calibration.registry.ledger import (
     HEAD,
     LEDGER,
@@ -61,7 +62,7 @@ def commit(folder: Path, build: Callable[[Ledger], Change | None]) -> bool:
     Raises
     ------
     RegistryError
-        the ledger is damaged; nothing is written onto a damaged ledger
+        the ledger is damaged, or its last entry is later than this one (``time``); nothing is written
     OutputError
         the folder cannot be written to
     """
@@ -81,6 +82,8 @@ def commit(folder: Path, build: Callable[[Ledger], Change | None]) -> bool:
         change = build(ledger)
         if change is None:
             return False
+        last = ledger.entries[-1].time if ledger.entries else None
+        check_after(last, change.event["time"], folder / LEDGER)
         line, digest = next_line(len(ledger.entries) + 1, ledger.head, change.event)
         before = (folder / LEDGER).read_bytes() if ledger.entries else b""
         journal = {

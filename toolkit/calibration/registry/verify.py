@@ -9,11 +9,13 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from datetime import date
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from toolkit.calibration.records.record import CalibrationRecord, from_bytes
-from toolkit.calibration.registry.ledger import HEAD, LEDGER, Ledger
+from toolkit.calibration.registry.clock import begun, moment
+from toolkit.calibration.registry.ledger import HEAD, LEDGER, Entry, Ledger
 from toolkit.calibration.registry.registry import ID, load_many
 from toolkit.errors import ToolkitError
 from toolkit.files import read_regular
@@ -81,6 +83,8 @@ def _instrument(folder: Path, ledger: Ledger) -> list[VerifyRow]:
     for row, files in _judged(folder, ids, ledger):
         rows.append(row)
         owned |= {f"{row.id}.json", *files}
+    if (disorder := ledger.disorder()) is not None:
+        rows.append(VerifyRow(id=LEDGER, ok=False, verified=False, reason=f"time: {disorder}"))
     if ledger.damage is not None and not rows:
         rows.append(VerifyRow(id=LEDGER, ok=False, verified=False, reason=f"ledger: {ledger.damage}"))
     rows += [_stray(name) for name in _files(folder) if name not in owned]
@@ -122,17 +126,38 @@ def _judge_shared(folder: Path, ids: Sequence[str]) -> list[_Judged]:
 
 def _judge(folder: Path, ids: Sequence[str], ledger: Ledger) -> list[_Judged]:
     """Return the rows of some records and the names of their files."""
-    return [_row(folder, record_id, one) for record_id, one in load_many(folder, ids, ledger).items()]
+    found = load_many(folder, ids, ledger)
+    return [_row(folder, record_id, one, ledger) for record_id, one in found.items()]
 
 
-def _row(folder: Path, record_id: str, found: CalibrationRecord | ToolkitError) -> _Judged:
+def _row(folder: Path, record_id: str, found: CalibrationRecord | ToolkitError, ledger: Ledger) -> _Judged:
     if isinstance(found, ToolkitError):
         reason = f"{found.rule or 'unreadable'}: {found.what}"
         reason += f" (got {found.got}, expected {found.expected})" if found.got else ""
         row = VerifyRow(id=record_id, ok=False, verified=False, reason=reason)
         return row, tuple(_owned_by_bad(folder, record_id))
-    row = VerifyRow(id=record_id, ok=True, verified=found.verified, reason=None)
+    late = _untimely(found, ledger.of(record_id))
+    untimely = None if late is None else f"time: {late}"
+    row = VerifyRow(id=record_id, ok=late is None, verified=found.verified, reason=untimely)
     return row, tuple(one.file for one in found.data)
+
+
+def _untimely(record: CalibrationRecord, entries: Sequence[Entry]) -> str | None:
+    """Say which day of a record and its decisions cannot be; None where all can."""
+    day = date.fromisoformat(record.date)
+    for entry in entries:
+        if entry.event == "entered" and not begun(day, moment(entry.time)):
+            return f"its session of {record.date} lies after its entry at {entry.time}"
+        if entry.known_on is None:
+            continue
+        if not begun(entry.known_on, moment(entry.time)):
+            return f"it was {entry.event} at {entry.time} by a decision of {entry.known_on}"
+        # A legacy record has no session: its date is that of the source.
+        if record.kind == "fit" and entry.known_on < day:
+            return (
+                f"it was {entry.event} on {entry.known_on.isoformat()}, before its session of {record.date}"
+            )
+    return None
 
 
 def _files(folder: Path) -> list[str]:

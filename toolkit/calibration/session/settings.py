@@ -29,7 +29,7 @@ METHODS = ("ols", "wls", "gls", "odr")
 DEFAULT_TOLERANCE = 1e-3
 _KEYS = (
     "schema instrument date operator temperature indications loads data check reference cells zero creep "
-    "phase model degree method drop certificate standard"
+    "phase model degree method drop certificate standard polarity"
 ).split()
 _CHECK = "file data tolerance".split()
 _STANDARD = ("preloads",)

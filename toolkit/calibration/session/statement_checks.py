@@ -11,6 +11,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from toolkit.calibration.session.bridge import Bridge, bridges_of, per
+from toolkit.calibration.session.polarity import polarity_readings
 from toolkit.calibration.session.reading_entries import (
     Scope,
     creep_entries,
@@ -29,7 +30,7 @@ if TYPE_CHECKING:
 _REFERENCE = "standard certificate uncertainty due shared_group".split()
 _CELL = (
     "serial resolution scale excitation shunt_expected shunt_measured shunt_tolerance u "
-    "temperature_coefficient"
+    "temperature_coefficient replacement"
 ).split()
 _PER_KELVIN = re.compile(r"\s*/\s*(K|degC|°C)\s*\Z")
 _FORCE, _MOMENT = re.compile(r"F[XYZ]?\Z"), re.compile(r"M[XYZ]\Z")
@@ -107,10 +108,14 @@ def check_statements(raw: Mapping[str, Any], table: Table, loads: tuple[str, ...
             if not bridge.stated(cell[key], place, column=column, target=scope.unit(name)) > 0:
                 raise wrong(where, place, cell[key], "a number above zero; leave out what is not known")
         temperature_effect(cell.get("temperature_coefficient"), bridge, column, scope.unit(name))
+        replacement = cell.get("replacement", "none")
+        if not isinstance(replacement, str) or not replacement.strip():
+            raise wrong(where, f"cells.{name}.replacement", replacement, "a text: why the cell was replaced")
         shunt_entry(name, cell, scope)
     _check_reference(raw.get("reference", {}), table, loads, where)
     zero_entries(zero_readings(raw), scope)
     creep_entries(raw.get("creep", []), scope)
+    polarity_readings(raw.get("polarity", []), scope)
     if "temperature" in raw:
         kelvin = quantity(raw["temperature"], "temperature", f"{where}: temperature")
         if not kelvin > 0:

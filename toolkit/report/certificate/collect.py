@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 
 from toolkit.calibration.control.as_found import as_found, as_found_before
 from toolkit.calibration.records.record import from_bytes
+from toolkit.calibration.registry.clock import today
 from toolkit.calibration.registry.gates import unverifiable
-from toolkit.calibration.registry.registry import today
 from toolkit.calibration.registry.stored import stored_check, stored_loads
 from toolkit.calibration.session.statements import Statements, statements_of
 from toolkit.errors import ConfigError, RecordError, ToolkitError

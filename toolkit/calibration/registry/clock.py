@@ -1,0 +1,88 @@
+"""Days and times of the registry: what has begun, and what comes before what.
+
+Days are those that people write (a session, a decision) and belong to the calendar where they are; the time
+of a ledger entry is UTC. A day lies in the future only where it has not begun anywhere on earth, so that no
+laboratory is refused for its time zone.
+"""
+
+from __future__ import annotations
+
+from datetime import UTC, date, datetime, timedelta
+
+from toolkit.errors import RegistryError
+
+_EARLIEST_ZONE = timedelta(hours=14)  # UTC+14, Kiribati: where a day begins first
+
+
+def today() -> date:
+    """Return the day by this computer's own time zone: the default day of knowledge and of a decision."""
+    return datetime.now().astimezone().date()
+
+
+def now() -> str:
+    """Return the time of an entry, UTC to the second."""
+    return datetime.now(tz=UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
+
+
+def moment(text: str) -> datetime:
+    """Return the time of an entry; one without a zone is UTC.
+
+    Raises
+    ------
+    ValueError
+        the text is no time
+    """
+    found = datetime.fromisoformat(text)
+    return found if found.tzinfo is not None else found.replace(tzinfo=UTC)
+
+
+def begun(day: date, at: datetime | None = None) -> bool:
+    """Tell whether a day has begun somewhere on earth at a time (default: now).
+
+    >>> begun(date(2026, 3, 2), datetime(2026, 3, 1, 9, 0, tzinfo=UTC))
+    False
+    >>> begun(date(2026, 3, 2), datetime(2026, 3, 1, 10, 0, tzinfo=UTC))
+    True
+    """
+    return day <= ((at or datetime.now(tz=UTC)) + _EARLIEST_ZONE).date()
+
+
+def check_begun(day: date, what: str, where: object) -> None:
+    """Refuse a day in the future; ``what`` names it, such as "the session".
+
+    Raises
+    ------
+    RegistryError
+        ``time``
+    """
+    if not begun(day):
+        raise untimely(
+            f"{what} lies in the future", where, day.isoformat(), f"a day up to {today().isoformat()}"
+        )
+
+
+def check_after(last: str | None, time: str, where: object) -> None:
+    """Refuse an entry whose time lies before that of the last one: a clock was set back.
+
+    Raises
+    ------
+    RegistryError
+        ``time``
+    """
+    if last is not None and moment(time) < moment(last):
+        raise RegistryError(
+            "the time of a ledger entry lies before that of the entry before it",
+            where=where,
+            got=time,
+            expected=f"a time from {last} on",
+            next_step="correct this computer's clock; nothing was written",
+            rule="time",
+        )
+
+
+def untimely(what: str, where: object, got: str, expected: str) -> RegistryError:
+    """Return the error of a day that cannot be."""
+    return RegistryError(
+        what, where=where, got=got, expected=expected,
+        next_step="correct the date, or this computer's clock; nothing was written", rule="time",
+    )  # fmt: skip
