@@ -44,6 +44,7 @@ from toolkit.calibration.terms import term_matrix
 from toolkit.errors import ToolkitError
 from toolkit.files import read_regular, sha256_bytes
 from toolkit.findings import Finding
+from toolkit.recording.sniff import sniff
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -207,14 +208,22 @@ def _record(fit: SessionFit) -> CalibrationRecord:
 
 
 def _numbered(record: CalibrationRecord, record_id: str, session: Session) -> CalibrationRecord:
-    files = [("loads", "loads.csv", session.data_bytes), ("session", "session.toml", session.session_bytes)]
-    if session.check_bytes is not None:
-        files.insert(1, ("check", "check.csv", session.check_bytes))
+    files = [
+        ("loads", session.data_bytes),
+        ("check", session.check_bytes),
+        ("session", session.session_bytes),
+    ]
     data = tuple(
-        DataFile(role=role, file=f"{record_id}.{name}", sha256=sha256_bytes(content))
-        for role, name, content in files
+        DataFile(role=role, file=f"{record_id}.{role}.{_suffix(role, data)}", sha256=sha256_bytes(data))
+        for role, data in files
+        if data is not None
     )
     return sealed(dataclasses.replace(record, id=record_id, data=data))
+
+
+def _suffix(role: str, data: bytes) -> str:
+    # By its content, as the reader goes: the name in the session may be any.
+    return "toml" if role == "session" else "xlsx" if sniff(data).id == "zip" else "csv"
 
 
 def _load_fit(session: Session, one: LoadResult) -> LoadFit:

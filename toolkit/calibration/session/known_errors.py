@@ -27,7 +27,7 @@ from __future__ import annotations
 
 import difflib
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -67,6 +67,11 @@ def group_column(reference: Mapping[str, Any]) -> tuple[str, ...]:
     found = reference.get("shared_group")
     name = found.get("column") if isinstance(found, dict) else found
     return (name,) if isinstance(name, str) and name not in _LABELS else ()
+
+
+def row_columns(loads: Sequence[str], labels: Sequence[str] = ()) -> list[str]:
+    """Return the columns that tell something of single rows: ``u_<LOAD>``, and the names of groups."""
+    return [*(f"u_{load}" for load in loads), *labels]
 
 
 def row_uncertainty(table: Table, load: str) -> NDArray[np.float64] | None:
