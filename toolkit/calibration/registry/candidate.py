@@ -38,6 +38,7 @@ from toolkit.calibration.registry.history import history_findings, history_of
 from toolkit.calibration.registry.ledger import Ledger
 from toolkit.calibration.registry.refit import check_reproduces, polarity
 from toolkit.calibration.registry.registry import ID, Registry, load_checked
+from toolkit.calibration.registry.status import discarded_before, is_discarded
 from toolkit.calibration.registry.store import Change, commit
 from toolkit.calibration.session.read import Session, read_session
 from toolkit.calibration.terms import term_matrix
@@ -65,23 +66,24 @@ class Candidate:
     findings: tuple[Finding, ...]
 
 
-def calibrate(session_file: Path, registry: Registry) -> Candidate:
+def calibrate(session_file: Path, registry: Registry, *, again: bool = False) -> Candidate:
     """Fit a session and enter its record as a candidate.
 
     The findings never change the fit. A session whose data and settings are already recorded returns that
-    record and writes nothing.
+    record and writes nothing. One whose record was discarded is refused with the discard's reason, unless it
+    is to be entered ``again``, under a new id.
 
     Raises
     ------
     ConfigError, SessionError, UnitError
         the session cannot be used; nothing is written
     RegistryError
-        the ledger is damaged; nothing is written
+        the ledger is damaged, or ``discarded``; nothing is written
     """
     session = read_session(session_file)
     folder = registry.folder / session.instrument
     fit = fit_session(session)
-    existing = _recorded(folder, session, registry.ledger(session.instrument))
+    existing = _recorded(folder, session, registry.ledger(session.instrument), again=again)
     findings = session_findings(fit)
     if existing is not None:
         readings = readings_of(existing, session.table)
@@ -98,7 +100,7 @@ def calibrate(session_file: Path, registry: Registry) -> Candidate:
 
     def build(ledger: Ledger) -> Change | None:
         # Under the lock: another writer may have recorded this very session meanwhile.
-        twin = _recorded(folder, session, ledger)
+        twin = _recorded(folder, session, ledger, again=again)
         if twin is not None:
             made.append(twin)
             return None
@@ -156,7 +158,8 @@ def now() -> str:
     return datetime.now(tz=UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
 
 
-def _recorded(folder: Path, session: Session, ledger: Ledger) -> CalibrationRecord | None:
+def _recorded(folder: Path, session: Session, ledger: Ledger, *, again: bool) -> CalibrationRecord | None:
+    ended: list[str] = []
     for record_id, entry in ledger.entered().items():
         # What the line tells is only where to look: the record found passes its gates, its inputs too.
         if entry.inputs not in (None, session.inputs_sha256):
@@ -165,9 +168,14 @@ def _recorded(folder: Path, session: Session, ledger: Ledger) -> CalibrationReco
         try:
             # The gates cost a refit: only the record that claims these inputs goes through them.
             if from_bytes(read_regular(path), where=path).inputs_sha256 == session.inputs_sha256:
+                if is_discarded(ledger, record_id):
+                    ended.append(record_id)
+                    continue
                 return load_checked(folder, record_id, ledger)
         except (ToolkitError, OSError):
             continue
+    if ended and not again:
+        raise discarded_before(ledger, ended[-1], "the session", session.path)
     return None
 
 

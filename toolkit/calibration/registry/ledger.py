@@ -20,7 +20,7 @@ from toolkit.files import read_regular, sha256_bytes
 LEDGER = "ledger.jsonl"
 HEAD = "head.json"
 START = "0" * 64
-EVENTS = ("entered", "approved", "withdrawn")
+EVENTS = ("entered", "approved", "withdrawn", "discarded")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -33,6 +33,7 @@ class Entry:
     ``unverifiable`` terms as "load: term", ``note`` where ``since`` lies before ``known_on``, ``recall`` the
     recall interval such as "12 months", where one was set.
     ``withdrawn``: ``known_on``, ``since`` (void from; None is the in-force date), ``by``, ``reason``.
+    ``discarded``: ``known_on``, ``by``, ``reason``: the end of a candidate that was never approved.
     """
 
     seq: int

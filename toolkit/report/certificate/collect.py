@@ -159,6 +159,11 @@ def _admit(record: CalibrationRecord, status: RecordStatus, day: dt.date, draft:
             record.id, "certificate-withdrawn", f"withdrawn: {status.reason or 'no reason stated'}",
             "a record that is not withdrawn, or the paper of an earlier day with --known-at",
         )  # fmt: skip
+    if status.state == "discarded":
+        raise _refused(
+            record.id, "certificate-discarded", f"discarded: {status.reason or 'no reason stated'}",
+            "a record that was approved",
+        )  # fmt: skip
     if day < dt.date.fromisoformat(record.date):
         raise _refused(
             record.id, "certificate-date", f"an issue on {day.isoformat()}",
