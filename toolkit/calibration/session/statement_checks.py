@@ -18,10 +18,10 @@ from toolkit.calibration.session.reading_entries import (
     zero_entries,
 )
 from toolkit.calibration.session.settings import wrong, zero_readings
-from toolkit.errors import SessionError
+from toolkit.errors import SessionError, UnitError
 from toolkit.files import check_keys, is_number
 from toolkit.machine.definition import quantity
-from toolkit.units import si_scale, unit
+from toolkit.units import Unit, si_scale, unit
 
 if TYPE_CHECKING:
     from toolkit.calibration.session.table import Table
@@ -62,14 +62,33 @@ def check_columns(table: Table, loads: tuple[str, ...], where: object) -> None:
         name = f"u_{load}"
         if not table.has(name):
             continue
-        si_scale(table.unit(name), unit(table.unit(load)).dimension, where=f"{where}, column {name}")
+        found, dimension = unit(table.unit(name)), unit(table.unit(load)).dimension
+        if found.dimension != dimension:
+            raise _other_unit(
+                f"{where}, column {name}", found, dimension,
+                f"{table.unit(load)!r}; a share of the load is stated once for all rows, "
+                f"[reference.uncertainty] {load} = {{ U = .., k = .., unit = '%' }}",
+            )  # fmt: skip
         if not (table.column(name) > 0).all():
             row = int((table.column(name) <= 0).argmax()) + 1
             raise SessionError(
                 "a standard uncertainty is not positive",
-                where=f"{where}, row {row}, column {name}", got=table.column(name)[row - 1],
-                expected="a positive number", next_step="state the uncertainty of every row", rule="cell",
+                where=f"{where}, row {row} (line {table.lines[row - 1]}), column {name}",
+                got=table.column(name)[row - 1],
+                expected="a positive number",
+                next_step="state the uncertainty of every row; nothing was written", rule="cell",
             )  # fmt: skip
+
+
+def _other_unit(where: str, found: Unit, dimension: str, allowed: str) -> UnitError:
+    return UnitError(
+        f"unit {found.text!r} is no unit of {dimension}",
+        where=where,
+        got=f"{found.text} ({found.dimension})",
+        expected=f"a unit of {dimension}, such as {allowed}",
+        next_step="correct the unit; nothing was written",
+        rule="unit-dimension",
+    )
 
 
 def check_statements(raw: Mapping[str, Any], table: Table, loads: tuple[str, ...], where: object) -> None:
@@ -190,5 +209,9 @@ def _check_reference(
                 raise wrong(where, f"{place}.{key}", value, least)
         text = entry.get("unit")
         if not isinstance(text, str):
-            raise wrong(where, f"{place}.unit", text, f"a unit such as {table.unit(name)!r}", "no-unit")
-        si_scale(text, unit(table.unit(name)).dimension, where=f"{where}: {place}")
+            allowed = f"{table.unit(name)!r}, or '%' of the applied load"
+            raise wrong(where, f"{place}.unit", text, allowed, "no-unit")
+        found, dimension = unit(text, where=f"{where}: {place}.unit"), unit(table.unit(name)).dimension
+        if found.dimension not in (dimension, "ratio"):
+            raise _other_unit(f"{where}: {place}.unit", found, dimension, f"{table.unit(name)!r}, or '%' or "
+                              "'ppm' of the applied load")  # fmt: skip

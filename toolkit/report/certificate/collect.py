@@ -115,7 +115,10 @@ def collect(
         reference=statements.reference.standard,
         reference_certificate=statements.reference.certificate,
         reference_uncertainties=tuple(
-            (one.load, one.U, one.k, record.load(one.load).unit) for one in statements.reference.uncertainties
+            (one.load, one.U, one.k, record.load(one.load).unit)
+            if one.relative is None
+            else (one.load, 100 * one.relative, one.k, "% of the applied load")
+            for one in statements.reference.uncertainties
         ),
         rule=stated.rule,
         interval=stated.interval,
