@@ -116,7 +116,7 @@ def test_methods_take_a_relative_uncertainty_row_by_row(make_session: Make) -> N
     [
         ('U = 0.05, k = 2, unit = "lbf*ft"', ("a unit of force", "'lbf'", "'%'")),
         ('U = 0.05, k = 2, unit = "%/K"', ("a unit of force", "'%'")),
-        ("U = 0.05, k = 2", ("'lbf'", "'%'")),
+        ("U = 0.05, k = 2", ("a unit of the load", "'%'")),
         ('u = 0.05, k = 2, unit = "%"', ("U",)),
     ],
 )

@@ -158,7 +158,9 @@ def now() -> str:
     return datetime.now(tz=UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
 
 
-def _recorded(folder: Path, session: Session, ledger: Ledger, *, again: bool = False) -> CalibrationRecord | None:
+def _recorded(
+    folder: Path, session: Session, ledger: Ledger, *, again: bool = False
+) -> CalibrationRecord | None:
     ended: list[str] = []
     for record_id, entry in ledger.entered().items():
         # What the line tells is only where to look: the record found passes its gates, its inputs too.

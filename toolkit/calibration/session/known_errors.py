@@ -34,7 +34,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from toolkit.calibration.session.settings import wrong
-from toolkit.files import check_keys
 from toolkit.units import unit
 
 if TYPE_CHECKING:
@@ -140,7 +139,6 @@ def _groups(reference: Reference, table: Table, where: object) -> tuple[NDArray[
     entry, error = reference.shared_group, _ERRORS[0]
     named = isinstance(entry, dict)
     if named:
-        check_keys(entry, ("column", "error"), where=f"{where}: reference.shared_group")
         error, entry = entry.get("error", error), entry.get("column", "every row")
         named = entry != "every row"
     if not isinstance(entry, str) or not entry.strip():

@@ -11,6 +11,8 @@ from typing import Any
 from toolkit.calibration.records.record import Zero
 from toolkit.calibration.session.bridge import Bridge, bridges_of, converted, fit_units
 from toolkit.calibration.session.cells import FILES
+from toolkit.calibration.session.declaration import refuse
+from toolkit.calibration.session.keys import session_faults
 from toolkit.calibration.session.known_errors import group_column, row_columns
 from toolkit.calibration.session.settings import (
     Settings,
@@ -23,7 +25,7 @@ from toolkit.calibration.session.settings import (
 from toolkit.calibration.session.statement_checks import check_columns, check_statements
 from toolkit.calibration.session.table import Table, read_table
 from toolkit.errors import SessionError
-from toolkit.files import check_keys, read_bytes, read_regular, sha256_bytes
+from toolkit.files import read_bytes, read_regular, sha256_bytes
 from toolkit.recording.archive import MAX_FILE_BYTES
 
 
@@ -92,13 +94,15 @@ class Session:
         )
 
 
-def read_session(path: Path) -> Session:
+def read_session(path: Path, *, entered: bool = False) -> Session:
     """Read a session and its data files.
+
+    ``entered``: it lies beside a record. Sessions of older records may have keys that nobody read.
 
     Raises
     ------
     ConfigError
-        SESSION.toml: unknown key, missing or wrong value
+        SESSION.toml: unknown keys, missing or wrong values, all of them told at once
     SessionError
         a data file: columns, cells, no such file, or one outside the session's folder
     UnitError
@@ -106,6 +110,8 @@ def read_session(path: Path) -> Session:
     """
     session_bytes = read_bytes(path)
     raw = parse_session(session_bytes, where=path)
+    if not entered:
+        refuse(session_faults(raw), where=path)
     settings = settings_of(raw, where=path)
     loads, indications = settings.loads, settings.indications
     data_bytes = _file(path, raw.get("data"), "data")
@@ -122,7 +128,6 @@ def read_session(path: Path) -> Session:
     check_statements(raw, recorded, loads, path)
     bridges = bridges_of(raw.get("cells", {}), indications, where=path)
     table = converted(recorded, bridges, fit_units(recorded, bridges), where=path)
-    check_keys(dict(settings.tolerances), loads, where=f"{path}: check.tolerance")
     check_name = _check_name(settings, path)
     check_bytes = None if check_name is None else _file(path, check_name, "check")
     check = None
