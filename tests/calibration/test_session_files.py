@@ -209,6 +209,12 @@ def test_a_cell_of_a_workbook_that_is_no_number_is_told_where_it_stands(
     assert all(error.as_dict().values())
 
 
+def test_a_formula_that_was_never_computed_is_no_number() -> None:
+    error = refusal(workbook(changed(2, 1, "=B2*2")))
+    assert "row 2 (cell B3)" in str(error.where)
+    assert "a formula has a value only once" in str(error.next_step)
+
+
 def test_merged_cells_are_named() -> None:
     error = refusal(workbook(SHEET, lambda sheet: sheet.merge_cells("B2:B3")))
     assert "row 2 (cell B3)" in str(error.where)

@@ -164,6 +164,11 @@ def test_text_in_latin_1_is_read_with_its_signs(read):
     np.testing.assert_array_equal(found["T"].values, [20.5] * len(DATA))
 
 
+@pytest.mark.parametrize("hint", ["sep=;\n", '"sep=;"\r\n', "SEP=;\n"])
+def test_a_spreadsheets_hint_of_its_separator_is_no_row(read, hint):
+    same(read(hint + text(separator=";", decimal=",")))
+
+
 @pytest.mark.parametrize("begin", [b"", b"\xef\xbb\xbf"])
 def test_bytes_that_are_no_text_are_named(read, begin):
     byte = b"\xfc" if begin else b"\x81"  # a mark of UTF-8 leaves no other encoding; 0x81 is no letter

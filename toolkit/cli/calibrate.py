@@ -20,7 +20,7 @@ NOT_ENTERED = "not entered"
 
 
 def command(
-    session: Annotated[Path, typer.Argument(help="SESSION.toml, with its CSV files beside it.")],
+    session: Annotated[Path, typer.Argument(help="SESSION.toml, with its CSV or .xlsx files beside it.")],
     calibrations: Calibrations = None,
     out: Annotated[Path | None, typer.Option("--out", help="Another name for --calibrations.")] = None,
     dry_run: Annotated[

@@ -23,6 +23,7 @@ _EXPONENT = r"(?:[eE][+-]?[0-9]{1,4})?"
 _NUMBER = {
     mark: re.compile(rf"[+-]?(?:[0-9]+{mark}?[0-9]*|{mark}[0-9]+){_EXPONENT}") for mark in (r"\.", ",")
 }
+_HINT = re.compile(r"\A\"?sep=[,;\t]\"?(?=\r?\n)", re.IGNORECASE)
 _GROUPED = re.compile(r"[+-]?[1-9][0-9]{0,2},[0-9]{3}")
 _NO_NUMBER = frozenset("nan +nan -nan inf +inf -inf infinity +infinity -infinity".split())
 
@@ -32,7 +33,8 @@ def decode(data: bytes, *, where: Path) -> str:
 
     Windows-1252 holds Latin-1's letters, the degree sign and the micro sign at their places: a program of
     Western Europe writes it without saying so. Digits and separators are the same bytes in either, so that
-    no number can change by it.
+    no number can change by it. A first line ``sep=;``, which tells a spreadsheet what separates the cells, is
+    left blank.
 
     Raises
     ------
@@ -41,12 +43,12 @@ def decode(data: bytes, *, where: Path) -> str:
     """
     wide = data[:2] in _WIDE
     try:
-        return data.decode("utf-16" if wide else "utf-8-sig")
+        return _HINT.sub("", data.decode("utf-16" if wide else "utf-8-sig"), count=1)
     except UnicodeDecodeError as error:
         # A file that begins with the mark of UTF-8 is no other encoding.
         if not wide and not data.startswith(codecs.BOM_UTF8):
             with contextlib.suppress(UnicodeDecodeError):
-                return data.decode("cp1252")
+                return _HINT.sub("", data.decode("cp1252"), count=1)
         raise UnreadableError(
             f"the text file is not in UTF-{16 if wide else 8}",
             where=where,

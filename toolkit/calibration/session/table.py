@@ -244,6 +244,8 @@ def _cell(cells: Cells, row: int, column: int, expected: str) -> SessionError:
     next_step = _CORRECT
     if is_empty(cell) and cells.merged:
         next_step = "the worksheet has merged cells, which hold one value: unmerge them and fill every row"
+    elif is_empty(cell) and not cells.separator:
+        next_step += "; a formula has a value only once a spreadsheet has computed and saved it"
     elif isinstance(cell, str) and "," in cell:
         next_step = _DECIMAL_COMMA if cells.separator == "," else _POINT_AND_COMMA
     elif hasattr(cell, "isoformat"):
