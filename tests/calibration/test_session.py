@@ -109,8 +109,7 @@ def doubled(values: np.ndarray) -> np.ndarray:
     ("change", "expected"),
     [
         (outlier, {"outlier"}),
-        # A third of the loads span less than the check loads do.
-        (few, {"few-points", "check-beyond-range"}),
+        (few, {"few-points"}),
         (doubled, {"duplicates"}),
     ],
 )

@@ -239,6 +239,13 @@ def test_headers_of_a_workbook(rows: list[list[Any]], word: str) -> None:
 def test_commas_that_may_stand_between_thousands_are_refused_where_they_stand() -> None:
     error = refusal(b"S [mV/V];FY [kN];run;direction\n1;2;1;up\n1,234;1,500;1;up\n")
     assert (error.rule, error.where) == ("ambiguous-text", "loads.xlsx, row 2 (line 3), column S")
+    counts = "S [counts];FY [N];run;direction\n-33010;1.500;1;up\n-66020;3.000;1;up\n"
+    error = refusal(counts.encode())
+    assert (error.rule, error.where) == ("ambiguous-text", "loads.xlsx, row 1 (line 2), column FY")
+    # One number that cannot be in thousands decides, as do commas between the cells.
+    decided = counts.replace("3.000", "3.0")
+    for text in (decided, counts.replace(";", ",")):
+        np.testing.assert_array_equal(table(text.encode()).column("FY"), [1.5, 3.0])
 
 
 def refusal(data: bytes) -> SessionError:

@@ -62,7 +62,7 @@ def test_check_loads_beyond_what_was_fitted_say_so(tmp_path: Path, make_session:
     found = of(made(tmp_path, make_session(rows, check_rows=check)), "check-beyond-range")
     assert [one.where for one in found] == ["check row 2"]
     assert f"FY = {check[1, 3]:.6g} lbf (fitted: " in found[0].message
-    assert found[0].level == "warning"
+    assert found[0].level == "note"
 
 
 def reference(make_session: Make, entry: str) -> tuple[Session, Reference]:

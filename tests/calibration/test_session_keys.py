@@ -101,6 +101,12 @@ def test_all_faults_are_told_at_once(tmp_path: Path, make_session: Make) -> None
     ]
 
 
+def test_a_key_that_stands_there_was_not_meant(tmp_path: Path, make_session: Make) -> None:
+    # "dat" is as near to date, which is there, as to data.
+    error = refused(tmp_path, make_session(data="-", dat='"loads.csv"'))
+    assert (error.what, error.expected) == ("unknown key 'dat'", "data")
+
+
 def test_a_misspelt_key_is_not_missing_too(tmp_path: Path, make_session: Make) -> None:
     error = refused(tmp_path, make_session(operator="-", operatr='"A"'))
     assert (error.what, error.rule) == ("unknown key 'operatr'", "unknown-key")

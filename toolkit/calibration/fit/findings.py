@@ -89,6 +89,7 @@ def _beyond(session: Session, check: Table) -> list[Finding]:
             where=f"check row {at + 1}",
             message=f"{', '.join(told)}: a check load there verifies an extrapolation, which neither the fit "
             "nor its uncertainty covers",
+            level="note",  # as where there are no check loads: the range that was fitted stands
         )
         for at, told in sorted(outside.items())
     ]

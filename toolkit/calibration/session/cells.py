@@ -71,9 +71,8 @@ def read_cells(data: bytes, known: Callable[[str], bool], *, where: object) -> C
     except RecordingError as error:
         if error.rule == "not-a-workbook":
             raise _foreign(where, error.got, error.rule) from error
-        raise _error(
-            error.what, error.where, error.got, error.expected, error.rule or "unreadable", error.next_step
-        ) from error
+        rule = "no-data" if error.rule == "empty-file" else error.rule or "unreadable"
+        raise _error(error.what, error.where, error.got, error.expected, rule, error.next_step) from error
 
 
 def _plain(data: bytes, where: object) -> Cells | None:

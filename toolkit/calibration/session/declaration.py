@@ -8,13 +8,14 @@ from __future__ import annotations
 import datetime as dt
 import difflib
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Container, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
 from toolkit.errors import ConfigError
 
 Names = Mapping[str, Sequence[str]]
+LIKE = 0.5
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -97,7 +98,9 @@ class Table:
     def inside(self, value: Mapping[str, Any], key: str, names: Names) -> Iterator[Fault]:
         """Yield what is wrong with the entries of a table."""
         known = self._known(names)
-        meant = set()
+        entries = self.entries.items() if isinstance(self.entries, Mapping) else ()
+        required = {name: one for name, one in entries if isinstance(one, Value) and one.required}
+        lacking, meant = [name for name in required if name not in value], set()
         for name, one in value.items():
             if isinstance(self.entries, Mapping):
                 declared = self.entries.get(name)
@@ -107,14 +110,14 @@ class Table:
             if declared is not None:
                 yield from declared.faults(one, key, name, names)
                 continue
-            meant.add(near := _near(name, known))
+            meant.add(near := _near(name, known, value))
             yield Fault(
                 kind="unknown", table=key, name=name, got=name, expected=", ".join(sorted(known)), near=near,
                 rule="unknown-key",
             )  # fmt: skip
-        for name, one in self.entries.items() if isinstance(self.entries, Mapping) else ():
-            # A key that was misspelt is not missing too.
-            if isinstance(one, Value) and one.required and name not in value and name not in meant:
+        for name in lacking:
+            if name not in meant:  # a key that was misspelt is not missing too
+                one = required[name]
                 yield Fault(
                     kind="missing", table=key, name=name, got=None, expected=one.expected, rule=one.rule
                 )
@@ -154,10 +157,8 @@ def refuse(faults: Sequence[Fault], *, where: object) -> None:
             where=f"{where}: {one.table}" if one.table else where,
             got=one.name,
             expected=one.near or one.expected,
-            next_step=(
-                f"did you mean {one.near!r}?" if one.near else "remove it or use one of those expected"
-            )
-            + " Nothing was written",
+            next_step=f"did you mean {one.near!r}? " * bool(one.near)
+            + "correct or remove it; nothing was written",
             rule=one.rule,
         )
     raise ConfigError(
@@ -190,8 +191,10 @@ def _parses(text: str) -> bool:
     return True
 
 
-def _near(name: str, known: Sequence[str]) -> str | None:
-    # Without regard to case: "dot" is DOT.
-    lowered = {one.lower(): one for one in known}
-    near = difflib.get_close_matches(name.lower(), list(lowered), n=1, cutoff=0.5)
-    return lowered[near[0]] if near else None
+def _near(name: str, known: Sequence[str], present: Container[str]) -> str | None:
+    # Without regard to case: "dot" is DOT. Of two that are as near, the one that is not there yet was meant.
+    def likeness(one: str) -> tuple[float, bool]:
+        return difflib.SequenceMatcher(None, name.lower(), one.lower()).ratio(), one not in present
+
+    near = max(known, key=likeness, default=None)
+    return None if near is None or likeness(near)[0] < LIKE else near

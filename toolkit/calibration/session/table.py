@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import chain
@@ -32,6 +33,7 @@ from toolkit.units import si_scale, unit
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+_GROUPED = re.compile(r"[+-]?[1-9][0-9]{0,2}\.[0-9]{3}")
 _POINT_AND_COMMA = (
     "the file has numbers with a decimal point and numbers with a comma, or marks between thousands: write "
     "all of them with one decimal sign and nothing between thousands; nothing was written"
@@ -208,18 +210,32 @@ def _decimal(cells: Cells, at: Sequence[int]) -> str:
     texts = [cell for cell in chain.from_iterable(cells.columns[one] for one in at) if isinstance(cell, str)]
     try:
         # Texts of a worksheet are numbers that somebody pasted: their commas are judged as a text file's.
-        return decimal_sign(texts, cells.separator or ";", where=Path(cells.where))
+        decimal = decimal_sign(texts, cells.separator or ";", where=Path(cells.where))
     except RecordingError as error:
-        first = next(
-            (row, one)
-            for one in at
-            for row, cell in enumerate(cells.columns[one], start=1)
-            if isinstance(cell, str) and "," in cell
-        )
-        raise SessionError(
-            error.what, where=cells.place(*first), got=error.got, expected=error.expected,
-            next_step=f"{error.next_step}; nothing was written", rule=error.rule,
-        ) from error  # fmt: skip
+        raise _ambiguous(cells, at, ",") from error
+    pointed = [text.strip() for text in texts if "." in text]
+    if decimal == "." and cells.separator != "," and pointed and all(map(_GROUPED.fullmatch, pointed)):
+        # Where commas separate no cells they may be decimal signs, and then points stand between thousands.
+        raise _ambiguous(cells, at, ".")
+    return decimal
+
+
+def _ambiguous(cells: Cells, at: Sequence[int], mark: str) -> SessionError:
+    row, column = next(
+        (row, one)
+        for one in at
+        for row, cell in enumerate(cells.columns[one], start=1)
+        if isinstance(cell, str) and mark in cell
+    )
+    return SessionError(
+        f"the mark {mark!r} in the numbers may be their decimal sign or stand between thousands",
+        where=cells.place(row, column),
+        got=f"{cells.columns[column][row - 1]!r}, and every other number with it has three digits behind it",
+        expected="numbers that can be read in one way only",
+        next_step="save the file with a point as the decimal sign and nothing between thousands, and more or "
+        "fewer than three decimals in one of them; nothing was written",
+        rule="ambiguous-text",
+    )
 
 
 def _number(cells: Cells, row: int, column: int, decimal: str) -> float:
