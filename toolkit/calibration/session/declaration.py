@@ -193,8 +193,8 @@ def _parses(text: str) -> bool:
 
 def _near(name: str, known: Sequence[str], present: Container[str]) -> str | None:
     # Without regard to case: "dot" is DOT. Of two that are as near, the one that is not there yet was meant.
-    def likeness(one: str) -> tuple[float, bool]:
-        return difflib.SequenceMatcher(None, name.lower(), one.lower()).ratio(), one not in present
+    def likeness(one: str) -> tuple[float, bool, str]:
+        return difflib.SequenceMatcher(None, name.lower(), one.lower()).ratio(), one not in present, one
 
     near = max(known, key=likeness, default=None)
     return None if near is None or likeness(near)[0] < LIKE else near
