@@ -158,11 +158,12 @@ class _Reader:
 
     def __call__(self, name: str) -> int:
         from toolkit.errors import ToolkitError
+        from toolkit.recording.columns import header_of
         from toolkit.recording.gate import gate
         from toolkit.recording.xlsx import read_sheet
 
         try:
-            return len(read_sheet(gate(self.folder / name), self.machine, grids=False)[1].rows)
+            return len(read_sheet(gate(self.folder / name), header_of(self.machine), grids=False)[1].rows)
         except ToolkitError:
             return 0
 

@@ -47,7 +47,9 @@ def test_clean_linear_sessions_are_recommended_nothing(make_session: Make) -> No
     noted = 0
     for seed in range(seeds):
         session.table.values[:] = hub_data(40, 1000 + seed)
-        noted += any(one.level == "note" for one in session_findings(fit_session(session)))
+        found = session_findings(fit_session(session))
+        # The check loads stay those of another seed, beyond the loads of every other session.
+        noted += any(one.level == "note" and one.rule != "check-beyond-range" for one in found)
     assert noted <= 0.05 * seeds
     # And the tests are alive: told never, at risks of 1 % a kind, would be a fault too.
     assert noted >= binom.ppf(0.001, seeds, 0.02)

@@ -103,7 +103,7 @@ def test_a_flipped_sign_blocks_and_changes_nothing(
     registry: Registry, make_session: Callable[..., Path]
 ) -> None:
     approve(registry, "hub-r1", in_force_from=date(2026, 2, 1), checked_by="B")
-    flipped, check = hub_data(60, 4), hub_data(9, 6)
+    flipped, check = hub_data(60, 4), hub_data(9, 30)
     flipped[:, 2] *= -1
     check[:, 2] *= -1
     made = calibrate(make_session(flipped, check_rows=check, name="flipped"), registry)
@@ -122,7 +122,7 @@ def test_span_and_check_loads_block_too_and_another_span_of_a_replacement_needs_
     registry: Registry, make_session: Callable[..., Path]
 ) -> None:
     approve(registry, "hub-r1", in_force_from=date(2026, 2, 1), checked_by="B")
-    scaled, check = hub_data(60, 4), hub_data(9, 6)
+    scaled, check = hub_data(60, 4), hub_data(9, 30)
     scaled[:, 0] *= 1.05
     made = calibrate(make_session(scaled, check_rows=check, name="span"), registry)
     assert {f.rule for f in made.findings} == {"span", "check-load"}

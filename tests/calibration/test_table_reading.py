@@ -65,20 +65,6 @@ def test_a_header_alone_has_no_rows() -> None:
     assert refusal(HEADER + "\n").rule == "no-data"
 
 
-def test_semicolons_are_named_with_what_to_do() -> None:
-    german = "\n".join([HEADER, *ROWS]).replace(",", ";").replace(".", ",")
-    error = refusal(german)
-    assert error.what == "the file's cells are separated by semicolons"
-    assert "S [mV/V];F [N];run;direction" in str(error.got)
-    assert "a point in the numbers" in str(error.expected)
-    assert "decimal='.'" in str(error.next_step)
-    assert error.rule == "columns"
-
-
-def test_tabs_are_named() -> None:
-    assert "separated by tabs" in refusal("\n".join([HEADER, *ROWS]).replace(",", "\t")).what
-
-
 def test_a_semicolon_in_a_name_is_no_separator() -> None:
     assert "unknown column 'a;b'" in refusal(HEADER + ",a;b [N]\n" + ROWS[0] + ",1\n").what
 

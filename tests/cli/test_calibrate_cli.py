@@ -163,7 +163,9 @@ CHANGES: dict[str, tuple[Any, str, str]] = {
     "overflow": (
         lambda: csv(rows(40, 1)).replace("\n", "\n1,1e999,1,1,1,up\n", 1), "cell", "row 1, column B"),
     "empty file": (lambda: "", "no-data", "loads.csv"),
-    "semicolons": (lambda: csv(rows(40, 1), comma=";"), "columns", ""),
+    "thousands": (
+        lambda: "A [mV/V];B [mV/V];FY [N];MZ [N*m];run;direction\n1,234;2;3;4;1;up\n", "ambiguous-text",
+        "row 1 (line 2), column A"),
 }  # fmt: skip
 
 

@@ -61,7 +61,9 @@ def session(tmp_path: Path) -> Path:
 
 def test_calibrate_answers_as_the_contract_says(run: Run, session: Path, tmp_path: Path) -> None:
     code, answer = run("calibrate", session)
-    assert (code, answer["schema"], answer["findings"]) == (0, 1, [])
+    # The random check loads of this session reach beyond its random loads, which is a note.
+    assert {(f["rule"], f["level"]) for f in answer["findings"]} == {("check-beyond-range", "note")}
+    assert (code, answer["schema"]) == (0, 1)
     record = answer["record"]
     assert {"id", "sha256", "status", "existing", "path"} <= set(record)
     assert (record["id"], record["status"], record["existing"]) == ("pair-r1", "candidate", False)
@@ -131,7 +133,8 @@ def test_a_finding_ends_with_one_and_a_bad_session_with_two(run: Run, session: P
     text = (session.parent / "loads.csv").read_text()
     (session.parent / "loads.csv").write_text("\n".join(text.splitlines()[:21]) + "\n")
     code, answer = run("calibrate", session)
-    assert (code, {f["rule"] for f in answer["findings"]}) == (1, {"few-points"})
+    warnings = {f["rule"] for f in answer["findings"] if f["level"] != "note"}
+    assert (code, warnings) == (1, {"few-points"})
     (session.parent / "loads.csv").write_text(text.replace("mV/V", "mV/Q", 1))
     code, answer = run("calibrate", session)
     assert code == 2

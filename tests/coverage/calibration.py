@@ -1,4 +1,4 @@
-"""Coverage of calibration sessions: drawn whole, fitted, and what they say of themselves held against the truth.
+"""Coverage of calibration sessions: drawn whole, fitted, and what they say of themselves against the truth.
 
 A cell of 2000 N per mV/V is loaded in five steps from zero to 4000 N, up and down in every run. The reference
 standard reads what is applied; what is applied scatters about the steps; runs differ in zero and gain; the

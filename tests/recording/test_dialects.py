@@ -157,8 +157,23 @@ def test_wide_text_that_is_none(read):
     refused(read, text().replace("86.06072", "86.0\x006072").encode("utf-16"), "text-cell", CellError)
 
 
-def test_text_in_another_code_page_is_named(read):
-    error = refused(read, text(headers=[*HEADERS[:-1], "M\xfc [N]"]).encode("latin-1"), "encoding")
+def test_text_in_latin_1_is_read_with_its_signs(read):
+    words = text(headers=[*HEADERS, "T [°C]"], rows=[(*row, 20.5) for row in DATA])
+    found = read(words.encode("latin-1"))
+    assert found["T"].unit == read(words)["T"].unit
+    np.testing.assert_array_equal(found["T"].values, [20.5] * len(DATA))
+
+
+@pytest.mark.parametrize("hint", ["sep=;\n", '"sep=;"\r\n', "SEP=;\n"])
+def test_a_spreadsheets_hint_of_its_separator_is_no_row(read, hint):
+    same(read(hint + text(separator=";", decimal=",")))
+
+
+@pytest.mark.parametrize("begin", [b"", b"\xef\xbb\xbf"])
+def test_bytes_that_are_no_text_are_named(read, begin):
+    byte = b"\xfc" if begin else b"\x81"  # a mark of UTF-8 leaves no other encoding; 0x81 is no letter
+    data = begin + text(headers=[*HEADERS, "M? [N]"], rows=[(*row, 1.0) for row in DATA]).encode()
+    error = refused(read, data.replace(b"?", byte), "encoding")
     assert "UTF-16 with its byte order mark" in error.expected
 
 

@@ -28,6 +28,7 @@ from toolkit.errors import ToolkitError
 from toolkit.machine import load_machine
 from toolkit.recording import read_recording
 from toolkit.recording.cells import _parse, find_cells
+from toolkit.recording.columns import header_of
 from toolkit.recording.gate import gate
 from toolkit.recording.grid import find_grid
 from toolkit.recording.table import read_table
@@ -48,7 +49,7 @@ def both_ways(path, xml: str, **parts: bytes) -> tuple[object, object]:
     told = []
     for grids in (True, False):
         try:
-            name, table = read_sheet(gate(path), M15, grids=grids)
+            name, table = read_sheet(gate(path), header_of(M15), grids=grids)
             told.append((name, [(one, one.values.tobytes()) for one in read_table(table, M15)]))
         except ToolkitError as error:
             told.append(error.as_dict())
@@ -276,7 +277,7 @@ def test_several_sheets_have_one_answer(tmp_path, names, hidden, grid):
     told = []
     for grids in (True, False):
         try:
-            name, table = read_sheet(gate(path), M15, grids=grids)
+            name, table = read_sheet(gate(path), header_of(M15), grids=grids)
             told.append((name, table.whole().rows))
             assert (table.numbers is not None) == (grid and grids)
         except ToolkitError as error:

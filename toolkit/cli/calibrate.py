@@ -26,13 +26,20 @@ if TYPE_CHECKING:
     from toolkit.calibration.registry.candidate import Candidate
 
 NAME = "calibrate"
+NOT_ENTERED = "not entered"
 
 
 def command(
-    session: Annotated[Path, typer.Argument(help="SESSION.toml, with its CSV files beside it.")],
+    session: Annotated[Path, typer.Argument(help="SESSION.toml, with its CSV or .xlsx files beside it.")],
     calibrations: Calibrations = None,
     out: Annotated[Path | None, typer.Option("--out", help="Another name for --calibrations.")] = None,
     machine: Machine = None,
+    dry_run: Annotated[
+        bool, typer.Option("--dry-run", help="Compute and judge everything, and make nothing.")
+    ] = False,
+    again: Annotated[
+        bool, typer.Option("--again", help="Enter a session anew whose record was discarded.")
+    ] = False,
     full: Full = False,
     figures: Figures = None,
     home: Home = None,
@@ -46,7 +53,7 @@ def command(
 
     Example: toolkit calibrate sessions/2026-03.toml --figures fit
     """
-    from toolkit.calibration.control.calibrate import calibrate
+    from toolkit.calibration.control.calibrate import calibrate, rehearse
     from toolkit.calibration.registry.registry import Registry
 
     if calibrations is not None and out is not None and calibrations != out:
@@ -59,10 +66,20 @@ def command(
             rule="usage",
         )
     registry = Registry(registry_to_write(calibrations or out, home))
+    if dry_run and figures is not None:
+        raise ConfigError(
+            "a dry run makes no files",
+            where="--dry-run, --figures",
+            got=f"--figures {figures}",
+            expected="one of the two",
+            next_step="leave out --figures, or enter the session; nothing was written",
+            rule="usage",
+        )
     check_folder(figures)
-    made = calibrate(session, registry, machine=machine)
-    status = registry.status(made.record.id).state
+    made = (rehearse if dry_run else calibrate)(session, registry, machine=machine, again=again)
+    status = NOT_ENTERED if dry_run and not made.existing else registry.status(made.record.id).state
     payload, text = _payload(made, status), _text(made, status)
+    payload["dry_run"] = dry_run
     if full or as_json or figures is not None:
         from toolkit.calibration.standards.evaluation import evaluations
 
@@ -126,7 +143,7 @@ def _text(made: Candidate, status: str) -> str:
     lines = [
         f"{record.id}  {status}" + ("  (already recorded; nothing was written)" if made.existing else ""),
         f"sha256 {record.sha256}",
-        f"file   {made.path}",
+        f"file   {made.path}" + ("  (not written: a dry run)" if status == NOT_ENTERED else ""),
     ]
     for one in made.fit.loads:
         issued = record.load(one.setting.name).issued

@@ -13,6 +13,7 @@ from toolkit.cli import (
     calibration_certificate,
     calibration_chart,
     calibration_diff,
+    calibration_discard,
     calibration_due,
     calibration_report,
     calibration_standard,
@@ -49,25 +50,29 @@ KnownAt = Annotated[str | None, typer.Option("--known-at", help="What was known 
 @app.command("list")
 def list_records(
     instrument: Annotated[str | None, typer.Argument(help="One instrument; default: all.")] = None,
+    everything: Annotated[bool, typer.Option("--all", help="Discarded candidates too.")] = False,
     known_at: KnownAt = None,
     calibrations: Calibrations = None,
     home: Home = None,
     as_json: Json = False,
     quiet: Quiet = False,
 ) -> int:
-    """List the records with their state, and the head of each ledger.
+    """List the records with their state, and the head of each ledger; --all has discarded candidates too.
 
     Example: toolkit calibration list m15 --known-at 2026-03-02
     """
     registry = _registry(calibrations, home)
     known = _day(known_at, "--known-at")
-    rows, heads, bad = [], {}, 0
+    rows, heads, bad, hidden = [], {}, 0, 0
     for name in [instrument] if instrument else registry.instruments():
         ledger = registry.ledger(name)
         heads[name] = {"count": len(ledger.entries), "sha256": ledger.head, "damage": ledger.damage}
         good, refused = registry.usable(name)
         bad += len(refused) + (ledger.damage is not None)
-        rows += [_row(record, registry.status(record.id, known_at=known)) for record in good]
+        every = [_row(record, registry.status(record.id, known_at=known)) for record in good]
+        shown = [row for row in every if everything or row["status"] != "discarded"]
+        hidden += len(every) - len(shown)
+        rows += shown
         rows += [
             {"id": one.id, "status": "refused", "rule": one.rule, "reason": one.reason} for one in refused
         ]
@@ -80,8 +85,10 @@ def list_records(
         ],
         align="<" * 7,
     )  # fmt: skip
-    text = "\n".join([lines or "no records", "", *(f"head of {n}: {h['sha256']}" for n, h in heads.items())])
-    answer({"records": rows, "heads": heads}, text, as_json=as_json, quiet=quiet)
+    more = [f"discarded and not shown: {hidden} (--all)"] if hidden else []
+    heads_text = [f"head of {n}: {h['sha256']}" for n, h in heads.items()]
+    text = "\n".join([lines or "no records", *more, "", *heads_text])
+    answer({"records": rows, "heads": heads, "hidden": hidden}, text, as_json=as_json, quiet=quiet)
     return 1 if bad else 0
 
 
@@ -182,6 +189,9 @@ def history(
 @app.command("import")
 def import_record(
     file: Annotated[Path, typer.Argument(help="TOML with the coefficients and the source that names them.")],
+    again: Annotated[
+        bool, typer.Option("--again", help="Enter a file anew whose record was discarded.")
+    ] = False,
     calibrations: Calibrations = None,
     home: Home = None,
     as_json: Json = False,
@@ -195,7 +205,7 @@ def import_record(
     from toolkit.calibration.registry.registry import Registry
 
     registry = Registry(registry_to_write(calibrations, home))
-    record, existing = import_legacy(file, registry)
+    record, existing = import_legacy(file, registry, again=again)
     path = registry.folder / record.instrument / f"{record.id}.json"
     payload = {**_row(record, registry.status(record.id)), "existing": existing, "path": str(path)}
     text = (
@@ -305,6 +315,7 @@ def withdraw(
 app.command(calibration_certificate.NAME)(calibration_certificate.command)
 app.command("budget")(calibration_budget.command)
 app.command("diff")(calibration_diff.command)
+app.command("discard")(calibration_discard.command)
 app.command("report")(calibration_report.command)
 app.command("standard")(calibration_standard.command)
 app.command("chart")(calibration_chart.command)

@@ -71,7 +71,7 @@ def calibration_findings(case: Case, calibrations: Path | None) -> tuple[Finding
         except RegistryError:
             state = "candidate"
         if state != "approved":
-            article = "a candidate: nobody has approved it" if state == "candidate" else "withdrawn"
+            article = "a candidate: nobody has approved it" if state == "candidate" else state
             said.append(article)
     if record.kind == "legacy":
         said.append("imported, not fitted here: unverified")

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import difflib
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import NoReturn
@@ -65,9 +65,12 @@ def assign_columns(headers: Sequence[str], machine: Machine, *, where: object) -
     return found
 
 
-def looks_like_header(headers: Sequence[str], machine: Machine) -> bool:
-    """Tell whether a row has at least one header of the machine: enough to take it for a recording's."""
-    return any(_machine_column(split_header(header)[0], machine) is not None for header in headers)
+def header_of(machine: Machine) -> Callable[[str], bool]:
+    """Return what tells whether a text is a header of the machine.
+
+    A row with one such text is taken for a recording's.
+    """
+    return lambda header: _machine_column(split_header(header)[0], machine) is not None
 
 
 def _assign(index: int, header: str, machine: Machine, where: object) -> Assigned:

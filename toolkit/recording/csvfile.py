@@ -5,9 +5,11 @@ from __future__ import annotations
 import csv
 import io
 from itertools import chain
+from pathlib import Path
 
 from toolkit.errors import UnreadableError
 from toolkit.machine import Machine
+from toolkit.recording.columns import header_of
 from toolkit.recording.dialect import SEPARATORS, decimal_sign, decode, number_or_text, separator_of
 from toolkit.recording.gate import Gated
 from toolkit.recording.table import Table
@@ -26,8 +28,8 @@ def read_csv(gated: Gated, machine: Machine) -> Table:
         another encoding, or that can be read in more than one way
     """
     text = decode(gated.data, where=gated.path)
-    head = next((line for line in text.splitlines() if line.strip(" \t,;")), "")
-    separator = separator_of(head, machine, where=gated.path)
+    head = first_line(text)
+    separator = separator_of(head, header_of(machine), where=gated.path)
     if separator is None:
         raise UnreadableError(
             "the file is a text file, not a recording",
@@ -38,19 +40,35 @@ def read_csv(gated: Gated, machine: Machine) -> Table:
             next_step="give the file that the acquisition program wrote",
             rule="not-a-workbook",
         )
-    try:
-        cells = list(csv.reader(io.StringIO(text, newline=""), delimiter=separator, strict=True))
-    except csv.Error as error:
-        raise UnreadableError(
-            "the CSV file cannot be read",
-            where=gated.path,
-            got=error,
-            expected=f"values separated by {SEPARATORS[separator]}",
-            next_step="mend the quotation marks in a copy of the file",
-            rule="unreadable",
-        ) from error
+    cells = split_rows(text, separator, where=gated.path)
     first = next((i for i, row in enumerate(cells) if any(cell.strip() for cell in row)), len(cells))
     decimal = decimal_sign(chain.from_iterable(cells[first + 1 :]), separator, where=gated.path)
     rows = [[number_or_text(cell, decimal) for cell in row] for row in cells]
     width = max(map(len, rows), default=0)
     return Table(where=str(gated.path), rows=[row + [""] * (width - len(row)) for row in rows])
+
+
+def first_line(text: str) -> str:
+    """Return the first line that has more than blanks and separators; empty where there is none."""
+    return next((line for line in text.splitlines() if line.strip(" \t,;")), "")
+
+
+def split_rows(text: str, separator: str, *, where: Path) -> list[list[str]]:
+    """Return the cells of a text table, row by row.
+
+    Raises
+    ------
+    UnreadableError
+        rule ``unreadable``
+    """
+    try:
+        return list(csv.reader(io.StringIO(text, newline=""), delimiter=separator, strict=True))
+    except csv.Error as error:
+        raise UnreadableError(
+            "the CSV file cannot be read",
+            where=where,
+            got=error,
+            expected=f"values separated by {SEPARATORS[separator]}",
+            next_step="mend the quotation marks in a copy of the file",
+            rule="unreadable",
+        ) from error

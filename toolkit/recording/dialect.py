@@ -8,14 +8,14 @@ be told with the cell that does not fit.
 
 from __future__ import annotations
 
+import codecs
+import contextlib
 import csv
 import re
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 
 from toolkit.errors import UnreadableError
-from toolkit.machine import Machine
-from toolkit.recording.columns import looks_like_header
 
 SEPARATORS = {",": "commas", ";": "semicolons", "\t": "tabs"}
 _WIDE = (b"\xff\xfe", b"\xfe\xff")
@@ -23,41 +23,51 @@ _EXPONENT = r"(?:[eE][+-]?[0-9]{1,4})?"
 _NUMBER = {
     mark: re.compile(rf"[+-]?(?:[0-9]+{mark}?[0-9]*|{mark}[0-9]+){_EXPONENT}") for mark in (r"\.", ",")
 }
+_HINT = re.compile(r"\A\"?sep=[,;\t]\"?(?=\r?\n)", re.IGNORECASE)
 _GROUPED = re.compile(r"[+-]?[1-9][0-9]{0,2},[0-9]{3}")
 _NO_NUMBER = frozenset("nan +nan -nan inf +inf -inf infinity +infinity -infinity".split())
 
 
 def decode(data: bytes, *, where: Path) -> str:
-    """Return a text file's content: UTF-8, or UTF-16 where its byte order mark says so.
+    """Return a text file's content: UTF-16 where its byte order mark says so, UTF-8, else Windows-1252.
+
+    Windows-1252 holds Latin-1's letters, the degree sign and the micro sign at their places: a program of
+    Western Europe writes it without saying so. Digits and separators are the same bytes in either, so that
+    no number can change by it. A first line ``sep=;``, which tells a spreadsheet what separates the cells, is
+    left blank.
 
     Raises
     ------
     UnreadableError
-        rule ``encoding``
+        rule ``encoding``: bytes that are none of these
     """
     wide = data[:2] in _WIDE
     try:
-        return data.decode("utf-16" if wide else "utf-8-sig")
+        return _HINT.sub("", data.decode("utf-16" if wide else "utf-8-sig"), count=1)
     except UnicodeDecodeError as error:
+        # A file that begins with the mark of UTF-8 is no other encoding.
+        if not wide and not data.startswith(codecs.BOM_UTF8):
+            with contextlib.suppress(UnicodeDecodeError):
+                return _HINT.sub("", data.decode("cp1252"), count=1)
         raise UnreadableError(
             f"the text file is not in UTF-{16 if wide else 8}",
             where=where,
             got=f"byte {data[error.start]:#04x} at {error.start}",
-            expected="a CSV file in UTF-8, or in UTF-16 with its byte order mark",
+            expected="a CSV file in UTF-8, in UTF-16 with its byte order mark, or in Windows-1252 (Latin-1)",
             next_step="save it again as 'CSV UTF-8'",
             rule="encoding",
         ) from error
 
 
-def separator_of(head: str, machine: Machine, *, where: Path) -> str | None:
-    """Return what splits a header row into the most headers of the machine; None where nothing does.
+def separator_of(head: str, known: Callable[[str], bool], *, where: Path) -> str | None:
+    """Return what splits a header row into the most headers that are ``known``; None where nothing does.
 
     Raises
     ------
     UnreadableError
         rule ``ambiguous-text``: two separators do as well
     """
-    found = {mark: _headers(head, mark, machine) for mark in SEPARATORS}
+    found = {mark: _headers(head, mark, known) for mark in SEPARATORS}
     most = max(found.values())
     best = [mark for mark, count in found.items() if count == most]
     if most == 0:
@@ -113,9 +123,9 @@ def number_or_text(cell: str, decimal: str = ".") -> float | str:
     return float(text) if text.lower() in _NO_NUMBER else text
 
 
-def _headers(head: str, separator: str, machine: Machine) -> int:
+def _headers(head: str, separator: str, known: Callable[[str], bool]) -> int:
     try:
         headers = next(csv.reader([head], delimiter=separator), [])
     except csv.Error:
         return 0
-    return sum(looks_like_header([one], machine) for one in headers) if len(headers) > 1 else 0
+    return sum(map(known, headers)) if len(headers) > 1 else 0

@@ -7,6 +7,7 @@ from typing import Literal
 
 from toolkit.errors import RecordingError, UnreadableError
 from toolkit.machine import Machine
+from toolkit.recording.columns import header_of
 from toolkit.recording.csvfile import read_csv
 from toolkit.recording.formats import READERS
 from toolkit.recording.formats.vectors import series_of
@@ -66,7 +67,7 @@ def read_recording(
     properties = gated.members.get("docProps/core.xml", b"")
     keywords = keywords_of(properties)
     _check_origin(path, keywords, machine)
-    sheet, table = read_sheet(gated, machine)
+    sheet, table = read_sheet(gated, header_of(machine))
     series = read_table(table, machine)
     if reader == "both":
         from toolkit.recording.crosscheck import cross_check

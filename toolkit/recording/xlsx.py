@@ -5,15 +5,13 @@ from __future__ import annotations
 import io
 import posixpath
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NoReturn
 from xml.etree import ElementTree as ET
 
 from toolkit.errors import CellError, RecordingError, ToolkitError, UnreadableError
-from toolkit.machine import Machine
 from toolkit.recording.archive import stored_archive
 from toolkit.recording.cells import error_cells
-from toolkit.recording.columns import looks_like_header
 from toolkit.recording.gate import Gated
 from toolkit.recording.table import Table
 
@@ -25,11 +23,11 @@ _Errors = Mapping[str, tuple[tuple[str, str], ...]]  # sheet -> (reference, text
 _STRICT_ID = "{http://purl.oclc.org/ooxml/officeDocument/relationships}id"
 
 
-def read_sheet(gated: Gated, machine: Machine, *, grids: bool = True) -> tuple[str, Table]:
-    """Return the name and the cells of the one visible worksheet that holds the recording.
+def read_sheet(gated: Gated, known: Callable[[str], bool], *, grids: bool = True) -> tuple[str, Table]:
+    """Return the name and the cells of the one visible worksheet that holds the data.
 
-    Hidden worksheets are never read. With several visible ones, the recording is the one whose first row
-    has headers of the machine. ``grids=False`` has python-calamine read every cell, with the same result.
+    Hidden worksheets are never read. With several visible ones, it is the one whose first row has a
+    header that is ``known``. ``grids=False`` has python-calamine read every cell, with the same result.
 
     Raises
     ------
@@ -54,7 +52,7 @@ def read_sheet(gated: Gated, machine: Machine, *, grids: bool = True) -> tuple[s
             next_step="repeat the recording; hidden worksheets are not read",
             rule="no-data",
         )
-    fitting = [one for one in filled if looks_like_header(_first(one[1].rows), machine)] or filled[:1]
+    fitting = [one for one in filled if any(map(known, _first(one[1].rows)))] or filled[:1]
     if len(fitting) > 1:
         raise RecordingError(
             "more than one worksheet looks like a recording",

@@ -143,7 +143,7 @@ def as_found_findings(found: AsFound) -> tuple[Finding, ...]:
 
 
 def as_found_history(registry: Registry, instrument: str) -> tuple[AsFound, ...]:
-    """Return every as-found result of an instrument, oldest first; withdrawn records are left out.
+    """Return every as-found result of an instrument, oldest first; withdrawn and discarded ones are left out.
 
     Raises
     ------
@@ -178,7 +178,7 @@ def _of_phase(registry: Registry, instrument: str, phase: str) -> list[Calibrati
     standing = [
         record_id
         for record_id in ledger.entered()
-        if status_of(record_id, ledger.of(record_id), dt.date.max).state != "withdrawn"
+        if not status_of(record_id, ledger.of(record_id), dt.date.max).ended
     ]
     made = []
     for at, record in enumerate(load_many(registry.folder / instrument, standing, ledger).values()):

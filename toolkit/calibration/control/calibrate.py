@@ -11,7 +11,9 @@ from toolkit.calibration.control.as_found import as_found, as_found_findings, ph
 from toolkit.calibration.control.chart import chart_findings, control_chart
 from toolkit.calibration.registry.candidate import Candidate
 from toolkit.calibration.registry.candidate import calibrate as enter
+from toolkit.calibration.registry.rehearsal import rehearsal
 from toolkit.calibration.registry.stored import reason_of
+from toolkit.calibration.session.read import read_session
 from toolkit.errors import ToolkitError
 from toolkit.findings import Finding
 
@@ -20,7 +22,9 @@ if TYPE_CHECKING:
     from toolkit.calibration.registry.registry import Registry
 
 
-def calibrate(session_file: Path, registry: Registry, *, machine: str | None = None) -> Candidate:
+def calibrate(
+    session_file: Path, registry: Registry, *, machine: str | None = None, again: bool = False
+) -> Candidate:
     """Enter a session's candidate record and judge it against the instrument's history.
 
     The history is judged after the record was entered: where it cannot be, that is a finding, not an error.
@@ -30,8 +34,26 @@ def calibrate(session_file: Path, registry: Registry, *, machine: str | None = N
     ToolkitError
         as `registry.candidate.calibrate`; nothing is written
     """
-    made = enter(session_file, registry, machine=machine)
+    made = enter(session_file, registry, machine=machine, again=again)
     return dataclasses.replace(made, findings=made.findings + control_findings(registry, made.record))
+
+
+def rehearse(
+    session_file: Path, registry: Registry, *, machine: str | None = None, again: bool = False
+) -> Candidate:
+    """Return what `calibrate` would, and make nothing: it is done in a copy of the instrument's folder.
+
+    The record has the id and the hash that it would get now, and a path where nothing lies yet.
+
+    Raises
+    ------
+    ToolkitError
+        as `calibrate`
+    """
+    instrument = read_session(session_file).instrument
+    with rehearsal(registry, instrument) as copy:
+        made = calibrate(session_file, copy, machine=machine, again=again)
+    return dataclasses.replace(made, path=registry.folder / made.path.relative_to(copy.folder))
 
 
 def control_findings(registry: Registry, record: CalibrationRecord) -> tuple[Finding, ...]:

@@ -172,8 +172,9 @@ def _sessions(registry: Registry, instrument: str) -> tuple[list[_Session], list
     left_out: list[tuple[str, str]] = []
     standing = []
     for record_id in ledger.entered():
-        if status_of(record_id, ledger.of(record_id), dt.date.max).state == "withdrawn":
-            left_out.append((record_id, "withdrawn"))
+        status = status_of(record_id, ledger.of(record_id), dt.date.max)
+        if status.ended:
+            left_out.append((record_id, status.state))
         else:
             standing.append(record_id)
     checked: dict[str, CalibrationRecord] = {}

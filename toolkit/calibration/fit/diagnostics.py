@@ -115,11 +115,6 @@ def replicate_groups(rows: NDArray[np.float64]) -> NDArray[np.intp]:
     return groups
 
 
-def repeated_share(rows: NDArray[np.float64]) -> float:
-    """Return the share of rows that repeat another one, cell by cell."""
-    return 1.0 - (int(replicate_groups(rows).max()) + 1) / len(rows)
-
-
 def _outliers(external: NDArray[np.float64], dof: int) -> tuple[int, ...]:
     # Bonferroni: the risk that any row of a clean session is named is OUTLIER_RISK.
     from scipy.special import stdtrit

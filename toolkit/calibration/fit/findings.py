@@ -11,21 +11,26 @@ import numpy as np
 
 from toolkit.calibration.fit.adequacy import COLLINEAR_FINDING
 from toolkit.calibration.fit.balance_report import balance_findings
-from toolkit.calibration.fit.diagnostics import repeated_share
+from toolkit.calibration.fit.diagnostics import replicate_groups
 from toolkit.calibration.fit.levels import lack_of_fit, load_levels
 from toolkit.calibration.fit.recommend import NEGLIGIBLE_PERCENT, recommend_drop, recommend_wider
 from toolkit.calibration.fit.robust import hidden_outliers, robust_weights
 from toolkit.calibration.fit.run_scatter import groups_of
 from toolkit.calibration.fit.session_fit import session_statements
 from toolkit.calibration.session.known_errors import undeclared_standard
+from toolkit.calibration.session.settings import DEFAULT_TOLERANCE
 from toolkit.findings import Finding
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from toolkit.calibration.fit.session_fit import LoadResult, SessionFit
     from toolkit.calibration.session.read import Session
+    from toolkit.calibration.session.table import Table
 
 FEW_POINTS = 30
 REPEATED = 0.1
+MOST_NAMED = 10
 _RISK = 0.01
 
 
@@ -44,6 +49,53 @@ def session_findings(fit: SessionFit) -> tuple[Finding, ...]:
     return tuple(found)
 
 
+def _repeated(rows: NDArray[np.float64], where: str) -> list[Finding]:
+    """Return which rows repeat another one: a finding where they are many, else a note."""
+    groups = replicate_groups(rows)
+    _, first, inverse = np.unique(groups, return_index=True, return_inverse=True)
+    again = np.flatnonzero(first[inverse] != np.arange(len(rows)))
+    if not again.size:
+        return []
+    pairs = [f"{at + 1} = {first[inverse[at]] + 1}" for at in again[:MOST_NAMED].tolist()]
+    more = f" and {again.size - MOST_NAMED} more" if again.size > MOST_NAMED else ""
+    share = again.size / len(rows)
+    message = (
+        f"{again.size} of {len(rows)} rows ({100 * share:.2g} %) repeat another row, indications and loads "
+        f"alike: rows {', '.join(pairs)}{more}"
+    )
+    return [
+        Finding(
+            rule="duplicates", where=where, message=message, level="warning" if share > REPEATED else "note"
+        )
+    ]
+
+
+def _beyond(session: Session, check: Table) -> list[Finding]:
+    """Return the check loads outside of what was fitted, by more than a reading of its end may differ."""
+    edges = [(load.name, load.unit, load.tolerance) for load in session.loads]
+    edges += [
+        (cell.name, cell.unit, DEFAULT_TOLERANCE * float(np.abs(session.table.column(cell.name)).max()))
+        for cell in session.cells
+    ]
+    outside: dict[int, list[str]] = {}
+    for name, text, slack in edges:
+        fitted, values = session.table.column(name), check.column(name)
+        low, high = float(fitted.min()), float(fitted.max())
+        for at in np.flatnonzero((values < low - slack) | (values > high + slack)).tolist():
+            told = f"{name} = {values[at]:.6g} {text} (fitted: {low:.6g} to {high:.6g})"
+            outside.setdefault(at, []).append(told)
+    return [
+        Finding(
+            rule="check-beyond-range",
+            where=f"check row {at + 1}",
+            message=f"{', '.join(told)}: a check load there verifies an extrapolation, which neither the fit "
+            "nor its uncertainty covers",
+            level="note",  # as where there are no check loads: the range that was fitted stands
+        )
+        for at, told in sorted(outside.items())
+    ]
+
+
 def _data_findings(session: Session) -> list[Finding]:
     found: list[Finding] = []
     table, where = session.table, session.path.name
@@ -52,10 +104,7 @@ def _data_findings(session: Session) -> list[Finding]:
         found.append(Finding(rule="few-points", where=where, message=message))
     names = [*session.indications, *(load.name for load in session.loads)]
     rows = table.matrix(names)
-    share = repeated_share(rows)
-    if share > REPEATED:
-        message = f"{100 * share:.0f} % of the rows repeat another row, indications and loads alike"
-        found.append(Finding(rule="duplicates", where=where, message=message))
+    found += _repeated(rows, where)
     factor, group = groups_of(table)
     if session.method == "ols" and not group.any():
         message = (
@@ -68,6 +117,7 @@ def _data_findings(session: Session) -> list[Finding]:
         found.append(Finding(rule="no-check", where=where, message=message, level="note"))
     else:
         check = session.check.matrix(names)
+        found += [*_repeated(check, f"{where}, check loads"), *_beyond(session, session.check)]
         # Most rows of a long session share no first value with a check load.
         fitted = {tuple(row) for row in rows[np.isin(rows[:, 0], check[:, 0])].tolist()}
         for number, row in enumerate(check.tolist(), start=1):

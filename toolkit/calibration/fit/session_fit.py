@@ -173,6 +173,7 @@ def session_statements(session: Session) -> Statements:
         json.loads(session.settings),
         indications={cell.name: cell.unit for cell in session.cells},
         loads={load.name: load.unit for load in session.loads},
+        largest={load.name: float(abs(session.table.column(load.name)).max()) for load in session.loads},
         date=session.date,
         where=session.path,
         columns={cell.name: cell.column_unit or cell.unit for cell in session.cells},

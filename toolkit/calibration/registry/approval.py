@@ -106,10 +106,11 @@ def approve(
             # The folder was removed or exchanged since the record was read.
             raise _refused(record_id, "no such record", record_id, ", ".join(ledger.entered()), "missing")
         status = status_of(record_id, ledger.of(record_id), dt.date.max)
-        if status.state == "withdrawn":
+        if status.ended:
             raise _refused(
-                record_id, "a withdrawn record cannot be approved", "withdrawn", "a new session", "approval"
-            )
+                record_id, f"a {status.state} record cannot be approved",
+                f"{status.state}: {status.reason or 'no reason stated'}", "a new session", "approval",
+            )  # fmt: skip
         changes = status.in_force_from != in_force_from or interval not in (None, status.recall)
         if status.in_force_from is not None and not (reason and changes):
             raise _refused(
@@ -191,11 +192,12 @@ def withdraw(
         if record_id not in ledger.entered():
             raise _refused(record_id, "no such record", record_id, ", ".join(ledger.entered()), "missing")
         _check_not_before(_read(folder, record_id), on)
-        if any(entry.event == "withdrawn" for entry in ledger.of(record_id)):
+        status = status_of(record_id, ledger.of(record_id), dt.date.max)
+        if status.ended:
             raise _refused(
                 record_id,
-                "the record is withdrawn already",
-                "withdrawn",
+                f"the record is {status.state} already",
+                f"{status.state}: {status.reason or 'no reason stated'}",
                 "a record that stands",
                 "withdrawal",
             )

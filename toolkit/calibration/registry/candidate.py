@@ -39,12 +39,14 @@ from toolkit.calibration.registry.judgement import judge, machine_of
 from toolkit.calibration.registry.ledger import Ledger
 from toolkit.calibration.registry.refit import check_reproduces, polarity
 from toolkit.calibration.registry.registry import ID, Registry, load_checked
+from toolkit.calibration.registry.status import discarded_before, is_discarded
 from toolkit.calibration.registry.store import Change, commit
 from toolkit.calibration.session.read import Session, read_session
 from toolkit.calibration.terms import term_matrix
 from toolkit.errors import ToolkitError
 from toolkit.files import read_regular, sha256_bytes
 from toolkit.findings import Finding
+from toolkit.recording.sniff import sniff
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -65,26 +67,29 @@ class Candidate:
     findings: tuple[Finding, ...]
 
 
-def calibrate(session_file: Path, registry: Registry, *, machine: str | None = None) -> Candidate:
+def calibrate(
+    session_file: Path, registry: Registry, *, machine: str | None = None, again: bool = False
+) -> Candidate:
     """Fit a session and enter its record as a candidate.
 
     ``machine`` names or is the file of the machine definition whose polarity is held against the record;
     default: the packaged one of the instrument's name. The findings never change the fit. A session whose
-    data and settings are already recorded returns that record and writes nothing.
+    data and settings are already recorded returns that record and writes nothing. One whose record was
+    discarded is refused with the discard's reason, unless it is to be entered ``again``, under a new id.
 
     Raises
     ------
     ConfigError, SessionError, UnitError
         the session cannot be used; nothing is written
     RegistryError
-        the ledger is damaged, or the session lies in the future; nothing is written
+        the ledger is damaged, the session lies in the future, or ``discarded``; nothing is written
     """
     session = read_session(session_file)
     check_begun(session.date, "the session's date", f"{session_file}: date")
     definition = machine_of(session.instrument, machine)
     folder = registry.folder / session.instrument
     fit = fit_session(session)
-    existing = _recorded(folder, session, registry.ledger(session.instrument))
+    existing = _recorded(folder, session, registry.ledger(session.instrument), again=again)
     findings = session_findings(fit)
     if existing is not None:
         readings = readings_of(existing, session.table)
@@ -101,7 +106,7 @@ def calibrate(session_file: Path, registry: Registry, *, machine: str | None = N
 
     def build(ledger: Ledger) -> Change | None:
         # Under the lock: another writer may have recorded this very session meanwhile.
-        twin = _recorded(folder, session, ledger)
+        twin = _recorded(folder, session, ledger, again=again)
         if twin is not None:
             made.append(twin)
             return None
@@ -158,7 +163,10 @@ def next_id(folder: Path, instrument: str, ledger: Ledger) -> str:
     return f"{instrument}-r{max(numbers, default=0) + 1}"
 
 
-def _recorded(folder: Path, session: Session, ledger: Ledger) -> CalibrationRecord | None:
+def _recorded(
+    folder: Path, session: Session, ledger: Ledger, *, again: bool = False
+) -> CalibrationRecord | None:
+    ended: list[str] = []
     for record_id, entry in ledger.entered().items():
         # What the line tells is only where to look: the record found passes its gates, its inputs too.
         if entry.inputs not in (None, session.inputs_sha256):
@@ -167,9 +175,14 @@ def _recorded(folder: Path, session: Session, ledger: Ledger) -> CalibrationReco
         try:
             # The gates cost a refit: only the record that claims these inputs goes through them.
             if from_bytes(read_regular(path), where=path).inputs_sha256 == session.inputs_sha256:
+                if is_discarded(ledger, record_id):
+                    ended.append(record_id)
+                    continue
                 return load_checked(folder, record_id, ledger)
         except (ToolkitError, OSError):
             continue
+    if ended and not again:
+        raise discarded_before(ledger, ended[-1], "the session", session.path)
     return None
 
 
@@ -210,14 +223,22 @@ def _record(fit: SessionFit) -> CalibrationRecord:
 
 
 def _numbered(record: CalibrationRecord, record_id: str, session: Session) -> CalibrationRecord:
-    files = [("loads", "loads.csv", session.data_bytes), ("session", "session.toml", session.session_bytes)]
-    if session.check_bytes is not None:
-        files.insert(1, ("check", "check.csv", session.check_bytes))
+    files = [
+        ("loads", session.data_bytes),
+        ("check", session.check_bytes),
+        ("session", session.session_bytes),
+    ]
     data = tuple(
-        DataFile(role=role, file=f"{record_id}.{name}", sha256=sha256_bytes(content))
-        for role, name, content in files
+        DataFile(role=role, file=f"{record_id}.{role}.{_suffix(role, data)}", sha256=sha256_bytes(data))
+        for role, data in files
+        if data is not None
     )
     return sealed(dataclasses.replace(record, id=record_id, data=data))
+
+
+def _suffix(role: str, data: bytes) -> str:
+    # By its content, as the reader goes: the name in the session may be any.
+    return "toml" if role == "session" else "xlsx" if sniff(data).id == "zip" else "csv"
 
 
 def _load_fit(session: Session, one: LoadResult) -> LoadFit:

@@ -22,7 +22,7 @@ from toolkit.files import read_regular, sha256_bytes
 LEDGER = "ledger.jsonl"
 HEAD = "head.json"
 START = "0" * 64
-EVENTS = ("entered", "approved", "withdrawn")
+EVENTS = ("entered", "approved", "withdrawn", "discarded")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -37,6 +37,7 @@ class Entry:
     and what the gates said that did not stand in the way.
     ``withdrawn``: ``known_on``, ``since`` (void from; None is the in-force date), ``by``, ``reason``, and a
     ``note`` where the entry is dated back.
+    ``discarded``: ``known_on``, ``by``, ``reason``: the end of a candidate that was never approved.
     """
 
     seq: int

@@ -31,13 +31,16 @@ from toolkit.calibration.registry.clock import check_begun
 from toolkit.calibration.registry.ledger import Ledger
 from toolkit.calibration.registry.legacy_file import check_possible, read_legacy
 from toolkit.calibration.registry.registry import Registry, load_checked
+from toolkit.calibration.registry.status import discarded_before, is_discarded
 from toolkit.calibration.registry.store import Change, commit
 from toolkit.errors import ToolkitError
 from toolkit.files import read_bytes, sha256_bytes
 
 
-def import_legacy(path: Path, registry: Registry) -> tuple[CalibrationRecord, bool]:
+def import_legacy(path: Path, registry: Registry, *, again: bool = False) -> tuple[CalibrationRecord, bool]:
     """Enter a legacy record; return it, and whether it was there already.
+
+    A file whose record was discarded is refused, unless it is to be entered ``again``, under a new id.
 
     Raises
     ------
@@ -45,7 +48,7 @@ def import_legacy(path: Path, registry: Registry) -> tuple[CalibrationRecord, bo
         the file: unknown key, missing value, unknown unit, a term that cannot be read, or what no
         calibration can have given (`check_possible`)
     RegistryError
-        the ledger is damaged, or the source is dated in the future
+        the ledger is damaged, the source is dated in the future, or ``discarded``
     """
     import datetime as dt
 
@@ -60,14 +63,20 @@ def import_legacy(path: Path, registry: Registry) -> tuple[CalibrationRecord, bo
     made: list[CalibrationRecord] = []
 
     def build(ledger: Ledger) -> Change | None:
+        ended: list[str] = []
         for record_id in ledger.entered():
             try:
                 twin = load_checked(folder, record_id, ledger)
             except ToolkitError:
                 continue
-            if twin.inputs_sha256 == unnumbered.inputs_sha256:
+            if twin.inputs_sha256 != unnumbered.inputs_sha256:
+                continue
+            if not is_discarded(ledger, record_id):
                 made.append(twin)
                 return None
+            ended.append(record_id)
+        if ended and not again:
+            raise discarded_before(ledger, ended[-1], "the file", path)
         record = _numbered(unnumbered, next_id(folder, unnumbered.instrument, ledger), source)
         check_transcribed(record, source)
         made.append(record)

@@ -24,6 +24,7 @@ import errno
 import fcntl
 import json
 import os
+import shutil
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -113,6 +114,17 @@ def read(folder: Path) -> Ledger:
             return Ledger(entries=(), damage=f"{error.what}: {error.got}")
     with _lock(folder, fcntl.LOCK_SH):
         return read_ledger(folder)
+
+
+def copy_files(folder: Path, target: Path) -> None:
+    """Copy the files of an instrument's folder as they stand between two writes, or after a cut-off one."""
+    if not folder.is_dir():
+        return
+    target.mkdir()
+    with _lock(folder, fcntl.LOCK_SH):
+        for path in folder.iterdir():
+            if path.is_file():
+                shutil.copyfile(path, target / path.name)
 
 
 def interrupted(folder: Path) -> bool:

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from toolkit.calibration.session.bridge import Bridge, bridges_of, converted
-from toolkit.calibration.session.known_errors import group_column
+from toolkit.calibration.session.known_errors import group_column, row_columns
 from toolkit.calibration.session.run_zero import without_read_zeros, without_run_zeros
 from toolkit.calibration.session.table import Table, read_table
 from toolkit.errors import RecordError, RegistryError, ToolkitError
@@ -40,7 +40,13 @@ def stored_check(registry: Path, record: CalibrationRecord) -> Table | None:
         return None
     path = registry / record.instrument / entry.file
     loads = [one.load for one in record.loads]
-    table = read_table(path.read_bytes(), where=path, required=[*record.indications, *loads], runs=False)
+    table = read_table(
+        path.read_bytes(),
+        where=path,
+        required=[*record.indications, *loads],
+        passed=row_columns(loads, _labels(record)),
+        runs=False,
+    )
     units = dict(zip(record.indications, record.indication_units, strict=True))
     other = [n for n, text in units.items() if unit(table.unit(n)).dimension != unit(text).dimension]
     table = converted(table, _bridges(record, other), units, where=path)
@@ -57,13 +63,11 @@ def parse_loads(record: CalibrationRecord, data: bytes, folder: Path) -> Table:
         ``data``: they cannot be read
     """
     needed = [*record.indications, *(one.load for one in record.loads)]
-    uncertainties = [f"u_{one.load}" for one in record.loads]
+    uncertainties = row_columns([one.load for one in record.loads])
     file = record.data_file("loads")
     where = folder / ("loads" if file is None else file.file)
     try:
-        named = '"shared_group"' in record.settings
-        group = group_column(json.loads(record.settings).get("reference", {})) if named else ()
-        table = read_table(data, where=where, required=needed, optional=uncertainties, labels=group)
+        table = read_table(data, where=where, required=needed, optional=uncertainties, labels=_labels(record))
         table = _as_fitted(record, table, where)
         loads = [one.load for one in record.loads]
         return without_run_zeros(table, record.indications, loads) if record.zero == "run" else table
@@ -72,6 +76,12 @@ def parse_loads(record: CalibrationRecord, data: bytes, folder: Path) -> Table:
     except ToolkitError as error:
         got = f"{where.name}: {reason_of(error)}"
         raise bad_record(record.id, where, got, "reference-load data that can be read", "data") from error
+
+
+def _labels(record: CalibrationRecord) -> tuple[str, ...]:
+    # Few sessions name a group: the settings of the others are not parsed.
+    named = '"shared_group"' in record.settings
+    return group_column(json.loads(record.settings).get("reference", {})) if named else ()
 
 
 def _as_fitted(record: CalibrationRecord, table: Table, where: Path) -> Table:

@@ -52,4 +52,4 @@ def stored_session(registry: Path, record: CalibrationRecord) -> Session:
                 target.write_bytes(files[role])
         path = Path(place) / "SESSION.toml"
         path.write_bytes(files["session"])
-        return read_session(path)
+        return read_session(path, entered=True)

@@ -27,14 +27,13 @@ from __future__ import annotations
 
 import difflib
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from toolkit.calibration.session.settings import wrong
-from toolkit.files import check_keys
 from toolkit.units import unit
 
 if TYPE_CHECKING:
@@ -69,6 +68,11 @@ def group_column(reference: Mapping[str, Any]) -> tuple[str, ...]:
     return (name,) if isinstance(name, str) and name not in _LABELS else ()
 
 
+def row_columns(loads: Sequence[str], labels: Sequence[str] = ()) -> list[str]:
+    """Return the columns that tell something of single rows: ``u_<LOAD>``, and the names of groups."""
+    return [*(f"u_{load}" for load in loads), *labels]
+
+
 def row_uncertainty(table: Table, load: str) -> NDArray[np.float64] | None:
     """Return the column ``u_<LOAD>`` (rows,) in the load's unit; None where the data have none."""
     name = f"u_{load}"
@@ -87,20 +91,29 @@ def known_errors(method: str, statements: Statements, table: Table, load: str, w
         ``session``: an uncertainty or the group is not stated, or cannot be
     """
     u, reference = row_uncertainty(table, load), statements.reference
-    of_reference = reference.u(load)
+    stated = reference.of(load)
     group = np.zeros(table.rows, dtype=np.intp)
     if method == "gls":
         group, proportional = _groups(reference, table, where)
-        if of_reference is None:
+        if stated is None:
             expected = "{ U, k, unit } of the error that the rows of a group share"
             raise wrong(where, f"reference.uncertainty.{load}", None, expected)
+        if stated.relative is not None and not proportional:
+            expected = f"U in the unit of {load} where the shared error is constant"
+            raise wrong(where, f"reference.uncertainty.{load}", "a share of the applied load", expected)
         return KnownErrors(
-            u=u, group=group, u_shared=of_reference, proportional=proportional, u_cells=np.zeros(0)
+            u=u, group=group, u_shared=stated.u, proportional=proportional, u_cells=np.zeros(0)
         )
-    if u is None and not of_reference:
+    if u is None and (stated is None or not stated.U):
         expected = f"a column u_{load}, or reference.uncertainty.{load} = {{ U, k, unit }} with U above 0"
-        raise wrong(where, f"the uncertainty of {load}", of_reference, expected)
-    u = np.full(table.rows, of_reference, dtype=np.float64) if u is None else u
+        raise wrong(where, f"the uncertainty of {load}", None if stated is None else stated.U, expected)
+    u = reference.u_at(load, table.column(load)) if u is None else u
+    if u is not None and not (u > 0).all():
+        row = int((u <= 0).argmax()) + 1
+        got = f"a share of the applied load, which is 0 in row {row}"
+        raise wrong(
+            where, f"reference.uncertainty.{load}", got, f"U in the unit of {load}, or a column u_{load}"
+        )
     cells = np.array([_u_cell(c.u, c.resolution, c.name, where) for c in statements.cells])
     return KnownErrors(u=u, group=group, u_shared=0.0, proportional=False, u_cells=cells)
 
@@ -126,7 +139,6 @@ def _groups(reference: Reference, table: Table, where: object) -> tuple[NDArray[
     entry, error = reference.shared_group, _ERRORS[0]
     named = isinstance(entry, dict)
     if named:
-        check_keys(entry, ("column", "error"), where=f"{where}: reference.shared_group")
         error, entry = entry.get("error", error), entry.get("column", "every row")
         named = entry != "every row"
     if not isinstance(entry, str) or not entry.strip():

@@ -10,7 +10,10 @@ from typing import Any
 
 from toolkit.calibration.records.record import Zero
 from toolkit.calibration.session.bridge import Bridge, bridges_of, converted, fit_units
-from toolkit.calibration.session.known_errors import group_column
+from toolkit.calibration.session.cells import FILES
+from toolkit.calibration.session.declaration import refuse
+from toolkit.calibration.session.keys import session_faults
+from toolkit.calibration.session.known_errors import group_column, row_columns
 from toolkit.calibration.session.run_zero import without_read_zeros, without_run_zeros
 from toolkit.calibration.session.settings import (
     Settings,
@@ -23,7 +26,8 @@ from toolkit.calibration.session.settings import (
 from toolkit.calibration.session.statement_checks import check_columns, check_statements
 from toolkit.calibration.session.table import Table, read_table
 from toolkit.errors import SessionError
-from toolkit.files import check_keys, read_bytes, sha256_bytes
+from toolkit.files import read_bytes, read_regular, sha256_bytes
+from toolkit.recording.archive import MAX_FILE_BYTES
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -91,13 +95,15 @@ class Session:
         )
 
 
-def read_session(path: Path) -> Session:
+def read_session(path: Path, *, entered: bool = False) -> Session:
     """Read a session and its data files.
+
+    ``entered``: it lies beside a record. Sessions of older records may have keys that nobody read.
 
     Raises
     ------
     ConfigError
-        SESSION.toml: unknown key, missing or wrong value
+        SESSION.toml: unknown keys, missing or wrong values, all of them told at once
     SessionError
         a data file: columns, cells, no such file, or one outside the session's folder
     UnitError
@@ -105,16 +111,19 @@ def read_session(path: Path) -> Session:
     """
     session_bytes = read_bytes(path)
     raw = parse_session(session_bytes, where=path)
+    if not entered:
+        refuse(session_faults(raw), where=path)
     settings = settings_of(raw, where=path)
     loads, indications = settings.loads, settings.indications
     data_bytes = _file(path, raw.get("data"), "data")
-    uncertainties = [f"u_{load}" for load in loads]
+    uncertainties = row_columns(loads)
+    labels = group_column(raw.get("reference", {}))
     recorded = read_table(
         data_bytes,
         where=path.parent / str(raw["data"]),
         required=[*indications, *loads, *(uncertainties if settings.method == "wls" else ())],
         optional=uncertainties,
-        labels=group_column(raw.get("reference", {})),
+        labels=labels,
     )
     check_columns(recorded, loads, path)
     check_statements(raw, recorded, loads, path)
@@ -122,12 +131,11 @@ def read_session(path: Path) -> Session:
     table = converted(recorded, bridges, fit_units(recorded, bridges), where=path)
     if settings.zero == "run":
         table = without_run_zeros(table, indications, loads)
-    check_keys(dict(settings.tolerances), loads, where=f"{path}: check.tolerance")
     check_name = _check_name(settings, path)
     check_bytes = None if check_name is None else _file(path, check_name, "check")
     check = None
     if check_bytes is not None:
-        check = _check_table(check_bytes, path.parent / str(check_name), table, bridges, settings)
+        check = _check_table(check_bytes, path.parent / str(check_name), table, bridges, settings, labels)
     reference = raw.get("reference", {})
     return Session(
         path=path,
@@ -156,16 +164,27 @@ def read_session(path: Path) -> Session:
 
 
 def _check_name(settings: Settings, path: Path) -> str | None:
-    # A table [check] without a name means check.csv beside the session.
-    if settings.check is None and settings.check_table and (path.parent / "check.csv").is_file():
-        return "check.csv"
+    # A table [check] without a name means check.csv, or check.xlsx, beside the session.
+    if settings.check is None and settings.check_table:
+        return next((name for name in ("check.csv", "check.xlsx") if (path.parent / name).is_file()), None)
     return settings.check
 
 
 def _check_table(
-    data: bytes, where: Path, table: Table, bridges: Mapping[str, Bridge], settings: Settings
+    data: bytes,
+    where: Path,
+    table: Table,
+    bridges: Mapping[str, Bridge],
+    settings: Settings,
+    labels: tuple[str, ...],
 ) -> Table:
-    check = read_table(data, where=where, required=[*settings.indications, *settings.loads], runs=False)
+    check = read_table(
+        data,
+        where=where,
+        required=[*settings.indications, *settings.loads],
+        passed=row_columns(settings.loads, labels),
+        runs=False,
+    )
     # The check file may be in other units than the data; it is brought to those of the fit.
     units = {name: table.unit(name) for name in check.names}
     check = converted(check, bridges, units, where=where).in_units(units)
@@ -195,7 +214,7 @@ def _cell(bridge: Bridge, serial: str | None, entry: Mapping[str, Any], column: 
 
 def _file(path: Path, name: object, key: str) -> bytes:
     if not isinstance(name, str) or not name:
-        raise wrong(path, key, name, f'the name of a CSV file, such as {key} = "{key}.csv"')
+        raise wrong(path, key, name, f'the name of a file, such as {key} = "{key}.csv" or "{key}.xlsx"')
     target = path.parent / name
     try:
         # Links too: what an error quotes of a file must never be another one than the session's own.
@@ -208,11 +227,17 @@ def _file(path: Path, name: object, key: str) -> bytes:
             )  # fmt: skip
         if target.exists() and not target.is_file():
             raise IsADirectoryError(0, "not a regular file")
-        return target.read_bytes()
+        if target.exists() and (size := target.stat().st_size) > MAX_FILE_BYTES:
+            raise SessionError(
+                "a data file is too large",
+                where=target, got=f"{size / 2**20:.0f} MB", expected=f"at most {MAX_FILE_BYTES // 2**20} MB",
+                next_step="name the file of the reference loads; nothing was written", rule="inflation",
+            )  # fmt: skip
+        return read_regular(target)
     except (OSError, ValueError, RuntimeError) as error:
         raise SessionError(
             "a data file cannot be read",
             where=target, got=getattr(error, "strerror", None) or error,
-            expected="a CSV file beside the session",
-            next_step=f"correct '{key}' in {path.name}", rule="no-data",
+            expected=f"{FILES}, beside the session",
+            next_step=f"correct '{key}' in {path.name}; nothing was written", rule="no-data",
         ) from error  # fmt: skip

@@ -194,8 +194,6 @@ def shunt_entry(name: str, cell: Mapping[str, Any], scope: Scope) -> ShuntEntry 
 def _tables(entries: object, key: str, keys: Sequence[str], scope: Scope) -> list[dict[str, Any]]:
     if not isinstance(entries, list) or not all(isinstance(one, dict) for one in entries):
         raise wrong(scope.where, key, entries, f"tables [[{key}]] with {', '.join(keys)}")
-    for entry in entries:
-        check_keys(entry, keys, where=f"{scope.where}: {key}")
     return entries
 
 

@@ -18,7 +18,7 @@ from toolkit.calibration.records.record import ZEROS, Zero, canonical
 from toolkit.calibration.session.plain_toml import plain_toml
 from toolkit.calibration.terms import INTERCEPT, MODELS, NAME, model_terms
 from toolkit.errors import ConfigError, ToolkitError
-from toolkit.files import check_keys, parse_toml, sha256_bytes
+from toolkit.files import parse_toml, sha256_bytes
 from toolkit.machine.definition import quantity
 from toolkit.units import unit
 
@@ -27,12 +27,6 @@ _ENCODER = json.JSONEncoder(
 )
 METHODS = ("ols", "wls", "gls", "odr")
 DEFAULT_TOLERANCE = 1e-3
-_KEYS = (
-    "schema instrument date operator temperature indications loads data check reference cells zero creep "
-    "phase model degree method drop certificate standard polarity"
-).split()
-_CHECK = "file data tolerance".split()
-_STANDARD = ("preloads",)
 _MOST_PRELOADS = 99
 INSTRUMENT = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]*\Z")
 _CHECK_VALUE, _CHECK_TABLE = re.compile(r"(?m)^\s*check\s*="), re.compile(r"(?m)^\s*\[\s*check\s*\]")
@@ -90,7 +84,7 @@ def parse_session(data: bytes, *, where: object) -> dict[str, Any]:
     Raises
     ------
     ConfigError
-        ``not-toml``, with a hint where ``check`` stands as a value and as a table; ``unknown-key``
+        ``not-toml``, with a hint where ``check`` stands as a value and as a table
     """
     try:
         plain = plain_toml(data)
@@ -108,7 +102,6 @@ def parse_session(data: bytes, *, where: object) -> dict[str, Any]:
             "nothing was written",
             rule="not-toml",
         ) from error
-    check_keys(raw, _KEYS, where=where)
     return raw
 
 
@@ -167,12 +160,11 @@ def preloads_of(raw: Mapping[str, Any], where: object) -> int | None:
     Raises
     ------
     ConfigError
-        it is no whole number from 0 to 99, or the table has another key
+        it is no whole number from 0 to 99
     """
     entry = raw.get("standard", {})
     if not isinstance(entry, dict):
         raise wrong(where, "standard", entry, "a table [standard] with preloads = 3")
-    check_keys(entry, _STANDARD, where=f"{where}: standard")
     preloads = entry.get("preloads")
     if preloads is None:
         return None
@@ -233,7 +225,6 @@ def _check_entry(raw: Mapping[str, Any], where: object) -> tuple[str | None, dic
         return entry, {}
     if not isinstance(entry, dict):
         raise wrong(where, "check", entry, 'check = "check.csv", or a table [check] with file and tolerance')
-    check_keys(entry, _CHECK, where=f"{where}: check")
     tolerance = entry.get("tolerance", {})
     if not isinstance(tolerance, dict):
         raise wrong(where, "check.tolerance", tolerance, "{ FY = { value, unit } }")
@@ -275,8 +266,6 @@ def _choice(raw: Mapping[str, Any], key: str, known: tuple[str, ...], default: s
     if key == "zero" and isinstance(value, list | dict):
         # [[zero]] readings and zero = "tared" share the key: readings say nothing about the fit's zero.
         # A table [zero] says both, as [check] does.
-        if isinstance(value, dict):
-            check_keys(value, ("fit", "readings"), where=f"{where}: zero")
         value = value.get("fit", default) if isinstance(value, dict) else default
     if value not in known:
         raise wrong(where, key, value, " | ".join(known))

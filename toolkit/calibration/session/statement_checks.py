@@ -19,19 +19,14 @@ from toolkit.calibration.session.reading_entries import (
     zero_entries,
 )
 from toolkit.calibration.session.settings import wrong, zero_readings
-from toolkit.errors import SessionError
+from toolkit.errors import SessionError, UnitError
 from toolkit.files import check_keys, is_number
 from toolkit.machine.definition import quantity
-from toolkit.units import si_scale, unit
+from toolkit.units import Unit, si_scale, unit
 
 if TYPE_CHECKING:
     from toolkit.calibration.session.table import Table
 
-_REFERENCE = "standard certificate uncertainty due shared_group".split()
-_CELL = (
-    "serial resolution scale excitation shunt_expected shunt_measured shunt_tolerance u "
-    "temperature_coefficient replacement"
-).split()
 _PER_KELVIN = re.compile(r"\s*/\s*(K|degC|°C)\s*\Z")
 _FORCE, _MOMENT = re.compile(r"F[XYZ]?\Z"), re.compile(r"M[XYZ]\Z")
 
@@ -63,36 +58,45 @@ def check_columns(table: Table, loads: tuple[str, ...], where: object) -> None:
         name = f"u_{load}"
         if not table.has(name):
             continue
-        si_scale(table.unit(name), unit(table.unit(load)).dimension, where=f"{where}, column {name}")
+        found, dimension = unit(table.unit(name)), unit(table.unit(load)).dimension
+        if found.dimension != dimension:
+            raise _other_unit(
+                f"{where}, column {name}", found, dimension,
+                f"{table.unit(load)!r}; a share of the load is stated once for all rows, "
+                f"[reference.uncertainty] {load} = {{ U = .., k = .., unit = '%' }}",
+            )  # fmt: skip
         if not (table.column(name) > 0).all():
             row = int((table.column(name) <= 0).argmax()) + 1
             raise SessionError(
                 "a standard uncertainty is not positive",
-                where=f"{where}, row {row}, column {name}", got=table.column(name)[row - 1],
-                expected="a positive number", next_step="state the uncertainty of every row", rule="cell",
+                where=f"{where}, row {row} (line {table.lines[row - 1]}), column {name}",
+                got=table.column(name)[row - 1],
+                expected="a positive number",
+                next_step="state the uncertainty of every row; nothing was written", rule="cell",
             )  # fmt: skip
 
 
+def _other_unit(where: str, found: Unit, dimension: str, allowed: str) -> UnitError:
+    return UnitError(
+        f"unit {found.text!r} is no unit of {dimension}",
+        where=where,
+        got=f"{found.text} ({found.dimension})",
+        expected=f"a unit of {dimension}, such as {allowed}",
+        next_step="correct the unit; nothing was written",
+        rule="unit-dimension",
+    )
+
+
 def check_statements(raw: Mapping[str, Any], table: Table, loads: tuple[str, ...], where: object) -> None:
-    """Check what a session states beside its data; ``table`` is the data as recorded.
+    """Check what a session states beside its data; ``table`` is the data as recorded, its keys are `keys`'.
 
     Raises
     ------
     ConfigError, UnitError
-        an unknown key, a number that is none, a unit that is unknown or of another dimension
+        a number that is none, a unit that is unknown or of another dimension
     """
     indications = list(raw["indications"])  # checked by `settings`; a list of readings is in this order
-    for key, known in (("reference", _REFERENCE), ("cells", indications), ("certificate", None)):
-        entry = raw.get(key, {})
-        if not isinstance(entry, dict):
-            raise wrong(where, key, entry, f"a table [{key}]")
-        if known is not None:
-            check_keys(entry, known, where=f"{where}: {key}")
     cells = raw.get("cells", {})
-    for name, cell in cells.items():
-        if not isinstance(cell, dict):
-            raise wrong(where, f"cells.{name}", cell, f"a table [cells.{name}]")
-        check_keys(cell, _CELL, where=f"{where}: cells.{name}")
     scope = Scope(
         bridges=bridges_of(cells, indications, where=where),
         columns={name: table.unit(name) for name in indications},
@@ -112,7 +116,7 @@ def check_statements(raw: Mapping[str, Any], table: Table, loads: tuple[str, ...
         if not isinstance(replacement, str) or not replacement.strip():
             raise wrong(where, f"cells.{name}.replacement", replacement, "a text: why the cell was replaced")
         shunt_entry(name, cell, scope)
-    _check_reference(raw.get("reference", {}), table, loads, where)
+    _check_reference(raw.get("reference", {}), table, where)
     zero_entries(zero_readings(raw), scope)
     creep_entries(raw.get("creep", []), scope)
     polarity_readings(raw.get("polarity", []), scope)
@@ -170,30 +174,17 @@ def stated(entry: object, text: str, place: str, where: object) -> float:
     return float(value)
 
 
-def _check_reference(
-    reference: Mapping[str, Any], table: Table, loads: tuple[str, ...], where: object
-) -> None:
-    for key in ("standard", "certificate"):
-        # A certificate's number may be written without quotes.
-        told = reference.get(key, "-")
-        if isinstance(told, bool) or not isinstance(told, str | int) or not str(told).strip():
-            raise wrong(where, f"reference.{key}", told, f'a text: {key} = "..."')
-    uncertainty = reference.get("uncertainty", {})
-    if not isinstance(uncertainty, dict):
-        raise wrong(where, "reference.uncertainty", uncertainty, "{ FY = { U, k, unit } }")
-    check_keys(uncertainty, loads, where=f"{where}: reference.uncertainty")
-    for name, entry in uncertainty.items():
+def _check_reference(reference: Mapping[str, Any], table: Table, where: object) -> None:
+    for name, entry in reference.get("uncertainty", {}).items():
         place = f"reference.uncertainty.{name}"
-        if not isinstance(entry, dict):
-            raise wrong(where, place, entry, "{ U, k, unit }")
-        check_keys(entry, ("U", "k", "unit"), where=f"{where}: {place}")
         for key, least in (("U", "a number, zero or more"), ("k", "a positive number")):
             value = entry.get(key)
             if not is_number(value):
                 raise wrong(where, f"{place}.{key}", value, least)
             if value < 0 or (key == "k" and value == 0):
                 raise wrong(where, f"{place}.{key}", value, least)
-        text = entry.get("unit")
-        if not isinstance(text, str):
-            raise wrong(where, f"{place}.unit", text, f"a unit such as {table.unit(name)!r}", "no-unit")
-        si_scale(text, unit(table.unit(name)).dimension, where=f"{where}: {place}")
+        text = entry["unit"]
+        found, dimension = unit(text, where=f"{where}: {place}.unit"), unit(table.unit(name)).dimension
+        if found.dimension not in (dimension, "ratio"):
+            raise _other_unit(f"{where}: {place}.unit", found, dimension, f"{table.unit(name)!r}, or '%' or "
+                              "'ppm' of the applied load")  # fmt: skip

@@ -13,6 +13,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from toolkit.calibration.session.bridge import bridge_of, bridges_of
 from toolkit.calibration.session.reading_entries import Scope
 from toolkit.calibration.session.settings import preloads_of, zero_readings
@@ -21,21 +23,34 @@ from toolkit.machine.definition import quantity
 from toolkit.units import unit
 
 if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
     from toolkit.calibration.records.record import CalibrationRecord
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ReferenceUncertainty:
-    """Of one load: expanded uncertainty ``U`` in the load's unit, with its coverage factor ``k``."""
+    """Of one load: expanded uncertainty ``U`` in the load's unit, with its coverage factor ``k``.
+
+    ``relative`` is the expanded uncertainty as a share of the applied load, None where it was not stated so;
+    ``U`` is then that at the largest load.
+    """
 
     load: str
     U: float
     k: float
+    relative: float | None = None
 
     @property
     def u(self) -> float:
-        """Standard uncertainty, in the load's unit."""
+        """Standard uncertainty in the load's unit; of a relative one, that at the largest load."""
         return self.U / self.k
+
+    def u_at(self, value: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the standard uncertainty at applied loads; both in the load's unit, of one shape."""
+        if self.relative is None:
+            return np.full_like(value, self.u, dtype=np.float64)
+        return np.asarray(np.abs(value) * (self.relative / self.k), dtype=np.float64)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -49,8 +64,21 @@ class Reference:
     uncertainties: tuple[ReferenceUncertainty, ...]
 
     def u(self, load: str) -> float | None:
-        """Return the standard uncertainty of a load in its unit; None where none is stated."""
-        return next((one.u for one in self.uncertainties if one.load == load), None)
+        """Return the standard uncertainty of a load in its unit; None where none is stated.
+
+        Of one that was stated as a share of the applied load, it is that at the largest load.
+        """
+        stated = self.of(load)
+        return None if stated is None else stated.u
+
+    def u_at(self, load: str, value: ArrayLike) -> NDArray[np.float64] | None:
+        """Return the standard uncertainty at applied loads (any shape) in their unit; None: not stated."""
+        stated = self.of(load)
+        return None if stated is None else stated.u_at(np.asarray(value, dtype=np.float64))
+
+    def of(self, load: str) -> ReferenceUncertainty | None:
+        """Return what was stated of a load; None where nothing was."""
+        return next((one for one in self.uncertainties if one.load == load), None)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -104,6 +132,7 @@ def statements_of(record: CalibrationRecord) -> Statements:
         json.loads(record.settings),
         indications=units,
         loads={one.load: one.unit for one in record.loads},
+        largest={one.load: one.largest for one in record.loads},
         date=dt.date.fromisoformat(record.date),
         where=record.id,
         columns=columns,
@@ -129,11 +158,12 @@ def parse_statements(
     date: dt.date,
     where: object,
     columns: Mapping[str, str] | None = None,
+    largest: Mapping[str, float],
 ) -> Statements:
     """Return the statements of a session's settings.
 
     ``indications`` and ``loads`` are name to unit of the fit, ``columns`` name to unit of the data where an
-    indication was converted.
+    indication was converted, ``largest`` name to the largest absolute load of the fit.
     """
     entry = settings.get("reference", {})
     due = entry.get("due")
@@ -152,7 +182,8 @@ def parse_statements(
             due=None if due is None else dt.date.fromisoformat(str(due)),
             shared_group=entry.get("shared_group"),
             uncertainties=tuple(
-                _reference(name, one, loads[name]) for name, one in entry.get("uncertainty", {}).items()
+                _reference(name, one, loads[name], largest[name])
+                for name, one in entry.get("uncertainty", {}).items()
             ),
         ),
         cells=tuple(
@@ -166,9 +197,12 @@ def parse_statements(
     )
 
 
-def _reference(load: str, entry: Mapping[str, Any], text: str) -> ReferenceUncertainty:
-    factor = unit(str(entry["unit"])).factor / unit(text).factor
-    return ReferenceUncertainty(load=load, U=float(entry["U"]) * factor, k=float(entry["k"]))
+def _reference(load: str, entry: Mapping[str, Any], text: str, largest: float) -> ReferenceUncertainty:
+    U, k, found = float(entry["U"]), float(entry["k"]), unit(str(entry["unit"]))
+    if found.dimension == "ratio":
+        relative = U * found.factor
+        return ReferenceUncertainty(load=load, U=relative * largest, k=k, relative=relative)
+    return ReferenceUncertainty(load=load, U=U * (found.factor / unit(text).factor), k=k)
 
 
 def _cell(name: str, text: str, column: str, entry: Mapping[str, Any], where: object) -> CellStatement:

@@ -1,32 +1,48 @@
-"""Reference-load data: a CSV with units in its header, whole or not at all.
+"""Reference-load data: a table with units in its header, whole or not at all.
 
-The same light reader serves a session and the load-time refit of a record, so that what is checked is
-what was fitted; it needs numpy alone.
+The same reader serves a session and the load-time refit of a record, so that what is checked is what was
+fitted; for a plain CSV file it needs numpy alone.
 """
 
 from __future__ import annotations
 
-import csv
 import dataclasses
-import difflib
-import io
 import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
-from typing import TYPE_CHECKING, NamedTuple
+from itertools import chain
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from toolkit.calibration.session.separators import HOW_TO_SAVE, has_decimal_comma, separator_seen
-from toolkit.errors import SessionError, ToolkitError
+from toolkit.calibration.session.cells import Cells, is_empty, read_cells
+from toolkit.calibration.session.header import (
+    COMMENT,
+    RUNS,
+    Wanted,
+    header_error,
+    is_known,
+    read_head,
+    with_units_row,
+)
+from toolkit.errors import RecordingError, SessionError
 from toolkit.units import si_scale, unit
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-_HEADER = re.compile(r"(?P<name>[^\[\]]+?)\s*(?:\[(?P<unit>[^\[\]]*)\])?\s*\Z")
+_GROUPED = re.compile(r"[+-]?[1-9][0-9]{0,2}\.[0-9]{3}")
+_POINT_AND_COMMA = (
+    "the file has numbers with a decimal point and numbers with a comma, or marks between thousands: write "
+    "all of them with one decimal sign and nothing between thousands; nothing was written"
+)
+_DECIMAL_COMMA = (
+    "the number has a decimal comma, and commas stand between the cells too: save the file with semicolons "
+    "or tabs between the cells, or with a decimal point; nothing was written"
+)
+_CORRECT = "correct the cell, or remove the whole row with a reason in the laboratory's notes"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -35,6 +51,7 @@ class Table:
 
     ``run`` (rows,), ``up`` (rows,), True where the load was increased, and ``rotation`` [deg] are None where
     the file has no such column; ``labels`` are columns of names (name, a text a row), see `known_errors`.
+    ``lines`` (rows,) are the numbers of the rows in the file, for messages.
     """
 
     names: tuple[str, ...]
@@ -44,6 +61,7 @@ class Table:
     up: NDArray[np.bool_] | None
     rotation: NDArray[np.float64] | None
     labels: tuple[tuple[str, tuple[str, ...]], ...] = ()
+    lines: Sequence[int] = ()
 
     @property
     def rows(self) -> int:
@@ -104,17 +122,19 @@ def read_table(
     required: Sequence[str],
     optional: Sequence[str] = (),
     labels: Sequence[str] = (),
+    passed: Sequence[str] = (),
     runs: bool = True,
 ) -> Table:
-    """Read reference-load data.
+    """Read reference-load data, see `cells` for the kinds of files.
 
     Parameters
     ----------
     data : the file's content
     where : the file, for messages
-    required, optional : names of the numeric columns; each needs a unit in the header
+    required, optional : names of the numeric columns; each needs a unit in the header, or in a row below it
     labels : names of columns that may hold names, without a unit; with one they are numeric
-    runs : whether ``run`` and ``direction`` are required (and ``rotation`` allowed), or not allowed
+    passed : names of columns that may stand in the file and are passed over, as ``comment`` always is
+    runs : whether ``run`` and ``direction`` are required and ``rotation`` is read; else they are passed over
 
     Raises
     ------
@@ -123,234 +143,137 @@ def read_table(
     UnitError
         a unit is unknown
     """
-    plain = _plain_columns(data)
-    rows = [] if plain is not None else _rows(data, where)
-    header = rows[0] if plain is None else plain[0]
-    head = _head(_Wanted(tuple(header), tuple(required), tuple(optional), tuple(labels), runs), where)
-    columns = _turned(rows[1:], len(header), where) if plain is None else plain[1]
-    if not columns[0]:
-        raise _error(where, "the file has no rows", "0 rows", "one row a reference load", "no-data")
-    cells = dict(zip(head.names, columns, strict=True))
+    over = {*passed, COMMENT, *(() if runs else RUNS)} - {*required}
+    wanted = Wanted(tuple(required), tuple(optional), tuple(labels), tuple(sorted(over)), runs)
+    cells = with_units_row(read_cells(data, lambda text: is_known(text, wanted), where=where), wanted)
+    head = read_head(cells, wanted)
+    if not cells.lines:
+        raise header_error(
+            cells.where, "the file has no rows", "0 rows", "one row a reference load", "no-data"
+        )
     up = None
-    if "direction" in cells:
-        direction = cells["direction"]
-        if not set(direction) <= {"up", "down"}:
-            direction = tuple(cell.strip().lower() for cell in direction)
-            for number, cell in enumerate(direction, start=1):
-                if cell not in ("up", "down"):
-                    raise _cell(where, number, "direction", cell, "up or down")
-        up = np.array([cell == "up" for cell in direction])
-    more = [name for name in ("run", "rotation") if name in cells]
-    found = _numbers({name: cells[name] for name in (*head.numeric, *more)}, where)
-    values, told = found[: len(head.numeric)].T, dict(zip(more, found[len(head.numeric) :], strict=True))
-    run = told.get("run")
+    if "direction" in head.columns:
+        direction = [str(cell).strip().lower() for cell in cells.columns[head.columns["direction"]]]
+        for number, text in enumerate(direction, start=1):
+            if text not in ("up", "down"):
+                raise _cell(cells, number, head.columns["direction"], "up or down")
+        up = np.array([text == "up" for text in direction])
+    more = [name for name in ("run", "rotation") if name in head.columns]
+    found = _numbers(cells, [head.columns[name] for name in (*head.numeric, *more)])
+    values, extra = found[: len(head.numeric)].T, dict(zip(more, found[len(head.numeric) :], strict=True))
+    run = extra.get("run")
     if run is not None and (fraction := np.flatnonzero(run != np.floor(run))).size:
-        at = int(fraction[0])
-        raise _cell(where, at + 1, "run", cells["run"][at], "a whole number")
+        raise _cell(cells, int(fraction[0]) + 1, head.columns["run"], "a whole number")
     return Table(
         names=head.numeric,
         units=head.units,
         values=values,
         run=run,
         up=up,
-        rotation=told.get("rotation"),
-        labels=tuple((name, _texts(cells[name], name, where)) for name in head.labels),
+        rotation=extra.get("rotation"),
+        labels=tuple((name, _texts(cells, head.columns[name])) for name in head.labels),
+        lines=cells.lines,
     )
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Head:
-    """``names`` of all columns, ``numeric`` and ``units`` of those that are loads, cells, uncertainties."""
-
-    names: tuple[str, ...]
-    numeric: tuple[str, ...]
-    units: tuple[str, ...]
-    labels: tuple[str, ...]
-
-
-class _Wanted(NamedTuple):
-    """A header's cells, and what `read_table` was asked for."""
-
-    header: tuple[str, ...]
-    required: tuple[str, ...]
-    optional: tuple[str, ...]
-    labels: tuple[str, ...]
-    runs: bool
-
-
-def _head(wanted: _Wanted, where: object) -> _Head:
-    try:
-        return _known_head(wanted)
-    except ToolkitError:
-        # Said again with the file's name.
-        return _read_head(wanted, where)
-
-
-@lru_cache(maxsize=256)
-def _known_head(wanted: _Wanted) -> _Head:
-    # The files of a history have one header.
-    return _read_head(wanted, "")
-
-
-def _read_head(wanted: _Wanted, where: object) -> _Head:
-    header, required, optional, labels, runs = wanted
-    parsed = [_HEADER.match(cell.strip()) for cell in header]
-    names = [
-        match["name"].strip() if match else cell.strip() for match, cell in zip(parsed, header, strict=True)
-    ]
-    extra = ("run", "direction", "rotation") if runs else ()
-    _check_header(names, list(header), [*required, *(extra[:2])], [*optional, *labels, *extra], where)
-    numeric, units, texts = [], [], []
-    for name, cell, match in zip(names, header, parsed, strict=True):
-        if name in ("run", "direction", "rotation"):
-            continue
-        if match is None or match["unit"] is None:
-            if name in labels and name not in required:
-                texts.append(name)
-                continue
-            raise _error(
-                f"{where}, column {name}", f"column {name} has no unit",
-                cell, f"a header such as '{name} [N]' or '{name} [mV/V]'", "no-unit",
-            )  # fmt: skip
-        numeric.append(name)
-        units.append(unit(match["unit"].strip(), where=f"{where}, column {name}").text)
-    return _Head(names=tuple(names), numeric=tuple(numeric), units=tuple(units), labels=tuple(texts))
-
-
-def _texts(cells: Sequence[str], name: str, where: object) -> tuple[str, ...]:
-    texts = tuple(cell.strip() for cell in cells)
+def _texts(cells: Cells, column: int) -> tuple[str, ...]:
+    # A worksheet holds a stack named 1 as a number.
+    texts = tuple(
+        f"{cell:.15g}" if isinstance(cell, float) else str(cell).strip() for cell in cells.columns[column]
+    )
     if not all(texts):
-        raise _cell(where, texts.index("") + 1, name, "", "a name in every row")
+        raise _cell(cells, texts.index("") + 1, column, "a name in every row")
     return texts
 
 
-def _turned(rows: list[list[str]], width: int, where: object) -> list[Sequence[str]]:
-    """Return rows as columns."""
-    for number, row in enumerate(rows, start=1):
-        if len(row) != width:
-            raise _error(
-                f"{where}, row {number} (line {number + 1})",
-                "a row has another number of cells than the header",
-                f"{len(row)} cells: {', '.join(row)}", f"{width} cells", "columns",
-                "correct the file (a number with a decimal comma makes two cells: "
-                f"{HOW_TO_SAVE})" if len(row) > width else "correct the file; nothing was written",
-            )  # fmt: skip
-    return [[row[at] for row in rows] for at in range(width)]
-
-
-def _plain_columns(data: bytes) -> tuple[list[str], list[Sequence[str]]] | None:
-    """Return the header and the columns that `csv` reads, without it.
-
-    None where there are quotes, blank rows, rows of another length, or bytes that are no text.
-    """
-    try:
-        text = data.decode("utf-8-sig")
-    except UnicodeDecodeError:
-        return None
-    if '"' in text or "\r" in text or "\0" in text:
-        return None
-    lines = text.removesuffix("\n").split("\n")
-    commas = lines[0].count(",")
-    if not commas or {line.count(",") for line in lines} != {commas}:
-        return None
-    cells = ",".join(lines).split(",")
-    width = commas + 1
-    # A row of empty cells is no row, and begins with one.
-    if not all(map(str.strip, cells[::width])):
-        return None
-    return cells[:width], [cells[width + at :: width] for at in range(width)]
-
-
-def _rows(data: bytes, where: object) -> list[list[str]]:
-    try:
-        text = data.decode("utf-8-sig")
-        read = csv.reader(io.StringIO(text, newline=""), strict=True)
-        rows = [row for row in read if "".join(row).strip()]
-    except (ValueError, csv.Error) as error:
-        raise _error(
-            where, "the file is no CSV text", str(error), "comma-separated UTF-8 text", "no-csv"
-        ) from error
-    if not rows:
-        raise _error(where, "the file is empty", "no header", "a header with units, then rows", "no-data")
-    return rows
-
-
-def _check_header(
-    names: list[str], header: list[str], required: list[str], optional: list[str], where: object
-) -> None:
-    seen = separator_seen(header)
-    if seen is not None and not set(required) <= set(names):
-        raise _error(
-            where, f"the file's cells are separated by {seen}", ", ".join(header),
-            "commas between the cells, a point in the numbers", "columns", HOW_TO_SAVE,
-        )  # fmt: skip
-    for name in names:
-        if names.count(name) > 1:
-            raise _error(
-                where, f"column {name} stands twice", ", ".join(header), f"one column {name}", "columns"
-            )
-    for name in required:
-        if name not in names:
-            raise _error(
-                where, f"column {name} is missing", ", ".join(header), ", ".join(required), "columns"
-            )
-    known = [*required, *optional]
-    for name in names:
-        if name not in known:
-            near = difflib.get_close_matches(name, known, n=1, cutoff=0.4)
-            hint = f"did you mean {near[0]!r}? " if near else ""
-            raise _error(
-                where, f"unknown column {name!r}", name, ", ".join(dict.fromkeys(known)), "columns",
-                hint + "name it in indications or loads of the session, or remove it",
-            )  # fmt: skip
-
-
-def _numbers(columns: Mapping[str, Sequence[str]], where: object) -> NDArray[np.float64]:
-    """Return the columns' numbers (columns, rows)."""
-    try:
-        values = np.array([list(map(float, cells)) for cells in columns.values()])
-        # float() reads 1_0 as ten; in a table an underscore is a slip.
-        if np.isfinite(values).all() and not any("_" in "".join(cells) for cells in columns.values()):
-            return values
-    except ValueError:
-        pass
+def _numbers(cells: Cells, at: Sequence[int]) -> NDArray[np.float64]:
+    """Return the numbers of columns (columns, rows)."""
+    columns = [cells.columns[one] for one in at]
+    if cells.separator == ",":
+        text = "".join(map("".join, columns))
+        try:
+            values = np.array([list(map(float, column)) for column in columns])
+            # float() reads 1_0 as ten, and digits of every script; in a table they are a slip.
+            if np.isfinite(values).all() and text.isascii() and "_" not in text:
+                return values
+        except ValueError:
+            pass
+    decimal = _decimal(cells, at)
     return np.array(
-        [
-            [_number(cell, at, name, where) for at, cell in enumerate(cells, start=1)]
-            for name, cells in columns.items()
-        ]
+        [[_number(cells, row, one, decimal) for row in range(1, len(cells.lines) + 1)] for one in at]
     )
 
 
-def _number(cell: str, at: int, name: str, where: object) -> float:
+def _decimal(cells: Cells, at: Sequence[int]) -> str:
+    from toolkit.recording.dialect import decimal_sign
+
+    texts = [cell for cell in chain.from_iterable(cells.columns[one] for one in at) if isinstance(cell, str)]
+    try:
+        # Texts of a worksheet are numbers that somebody pasted: their commas are judged as a text file's.
+        decimal = decimal_sign(texts, cells.separator or ";", where=Path(cells.where))
+    except RecordingError as error:
+        raise _ambiguous(cells, at, ",") from error
+    pointed = [text.strip() for text in texts if "." in text]
+    if decimal == "." and cells.separator != "," and pointed and all(map(_GROUPED.fullmatch, pointed)):
+        # Where commas separate no cells they may be decimal signs, and then points stand between thousands.
+        raise _ambiguous(cells, at, ".")
+    return decimal
+
+
+def _ambiguous(cells: Cells, at: Sequence[int], mark: str) -> SessionError:
+    row, column = next(
+        (row, one)
+        for one in at
+        for row, cell in enumerate(cells.columns[one], start=1)
+        if isinstance(cell, str) and mark in cell
+    )
+    return SessionError(
+        f"the mark {mark!r} in the numbers may be their decimal sign or stand between thousands",
+        where=cells.place(row, column),
+        got=f"{cells.columns[column][row - 1]!r}, and every other number with it has three digits behind it",
+        expected="numbers that can be read in one way only",
+        next_step="save the file with a point as the decimal sign and nothing between thousands, and more or "
+        "fewer than three decimals in one of them; nothing was written",
+        rule="ambiguous-text",
+    )
+
+
+def _number(cells: Cells, row: int, column: int, decimal: str) -> float:
+    cell = cells.columns[column][row - 1]
+    if isinstance(cell, str):
+        from toolkit.recording.dialect import number_or_text
+
+        cell = number_or_text(cell, decimal)
+    if isinstance(cell, bool) or not isinstance(cell, int | float):
+        raise _cell(cells, row, column, "a finite number")
     try:
         value = float(cell)
-    except ValueError:
-        value = math.nan
-    if not math.isfinite(value) or "_" in cell:
-        raise _cell(where, at, name, cell, "a finite number")
+    except OverflowError:
+        value = math.inf
+    if not math.isfinite(value):
+        raise _cell(cells, row, column, "a finite number")
     return value
 
 
-def _cell(where: object, row: int, name: str, got: str, expected: str) -> SessionError:
+def _cell(cells: Cells, row: int, column: int, expected: str) -> SessionError:
+    cell: Any = cells.columns[column][row - 1]
+    next_step = _CORRECT
+    if is_empty(cell) and cells.merged:
+        next_step = "the worksheet has merged cells, which hold one value: unmerge them and fill every row"
+    elif is_empty(cell) and not cells.separator:
+        next_step += "; a formula has a value only once a spreadsheet has computed and saved it"
+    elif isinstance(cell, str) and "," in cell:
+        next_step = _DECIMAL_COMMA if cells.separator == "," else _POINT_AND_COMMA
+    elif hasattr(cell, "isoformat"):
+        next_step = (
+            "a spreadsheet has made a date or a time of what was typed: type the number again in a cell "
+            "with the format of a number"
+        )
     return SessionError(
-        f"row {row}, column {name} holds no usable value",
-        where=f"{where}, row {row} (line {row + 1}), column {name}",
-        got=repr(got),
+        f"row {row}, column {cells.name(column)} holds no usable value",
+        where=cells.place(row, column),
+        got="an empty cell" if is_empty(cell) else repr(cell) if isinstance(cell, str) else cell,
         expected=expected,
-        next_step=f"the number has a decimal comma: {HOW_TO_SAVE}"
-        if has_decimal_comma(got)
-        else "correct the cell, or remove the whole row with a reason in the laboratory's notes",
+        next_step=next_step,
         rule="cell",
     )
-
-
-def _error(
-    where: object,
-    what: str,
-    got: object,
-    expected: object,
-    rule: str,
-    next_step: str = "correct the file; nothing was written",
-) -> SessionError:
-    return SessionError(what, where=where, got=got, expected=expected, next_step=next_step, rule=rule)

@@ -168,8 +168,8 @@ def _e74(rows: CellRows, direction: str, degree: int | None) -> Evaluation:
 
 
 def _iso376(source: CellSource, rows: CellRows, preloads: int | None, degree: int | None) -> Evaluation:
-    stated = source.statements.reference.u(rows.load)
-    given = iso376_runs(rows.runs, stated_u=stated)
+    stated = source.statements.reference.of(rows.load)
+    given = iso376_runs(rows.runs, stated=stated)
     result, reasons = None, (*_zero_reasons(rows), *given.reasons)
     try:
         result = evaluate_iso376(

@@ -13,6 +13,7 @@ from toolkit.calibration.standards.iso376_input import Iso376Run
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from toolkit.calibration.session.statements import ReferenceUncertainty
     from toolkit.calibration.standards.cell_rows import CellRun
 
 # Reference loads that differ by less are one force; the deflection is carried to it in proportion.
@@ -32,8 +33,8 @@ class Iso376Data:
     reasons: tuple[str, ...]
 
 
-def iso376_runs(runs: Sequence[CellRun], *, stated_u: float | None) -> Iso376Data:
-    """Return the runs that have every increasing force of the first; ``stated_u`` for rows without one."""
+def iso376_runs(runs: Sequence[CellRun], *, stated: ReferenceUncertainty | None) -> Iso376Data:
+    """Return the runs that have every increasing force of the first; ``stated`` for rows without an own u."""
     levels = np.array(_levels(runs[0].force[runs[0].up]))
     made, reasons = [], []
     if runs[0].rotation_deg is None:
@@ -61,7 +62,7 @@ def iso376_runs(runs: Sequence[CellRun], *, stated_u: float | None) -> Iso376Dat
                 zero_after=run.zero_after,
             )
         )
-    u = None if stated_u is None else np.full(len(levels), stated_u)
+    u = None if stated is None else stated.u_at(levels)
     if all(run.u is not None for run in runs) and len(levels):
         u = np.array([
             max(float(run.u[near].max(initial=0.0)) for run in runs if run.u is not None

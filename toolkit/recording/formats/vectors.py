@@ -10,7 +10,7 @@ import numpy as np
 
 from toolkit.errors import CellError, ColumnError, RecordingError, UnitError, UnreadableError
 from toolkit.machine import Machine
-from toolkit.recording.columns import assign_columns, looks_like_header, split_header
+from toolkit.recording.columns import assign_columns, header_of, split_header
 from toolkit.recording.model import Series
 from toolkit.units import unit
 
@@ -56,7 +56,7 @@ def one_table(tables: Sequence[Vectors], machine: Machine, *, where: object) -> 
             "the file has no channels", where=where, got="no channel", expected="channels with values",
             next_step="repeat the recording, or leave the file out of the test", rule="no-data",
         )  # fmt: skip
-    fitting = [one for one in filled if looks_like_header([v.name for v in one.vectors], machine)]
+    fitting = [one for one in filled if any(map(header_of(machine), (v.name for v in one.vectors)))]
     if len(fitting) > 1:
         raise RecordingError(
             "more than one group of channels looks like a recording",

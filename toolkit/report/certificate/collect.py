@@ -115,7 +115,10 @@ def collect(
         reference=statements.reference.standard,
         reference_certificate=statements.reference.certificate,
         reference_uncertainties=tuple(
-            (one.load, one.U, one.k, record.load(one.load).unit) for one in statements.reference.uncertainties
+            (one.load, one.U, one.k, record.load(one.load).unit)
+            if one.relative is None
+            else (one.load, 100 * one.relative, one.k, "% of the applied load")
+            for one in statements.reference.uncertainties
         ),
         rule=stated.rule,
         interval=stated.interval,
@@ -158,6 +161,11 @@ def _admit(record: CalibrationRecord, status: RecordStatus, day: dt.date, draft:
         raise _refused(
             record.id, "certificate-withdrawn", f"withdrawn: {status.reason or 'no reason stated'}",
             "a record that is not withdrawn, or the paper of an earlier day with --known-at",
+        )  # fmt: skip
+    if status.state == "discarded":
+        raise _refused(
+            record.id, "certificate-discarded", f"discarded: {status.reason or 'no reason stated'}",
+            "a record that was approved",
         )  # fmt: skip
     if day < dt.date.fromisoformat(record.date):
         raise _refused(

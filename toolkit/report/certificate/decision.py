@@ -21,25 +21,6 @@ RULES = {
         "rejection is at most 2.5 % for fail and 50 % for conditional fail."
     ),
 }
-_NAMES = {
-    "simple": "simple",
-    "simple acceptance": "simple",
-    "guard band": "guard_band",
-    "guard band w=u": "guard_band",
-    "guarded acceptance": "guard_band",
-    "guarded": "guard_band",
-    "w=u": "guard_band",
-}
-
-
-def rule_of(text: str) -> str | None:
-    """Return the decision rule that a session names; None for a text that names none.
-
-    >>> rule_of("guard band, w = U"), rule_of("Simple acceptance"), rule_of("by eye")
-    ('guard_band', 'simple', None)
-    """
-    plain = " ".join(text.lower().replace("_", " ").replace("-", " ").replace(",", " ").split())
-    return _NAMES.get(plain.replace(" = ", "=").replace("= ", "=").replace(" =", "="))
 
 
 def decide(rule: str, deviation: float, tolerance: float, U: float) -> Verdict:

@@ -7,21 +7,15 @@ stand in the style file (``org.toml``) beside the template instead.
 from __future__ import annotations
 
 import datetime as dt
-import difflib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from toolkit.calibration.session.declaration import Fault, is_text
+from toolkit.calibration.session.keys import TEXTS, certificate_faults, rule_of
 from toolkit.errors import ConfigError
 from toolkit.findings import Finding
-from toolkit.report.certificate.decision import rule_of
 from toolkit.report.style import Style
-
-TEXTS = (
-    "number laboratory address place country accreditation customer customer_address item method "
-    "decision_rule interval opinions"
-).split()
-KEYS = (*TEXTS, "received", "due", "interval_agreed")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -69,24 +63,12 @@ def read_stated(table: Mapping[str, Any], style: Style, *, recall: str | None, w
         )
         if value
     }
-    for name in TEXTS:
-        if name in table:
-            texts[name] = _text(table, name, where)
-    findings = [_unknown(key, where) for key in table if key not in KEYS]
-    rule = rule_of(texts["decision_rule"]) if "decision_rule" in texts else None
-    if "decision_rule" in texts and rule is None:
-        findings.append(
-            Finding(
-                rule="certificate-rule",
-                where=where,
-                message=f"decision rule {texts['decision_rule']!r} is not known (simple, guard_band): no "
-                "conformity is stated",
-            )
-        )
+    findings = [_told(fault, where) for fault in certificate_faults(table)]
+    texts |= {name: " ".join(str(table[name]).split()) for name in TEXTS if name in table}
     return Stated(
         texts=texts,
-        received=_date(table, "received", where),
-        rule=rule,
+        received=_date(table, "received"),
+        rule=rule_of(texts.get("decision_rule", "")),
         interval=_interval(table, texts, recall, where, findings),
         findings=tuple(findings),
     )
@@ -95,12 +77,9 @@ def read_stated(table: Mapping[str, Any], style: Style, *, recall: str | None, w
 def _interval(
     table: Mapping[str, Any], texts: Mapping[str, str], recall: str | None, where: str, found: list[Finding]
 ) -> str | None:
-    agreed = table.get("interval_agreed", False)
-    if not isinstance(agreed, bool):
-        raise _wrong(where, "interval_agreed", agreed, "true or false")
-    due = _date(table, "due", where)
+    due = _date(table, "due")
     interval = texts.get("interval") or recall
-    if not agreed:
+    if not table.get("interval_agreed", False):
         return None
     if due is None and interval is None:
         found.append(
@@ -117,40 +96,27 @@ def _interval(
     return "As agreed with the customer: " + ", ".join(parts) + "."
 
 
-def _unknown(key: str, where: str) -> Finding:
-    near = difflib.get_close_matches(key, KEYS, n=1, cutoff=0.5)
-    hint = f"; did you mean {near[0]!r}?" if near else f"; known are {', '.join(KEYS)}"
-    return Finding(
-        rule="certificate-key",
-        where=f"{where}: [certificate]",
-        message=f"{key!r} is not known and is not printed{hint}",
-    )
-
-
-def _text(table: Mapping[str, Any], key: str, where: str) -> str:
-    value = table[key]
-    if isinstance(value, int) and not isinstance(value, bool):
-        value = str(value)  # a certificate's number may be written without quotes
-    if isinstance(value, str) and value.strip():
-        return " ".join(value.split())
-    raise _wrong(where, key, value, "a text")
-
-
-def _date(table: Mapping[str, Any], key: str, where: str) -> dt.date | None:
-    if key not in table:
-        return None
-    try:
-        return dt.date.fromisoformat(str(table[key]))
-    except ValueError as error:
-        raise _wrong(where, key, table[key], "a date such as 2026-03-31") from error
-
-
-def _wrong(where: str, key: str, got: object, expected: str) -> ConfigError:
-    return ConfigError(
-        f"[certificate] {key} cannot be printed",
-        where=f"{where}: [certificate] {key}",
-        got=got if str(got).strip() else "an empty text",
-        expected=expected,
+def _told(fault: Fault, where: str) -> Finding:
+    """Return the finding of an entry of a record from before sessions were checked for it, or refuse it."""
+    if fault.kind == "unknown":
+        known = f"did you mean {fault.near!r}?" if fault.near else f"known are {fault.expected}"
+        message = f"{fault.name!r} is not known and is not printed; {known}"
+        return Finding(rule="certificate-key", where=f"{where}: [certificate]", message=message)
+    if fault.name == "decision_rule" and is_text(fault.got):
+        message = f"decision rule {fault.got!r} is not known ({fault.expected}): no conformity is stated"
+        return Finding(rule="certificate-rule", where=where, message=message)
+    if fault.name == "country" and is_text(fault.got):
+        message = f"country {fault.got!r} is not {fault.expected}"
+        return Finding(rule="certificate-country", where=where, message=message)
+    raise ConfigError(
+        f"[certificate] {fault.name} cannot be printed",
+        where=f"{where}: [certificate] {fault.name}",
+        got=fault.got if str(fault.got).strip() else "an empty text",
+        expected=fault.expected,
         next_step="correct the session and calibrate again: the statement belongs to the record",
         rule="certificate-statement",
     )
+
+
+def _date(table: Mapping[str, Any], key: str) -> dt.date | None:
+    return dt.date.fromisoformat(str(table[key])) if key in table else None

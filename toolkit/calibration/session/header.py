@@ -1,0 +1,206 @@
+"""The header of reference-load data: names of the session, each with its unit.
+
+A unit stands in brackets, ``FY [kN]`` or ``FY (kN)``, or alone in the row below the names. Names are those of
+the session; where nothing else can be meant, another case is the same name.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import difflib
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import NamedTuple
+
+from toolkit.calibration.session.cells import Cells, is_empty
+from toolkit.errors import SessionError, ToolkitError
+from toolkit.units import unit
+
+COMMENT = "comment"
+RUNS = ("run", "direction", "rotation")
+_UNIT = re.compile(r"(?P<name>[^\[\]]+?)\s*\[(?P<unit>[^\[\]]*)\]\Z")
+_ROUND = re.compile(r"(?P<name>[^()]+?)\s*\((?P<unit>[^()]*)\)\Z")
+
+
+class Wanted(NamedTuple):
+    """What `read_table` was asked for."""
+
+    required: tuple[str, ...]
+    optional: tuple[str, ...]
+    labels: tuple[str, ...]
+    passed: tuple[str, ...]
+    runs: bool
+
+    @property
+    def needed(self) -> tuple[str, ...]:
+        """Names of the columns that must be there."""
+        return (*self.required, *(RUNS[:2] if self.runs else ()))
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of all columns that may be there."""
+        return tuple(
+            dict.fromkeys(
+                (*self.needed, *self.optional, *self.labels, *(RUNS if self.runs else ()), *self.passed)
+            )
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Head:
+    """Index of the columns that are read, by name; ``numeric`` and ``units`` of loads, cells, uncertainties.
+
+    ``labels`` are columns of names.
+    """
+
+    columns: Mapping[str, int]
+    numeric: tuple[str, ...]
+    units: tuple[str, ...]
+    labels: tuple[str, ...]
+
+
+def is_known(text: str, wanted: Wanted) -> bool:
+    """Tell whether a header's text names a column of the session."""
+    return _split(text, wanted)[0] in wanted.names
+
+
+def with_units_row(cells: Cells, wanted: Wanted) -> Cells:
+    """Return the cells with the units of a row below the names in the header, where there is such a row.
+
+    It is one where no header has a unit and every column that needs one has a text below that is no number.
+    """
+    split = [_split(text, wanted) for text in cells.header]
+    labels = (name for name in wanted.labels if name not in wanted.required)
+    plain = (*(RUNS if wanted.runs else ()), *wanted.passed, *labels)
+    needing = [at for at, (name, _) in enumerate(split) if name and name not in plain]
+    if not cells.lines or not needing or any(text is not None for _, text in split):
+        return cells
+    below = [column[0] for column in cells.columns]
+    if not all(isinstance(below[at], str) and re.search(r"[^\W\d_]|%", below[at]) for at in needing):
+        return cells
+    header = tuple(
+        f"{text} [{below[at].strip().strip('[]()').strip()}]" if at in needing else text
+        for at, text in enumerate(cells.header)
+    )
+    return dataclasses.replace(
+        cells, header=header, columns=tuple(column[1:] for column in cells.columns), lines=cells.lines[1:]
+    )
+
+
+def read_head(cells: Cells, wanted: Wanted) -> Head:
+    """Return what the columns are.
+
+    Raises
+    ------
+    SessionError
+        a column is missing, doubled, unknown, without a name or without a unit
+    UnitError
+        a unit is unknown
+    """
+    if not any(_split(text, wanted)[0] in wanted.names for text in cells.header):
+        raise header_error(
+            cells.where, "the first row is no header of the session",
+            ", ".join(text for text in cells.header if text), ", ".join(wanted.needed), "columns",
+            "write the names of the session and their units in the first row that is not empty, and a title "
+            "elsewhere; nothing was written",
+        )  # fmt: skip
+    for at, text in enumerate(cells.header):
+        filled = () if text else [row for row, cell in enumerate(cells.columns[at], 1) if not is_empty(cell)]
+        if filled:
+            raise header_error(
+                cells.place(filled[0], at), "a column has no header", cells.columns[at][filled[0] - 1],
+                "a header above every column that has values", "columns",
+            )  # fmt: skip
+    try:
+        return _known_head(cells.header, wanted)
+    except ToolkitError:
+        # Said again with the file's name.
+        return _read_head(cells.header, wanted, cells.where)
+
+
+@lru_cache(maxsize=256)
+def _known_head(header: tuple[str, ...], wanted: Wanted) -> Head:
+    # The files of a history have one header.
+    return _read_head(header, wanted, "")
+
+
+def _read_head(header: tuple[str, ...], wanted: Wanted, where: str) -> Head:
+    split = [_split(text.strip(), wanted) for text in header]
+    _check_names([name for name, _ in split if name], header, wanted, where)
+    columns, numeric, units, labels = {}, [], [], []
+    for at, (name, text) in enumerate(split):
+        if not name or name in wanted.passed:
+            continue
+        if wanted.runs and name in RUNS:
+            columns[name] = at
+            continue
+        if text is None:
+            if name not in wanted.labels or name in wanted.required:
+                raise header_error(
+                    f"{where}, column {name}", f"column {name} has no unit", header[at],
+                    f"a header such as '{name} [N]' or '{name} [mV/V]', or a row of units below the header",
+                    "no-unit",
+                )  # fmt: skip
+            labels.append(name)
+        else:
+            numeric.append(name)
+            units.append(unit(text.strip(), where=f"{where}, column {name}").text)
+        columns[name] = at
+    return Head(columns=columns, numeric=tuple(numeric), units=tuple(units), labels=tuple(labels))
+
+
+@lru_cache(maxsize=1024)
+def _split(text: str, wanted: Wanted) -> tuple[str, str | None]:
+    """Return a header's name, as the session writes it where it is one of its, and its unit."""
+    text = " ".join(text.split())
+    name, found = text, None
+    for pattern in (_UNIT, _ROUND):
+        match = pattern.match(text)
+        # Round brackets are part of many names; they hold a unit where the name is the session's without.
+        if match and (pattern is _UNIT or _named(match["name"], wanted) in wanted.names):
+            name, found = match["name"].strip(), match["unit"]
+            break
+    return _named(name, wanted), found
+
+
+def _named(name: str, wanted: Wanted) -> str:
+    name = name.strip()
+    if name in wanted.names:
+        return name
+    fits = [one for one in wanted.names if one.casefold() == name.casefold()]
+    return fits[0] if len(fits) == 1 else name
+
+
+def _check_names(names: list[str], header: Sequence[str], wanted: Wanted, where: str) -> None:
+    told = ", ".join(text for text in header if text)
+    for name in names:
+        if names.count(name) > 1:
+            raise header_error(where, f"column {name} stands twice", told, f"one column {name}", "columns")
+    missing = [name for name in wanted.needed if name not in names]
+    if missing:
+        what = f"column {missing[0]} is missing" if len(missing) == 1 else (
+            f"columns {', '.join(missing)} are missing"
+        )  # fmt: skip
+        raise header_error(where, what, told, ", ".join(wanted.needed), "columns")
+    for name in names:
+        if name not in wanted.names:
+            near = difflib.get_close_matches(name, wanted.names, n=1, cutoff=0.4)
+            hint = f"did you mean {near[0]!r}? " if near else ""
+            raise header_error(
+                where, f"unknown column {name!r}", name, ", ".join(wanted.names), "columns",
+                hint + "name it in indications or loads of the session, or remove it; nothing was written",
+            )  # fmt: skip
+
+
+def header_error(
+    where: str,
+    what: str,
+    got: object,
+    expected: object,
+    rule: str,
+    next_step: str = "correct the file; nothing was written",
+) -> SessionError:
+    """Return the error of a file whose header or rows cannot be used."""
+    return SessionError(what, where=where, got=got, expected=expected, next_step=next_step, rule=rule)
