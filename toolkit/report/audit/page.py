@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from toolkit.audit.since_good import Drift
     from toolkit.audit.timeline import Timeline
     from toolkit.audit.traces import Trace
+    from toolkit.calibration.registry.standing import CalibrationUse
 
 MOST_ROWS = 20_000
 """Beyond so many files the table leaves out those that are right, and says so."""
@@ -45,7 +46,10 @@ _NAMES = {
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class AuditView:
-    """What the page shows. ``rules``: rule id -> what it means and what to do."""
+    """What the page shows. ``rules``: rule id -> what it means and what to do.
+
+    ``uses``: the records in force by which repairs were computed.
+    """
 
     made: ArchiveAudit
     rules: Mapping[str, Mapping[str, str]]
@@ -55,6 +59,7 @@ class AuditView:
     drift: Drift | None = None
     drifted: Sequence[DriftedFile] = ()
     drifted_tests: Sequence[DriftedTest] = ()
+    uses: tuple[CalibrationUse, ...] = ()
 
 
 def write_page(path: Path, view: AuditView) -> None:
@@ -81,6 +86,7 @@ def page(view: AuditView) -> Iterator[str]:
         "script-src 'unsafe-inline'; img-src data:\">"
         f"<style>{_asset('page.css')}</style></head><body><main>"
     )
+    yield from (f"<p><strong>{escape(one.mark)}</strong></p>" for one in view.uses if one.mark)
     yield from _summary(view, title)
     for one in view.timelines:
         yield f"<h2>Versions of {escape(one.instrument)}</h2>"
