@@ -9,7 +9,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from toolkit import __version__
-from toolkit.calibration.registry.standing import UNVERIFIED
+from toolkit.calibration.registry.standing import DRAFT, UNVERIFIED
 from toolkit.files import sha256_bytes
 from toolkit.recording.details import ReportDetails
 from toolkit.report.columns import UNITS
@@ -117,7 +117,8 @@ def build_content(
 def report_id(result: TestResult, details: ReportDetails | None = None) -> str:
     """Return an id made from the inputs: the same recordings and calibration give the same id.
 
-    A report that replaces another one has an id of its own, although it rests on the same inputs.
+    A report that replaces another one has an id of its own, although it rests on the same inputs; that of a
+    draft says so.
     """
     reduced = result.reduced
     parts = sorted({c.file_sha256 for c in reduced.conditions})
@@ -125,7 +126,8 @@ def report_id(result: TestResult, details: ReportDetails | None = None) -> str:
         parts += [details.amends, details.amendment or ""]
     digest = sha256_bytes("\n".join([reduced.info.name, reduced.calibration.sha256, *parts]).encode())
     date = "".join(ch for ch in (reduced.info.date or "") if ch.isdigit())
-    return "-".join(part for part in ("TR", date, digest[:8].upper()) if part)
+    draft = DRAFT if reduced.calibration.draft else ""
+    return "-".join(part for part in (draft, "TR", date, digest[:8].upper()) if part)
 
 
 def _values(

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass, field
 from typing import Literal
 
-from toolkit.calibration.registry.standing import CalibrationUse
+from toolkit.calibration.registry.standing import CalibrationUse, mark_of
 from toolkit.report.columns import Column
 from toolkit.report.style import Style
 from toolkit.report.tags import format_number
@@ -110,7 +110,7 @@ class ReportContent:
     @property
     def page_mark(self) -> str | None:
         """The line that every page carries; None where every record may issue its numbers."""
-        return "; ".join(dict.fromkeys(one.mark for one in self.calibrations if one.mark)) or None
+        return mark_of(self.calibrations)
 
     @property
     def draft_reasons(self) -> tuple[str, ...]:

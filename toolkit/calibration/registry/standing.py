@@ -22,6 +22,8 @@ from toolkit.calibration.registry.stored import stored_check
 from toolkit.errors import RecordError, ToolkitError
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from toolkit.calibration.records.record import CalibrationRecord
     from toolkit.calibration.registry.registry import Registry
     from toolkit.calibration.registry.status import RecordStatus
@@ -29,7 +31,7 @@ if TYPE_CHECKING:
 DRAFT = "DRAFT"
 DRAFT_MARK = f"{DRAFT}, NOT APPROVED"
 UNVERIFIED = "UNVERIFIED CALIBRATION"
-_LONGEST = 180  # characters of a mark that stands on every page
+_LONGEST = 130  # characters of a part of the mark that stands on every page
 _PLACES = 4  # of a failed gate that are named
 
 
@@ -69,19 +71,30 @@ class CalibrationUse:
     @property
     def mark(self) -> str | None:
         """The line that stands on every page of a document; None for a record that needs none."""
-        said = []
-        if self.draft:
-            said.append(f"{DRAFT_MARK}: {self.id}: {'; '.join(self.draft_reasons)}")
-        if self.unverified:
-            said.append(f"{UNVERIFIED}: {self.id} is a legacy import")
-        if self.since:
-            said.append(f"KNOWN SINCE: {self.id}: {'; '.join(self.since)}")
-        text = " - ".join(said)
-        return (text if len(text) <= _LONGEST else f"{text[: _LONGEST - 3].rstrip()}...") or None
+        return mark_of((self,))
 
     def as_dict(self) -> dict[str, Any]:
         """Return the use under the keys of the answers and manifests."""
         return {"id": self.id, "sha256": self.sha256, "unverified": self.unverified, "draft": self.draft}
+
+
+def mark_of(uses: Sequence[CalibrationUse]) -> str | None:
+    """Return the one line that says how the records of a document stand; None where it needs none.
+
+    It names every record; why, as far as a line of a page has room for it.
+    """
+    said = []
+    for word, chosen, why in (
+        (DRAFT_MARK, [one for one in uses if one.draft], "draft_reasons"),
+        (UNVERIFIED, [one for one in uses if one.unverified], None),
+        ("KNOWN SINCE", [one for one in uses if one.since], "since"),
+    ):
+        if chosen:
+            text = f"{word}: {', '.join(dict.fromkeys(one.id for one in chosen))}"
+            if why and len(chosen) == 1:
+                text += f": {'; '.join(getattr(chosen[0], why))}"
+            said.append(text if len(text) <= _LONGEST else f"{text[: _LONGEST - 3].rstrip()}...")
+    return " - ".join(said) or None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -188,7 +201,7 @@ def unapproved(registry: Registry, record: CalibrationRecord, status: RecordStat
     """Return why a record is not approved: its gates that fail, or that nobody has approved it yet."""
     if status.in_force_from is not None:
         return ()
-    state = f"not approved ({status.state})"
+    state = "a candidate that nobody has approved" if status.state == "candidate" else status.state
     try:
         failed = failed_gates(registry, record)
     except ToolkitError as error:

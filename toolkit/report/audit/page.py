@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from toolkit.audit.since_good import DriftedFile, DriftedTest
+from toolkit.calibration.registry.standing import mark_of
 from toolkit.files import atomic_path
 from toolkit.recording.marks import OWN_OUTPUT
 from toolkit.report.audit.svg import COLOURS, rows_of, timeline
@@ -86,7 +87,8 @@ def page(view: AuditView) -> Iterator[str]:
         "script-src 'unsafe-inline'; img-src data:\">"
         f"<style>{_asset('page.css')}</style></head><body><main>"
     )
-    yield from (f"<p><strong>{escape(one.mark)}</strong></p>" for one in view.uses if one.mark)
+    if (mark := mark_of(view.uses)) is not None:
+        yield f"<p><strong>{escape(mark)}</strong></p>"
     yield from _summary(view, title)
     for one in view.timelines:
         yield f"<h2>Versions of {escape(one.instrument)}</h2>"
