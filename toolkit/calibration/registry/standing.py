@@ -75,7 +75,8 @@ class CalibrationUse:
 
     def as_dict(self) -> dict[str, Any]:
         """Return the use under the keys of the answers and manifests."""
-        return {"id": self.id, "sha256": self.sha256, "unverified": self.unverified, "draft": self.draft}
+        said = {"id": self.id, "sha256": self.sha256, "unverified": self.unverified}
+        return said | ({"draft": True} if self.draft else {})
 
 
 def mark_of(uses: Sequence[CalibrationUse]) -> str | None:
