@@ -220,7 +220,7 @@ def withdrawal(status: RecordStatus, on: date | None = None) -> tuple[Reason, ..
         return ()
     when = f" on {status.known_on.isoformat()}" if status.known_on else ""
     void = "" if status.void_always else f", void from {status.void_from.isoformat()}"
-    text = f"withdrawn{when}{void}: {status.reason or 'no reason stated'}"
+    text = f"{status.state}{when}{void}: {status.reason or 'no reason stated'}"
     return (Reason(text=text, next_step="see 'toolkit calibration list'"),)
 
 
