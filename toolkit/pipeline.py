@@ -72,7 +72,7 @@ def process(
     """Reduce, fit and characterise the recordings of a test with one calibration record.
 
     ``protocol`` goes before the test's own, and that before the machine's. ``use`` says how the record
-    stands for the test (`Standing.use`); without it nobody has looked into a registry.
+    stands for the test (`Standing.use`); without it the result is a draft.
     """
     machine = machine_of(folder, protocol)
     reduced = reduce_test(
@@ -84,9 +84,8 @@ def process(
             for one in recordings
         ],
         tare=declared_tare(folder, machine),
+        use=use,
     )
-    if use is not None:
-        reduced = dataclasses.replace(reduced, calibration=use)
     return TestResult(reduced=reduced, characteristics=characterise(reduced, machine=machine, record=record))
 
 

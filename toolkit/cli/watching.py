@@ -30,7 +30,7 @@ _PARTIAL = frozenset(
     "empty-file zip-truncated zip-damaged no-data no-recordings no-file xml not-toml".split()
 )
 # A watch makes no drafts: a test stands aside until a record for it is in force.
-_NOT_IN_FORCE = frozenset(("not-in-force", "no-record-in-force", "no-date"))
+_NOT_IN_FORCE = frozenset(("not-in-force", "no-record-in-force"))
 _LONGEST = 200  # bytes of a file's name, less than the 255 that file systems allow
 _MISSING = frozenset(("missing", "missing-repeat", "short-block"))
 

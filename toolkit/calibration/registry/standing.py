@@ -142,6 +142,16 @@ class Standing:
         )
 
 
+def not_asked(record: CalibrationRecord) -> CalibrationUse:
+    """Return the use of a record that no registry was asked about: what it computes is a draft."""
+    return CalibrationUse(
+        id=record.id,
+        sha256=record.sha256,
+        unverified=not record.verified,
+        draft_reasons=("no registry was asked whether it is in force",),
+    )
+
+
 def not_in_force(
     record_id: str, reasons: tuple[Reason, ...], expected: str, rule: str = "not-in-force"
 ) -> RecordError:
