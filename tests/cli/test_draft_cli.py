@@ -14,9 +14,9 @@ from typing import Any
 import openpyxl
 import pytest
 
-from toolkit.calibration.registry.approval import approve
+from toolkit.calibration.registry.approval import approve, withdraw
 from toolkit.calibration.registry.candidate import calibrate
-from toolkit.calibration.registry.registry import Registry
+from toolkit.calibration.registry.registry import Registry, today
 from toolkit.cli.home import packaged_home
 from toolkit.cli.main import run
 from toolkit.recording.marks import is_own_output
@@ -187,3 +187,25 @@ def test_a_draft_of_a_certificate_and_of_a_comparison(
 def text_of(pdf: Path) -> list[str]:
     done = subprocess.run(["pdftotext", str(pdf), "-"], capture_output=True, text=True, check=True)
     return done.stdout.split("\f")[:-1]
+
+
+def test_a_reduced_test_of_a_record_in_force_is_converted_and_one_withdrawn_since_is_not(
+    home: Path, virtual_test: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    own = tmp_path / "home"
+    shutil.copytree(home / "calibrations", own / "calibrations")
+    whole, table = tmp_path / "whole.xlsx", tmp_path / "whole.csv"
+    toolkit(capsys, own, "process", virtual_test, "--out", whole)
+    code, answer = toolkit(capsys, own, "convert", whole, table)
+    assert (code, answer["draft"]) == (0, False)
+    lines = table.read_text().splitlines()
+    assert lines[0] == "SA [deg],FZ [N],FY [N],MZ [N*m]"
+    table.unlink()
+    registry = Registry(own / "calibrations")
+    withdraw(registry, "m15-virtual-r1", on=today(), reason="cell overloaded")
+    for words in (("convert", whole, table), ("fit", whole), ("report", whole, "--out", tmp_path / "out")):
+        code, answer = toolkit(capsys, own, *words)
+        assert (code, answer["error"]["rule"]) == (2, "not-in-force")
+        assert "cell overloaded" in answer["error"]["got"]
+    assert not table.exists()
+    assert not (tmp_path / "out").exists()
