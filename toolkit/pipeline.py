@@ -18,7 +18,7 @@ from toolkit.reduction.tare import tare_of_file
 
 if TYPE_CHECKING:
     from toolkit.calibration.records.record import CalibrationRecord
-    from toolkit.calibration.registry.standing import CalibrationUse
+    from toolkit.calibration.records.use import CalibrationUse
     from toolkit.machine import Machine, Protocol
     from toolkit.recording.folder import TestFolder
     from toolkit.recording.model import Recording

@@ -12,10 +12,11 @@ import pytest
 from calibration_factory import hub_data
 from control_factory import enter, put_in_force
 
+from toolkit.calibration.records.use import CalibrationUse, mark_of
 from toolkit.calibration.registry.approval import approve, withdraw
 from toolkit.calibration.registry.candidate import calibrate
 from toolkit.calibration.registry.registry import Registry
-from toolkit.calibration.registry.standing import CalibrationUse, mark_of, standing
+from toolkit.calibration.registry.standing import standing
 from toolkit.errors import RecordError
 
 Sessions = Callable[..., Path]

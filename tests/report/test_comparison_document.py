@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from toolkit.calibration.registry.standing import CalibrationUse
+from toolkit.calibration.records.use import CalibrationUse
 from toolkit.characteristics.rows import Row
 from toolkit.characteristics.uncertain import Part, Uncertain
 from toolkit.comparison.compare import compare

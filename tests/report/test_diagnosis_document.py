@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from tests.diagnosis.cases import HEAD, TWO, carriage, write_case
-from toolkit.calibration.registry.standing import CalibrationUse
+from toolkit.calibration.records.use import CalibrationUse
 from toolkit.diagnosis.case_read import read_case
 from toolkit.diagnosis.diagnose import diagnose
 from toolkit.report.diagnosis.content import build_diagnosis_content

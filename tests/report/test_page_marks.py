@@ -15,7 +15,7 @@ from docx.shared import Mm
 from report_factory import make_record, make_result
 from template_factory import HASH
 
-from toolkit.calibration.registry.standing import CalibrationUse
+from toolkit.calibration.records.use import CalibrationUse
 from toolkit.report.build import build_content
 from toolkit.report.content import ReportContent
 from toolkit.report.deliver import deliver

@@ -38,8 +38,9 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from toolkit.audit.archive import ArchiveAudit
+    from toolkit.calibration.records.use import CalibrationUse
     from toolkit.calibration.registry.registry import Registry
-    from toolkit.calibration.registry.standing import CalibrationUse, Standing
+    from toolkit.calibration.registry.standing import Standing
     from toolkit.recording.model import Recording
 
 INDEX = "corrected.json"
@@ -145,7 +146,7 @@ def _copy(archive: Path, plain: Mapping[str, Any], stands: Standing, target: Pat
     if not place.parent.resolve().is_relative_to(target.resolve()):
         raise _refused(place.parent, "a link that leads outside", "a plain folder")
     try:
-        use = stands.use(draft=draft)
+        use = stands.use(draft=draft, where=path)
         context = context_of(path)
         recording = read_recording(path, context.machine)
         if recording.sha256 != plain["sha256"]:

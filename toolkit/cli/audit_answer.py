@@ -17,8 +17,8 @@ if TYPE_CHECKING:
     from toolkit.audit.corrected import Copy
     from toolkit.audit.linked import Linked
     from toolkit.audit.since_good import Drift, DriftedFile, DriftedTest
+    from toolkit.calibration.records.use import CalibrationUse
     from toolkit.calibration.registry.registry import Registry
-    from toolkit.calibration.registry.standing import CalibrationUse
     from toolkit.cli.audit_amend import Amended
     from toolkit.report.template.package import Template
 
@@ -129,7 +129,7 @@ def write_folder(out: Path, told: Answer, registry: Registry, template: Template
 
 def _uses(told: Answer, registry: Registry) -> tuple[CalibrationUse, ...]:
     """Return the records in force by which the changes of the files were computed."""
-    from toolkit.calibration.registry.standing import CalibrationUse
+    from toolkit.calibration.records.use import CalibrationUse
 
     wanted = {one["in_force"] for one in told.made.files.plain() if one["repair"] is not None}
     records = [registry.load(one) for one in sorted(wanted)]

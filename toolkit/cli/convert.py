@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from toolkit.calibration.registry.standing import CalibrationUse
+    from toolkit.calibration.records.use import CalibrationUse
     from toolkit.channels import Axes
     from toolkit.cli.resolve import Resolved
     from toolkit.findings import Finding
@@ -124,7 +124,7 @@ def _kinds(source: Path, target: Path) -> tuple[str, str]:
 
 def _refuse_draft(source: Path, target: Path, kinds: tuple[str, str], use: CalibrationUse | None) -> None:
     """Refuse a table of a draft: of a reduced test, or of a file that carries the mark of one."""
-    from toolkit.calibration.registry.standing import DRAFT_MARK
+    from toolkit.calibration.records.use import DRAFT_MARK
     from toolkit.errors import OutputError
 
     draft = use is not None and use.draft

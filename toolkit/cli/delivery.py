@@ -10,7 +10,7 @@ from toolkit.cli.home import find_home, packaged_home
 from toolkit.errors import ConfigError
 
 if TYPE_CHECKING:
-    from toolkit.calibration.registry.standing import CalibrationUse
+    from toolkit.calibration.records.use import CalibrationUse
     from toolkit.report.deliver import Delivered
 
 

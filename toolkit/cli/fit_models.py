@@ -13,7 +13,7 @@ from toolkit.errors import ConfigError, FitError
 from toolkit.findings import Finding
 
 if TYPE_CHECKING:
-    from toolkit.calibration.registry.standing import CalibrationUse
+    from toolkit.calibration.records.use import CalibrationUse
     from toolkit.cli.resolve import Resolved
     from toolkit.tires.comparison import Comparison
     from toolkit.tires.global_data import Measured

@@ -10,7 +10,7 @@ from toolkit.errors import ConfigError
 from toolkit.findings import Finding
 
 if TYPE_CHECKING:
-    from toolkit.calibration.registry.standing import CalibrationUse
+    from toolkit.calibration.records.use import CalibrationUse
     from toolkit.tires.global_data import Measured
     from toolkit.tires.global_result import ModelFit
 

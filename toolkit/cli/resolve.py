@@ -13,8 +13,8 @@ from toolkit.errors import ConfigError
 
 if TYPE_CHECKING:
     from toolkit.calibration.records.record import CalibrationRecord
+    from toolkit.calibration.records.use import CalibrationUse
     from toolkit.calibration.registry.registry import Registry
-    from toolkit.calibration.registry.standing import CalibrationUse
     from toolkit.findings import Finding
     from toolkit.pipeline import TestResult
     from toolkit.recording.model import Recording
@@ -111,7 +111,7 @@ def _from_folder(
             rule="no-date",
         )
     found = standing(registry, machine.name, on=on, known_at=known_at, named=calibration)
-    use = found.use(draft=draft)
+    use = found.use(draft=draft, where=test)
     recordings = read_test(folder, reader=reader, step=step)
     result = process(folder, recordings, found.record, protocol=plan, use=use)
     return Resolved(
@@ -181,7 +181,7 @@ def _from_file(
         for one in used.draft_reasons
         if one not in {reason.text for reason in found.reasons}
     )
-    use = replace(found, reasons=(*own, *found.reasons)).use(draft=draft)
+    use = replace(found, reasons=(*own, *found.reasons)).use(draft=draft, where=test)
     use = replace(use, since=tuple(dict.fromkeys((*used.since, *use.since))))
     if use != used:
         result = replace(result, reduced=replace(result.reduced, calibration=use))

@@ -10,7 +10,7 @@ import numpy as np
 from toolkit.findings import Finding
 
 if TYPE_CHECKING:
-    from toolkit.calibration.registry.standing import CalibrationUse
+    from toolkit.calibration.records.use import CalibrationUse
     from toolkit.diagnosis.case import Case
     from toolkit.diagnosis.problem import Problem
 
@@ -59,8 +59,9 @@ def calibration_use(case: Case, calibrations: Path | None) -> CalibrationUse | N
     A case has no date of its own: a record counts as in force where it is approved and not void on every day.
     A candidate is accepted, and what is made with it says that it is a draft.
     """
+    from toolkit.calibration.records.use import CalibrationUse
     from toolkit.calibration.registry.registry import Registry
-    from toolkit.calibration.registry.standing import CalibrationUse, unapproved, withdrawal
+    from toolkit.calibration.registry.standing import unapproved, withdrawal
     from toolkit.diagnosis.load import record_of
     from toolkit.errors import RegistryError
 

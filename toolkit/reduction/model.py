@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from toolkit.calibration.registry.standing import CalibrationUse
+from toolkit.calibration.records.use import CalibrationUse
 from toolkit.channels import Rotation
 from toolkit.findings import Finding
 from toolkit.recording.model import TestInfo

@@ -9,7 +9,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from toolkit import __version__
-from toolkit.calibration.registry.standing import DRAFT, UNVERIFIED
+from toolkit.calibration.records.use import DRAFT, UNVERIFIED
 from toolkit.files import sha256_bytes
 from toolkit.recording.details import ReportDetails
 from toolkit.report.columns import UNITS

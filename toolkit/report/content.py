@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass, field
 from typing import Literal
 
-from toolkit.calibration.registry.standing import CalibrationUse, mark_of
+from toolkit.calibration.records.use import CalibrationUse, mark_of
 from toolkit.report.columns import Column
 from toolkit.report.style import Style
 from toolkit.report.tags import format_number

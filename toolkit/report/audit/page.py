@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from toolkit.audit.since_good import DriftedFile, DriftedTest
-from toolkit.calibration.registry.standing import mark_of
+from toolkit.calibration.records.use import mark_of
 from toolkit.files import atomic_path
 from toolkit.recording.marks import OWN_OUTPUT
 from toolkit.report.audit.svg import COLOURS, rows_of, timeline
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from toolkit.audit.since_good import Drift
     from toolkit.audit.timeline import Timeline
     from toolkit.audit.traces import Trace
-    from toolkit.calibration.registry.standing import CalibrationUse
+    from toolkit.calibration.records.use import CalibrationUse
 
 MOST_ROWS = 20_000
 """Beyond so many files the table leaves out those that are right, and says so."""

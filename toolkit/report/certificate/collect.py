@@ -173,7 +173,9 @@ def _admit(
         reasons = (Reason(text=text, next_step="name a later day of issue with --known-at"),)
     if reasons and not draft:
         expected = f"a record that is approved on {day.isoformat()}, the day of issue"
-        raise not_in_force(record.id, reasons, expected, "certificate-candidate")
+        raise not_in_force(
+            record.id, reasons, where=record.id, expected=expected, rule="certificate-candidate"
+        )
     return tuple(one.text for one in reasons)
 
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from toolkit.calibration.records.record import DataFile, Indication
-from toolkit.calibration.registry.standing import CalibrationUse
+from toolkit.calibration.records.use import CalibrationUse
 from toolkit.findings import Finding
 
 Verdict = Literal["pass", "conditionalPass", "conditionalFail", "fail"]

@@ -25,7 +25,7 @@ from toolkit.report.comparison.vocabulary import COMPARISON, TABLES
 from toolkit.report.content import Cell, Plot, ReportContent, Table, Value
 
 if TYPE_CHECKING:
-    from toolkit.calibration.registry.standing import CalibrationUse
+    from toolkit.calibration.records.use import CalibrationUse
     from toolkit.findings import Finding
     from toolkit.report.style import Style
 

@@ -19,7 +19,7 @@ from toolkit.report.diagnosis.plots import diagnosis_plots
 from toolkit.report.diagnosis.vocabulary import DIAGNOSIS, TABLES
 
 if TYPE_CHECKING:
-    from toolkit.calibration.registry.standing import CalibrationUse
+    from toolkit.calibration.records.use import CalibrationUse
     from toolkit.diagnosis.answer import Diagnosis, FoundEffect
     from toolkit.diagnosis.case import Case
     from toolkit.diagnosis.diagnose import Result

@@ -17,7 +17,7 @@ from toolkit.report.diagnosis.numbers import few, over
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from toolkit.calibration.registry.standing import CalibrationUse
+    from toolkit.calibration.records.use import CalibrationUse
     from toolkit.diagnosis.answer import Diagnosis, FoundEffect, Mismatch
     from toolkit.diagnosis.diagnose import Result
 

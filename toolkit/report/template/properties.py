@@ -6,7 +6,7 @@ import datetime as dt
 from typing import Any
 
 from toolkit import __version__
-from toolkit.calibration.registry.standing import DRAFT
+from toolkit.calibration.records.use import DRAFT
 from toolkit.recording.marks import output_keywords
 from toolkit.report.content import ReportContent
 from toolkit.report.template.xml import clean
