@@ -56,6 +56,17 @@ def test_a_reduced_test_is_a_test(tmp_path: Path, capsys: pytest.CaptureFixture[
     assert again["conditions"] == first["conditions"]
 
 
+def test_a_reduced_test_of_a_machine_by_its_own_file_is_judged_by_its_record(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    test = fig_test(tmp_path, 'machine = "own.toml"\ndate = 2019-05-31')
+    (test / "own.toml").write_text('schema = 1\nname = "m15"\nextends = "m15"\ntitle = "Own"\nkind = "real"')
+    code, first = toolkit(capsys, "process", test, "--out", tmp_path / "test.xlsx")
+    assert (code, first["calibration"]["id"], first["draft"]) == (1, "m15-r2", False)
+    code, again = toolkit(capsys, "process", tmp_path / "test.xlsx")
+    assert (code, again["draft"]) == (1, False)
+
+
 def test_the_withdrawn_record_was_in_force_for_who_did_not_know(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

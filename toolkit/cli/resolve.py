@@ -174,7 +174,8 @@ def _from_file(
         )
     info = result.reduced.info
     on = date.fromisoformat(info.date) if info.date else None
-    found = standing(registry, info.machine, on=on, known_at=known_at, named=record.id)
+    # That a record is of another machine was told when the file was made, and stays with it.
+    found = standing(registry, record.instrument, on=on, known_at=known_at, named=record.id)
     # What the file was made with stays with it: a draft is issued by processing the recordings again.
     own = tuple(
         Reason(text=one, next_step="process the recordings again with a record in force")
@@ -182,7 +183,8 @@ def _from_file(
         if one not in {reason.text for reason in found.reasons}
     )
     use = replace(found, reasons=(*own, *found.reasons)).use(draft=draft, where=test)
-    use = replace(use, since=tuple(dict.fromkeys((*used.since, *use.since))))
+    later = dict.fromkeys(one for one in (*used.since, *use.since) if one not in use.draft_reasons)
+    use = replace(use, since=tuple(later))
     if use != used:
         result = replace(result, reduced=replace(result.reduced, calibration=use))
     return Resolved(result=result, record=record, findings=(*_findings(use), *result.findings))
