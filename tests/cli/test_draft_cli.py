@@ -130,6 +130,12 @@ def test_a_draft_says_so_in_answer_and_file_and_stays_one(
     assert (code, answer["draft"], answer["calibration"]["id"]) == (1, True, REFUSED)
     assert "failed gate sign" in answer["draft_reasons"][0]
     assert f"! DRAFT, NOT APPROVED: {REFUSED}" in tire.read_text()
+    (tmp_path / "grid.csv").write_text("SA [deg],FZ [N]\n1,4000\n")
+    with pytest.raises(SystemExit) as caught:
+        run(["evaluate", str(tire), str(tmp_path / "grid.csv"), "--json"])
+    evaluated = json.loads(capsys.readouterr().out)
+    assert (caught.value.code, evaluated["draft"]) == (1, True)
+    assert any(REFUSED in one["message"] for one in evaluated["findings"] if one["rule"] == "draft")
     # The comments of a tire file go along; a table has no place for the mark.
     toolkit(capsys, home, "convert", draft_file, tmp_path / "x.tdx", "--draft")
     assert "DRAFT, NOT APPROVED" in (tmp_path / "x.tdx").read_text()
