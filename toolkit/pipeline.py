@@ -18,6 +18,7 @@ from toolkit.reduction.tare import tare_of_file
 
 if TYPE_CHECKING:
     from toolkit.calibration.records.record import CalibrationRecord
+    from toolkit.calibration.records.use import CalibrationUse
     from toolkit.machine import Machine, Protocol
     from toolkit.recording.folder import TestFolder
     from toolkit.recording.model import Recording
@@ -66,10 +67,12 @@ def process(
     record: CalibrationRecord,
     *,
     protocol: Protocol | None = None,
+    use: CalibrationUse | None = None,
 ) -> TestResult:
     """Reduce, fit and characterise the recordings of a test with one calibration record.
 
-    ``protocol`` goes before the test's own, and that before the machine's.
+    ``protocol`` goes before the test's own, and that before the machine's. ``use`` says how the record
+    stands for the test (`Standing.use`); without it the result is a draft.
     """
     machine = machine_of(folder, protocol)
     reduced = reduce_test(
@@ -81,6 +84,7 @@ def process(
             for one in recordings
         ],
         tare=declared_tare(folder, machine),
+        use=use,
     )
     return TestResult(reduced=reduced, characteristics=characterise(reduced, machine=machine, record=record))
 

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import datetime as dt
 import json
+import shutil
 from pathlib import Path
 
 import numpy as np
+import openpyxl
 import pytest
 from archive_made import FY, HEADER, MZ, dated, factory, recording, write
 
 from toolkit.audit.archive import audit_archive
 from toolkit.audit.corrected import INDEX, check_target, write_copies
+from toolkit.calibration.registry.approval import approve
 from toolkit.calibration.registry.registry import Registry
 from toolkit.errors import OutputError
 from toolkit.files import sha256_file
@@ -165,3 +168,25 @@ def test_every_kind_of_wrong_file_has_a_copy_that_is_exact(tmp_path):
     assert {path: sha256_file(path) for path in before} == before
     again = audit_archive(tmp_path / "fixed", registry, known_at=factory.KNOWN_AT)
     assert {(one.path, one.grade) for one in again.files} == {(one.path, "exact") for one in copies}
+
+
+def test_a_copy_by_a_record_that_is_expired_is_a_draft_or_none(archive, tmp_path):
+    shutil.copytree(REGISTRY.folder, tmp_path / "cal")
+    registry = Registry(tmp_path / "cal")
+    done = approve(
+        registry, "m15-r2", in_force_from=dt.date(1973, 1, 1), checked_by="B", recall="1 month",
+        reason="an interval is set", known_on=dt.date(2020, 1, 2),
+    )  # fmt: skip
+    assert done.done, done.failed
+    dated(archive / "test", "2021-06-01")
+    made = audit_archive(archive, registry, known_at=dt.date(2026, 1, 1))
+    refused = write_copies(made, registry, tmp_path / "none")
+    assert refused
+    assert all(one.sha256 is None and "expired: its recall" in str(one.reason) for one in refused)
+    assert [one.name for one in (tmp_path / "none").iterdir()] == [INDEX]
+    copies = write_copies(made, registry, tmp_path / "drafts", draft=True)
+    told = json.loads((tmp_path / "drafts" / INDEX).read_text())["files"]
+    assert all(one.sha256 for one in copies)
+    assert all(one["draft"] and one["unverified"] and "expired" in one["draft_reasons"][0] for one in told)
+    title = openpyxl.load_workbook(tmp_path / "drafts" / "test" / "newton.xlsx").properties.title
+    assert "DRAFT, NOT APPROVED: m15-r2: expired" in title

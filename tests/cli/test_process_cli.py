@@ -56,6 +56,17 @@ def test_a_reduced_test_is_a_test(tmp_path: Path, capsys: pytest.CaptureFixture[
     assert again["conditions"] == first["conditions"]
 
 
+def test_a_reduced_test_of_a_machine_by_its_own_file_is_judged_by_its_record(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    test = fig_test(tmp_path, 'machine = "own.toml"\ndate = 2019-05-31')
+    (test / "own.toml").write_text('schema = 1\nname = "m15"\nextends = "m15"\ntitle = "Own"\nkind = "real"')
+    code, first = toolkit(capsys, "process", test, "--out", tmp_path / "test.xlsx")
+    assert (code, first["calibration"]["id"], first["draft"]) == (1, "m15-r2", False)
+    code, again = toolkit(capsys, "process", tmp_path / "test.xlsx")
+    assert (code, again["draft"]) == (1, False)
+
+
 def test_the_withdrawn_record_was_in_force_for_who_did_not_know(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -73,7 +84,13 @@ def test_the_withdrawn_record_was_in_force_for_who_did_not_know(
         ('machine = "m15"\ndate = 1950-01-01', (), "no-record-in-force"),
         ('machine = "m15"\ndate = 2019-05-31\noperater = "x"', (), "unknown-key"),
         ('machine = "m15"\ndate = 2019-05-31', ("--calibration", "m15-r9"), None),
-        ('machine = "m15"\ndate = 2019-05-31', ("--calibration", "m15-virtual-r1"), "record-units"),
+        ('machine = "m15"\ndate = 2019-05-31', ("--calibration", "m15-virtual-r1"), "not-in-force"),
+        (
+            'machine = "m15"\ndate = 2019-05-31',
+            ("--calibration", "m15-virtual-r1", "--draft"),
+            "record-units",
+        ),
+        ('machine = "m15"', ("--calibration", "m15-r2"), "not-in-force"),
         ('machine = "m15"\ndate = 2019-05-31\n[rotations]\n"nobody" = "reverse"', (), "no-file"),
     ],
 )
@@ -152,9 +169,16 @@ def test_a_withdrawn_record_that_is_named_is_called_withdrawn(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     test = fig_test(tmp_path, 'machine = "m15"\ndate = 2019-05-31')
-    code, answer = toolkit(capsys, "process", test, "--calibration", "m15-r1")
+    words = ("process", test, "--calibration", "m15-r1")
+    code, refused = toolkit(capsys, *words)
+    assert code == 2
+    assert refused["error"]["rule"] == "not-in-force"
+    assert "withdrawn on 2019-12-31" in refused["error"]["got"]
+    assert "m15-r2" in refused["error"]["next_step"]
+    code, answer = toolkit(capsys, *words, "--draft")
     assert code == 1
-    (told,) = [f for f in answer["findings"] if f["rule"] == "withdrawn-record"]
+    assert answer["draft"] is True
+    (told,) = [f for f in answer["findings"] if f["rule"] == "draft"]
     assert "wrong sign" in told["message"]
 
 
@@ -164,10 +188,20 @@ def test_a_reduced_test_whose_record_was_withdrawn_says_so(
     test = fig_test(tmp_path, 'machine = "m15"\ndate = 2019-05-31')
     toolkit(capsys, "process", test, "--known-at", "2019-06-30", "--out", tmp_path / "old.xlsx")
     code, answer = toolkit(capsys, "process", tmp_path / "old.xlsx")
-    assert code == 1
-    assert {"withdrawn-record", "not-in-force"} <= {finding["rule"] for finding in answer["findings"]}
-    _, then = toolkit(capsys, "process", tmp_path / "old.xlsx", "--known-at", "2019-06-30")
-    assert "withdrawn-record" not in {finding["rule"] for finding in then["findings"]}
+    assert code == 2
+    assert "withdrawn on 2019-12-31" in answer["error"]["got"]
+    code, then = toolkit(capsys, "process", tmp_path / "old.xlsx", "--known-at", "2019-06-30")
+    assert (code, then["draft"]) == (1, False)
+    (since,) = [f["message"] for f in then["findings"] if f["rule"] == "known-since"]
+    assert since.startswith("withdrawn on 2019-12-31")
+    code, draft = toolkit(
+        capsys, "process", tmp_path / "old.xlsx", "--draft", "--out", tmp_path / "draft.xlsx"
+    )
+    assert (code, draft["draft"]) == (1, True)
+    # The mark stays with the file: what is made of it later is a draft too, on any day of knowledge.
+    code, later = toolkit(capsys, "process", tmp_path / "draft.xlsx", "--known-at", "2019-06-30")
+    assert (code, later["error"]["rule"]) == (2, "not-in-force")
+    assert "process the recordings again" in later["error"]["next_step"]
 
 
 def test_the_budget_and_the_values_at_slip_angles_are_answered_in_si(

@@ -21,7 +21,15 @@ from toolkit.cli.home import packaged_home
 from toolkit.cli.report import Made
 from toolkit.cli.watch import command
 from toolkit.cli.watching import SET_ASIDE, STATE, Round, Watcher
-from toolkit.errors import ConfigError, OutputError, RegistryError, RenderError, ToolkitError, UnreadableError
+from toolkit.errors import (
+    ConfigError,
+    OutputError,
+    RecordError,
+    RegistryError,
+    RenderError,
+    ToolkitError,
+    UnreadableError,
+)
 from toolkit.findings import Finding
 from toolkit.recording.marks import is_own_output
 
@@ -42,13 +50,14 @@ class Bench:
         self.faults: dict[str, ToolkitError] = {}
         self.findings: dict[str, tuple[Finding, ...]] = {}
         self.refusals: dict[str, ToolkitError] = {}
+        self.registry = "one ledger"
         self.watcher = self.start()
 
     def start(self, settings: str = "as before", version: str = "1.2.0") -> Watcher:
         self.watcher = Watcher(
             self.folder, self.folder.parent / "out", resolve=self.resolve, report=self.report,
             settle_s=3, patience_s=60, clock=lambda: self.now,
-            settings=settings, version=version,
+            settings=settings, version=version, registry=lambda: self.registry,
         )  # fmt: skip
         return self.watcher
 
@@ -199,6 +208,30 @@ def test_a_bad_file_sets_its_test_aside_with_the_reason_until_it_changes(bench: 
     bench.look(after=4)
     assert bench.reported[-1] == ["bad"]
     assert not note.exists()
+
+
+@pytest.mark.parametrize(
+    "error",
+    [
+        RecordError("m15-r2 may not be used", rule="not-in-force"),
+        RegistryError("no calibration of m15 is in force on 1950-01-01", rule="no-record-in-force"),
+    ],
+)
+def test_a_watch_makes_no_drafts_and_tries_again_once_a_ledger_changes(
+    bench: Bench, error: ToolkitError
+) -> None:
+    bench.test("early")
+    bench.test("good")
+    bench.faults["early"] = error
+    bench.look()
+    assert [one.rule for one in bench.look(after=4).set_aside] == [error.rule]
+    assert bench.reported == [["good"]]
+    assert [one.test for one in bench.look(after=4).set_aside] == ["early"]
+    assert bench.read.count("early") == 1
+    bench.faults.clear()
+    bench.registry = "a ledger with one more line"
+    assert bench.look(after=4).set_aside == ()
+    assert bench.reported == [["good"], ["early"]]
 
 
 def test_a_cut_file_that_stays_cut_is_set_aside(bench: Bench) -> None:

@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 
+from toolkit.calibration.records.use import CalibrationUse
 from toolkit.characteristics.rows import Row
 from toolkit.characteristics.uncertain import Part, Uncertain
 from toolkit.comparison.compare import compare
@@ -47,7 +48,10 @@ def entry(label: str, shift: float, **more: Any) -> Entry:
     conditions = tuple({"tire": "one", "day": "2026-01-02", **more.pop("conditions", {})}.items())
     return Entry(
         label=label, kind="test", identity=label, source=label, rows=tuple(rows), conditions=conditions,
-        calibration=("m15-r1", "ab" * 32), **more,
+        calibration=CalibrationUse(
+            **{"id": "m15-r1", "sha256": "ab" * 32, "unverified": False, **more.pop("use", {})}
+        ),
+        **more,
     )  # fmt: skip
 
 
@@ -94,12 +98,18 @@ def test_units_and_decimal_mark_are_the_organisation_s() -> None:
 def test_marks_follow_the_tests() -> None:
     plain = content(pair())
     assert plain.marks == ()
-    marked = content(pair(simulated=True, unverified=True))
+    marked = content(pair(simulated=True, use={"unverified": True}))
     assert [name for name, _ in marked.marks] == ["simulated", "unverified"]
     assert "second & <b>" in dict(marked.marks)["unverified"]
-    assert all(plot.watermark == "SIMULATED" for plot in marked.plots.values())
+    assert all(plot.watermark == "UNVERIFIED - SIMULATED" for plot in marked.plots.values())
+    assert marked.page_mark == "UNVERIFIED CALIBRATION: m15-r1"
     assert "UNVERIFIED" in marked.values["comparison.calibrations"].value
-    assert ("m15-r1", "ab" * 32, True) in marked.calibrations
+    assert [one.unverified for one in marked.calibrations] == [False, True]
+    draft = content(pair(use={"draft_reasons": ("withdrawn",)}))
+    assert draft.draft_reasons == ("m15-r1: withdrawn",)
+    assert "not approved: withdrawn" in draft.values["comparison.calibrations"].value
+    assert dict(draft.marks)["draft"].endswith("not approved: withdrawn.")
+    assert draft.page_mark == "DRAFT, NOT APPROVED: m15-r1: withdrawn"
 
 
 def test_the_same_comparison_has_the_same_id_on_any_day() -> None:

@@ -10,9 +10,11 @@ from typing import Any
 import pytest
 
 from tests.diagnosis.cases import HEAD, TWO, carriage, write_case
+from toolkit.calibration.records.use import CalibrationUse
 from toolkit.diagnosis.case_read import read_case
 from toolkit.diagnosis.diagnose import diagnose
 from toolkit.report.diagnosis.content import build_diagnosis_content
+from toolkit.report.diagnosis.page import page
 from toolkit.report.diagnosis.plots import diagnosis_plots
 from toolkit.report.diagnosis.template import build_diagnosis
 from toolkit.report.diagnosis.vocabulary import DIAGNOSIS, TABLES
@@ -143,3 +145,13 @@ def test_the_template_is_filled_without_a_gap(which: str, request: pytest.Fixtur
     made = fill(read_template(CHECKOUT / "report_templates" / "diagnosis.docx"), found, pictures)
     assert made.missing == ()
     assert {tag for tag, _ in made.figures} <= {f"tk:figure.{name}" for name in found.plots}
+
+
+def test_a_candidate_is_accepted_and_every_page_says_so(dragged: Any) -> None:
+    use = CalibrationUse(id="m15-r3", sha256="ab" * 32, unverified=False, draft_reasons=("a candidate",))
+    found = content(dragged, use=use)
+    assert found.page_mark == "DRAFT, NOT APPROVED: m15-r3: a candidate"
+    assert found.conditions["draft"]
+    assert "not approved: a candidate" in found.values["diagnosis.calibrations"].value
+    assert "DRAFT, NOT APPROVED: m15-r3" in page(dragged[1], use)
+    assert "NOT APPROVED" not in page(dragged[1])

@@ -133,10 +133,26 @@ def test_what_the_machine_states_is_in_the_file(made: Made, file: Path) -> None:
 
 def test_a_file_from_before_anything_was_stated_keeps_its_hash(tmp_path: Path, made: Made) -> None:
     """Its hash was made of a reduced test that had no such field."""
-    bare = dataclasses.replace(made[0], reduced=dataclasses.replace(made[0].reduced, stated=()))
+    use = dataclasses.replace(made[0].reduced.calibration, draft_reasons=())
+    bare = dataclasses.replace(
+        made[0], reduced=dataclasses.replace(made[0].reduced, stated=(), calibration=use)
+    )
     content = dataclasses.asdict(bare)
     del content["reduced"]["stated"]
+    for name in ("draft_reasons", "since"):
+        del content["reduced"]["calibration"][name]
     text = json.dumps(content, sort_keys=True, separators=(",", ":"))
     digest = write_test_file(tmp_path / "x.xlsx", bare)
     assert digest == hashlib.sha256(text.encode()).hexdigest()
     assert read_test_file(tmp_path / "x.xlsx") == bare
+
+
+def test_a_result_that_no_registry_was_asked_about_is_a_draft_and_stays_one(
+    tmp_path: Path, made: Made
+) -> None:
+    use = made[0].reduced.calibration
+    assert use.draft_reasons == ("no registry was asked whether it is in force",)
+    two = dataclasses.replace(use, draft_reasons=("one; two", "=three"), since=("four",))
+    result = dataclasses.replace(made[0], reduced=dataclasses.replace(made[0].reduced, calibration=two))
+    write_test_file(tmp_path / "x.xlsx", result)
+    assert read_test_file(tmp_path / "x.xlsx").reduced.calibration == two

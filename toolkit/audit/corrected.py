@@ -8,6 +8,7 @@ replaces, by its hash, and which record computed it.
 from __future__ import annotations
 
 import csv
+import datetime as dt
 import io
 import json
 import os
@@ -22,6 +23,8 @@ from toolkit.audit.columns import columns_of
 from toolkit.audit.context import context_of
 from toolkit.audit.identify import recompute
 from toolkit.audit.model import CLEAN
+from toolkit.calibration.registry.registry import instrument_of
+from toolkit.calibration.registry.standing import standing
 from toolkit.errors import OutputError, ToolkitError
 from toolkit.files import sha256_bytes, sha256_file, write_atomic
 from toolkit.recording.folder import TEST_FILE, nearest_test_toml
@@ -35,8 +38,9 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from toolkit.audit.archive import ArchiveAudit
-    from toolkit.calibration.records.record import CalibrationRecord
+    from toolkit.calibration.records.use import CalibrationUse
     from toolkit.calibration.registry.registry import Registry
+    from toolkit.calibration.registry.standing import Standing
     from toolkit.recording.model import Recording
 
 INDEX = "corrected.json"
@@ -52,6 +56,7 @@ class Copy:
     record_sha256: str
     sha256: str | None
     reason: str | None = None
+    use: CalibrationUse | None = None
 
     def as_dict(self) -> dict[str, Any]:
         """Return the copy under the keys of the answer."""
@@ -62,6 +67,9 @@ class Copy:
             "record": self.record,
             "record_sha256": self.record_sha256,
             "reason": self.reason,
+            "unverified": self.use is not None and self.use.unverified,
+            "draft": self.use is not None and self.use.draft,
+            "draft_reasons": list(self.use.draft_reasons) if self.use else [],
         }
 
 
@@ -83,11 +91,17 @@ def check_target(archive: Path, target: Path) -> None:
 
 
 def write_copies(
-    made: ArchiveAudit, registry: Registry, target: Path, *, step: Callable[[str], None] = lambda _: None
+    made: ArchiveAudit,
+    registry: Registry,
+    target: Path,
+    *,
+    draft: bool = False,
+    step: Callable[[str], None] = lambda _: None,
 ) -> tuple[Copy, ...]:
     """Write the corrected copies of an audited archive, and their index; return all of them.
 
-    Files without a record in force, and those that are right, have no copy.
+    Files without a record in force, and those that are right, have no copy; where the record in force may
+    not make a number (it is expired), the copy is refused unless a ``draft`` is asked for.
 
     Raises
     ------
@@ -95,15 +109,21 @@ def write_copies(
         see `check_target`; or a copy cannot be written
     """
     check_target(made.archive, target)
-    records: dict[str, CalibrationRecord] = {}
+    stands: dict[tuple[str, str], Standing] = {}
     copies: list[Copy] = []
     for plain in made.files.plain():
         if plain["repair"] is None or plain["grade"] in CLEAN or not plain["units"]:
             continue
-        identity = plain["in_force"]
-        if identity not in records:
-            records[identity] = registry.load(identity)
-        copies.append(_copy(made.archive, plain, records[identity], target))
+        key = (plain["in_force"], plain["date"])
+        if key not in stands:
+            stands[key] = standing(
+                registry,
+                instrument_of(key[0]),
+                on=dt.date.fromisoformat(key[1]),
+                known_at=made.known_at,
+                named=key[0],
+            )
+        copies.append(_copy(made.archive, plain, stands[key], target, draft=draft))
         step(plain["path"])
     told = {
         "generator": GENERATOR,
@@ -117,26 +137,29 @@ def write_copies(
     return tuple(copies)
 
 
-def _copy(archive: Path, plain: Mapping[str, Any], record: CalibrationRecord, target: Path) -> Copy:
+def _copy(archive: Path, plain: Mapping[str, Any], stands: Standing, target: Path, *, draft: bool) -> Copy:
+    record = stands.record
     path, place = archive / plain["path"], target / plain["path"]
     failed: str | None = None
     sha256: str | None = None
+    use: CalibrationUse | None = None
     if not place.parent.resolve().is_relative_to(target.resolve()):
         raise _refused(place.parent, "a link that leads outside", "a plain folder")
     try:
+        use = stands.use(draft=draft, where=path)
         context = context_of(path)
         recording = read_recording(path, context.machine)
         if recording.sha256 != plain["sha256"]:
             failed = "the file changed since it was audited"
         else:
             columns = columns_of(recording)
-            _write(place, recording, recompute(columns, record), record)
+            _write(place, recording, recompute(columns, record), use)
             sha256 = sha256_file(place)
             _keep_test(path, archive, target)
     except OutputError:
         raise
     except ToolkitError as error:
-        failed = f"{error.rule}: {error.what}"
+        failed = f"{error.rule}: {error.what}" + (f": {error.got}" if use is None else "")
     return Copy(
         path=plain["path"],
         replaces=plain["sha256"],
@@ -144,17 +167,19 @@ def _copy(archive: Path, plain: Mapping[str, Any], record: CalibrationRecord, ta
         record_sha256=record.sha256,
         sha256=sha256,
         reason=failed,
+        use=use,
     )
 
 
 def _write(
-    place: Path, recording: Recording, new: Mapping[str, NDArray[np.float64]], record: CalibrationRecord
+    place: Path, recording: Recording, new: Mapping[str, NDArray[np.float64]], use: CalibrationUse
 ) -> None:
     place.parent.mkdir(parents=True, exist_ok=True)
     if recording.format == "csv":
         write_atomic(place, _csv(recording, new))
         return
-    title = f"corrected copy of {recording.name}, sha256 {recording.sha256}; Fy and Mz by {record.id}"
+    title = f"corrected copy of {recording.name}, sha256 {recording.sha256}; Fy and Mz by {use.id}"
+    title += f"; {use.mark}" if use.mark else ""
     if recording.format in WRITERS:
         write_atomic(place, WRITERS[recording.format](_written(recording, new), title))
         return

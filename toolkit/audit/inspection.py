@@ -70,7 +70,11 @@ class Choice:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Inspection:
-    """One inspected file. ``corrected_by`` is the record in force on the test's date, else in force today."""
+    """One inspected file.
+
+    ``corrected_by`` is the record in force on the test's date, else in force today; ``unverified``: it is a
+    legacy import.
+    """
 
     recording: Recording
     context: Context
@@ -82,6 +86,7 @@ class Inspection:
     corrected_by: str | None
     choice: Choice | None
     findings: tuple[Finding, ...]
+    unverified: bool = False
 
 
 def choose(
@@ -183,6 +188,7 @@ def inspect_file(
         identification=identification,
         columns=columns,
         corrected_by=corrector.id if corrector is not None and corrected else None,
+        unverified=corrector is not None and not corrector.verified,
         choice=choice,
         findings=_findings(path, identification, choice),
     )

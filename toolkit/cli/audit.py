@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from toolkit.cli.console import Calibrations, Home, Json, KnownAt, Quiet, day, progress, stream
+from toolkit.cli.console import Calibrations, Draft, Home, Json, KnownAt, Quiet, day, progress, stream
 from toolkit.cli.home import calibrations_folder
 
 if TYPE_CHECKING:
@@ -55,6 +55,7 @@ def command(
         typer.Option("--parquet", help="Also the results of all files as a Parquet table (.parquet)."),
     ] = None,
     known_at: KnownAt = None,
+    draft: Draft = False,
     calibrations: Calibrations = None,
     home: Home = None,
     json: Json = False,
@@ -121,7 +122,7 @@ def command(
             )
         )
     with progress(None, "corrected copies", show=show and repair is not None) as step:
-        copies = None if repair is None else write_copies(made, registry, repair, step=step)
+        copies = None if repair is None else write_copies(made, registry, repair, draft=draft, step=step)
     linked = None if past is None else link(made, past)
     amended: tuple[Amended, ...] = ()
     if repair is not None and linked is not None:
@@ -135,6 +136,7 @@ def command(
                 calibrations=calibrations,
                 home=home,
                 known_at=day(known_at),
+                draft=draft,
                 step=step,
             )
     told = Answer(

@@ -44,6 +44,7 @@ def amend(
     calibrations: Path | None,
     home: Path | None,
     known_at: date | None,
+    draft: bool = False,
     step: Callable[[str], None],
 ) -> tuple[Amended, ...]:
     """Make the amended report of each report with a manifest that rests on another record than that in force.
@@ -69,7 +70,9 @@ def amend(
     failed: dict[int, ToolkitError] = {}
     for index, (past, test) in enumerate(wanted):
         try:
-            resolved = resolve_test(archive / test, calibrations=calibrations, home=home, known_at=known_at)
+            resolved = resolve_test(
+                archive / test, calibrations=calibrations, home=home, known_at=known_at, draft=draft
+            )
             out = target / FOLDER / file_name(f"{past.id}-{test}", otherwise=f"report-{index + 1}")
             jobs.append(_job(past, resolved, archive / test, template, out))
         except ToolkitError as error:

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from toolkit.audit.corrected import Copy
     from toolkit.audit.linked import Linked
     from toolkit.audit.since_good import Drift, DriftedFile, DriftedTest
+    from toolkit.calibration.records.use import CalibrationUse
     from toolkit.calibration.registry.registry import Registry
     from toolkit.cli.audit_amend import Amended
     from toolkit.report.template.package import Template
@@ -112,6 +113,7 @@ def write_folder(out: Path, told: Answer, registry: Registry, template: Template
         drift=told.drift,
         drifted=told.drifted,
         drifted_tests=told.drifted_tests,
+        uses=_uses(told, registry),
     )
     write_page(out / PAGE, view)
     if template is None:
@@ -123,6 +125,15 @@ def write_folder(out: Path, told: Answer, registry: Registry, template: Template
     content = build_audit_content(view, read_style(style_file(template.path)))
     done = deliver(template, content, out, name="audit")
     return out / PAGE, out / LINES, done.docx, done.pdf
+
+
+def _uses(told: Answer, registry: Registry) -> tuple[CalibrationUse, ...]:
+    """Return the records in force by which the changes of the files were computed."""
+    from toolkit.calibration.records.use import CalibrationUse
+
+    wanted = {one["in_force"] for one in told.made.files.plain() if one["repair"] is not None}
+    records = [registry.load(one) for one in sorted(wanted)]
+    return tuple(CalibrationUse(id=r.id, sha256=r.sha256, unverified=not r.verified) for r in records)
 
 
 def write_table(target: Path, told: Answer) -> Path:

@@ -47,7 +47,7 @@ def command(
         str | None, typer.Option("--amendment-reason", help="Why it is replaced; printed.")
     ] = None,
     draft: Annotated[
-        bool, typer.Option("--draft", help="Allow a record that is not approved; the paper says DRAFT.")
+        bool, typer.Option("--draft", help="Allow a record that is not approved: every page says DRAFT.")
     ] = False,
     known_at: KnownAt = None,
     keep: Annotated[
@@ -108,6 +108,7 @@ def _payload(made: Certificate, done: Delivered) -> dict[str, Any]:
         "head": made.ledger_head,
         "issued": made.issued.isoformat(),
         "draft": made.draft,
+        "draft_reasons": list(made.draft_reasons),
         "withdrawn": made.withdrawn,
         "replaces": made.replaces,
         **delivered_payload(done),

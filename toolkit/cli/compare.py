@@ -11,6 +11,7 @@ import typer
 
 from toolkit.cli.console import (
     Calibrations,
+    Draft,
     Home,
     Json,
     KnownAt,
@@ -80,6 +81,7 @@ def command(
     ] = None,
     protocol: ProtocolFile = None,
     known_at: KnownAt = None,
+    draft: Draft = False,
     reader: Reader = "calamine",
     calibrations: Calibrations = None,
     home: Home = None,
@@ -110,7 +112,7 @@ def command(
     with progress(None, "reading", show=not (json or quiet)) as step:
         entries, findings = read_entries(
             sources, axes=axes, protocol=protocol, known_at=day(known_at), calibrations=calibrations,
-            home=home, reader=chosen, step=step,
+            home=home, draft=draft, reader=chosen, step=step,
         )  # fmt: skip
     found = compare(entries, mode=cast("Mode | None", mode), level=level, reproducibility=reproducibility)
     drawn = _draw(found, style, figures) if figures else {}

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from toolkit.cli.console import finding_lines, table
+from toolkit.cli.delivery import draft_keys, mark_words
 
 if TYPE_CHECKING:
     from toolkit.comparison.model import Comparison, Difference, Entry, FactorSpread, Spread
@@ -22,6 +23,7 @@ def comparison_payload(found: Comparison) -> dict[str, Any]:
         "axes": "SAE",
         "level": found.level,
         "reference": found.reference.label,
+        **draft_keys(*found.uses),
         "entries": [_entry(one) for one in found.entries],
         "differences": [_difference(one) for one in found.differences],
         "significant": sum(one.significant for one in found.differences),
@@ -47,7 +49,8 @@ def _entry(one: Entry) -> dict[str, Any]:
         "kind": one.kind,
         "source": one.source,
         "simulated": one.simulated,
-        "unverified": one.unverified,
+        "calibration": one.calibration and one.calibration.as_dict(),
+        "unverified": one.calibration is not None and one.calibration.unverified,
         "conditions": dict(one.conditions),
     }
 
@@ -146,7 +149,8 @@ def comparison_text(
     from toolkit.report.comparison.cells import conclusion, shown_rows
 
     simulated = "  SIMULATED" if any(one.simulated for one in found.entries) else ""
-    parts = [f"comparison of {found.mode}, reference {found.reference.label}{simulated}"]
+    marks = simulated + mark_words(*found.uses)
+    parts = [f"comparison of {found.mode}, reference {found.reference.label}{marks}"]
     parts += [_conditions(found), conclusion(found)]
     for part in PARTS:
         rows, which = shown_rows(found, part)

@@ -45,6 +45,13 @@ KnownAt = Annotated[
     datetime | None,
     typer.Option("--known-at", formats=["%Y-%m-%d"], help="Judge the registry as known on this day."),
 ]
+Draft = Annotated[
+    bool,
+    typer.Option(
+        "--draft",
+        help="Allow a record that is not approved and in force; everything made is then marked as a draft.",
+    ),
+]
 ProtocolFile = Annotated[
     Path | None,
     typer.Option(

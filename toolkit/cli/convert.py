@@ -8,13 +8,27 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from toolkit.cli.console import Json, Quiet, answer, exit_code, finding_lines
+from toolkit.cli.console import (
+    Calibrations,
+    Draft,
+    Home,
+    Json,
+    KnownAt,
+    Quiet,
+    answer,
+    day,
+    exit_code,
+    finding_lines,
+)
+from toolkit.cli.delivery import draft_keys
 
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+    from toolkit.calibration.records.use import CalibrationUse
     from toolkit.channels import Axes
+    from toolkit.cli.resolve import Resolved
     from toolkit.findings import Finding
 
     Columns = dict[str, tuple[str, NDArray[np.float64]]]
@@ -31,18 +45,27 @@ def command(
     axes: Annotated[
         str, typer.Option("--axes", help="Axes of the .csv: SAE, adapted-SAE, ISO-W, machine.")
     ] = "SAE",
+    known_at: KnownAt = None,
+    draft: Draft = False,
+    calibrations: Calibrations = None,
+    home: Home = None,
     json: Json = False,
     quiet: Quiet = False,
 ) -> int:
     """Convert between the formats that are read and written; what the target cannot hold is named.
 
+    A reduced test is judged by the registry as in every other command. A table has no place for the mark of
+    a draft: a draft goes into no .csv.
+
     Example: toolkit convert tire.tdx tire.csv --axes SAE
     """
     from toolkit.channels import AXES
+    from toolkit.cli.resolve import resolve_test
     from toolkit.errors import ConfigError
     from toolkit.files import write_atomic
 
     started = time.perf_counter()
+    use: CalibrationUse | None = None
     if axes not in AXES:
         raise ConfigError(
             f"unknown axis system {axes!r}", where="--axes", got=axes, expected=", ".join(AXES),
@@ -52,8 +75,16 @@ def command(
     if kinds == ("tir", "tir"):
         text, findings = _tir(source)
     else:
-        columns, read_in, found = _read(source, kinds[0], axes)
-        text, more = _written(columns, read_in, kinds[1], axes, source)
+        resolved = None
+        if kinds[0] == "test":
+            resolved = resolve_test(
+                source, calibrations=calibrations, home=home, known_at=day(known_at), draft=draft
+            )
+            use = resolved.result.reduced.calibration
+        _refuse_draft(source, target, kinds, use)
+        columns, read_in, found = _of_test(source, resolved) if resolved else _read(source, kinds[0], axes)
+        comments = [use.mark] if use is not None and use.mark else []
+        text, more = _written(columns, read_in, kinds[1], axes, source, comments)
         findings = (*found, *more)
     write_atomic(target, text)
     shown = f"{target} written"
@@ -65,6 +96,7 @@ def command(
         "from": kinds[0],
         "to": kinds[1],
         "axes": axes if "csv" in kinds else "ISO-W",
+        **draft_keys(*([use] if use else [])),
         "findings": [finding.as_dict() for finding in findings],
         "timing": {"seconds": time.perf_counter() - started},
     }
@@ -88,6 +120,22 @@ def _kinds(source: Path, target: Path) -> tuple[str, str]:
             next_step="choose another name", rule="original",
         )  # fmt: skip
     return kinds
+
+
+def _refuse_draft(source: Path, target: Path, kinds: tuple[str, str], use: CalibrationUse | None) -> None:
+    """Refuse a table of a draft: of a reduced test, or of a file that carries the mark of one."""
+    from toolkit.calibration.records.use import DRAFT_MARK
+    from toolkit.errors import OutputError
+
+    draft = use is not None and use.draft
+    if kinds[0] == "tydex":
+        draft = source.is_file() and DRAFT_MARK.encode() in source.read_bytes()
+    if draft and kinds[1] == "csv":
+        raise OutputError(
+            "a table has no place for the mark of a draft", where=target, got=f"{source.name}, a draft",
+            expected="a format that carries the mark, such as .tdx",
+            next_step="convert to .tdx, or use a record that is in force", rule="draft-unmarked",
+        )  # fmt: skip
 
 
 def _tir(source: Path) -> tuple[str, tuple[Finding, ...]]:
@@ -117,8 +165,6 @@ def _read(source: Path, kind: str, axes: str) -> tuple[Columns, Axes, tuple[Find
             rule="not-converted", where=str(source), message=f"a table has no place for {', '.join(out)}"
         )
         return columns, "ISO-W", (*file.findings, *([note] if out else []))
-    if kind == "test":
-        return _of_test(source)
     from toolkit.tires.table import read_table
 
     table = read_table(source, axes=axes, required=("FZ",), measured=False)
@@ -130,13 +176,13 @@ def _read(source: Path, kind: str, axes: str) -> tuple[Columns, Axes, tuple[Find
     return columns, table.axes, ()
 
 
-def _of_test(source: Path) -> tuple[Columns, Axes, tuple[Finding, ...]]:
+def _of_test(source: Path, resolved: Resolved) -> tuple[Columns, Axes, tuple[Finding, ...]]:
     import numpy as np
 
     from toolkit.findings import Finding
-    from toolkit.testfile.read import read_test_file
 
-    every = read_test_file(source).reduced.conditions
+    every = resolved.result.reduced.conditions
+    use = resolved.result.reduced.calibration
     conditions = [one for one in every if one.used]
     reverse = sum(one.rotation == "reverse" for one in conditions)
     columns = {
@@ -153,11 +199,12 @@ def _of_test(source: Path) -> tuple[Columns, Axes, tuple[Finding, ...]]:
     note = Finding(
         rule="not-converted", where=str(source), message=f"the target has no place for {text}", level="note"
     )
-    return columns, "SAE", (note,)
+    own = [one for one in resolved.findings if one.where == use.id]  # how its record stands
+    return columns, "SAE", (*own, note)
 
 
 def _written(
-    columns: Columns, read_in: Axes, kind: str, axes: str, source: Path
+    columns: Columns, read_in: Axes, kind: str, axes: str, source: Path, comments: list[str]
 ) -> tuple[str, tuple[Finding, ...]]:
     from toolkit.channels import signs
     from toolkit.findings import Finding
@@ -173,7 +220,9 @@ def _written(
         ]
         return "\n".join(lines) + "\n", ()
     out = [symbol for symbol in turned if symbol not in NAMES]
-    text, findings = tydex_text({symbol: column for symbol, column in turned.items() if symbol in NAMES})
+    text, findings = tydex_text(
+        {symbol: column for symbol, column in turned.items() if symbol in NAMES}, comments=comments
+    )
     if out:
         message = f"TYDEX has no channel for {', '.join(out)}"
         findings = (*findings, Finding(rule="not-converted", where=str(source), message=message))

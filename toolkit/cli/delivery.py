@@ -10,6 +10,7 @@ from toolkit.cli.home import find_home, packaged_home
 from toolkit.errors import ConfigError
 
 if TYPE_CHECKING:
+    from toolkit.calibration.records.use import CalibrationUse
     from toolkit.report.deliver import Delivered
 
 
@@ -29,6 +30,23 @@ def home_template(name: str, home: Path | None = None) -> Path:
             raise
         return packaged
     return own if own.is_file() else packaged
+
+
+def draft_keys(*uses: CalibrationUse) -> dict[str, Any]:
+    """Return whether an answer is a draft, and why: the same keys in every answer and manifest."""
+    reasons = dict.fromkeys(f"{one.id}: {reason}" for one in uses for reason in one.draft_reasons)
+    return {"draft": bool(reasons), "draft_reasons": list(reasons)}
+
+
+def mark_words(*uses: CalibrationUse) -> str:
+    """Return the marks of the records as the end of a line for people."""
+    words = dict.fromkeys(
+        word
+        for one in uses
+        for word, on in (("DRAFT", one.draft), ("UNVERIFIED", one.unverified), ("KNOWN SINCE", one.since))
+        if on
+    )
+    return "".join(f"  {word}" for word in words)
 
 
 def file_name(text: str, *, otherwise: str) -> str:

@@ -64,9 +64,11 @@ def command(
     _one_thread()
     import json as json_module
 
+    from toolkit.cli.delivery import draft_keys
     from toolkit.diagnosis.case_read import read_case
     from toolkit.diagnosis.diagnose import diagnose
     from toolkit.diagnosis.model_text import MODEL, model_text
+    from toolkit.diagnosis.notes import calibration_use
     from toolkit.diagnosis.serial import as_json
     from toolkit.files import write_atomic
     from toolkit.report.diagnosis.page import page
@@ -82,8 +84,11 @@ def command(
     tell("")
     made = result.diagnosis
     augmented = None if result.search is None else model_text(read, result.search, made, out)
-    payload = as_json(made) | {"model": None if augmented is None else MODEL}
-    drawn = page(result)
+    use = calibration_use(read, registry)
+    payload = (
+        as_json(made) | draft_keys(*([use] if use else [])) | {"model": None if augmented is None else MODEL}
+    )
+    drawn = page(result, use)
     payload["timing"] = {"seconds": time.perf_counter() - started}
     text = json_module.dumps({"schema": 1, **payload}, ensure_ascii=False, indent=2, allow_nan=False) + "\n"
     for name, content in result.predictions:
@@ -96,7 +101,7 @@ def command(
     if opened is not None:
         from toolkit.cli.diagnose_document import write_document
 
-        document = write_document(read, result, opened, out, augmented=augmented, registry=registry, by=by)
+        document = write_document(read, result, opened, out, augmented=augmented, use=use, by=by)
         payload["document"] = document
         warned = bool(document["warnings"])
         said += f"\n{document['pdf']}\n{document['docx']}\n{document['pages']} pages, verified"

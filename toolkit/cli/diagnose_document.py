@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from toolkit.calibration.records.use import CalibrationUse
     from toolkit.diagnosis.case import Case
     from toolkit.diagnosis.diagnose import Result
     from toolkit.report.template.package import Template
@@ -18,7 +19,7 @@ def write_document(
     out: Path,
     *,
     augmented: str | None,
-    registry: Path | None,
+    use: CalibrationUse | None,
     by: str | None,
 ) -> dict[str, Any]:
     """Deliver ``diagnosis.docx`` and ``diagnosis.pdf``; return what the JSON answer says of them.
@@ -26,12 +27,11 @@ def write_document(
     Parameters
     ----------
     augmented : the answer's model file, None without one
-    registry : folder of the calibrations that the case may name
+    use : the calibration that the case names
     """
     from datetime import date
 
     from toolkit.cli.delivery import delivered_payload
-    from toolkit.diagnosis.load import record_of
     from toolkit.files import sha256_bytes
     from toolkit.report.deliver import deliver
     from toolkit.report.diagnosis.content import build_diagnosis_content
@@ -42,7 +42,7 @@ def write_document(
         result,
         read_style(style_file(opened.path)),
         issued=date.today(),  # noqa: DTZ011
-        record=record_of(case, registry) if case.simulation.calibration else None,
+        use=use,
         model_sha256=None if augmented is None else sha256_bytes(augmented.encode()),
         by=by,
     )

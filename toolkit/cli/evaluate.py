@@ -62,6 +62,7 @@ def command(
         "axes": table.axes,
         "angles": angles,
         "units": {**_units(table), "FX": "N", "FY": "N", "MZ": "N*m"},
+        "draft": any(one.rule == "draft" for one in findings),
         "rows": _rows(table, values),
         "out": None if out is None else str(out),
         "findings": [finding.as_dict() for finding in findings],
@@ -75,15 +76,19 @@ def evaluate_grid(
     file: Any, table: TireTable, *, angles: Angles
 ) -> tuple[dict[str, list[float]], tuple[Finding, ...]]:
     """Return FX, FY [N], MZ [N*m] of every row in the table's axes, and the findings."""
+    from toolkit.calibration.records.use import DRAFT_MARK
     from toolkit.channels import signs
     from toolkit.findings import Finding
     from toolkit.tires.tir_evaluate import evaluate_tir
 
+    mark = file.comment(DRAFT_MARK)
     turn = signs(table.axes, "ISO-W")
     optional = {name: column for name in ("IA", "KAPPA", "P", "V") if (column := table.get(name)) is not None}
     made, findings = evaluate_tir(
         file, SA=turn["SA"] * table["SA"], FZ=table["FZ"], angles=angles, **optional
     )
+    if mark is not None:
+        findings = (*findings, Finding(rule="draft", where=file.where, message=mark, level="error"))
     replaced = [name for name in _MADE if table.get(name) is not None]
     if replaced:
         text = f"the grid's own {', '.join(replaced)} stay out: the columns of that name are the tire file's"

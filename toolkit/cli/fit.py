@@ -11,6 +11,7 @@ import typer
 from toolkit.cli.console import (
     CalibrationId,
     Calibrations,
+    Draft,
     Home,
     Json,
     KnownAt,
@@ -66,6 +67,7 @@ def command(
     ] = "UNKNOWN",
     calibration: CalibrationId = None,
     known_at: KnownAt = None,
+    draft: Draft = False,
     calibrations: Calibrations = None,
     home: Home = None,
     json: Json = False,
@@ -91,6 +93,7 @@ def command(
         fitted = fit_test_models(
             source, names, axes=axes, loss=chosen, weights=weights, rated_load_N=rated_load, radius_m=radius,
             calibration=calibration, calibrations=calibrations, home=home, known_at=day(known_at),
+            draft=draft,
         )  # fmt: skip
     else:
         fitted = fit_table_models(
@@ -100,8 +103,9 @@ def command(
     if tir is not None:
         one = next(fit for fit in fitted.globals if fit.model == into)
         findings += write_fit(
-            tir, one, fitted.data, source=source, side=side.upper(), radius_m=fitted.radius_m
-        )
+            tir, one, fitted.data, source=source, side=side.upper(), radius_m=fitted.radius_m,
+            use=fitted.use,
+        )  # fmt: skip
     written = _draw(fitted, figures) if figures is not None else []
     told: dict[str, Any] = {
         **payload(fitted),
@@ -164,7 +168,8 @@ def _draw(fitted: Fitted, folder: Path) -> list[str]:
     from toolkit.files import write_atomic
     from toolkit.report.fit_figures import fit_figures
 
-    made = fit_figures(fitted.data, fitted.curves, fitted.globals, fitted.comparison)
+    word = fitted.use.word if fitted.use else None
+    made = fit_figures(fitted.data, fitted.curves, fitted.globals, fitted.comparison, word)
     for name, data in made.items():
         write_atomic(folder / name, data)
     return sorted(made)

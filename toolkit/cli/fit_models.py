@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import date
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -13,6 +13,7 @@ from toolkit.errors import ConfigError, FitError
 from toolkit.findings import Finding
 
 if TYPE_CHECKING:
+    from toolkit.calibration.records.use import CalibrationUse
     from toolkit.cli.resolve import Resolved
     from toolkit.tires.comparison import Comparison
     from toolkit.tires.global_data import Measured
@@ -26,7 +27,8 @@ class Fitted:
     """Everything that was fitted to one source.
 
     ``curves`` are the fits of single loads with their ``rotations``; ``globals`` those over all loads, of the
-    rows in ``data``; ``radius_m`` the tire's free radius where it is known.
+    rows in ``data``; ``radius_m`` the tire's free radius where it is known; ``use`` the calibration record
+    that computed the forces, None for a table.
     """
 
     data: Measured
@@ -36,6 +38,7 @@ class Fitted:
     comparison: Comparison
     findings: tuple[Finding, ...]
     radius_m: float | None
+    use: CalibrationUse | None = None
 
 
 def fit_table_models(
@@ -92,6 +95,7 @@ def fit_test_models(
     calibrations: Path | None,
     home: Path | None,
     known_at: date | None,
+    draft: bool = False,
 ) -> Fitted:
     """Return the fits of a test: single loads in both directions, models over all loads of the forward run.
 
@@ -108,8 +112,9 @@ def fit_test_models(
             next_step="leave --axes away; it declares the axes of a table", rule="axes-of-test",
         )  # fmt: skip
     resolved = resolve_test(
-        test, calibration=calibration, calibrations=calibrations, home=home, known_at=known_at
-    )
+        test, calibration=calibration, calibrations=calibrations, home=home, known_at=known_at,
+        draft=draft,
+    )  # fmt: skip
     return fit_resolved(
         resolved, names, where=str(test), loss=loss, weights=weights, rated_load_N=rated_load_N,
         radius_m=radius_m,
@@ -182,10 +187,11 @@ def fit_resolved(
     )  # fmt: skip
     fits_all, more, _ = _global(data, every, loss, weights, where, seconds)
     findings = (*resolved.findings, *own, *more)
-    return _fitted(
+    fitted = _fitted(
         data, tuple(fit for fit, _ in rows), tuple(turn for _, turn in rows), fits_all, findings, radius,
         seconds,
     )  # fmt: skip
+    return replace(fitted, use=resolved.result.reduced.calibration)
 
 
 def _split(names: Sequence[str]) -> tuple[tuple[TireModel, ...], tuple[GlobalModel, ...]]:

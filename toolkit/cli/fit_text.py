@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from toolkit.cli.console import finding_lines, table
+from toolkit.cli.delivery import draft_keys, mark_words
 from toolkit.tires.table_fit import slope_sign
 
 if TYPE_CHECKING:
@@ -30,6 +31,7 @@ def payload(fitted: Fitted) -> dict[str, Any]:
             *(global_payload(fit) for fit in every),
         ],
         "comparison": fitted.comparison.as_dict(),
+        **({"calibration": fitted.use.as_dict(), **draft_keys(fitted.use)} if fitted.use else {}),
     }
 
 
@@ -108,6 +110,8 @@ def _finite(dof: float | None) -> float | None:
 def text(fitted: Fitted, findings: Sequence[Finding]) -> str:
     """Return what a person reads: single loads, models over all loads, the comparison, findings."""
     parts = []
+    if fitted.use:
+        parts.append(f"calibration {fitted.use.id}{mark_words(fitted.use)}")
     rows = list(zip(fitted.curves, fitted.rotations, strict=True))
     for channel, head in (("FY", "C_FY [N/deg]"), ("MZ", "C_MZ [N·m/deg]")):
         if lines := [_line(fit, turn) for fit, turn in rows if fit.channel == channel]:

@@ -10,6 +10,7 @@ from toolkit.errors import ConfigError
 from toolkit.findings import Finding
 
 if TYPE_CHECKING:
+    from toolkit.calibration.records.use import CalibrationUse
     from toolkit.tires.global_data import Measured
     from toolkit.tires.global_result import ModelFit
 
@@ -45,7 +46,14 @@ def check_tir(tir: Path, source: Path, names: Sequence[str]) -> str:
 
 
 def write_fit(
-    tir: Path, fit: ModelFit, data: Measured, *, source: Path, side: str, radius_m: float | None
+    tir: Path,
+    fit: ModelFit,
+    data: Measured,
+    *,
+    source: Path,
+    side: str,
+    radius_m: float | None,
+    use: CalibrationUse | None = None,
 ) -> tuple[Finding, ...]:
     """Write the tire file and return what should be known about it.
 
@@ -71,7 +79,11 @@ def write_fit(
     assert isinstance(model, GlobalModel)  # noqa: S101  only such a model reaches here
     write_tir(
         tir, tire_fit(model, fit, data, side=side),
-        comments=[f"{model.title} fitted to {source.name}", f"{len(data)} rows, {len(data.loads)} loads"],
+        comments=[
+            f"{model.title} fitted to {source.name}", f"{len(data)} rows, {len(data.loads)} loads",
+            *([f"calibration {use.id} {use.sha256}"] if use else []),
+            *([use.mark] if use and use.mark else []),
+        ],
     )  # fmt: skip
     notes = []
     if radius_m is None:

@@ -119,6 +119,7 @@ def _payload(found: Inspection, intervals: tuple[Interval, ...]) -> dict[str, An
         "slip_angle_deg": math.degrees(found.slip_angle_rad),
         "calibration": _calibration(found),
         "corrected_by": found.corrected_by,
+        "unverified": found.unverified,
         "corrected_tared": False,
         "corrected": [_values(block) for block in found.blocks],
         "corrected_first_row": _values(found.first_row),
@@ -273,7 +274,8 @@ def _calibration_lines(found: Inspection) -> list[str]:
         first = found.first_row
         when = "in force on the test's date" if one.in_force else "in force today"
         tare = "; tare not subtracted ('toolkit process' does)" if found.context.tare else ""
-        lines.append(f"    corrected by {found.corrected_by}, {when}{tare}")
+        mark = "  UNVERIFIED" if found.unverified else ""
+        lines.append(f"    corrected by {found.corrected_by}, {when}{tare}{mark}")
         if first.FY_N is not None and first.FY_file_N is not None:
             lines.append(
                 f"    first row: Fy {_lbf(first.FY_N):.2f} lbf where the file has {_lbf(first.FY_file_N):.2f}"

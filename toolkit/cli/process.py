@@ -13,6 +13,7 @@ from toolkit.channels import CHANNELS
 from toolkit.cli.console import (
     CalibrationId,
     Calibrations,
+    Draft,
     Home,
     Json,
     KnownAt,
@@ -28,6 +29,7 @@ from toolkit.cli.console import (
     table,
 )
 from toolkit.cli.console import reader as choose_reader
+from toolkit.cli.delivery import draft_keys, mark_words
 
 if TYPE_CHECKING:
     from toolkit.cli.resolve import Resolved
@@ -44,6 +46,7 @@ def command(
         Path | None, typer.Option("--out", help="Write the reduced test (.xlsx: the whole test in one file).")
     ] = None,
     known_at: KnownAt = None,
+    draft: Draft = False,
     units: Units = "SI",
     protocol: ProtocolFile = None,
     reader: Reader = "calamine",
@@ -74,6 +77,7 @@ def command(
             calibrations=calibrations,
             home=home,
             known_at=day(known_at),
+            draft=draft,
             reader=chosen,
             protocol=protocol,
             step=step,
@@ -104,11 +108,8 @@ def test_payload(resolved: Resolved) -> dict[str, Any]:
         "averaging": reduced.averaging,
         "protocol": reduced.protocol,
         "reversal": reduced.info.reversal,
-        "calibration": {
-            "id": reduced.calibration.id,
-            "sha256": reduced.calibration.sha256,
-            "unverified": reduced.calibration.unverified,
-        },
+        "calibration": reduced.calibration.as_dict(),
+        **draft_keys(reduced.calibration),
         "tare": {
             "source": reduced.tare.source,
             "values": dict(reduced.tare.values),
@@ -203,7 +204,7 @@ def _text(resolved: Resolved, out: Path | None, style: Style) -> str:
     lines = [
         f"{reduced.info.name}: {used} conditions of {len({c.file for c in reduced.conditions})} files{mark}",
         f"calibration {reduced.calibration.id} ({reduced.calibration.sha256[:12]}...)"
-        + ("  UNVERIFIED" if reduced.calibration.unverified else ""),
+        + mark_words(reduced.calibration),
         f"averaging: {reduced.averaging}",
         f"tare: {reduced.tare.source}",
         *(["reversed runs: the tire turned round on the hub"] if reduced.info.reversal == "tire" else []),

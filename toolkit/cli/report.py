@@ -12,6 +12,7 @@ import typer
 from toolkit.cli.console import (
     CalibrationId,
     Calibrations,
+    Draft,
     Home,
     Json,
     KnownAt,
@@ -25,7 +26,7 @@ from toolkit.cli.console import (
     progress,
 )
 from toolkit.cli.console import reader as choose_reader
-from toolkit.cli.delivery import delivered_payload, file_name, home_template
+from toolkit.cli.delivery import delivered_payload, draft_keys, file_name, home_template, mark_words
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -134,6 +135,7 @@ def command(
     ] = None,
     calibration: CalibrationId = None,
     known_at: KnownAt = None,
+    draft: Draft = False,
     protocol: ProtocolFile = None,
     reader: Reader = "calamine",
     allow_missing: Annotated[
@@ -183,6 +185,7 @@ def command(
                 calibrations=calibrations,
                 home=home,
                 known_at=day(known_at),
+                draft=draft,
                 reader=chosen,
                 protocol=protocol,
                 step=step,
@@ -330,11 +333,11 @@ def _job(
 
 
 def report_code(made: Made) -> int:
-    """Return 2 without a report, 1 where findings, an unverified record or the template ask for attention."""
+    """Return 2 without a report, 1 where findings, the record or the template ask for attention."""
     if made.resolved is None or isinstance(made.outcome, Exception):
         return 2
-    unverified = made.resolved.result.reduced.calibration.unverified
-    return 1 if made.outcome.warnings or unverified else exit_code(made.resolved.findings)
+    marked = made.resolved.result.reduced.calibration.mark is not None
+    return 1 if made.outcome.warnings or marked else exit_code(made.resolved.findings)
 
 
 def report_payload(made: Made) -> dict[str, Any]:
@@ -345,7 +348,8 @@ def report_payload(made: Made) -> dict[str, Any]:
     use = resolved.result.reduced.calibration
     return {
         **delivered_payload(done),
-        "calibrations": [{"id": use.id, "sha256": use.sha256, "unverified": use.unverified}],
+        "calibrations": [use.as_dict()],
+        **draft_keys(use),
         "units": dict(zip(("force", "moment"), done.units, strict=True)),
         "manifest": [entry.as_dict() for entry in done.filled.manifest],
         "manifest_file": done.manifest,
@@ -364,9 +368,7 @@ def _text(made: Made) -> str:
     if resolved is None or isinstance(done, Exception):
         return f"{made.test}: no report\n{done}"
     use = resolved.result.reduced.calibration
-    marks = ("  SIMULATED" if resolved.result.reduced.info.simulated else "") + (
-        "  UNVERIFIED" if use.unverified else ""
-    )
+    marks = ("  SIMULATED" if resolved.result.reduced.info.simulated else "") + mark_words(use)
     lines = [
         *(f"{path}" for path in (done.pdf, done.docx, done.manifest, *done.extras) if path is not None),
         f"{done.pages} pages, {len(done.filled.figures)} figures, "

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import date
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
@@ -13,6 +13,7 @@ from toolkit.errors import ConfigError
 
 if TYPE_CHECKING:
     from toolkit.calibration.records.record import CalibrationRecord
+    from toolkit.calibration.records.use import CalibrationUse
     from toolkit.calibration.registry.registry import Registry
     from toolkit.findings import Finding
     from toolkit.pipeline import TestResult
@@ -36,6 +37,7 @@ def resolve_test(
     calibrations: Path | None = None,
     home: Path | None = None,
     known_at: date | None = None,
+    draft: bool = False,
     reader: Literal["calamine", "both"] = "calamine",
     protocol: Path | None = None,
     step: Callable[[str], None] = lambda _name: None,
@@ -45,7 +47,8 @@ def resolve_test(
     The record is ``calibration`` where it is named, else the one in force on the test's date as known at
     ``known_at``; the protocol is that of the file named, else the test's own, else the machine's. A reduced
     test keeps the record that made it, which must still be in the registry, whole
-    and with the same hash.
+    and with the same hash. A record that may not make a number (`registry.standing`) is refused, unless a
+    ``draft`` is asked for: the result then says that it is one.
 
     Raises
     ------
@@ -61,6 +64,7 @@ def resolve_test(
             registry,
             calibration=calibration,
             known_at=known_at,
+            draft=draft,
             reader=reader,
             protocol=protocol,
             step=step,
@@ -74,7 +78,7 @@ def resolve_test(
             next_step="process the recordings again with this protocol",
             rule="protocol-of-reduced",
         )
-    return _from_file(test, registry, calibration=calibration, known_at=known_at)
+    return _from_file(test, registry, calibration=calibration, known_at=known_at, draft=draft)
 
 
 def _from_folder(
@@ -83,10 +87,12 @@ def _from_folder(
     *,
     calibration: str | None,
     known_at: date | None,
+    draft: bool,
     reader: Literal["calamine", "both"],
     protocol: Path | None,
     step: Callable[[str], None],
 ) -> Resolved:
+    from toolkit.calibration.registry.standing import standing
     from toolkit.machine import read_protocol
     from toolkit.pipeline import machine_of, process, read_test
     from toolkit.recording.folder import read_test_folder
@@ -95,60 +101,41 @@ def _from_folder(
     plan = None if protocol is None else read_protocol(protocol)
     machine = machine_of(folder, plan)
     on = date.fromisoformat(folder.info.date) if folder.info.date else None
-    findings: list[Finding] = []
-    if calibration is not None:
-        record = registry.load(calibration)
-        findings += _not_in_force(registry, record, machine.name, on=on, known_at=known_at)
-    elif on is None:
+    if calibration is None and on is None:
         raise ConfigError(
             "the test has no date, so no calibration record can be chosen",
             where=test / "test.toml",
             got="no date",
             expected="date = YYYY-MM-DD",
-            next_step="write the test's date into test.toml, or name a record with --calibration ID",
+            next_step="write the test's date into test.toml, or make a draft with --calibration ID --draft",
             rule="no-date",
         )
-    else:
-        record = registry.in_force(machine.name, on=on, known_at=known_at)
+    found = standing(registry, machine.name, on=on, known_at=known_at, named=calibration)
+    use = found.use(draft=draft, where=test)
     recordings = read_test(folder, reader=reader, step=step)
-    result = process(folder, recordings, record, protocol=plan)
+    result = process(folder, recordings, found.record, protocol=plan, use=use)
     return Resolved(
         result=result,
-        record=record,
-        findings=(*findings, *result.findings),
+        record=found.record,
+        findings=(*_findings(use), *result.findings),
         recordings=tuple((one.path.relative_to(test).as_posix(), one) for one in recordings),
     )
 
 
-def _not_in_force(
-    registry: Registry,
-    record: CalibrationRecord,
-    instrument: str,
-    *,
-    on: date | None,
-    known_at: date | None,
-) -> list[Finding]:
-    from toolkit.errors import RegistryError
+def _findings(use: CalibrationUse) -> list[Finding]:
+    """Return what stands against a use of a record, as findings: reasons of a draft, later knowledge."""
     from toolkit.findings import Finding
 
-    found = []
-    status = registry.status(record.id, known_at=known_at)
-    if status.state == "withdrawn":
-        message = f"the record was withdrawn: {status.reason}"
-        found.append(Finding(rule="withdrawn-record", where=record.id, message=message, level="error"))
-    if on is None:
-        return found
-    try:
-        due = registry.in_force(instrument, on=on, known_at=known_at).id
-    except RegistryError:
-        due = "no record"
-    if due != record.id:
-        message = f"{due} was in force on {on.isoformat()}; {record.id} was used"
-        found.append(Finding(rule="not-in-force", where=record.id, message=message))
-    return found
+    return [
+        *(Finding(rule="draft", where=use.id, message=one, level="error") for one in use.draft_reasons),
+        *(Finding(rule="known-since", where=use.id, message=one) for one in use.since),
+    ]
 
 
-def _from_file(test: Path, registry: Registry, *, calibration: str | None, known_at: date | None) -> Resolved:
+def _from_file(
+    test: Path, registry: Registry, *, calibration: str | None, known_at: date | None, draft: bool
+) -> Resolved:
+    from toolkit.calibration.registry.standing import Reason, standing
     from toolkit.errors import RecordError
     from toolkit.recording.gate import gate
     from toolkit.recording.marks import is_own_output
@@ -187,5 +174,17 @@ def _from_file(test: Path, registry: Registry, *, calibration: str | None, known
         )
     info = result.reduced.info
     on = date.fromisoformat(info.date) if info.date else None
-    findings = _not_in_force(registry, record, record.instrument, on=on, known_at=known_at)
-    return Resolved(result=result, record=record, findings=(*findings, *result.findings))
+    # That a record is of another machine was told when the file was made, and stays with it.
+    found = standing(registry, record.instrument, on=on, known_at=known_at, named=record.id)
+    # What the file was made with stays with it: a draft is issued by processing the recordings again.
+    own = tuple(
+        Reason(text=one, next_step="process the recordings again with a record in force")
+        for one in used.draft_reasons
+        if one not in {reason.text for reason in found.reasons}
+    )
+    use = replace(found, reasons=(*own, *found.reasons)).use(draft=draft, where=test)
+    later = dict.fromkeys(one for one in (*used.since, *use.since) if one not in use.draft_reasons)
+    use = replace(use, since=tuple(later))
+    if use != used:
+        result = replace(result, reduced=replace(result.reduced, calibration=use))
+    return Resolved(result=result, record=record, findings=(*_findings(use), *result.findings))

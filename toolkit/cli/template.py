@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
-from toolkit.cli.console import Calibrations, Home, Json, Quiet, answer, table
+from toolkit.cli.console import Calibrations, Draft, Home, Json, Quiet, answer, table
 
 app = typer.Typer(help="The contract of report templates.", no_args_is_help=True, rich_markup_mode=None)
 
@@ -51,6 +51,7 @@ def tags(
         Path | None, typer.Option("--template", help="Take units and required tags from its style file.")
     ] = None,
     calibration: Annotated[str | None, typer.Option("--calibration", help="Record id.")] = None,
+    draft: Draft = False,
     kind: Annotated[
         str,
         typer.Option(
@@ -83,7 +84,9 @@ def tags(
     if test is not None:
         from toolkit.cli.resolve import resolve_test
 
-        resolved = resolve_test(test, calibration=calibration, calibrations=calibrations, home=home)
+        resolved = resolve_test(
+            test, calibration=calibration, calibrations=calibrations, home=home, draft=draft
+        )
         content = build_content(resolved.result, resolved.record, findings=resolved.findings, style=style)
     listed = list_tags(content, style, kinds[kind])
     answer({"tags": listed}, _text(listed), as_json=json, quiet=quiet)

@@ -68,7 +68,9 @@ def command(
 ) -> int:
     """Make a report as soon as the last file of a test has arrived and is whole.
 
-    A partial file is waited for; a bad one sets its test aside, with the reason in set-aside/. A restart
+    A partial file is waited for; a bad one sets its test aside, with the reason in set-aside/, and so does
+    a test without a record in force: a watch makes no drafts, and tries it again once a ledger changes. A
+    restart
     goes on where the last one ended; with another template, other units or another version of the toolkit it
     tries again what was refused, and leaves what was made. Ends with Ctrl-C or SIGTERM, after the report
     under way.
@@ -110,6 +112,7 @@ def command(
             patience_s=patience,
             clock=time.monotonic,
             settings=_settings(options, units),
+            registry=partial(_registry, calibrations, home),
         )
         while not stop:
             found = watcher.look()
@@ -120,6 +123,17 @@ def command(
     payload = told.payload()
     answer(payload, "", as_json=json, quiet=quiet)
     return 1 if payload["waiting"] or payload["set_aside"] or payload["attention"] else 0
+
+
+def _registry(calibrations: Path | None, home: Path | None) -> str:
+    """Return one hash of every ledger's head, and of the day: what is in force can change with either."""
+    from toolkit.calibration.registry.registry import Registry, today
+    from toolkit.cli.home import calibrations_folder
+    from toolkit.files import sha256_bytes
+
+    registry = Registry(calibrations_folder(calibrations, home))
+    heads = [f"{one} {registry.head(one)}" for one in registry.instruments()]
+    return sha256_bytes("\n".join([today().isoformat(), *heads]).encode())
 
 
 def _settings(options: Options, units: str | None) -> str:

@@ -29,6 +29,8 @@ SET_ASIDE = "set-aside"
 _PARTIAL = frozenset(
     "empty-file zip-truncated zip-damaged no-data no-recordings no-file xml not-toml".split()
 )
+# A watch makes no drafts: a test stands aside until a record for it is in force.
+_NOT_IN_FORCE = frozenset(("not-in-force", "no-record-in-force"))
 _LONGEST = 200  # bytes of a file's name, less than the 255 that file systems allow
 _MISSING = frozenset(("missing", "missing-repeat", "short-block"))
 
@@ -73,6 +75,7 @@ class Watcher:
         is reported with its findings
     clock : seconds that never go back
     settings : what the reports are made by; what was refused under others is tried again
+    registry : the state of the registry; a test without a record in force is tried again under another one
     version : of the toolkit; what another one set aside is tried once more
     """
 
@@ -87,11 +90,13 @@ class Watcher:
         patience_s: float,
         clock: Callable[[], float],
         settings: str = "",
+        registry: Callable[[], str] = lambda: "",
         version: str = __version__,
     ) -> None:
         self.folder, self.out, self.version = folder, out, version
         self.resolve, self.report, self.clock = resolve, report, clock
         self.settle_s, self.patience_s, self.settings = settle_s, patience_s, settings
+        self.registry = registry
         self.seen: dict[str, tuple[Listing, float]] = {}
         self.waited: dict[str, tuple[str, str]] = {}
         self.unwritten: dict[Path, tuple[str, str]] = {}
@@ -151,8 +156,10 @@ class Watcher:
         name = self._name(test)
         try:
             resolved = self.resolve(test)
-        except RegistryError:
-            raise  # no test is to blame for the registry
+        except RegistryError as error:
+            if error.rule not in _NOT_IN_FORCE:
+                raise  # no test is to blame for the registry
+            return Aside(test=name, rule=error.rule or "error", reason=str(error))
         except ToolkitError as error:
             if error.rule in _PARTIAL and age < self.patience_s:
                 return Waiting(test=name, reason=f"{error.rule}: {error.what} ({error.where})")
@@ -239,6 +246,8 @@ class Watcher:
         """
         if told.get("state") != SET_ASIDE:
             return False
+        if told.get("rule") in _NOT_IN_FORCE and told.get("registry") != self.registry():
+            return True
         return told.get("version") != self.version or told.get("settings", self.settings) != self.settings
 
     def _set_aside(self, fault: Aside, content: str, *, by: str | None = None) -> None:
@@ -250,6 +259,7 @@ class Watcher:
             "rule": fault.rule,
             "reason": fault.reason,
             "version": self.version,
+            **({"registry": self.registry()} if fault.rule in _NOT_IN_FORCE else {}),
             **({} if by is None else {"settings": by}),
         }
         self._write(self._note(fault.test), f"{OWN_OUTPUT}\n{fault.test}: {fault.rule}\n\n{fault.reason}\n")

@@ -71,9 +71,8 @@ def test_entry(
             ("laboratory", info.laboratory),
             ("special", info.special),
         ),
-        calibration=(record.id, record.sha256),
+        calibration=reduced.calibration,
         simulated=info.simulated,
-        unverified=reduced.calibration.unverified,
     )
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal, get_args
 
+from toolkit.calibration.records.use import CalibrationUse
 from toolkit.characteristics.rows import Row
 from toolkit.estimate import Estimate
 from toolkit.findings import Finding
@@ -32,7 +33,7 @@ class Entry:
     """One thing that is compared: a test, a maker's table, or a maker's table of characteristics.
 
     ``label`` is its name in tables and legends, different for each; ``identity`` tells two copies of the
-    same data; ``calibration`` is (id, SHA-256) of the record that computed a test. ``conditions`` are
+    same data; ``calibration`` is the record that computed a test, and how it stands. ``conditions`` are
     (what, value) as the entry states them, None where it is silent.
     """
 
@@ -42,9 +43,8 @@ class Entry:
     source: str
     rows: tuple[Row, ...]
     conditions: tuple[tuple[str, str | None], ...] = ()
-    calibration: tuple[str, str] | None = None
+    calibration: CalibrationUse | None = None
     simulated: bool = False
-    unverified: bool = False
 
     def condition(self, name: str) -> str | None:
         """Return what the entry states of a condition."""
@@ -181,3 +181,8 @@ class Comparison:
     def reference(self) -> Entry:
         """The entry that all others are compared with: the first."""
         return self.entries[0]
+
+    @property
+    def uses(self) -> tuple[CalibrationUse, ...]:
+        """The records that computed the tests, each once."""
+        return tuple(dict.fromkeys(one.calibration for one in self.entries if one.calibration))

@@ -10,6 +10,7 @@ import numpy as np
 from toolkit.findings import Finding
 
 if TYPE_CHECKING:
+    from toolkit.calibration.records.use import CalibrationUse
     from toolkit.diagnosis.case import Case
     from toolkit.diagnosis.problem import Problem
 
@@ -52,30 +53,47 @@ def case_findings(problem: Problem) -> tuple[Finding, ...]:
     return tuple(made)
 
 
-def calibration_findings(case: Case, calibrations: Path | None) -> tuple[Finding, ...]:
-    """Return notes on the calibration of a case that is no approved record, or an unverified one."""
+def calibration_use(case: Case, calibrations: Path | None) -> CalibrationUse | None:
+    """Return the calibration that a case names, and how it stands; None where it names none.
+
+    A case has no date of its own: a record counts as in force where it is approved and not void on every day.
+    A candidate is accepted, and what is made with it says that it is a draft.
+    """
+    from toolkit.calibration.records.use import CalibrationUse
     from toolkit.calibration.registry.registry import Registry
+    from toolkit.calibration.registry.standing import unapproved, withdrawal
     from toolkit.diagnosis.load import record_of
     from toolkit.errors import RegistryError
 
     named = case.simulation.calibration
     if not named:
-        return ()
+        return None
     record = record_of(case, calibrations)
-    said = []
+    reasons: tuple[str, ...] = ()
     if (case.path.parent / named).is_file():
-        said.append("a file beside the case: no registry says whether it is approved")
+        reasons = ("a file beside the case: no registry says whether it is approved",)
     elif calibrations is not None:
+        registry = Registry(calibrations)
         try:
-            state = Registry(calibrations).status(record.id).state
-        except RegistryError:
-            state = "candidate"
-        if state != "approved":
-            article = "a candidate: nobody has approved it" if state == "candidate" else state
-            said.append(article)
-    if record.kind == "legacy":
+            status = registry.status(record.id)
+            found = withdrawal(status) or unapproved(registry, record, status)
+            reasons = tuple(one.text for one in found)
+        except RegistryError as error:
+            reasons = (f"not approved: {error.what}",)
+    return CalibrationUse(
+        id=record.id, sha256=record.sha256, unverified=not record.verified, draft_reasons=reasons
+    )
+
+
+def calibration_findings(case: Case, calibrations: Path | None) -> tuple[Finding, ...]:
+    """Return notes on the calibration of a case that is no approved record, or an unverified one."""
+    use = calibration_use(case, calibrations)
+    if use is None:
+        return ()
+    said = list(use.draft_reasons)
+    if use.unverified:
         said.append("imported, not fitted here: unverified")
     return tuple(
-        Finding(rule="case-calibration", where=record.id, level="note", message=f"the calibration is {one}")
+        Finding(rule="case-calibration", where=use.id, level="note", message=f"the calibration is {one}")
         for one in said
     )

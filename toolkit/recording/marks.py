@@ -56,10 +56,11 @@ def output_keywords(*, simulated: bool) -> str:
     return "; ".join([OWN_OUTPUT, *([SIMULATED] if simulated else [])])
 
 
-def mark_workbook(book: Any, *, simulated: bool, machine: str) -> None:
-    """Mark an openpyxl workbook as a result of the toolkit, before it is saved."""
+def mark_workbook(book: Any, *, simulated: bool, machine: str, word: str | None = None) -> None:
+    """Mark an openpyxl workbook as a result of the toolkit, before it is saved; ``word`` such as DRAFT."""
     book.properties.creator = GENERATOR
-    book.properties.title = f"{'SIMULATED: ' if simulated else ''}tire test on {machine}"
+    marks = "".join(f"{one}: " for one in (word, "SIMULATED" if simulated else None) if one)
+    book.properties.title = f"{marks}tire test on {machine}"
     book.properties.keywords = output_keywords(simulated=simulated)
 
 

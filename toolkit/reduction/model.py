@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from toolkit.calibration.records.use import CalibrationUse
 from toolkit.channels import Rotation
 from toolkit.findings import Finding
 from toolkit.recording.model import TestInfo
@@ -13,15 +14,6 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from toolkit.machine import TypeB
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class CalibrationUse:
-    """Which record computed the forces: its id, its hash, and whether it is only a legacy import."""
-
-    id: str
-    sha256: str
-    unverified: bool
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -112,3 +104,6 @@ class ReducedTest:
         import pandas as pd
 
         return pd.DataFrame([dataclasses.asdict(c) for c in self.conditions])
+
+
+__all__ = ["CalibrationUse", "Condition", "ReducedTest", "Tare"]

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from toolkit import __version__
+from toolkit.calibration.records.use import not_asked
 from toolkit.channels import Reversal, Rotation, seen_by_cells, signs
 from toolkit.reduction import protocol as plan
 from toolkit.reduction import remarks
@@ -37,6 +38,7 @@ def reduce_test(
     record: CalibrationRecord,
     recordings: Sequence[tuple[str, Recording, Rotation]],
     tare: Tare | None = None,
+    use: CalibrationUse | None = None,
 ) -> ReducedTest:
     """Reduce the recordings of one test.
 
@@ -46,6 +48,7 @@ def reduce_test(
     record : the calibration record that applies
     recordings : each file by its path inside the test, with its direction of rotation; in that order
     tare : the declared tare; without it, a tare block in a file serves that file
+    use : how the record stands for the test (`Standing.use`); without it the result is a draft
 
     Raises
     ------
@@ -87,7 +90,7 @@ def reduce_test(
     ]
     return ReducedTest(
         info=info,
-        calibration=CalibrationUse(id=record.id, sha256=record.sha256, unverified=not record.verified),
+        calibration=use or not_asked(record),
         conditions=conditions,
         tare=files[0].tare,
         averaging=remarks.averaging_text(files, machine),

@@ -9,6 +9,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from toolkit import __version__
+from toolkit.calibration.records.use import DRAFT, UNVERIFIED
 from toolkit.files import sha256_bytes
 from toolkit.recording.details import ReportDetails
 from toolkit.report.columns import UNITS
@@ -30,7 +31,6 @@ if TYPE_CHECKING:
     from toolkit.tires.comparison import Comparison
 
 SIMULATED = "SIMULATED DATA"
-UNVERIFIED = "UNVERIFIED CALIBRATION"
 
 
 def build_content(
@@ -63,7 +63,7 @@ def build_content(
         (*result.reduced.findings, *result.characteristics.findings) if findings is None else findings
     )
     info, use = result.reduced.info, result.reduced.calibration
-    watermark = SIMULATED if info.simulated else None
+    watermark = " - ".join(one for one in (use.word, SIMULATED if info.simulated else None) if one) or None
     drawn = build_plots(result, style, watermark)
     drawn |= model_plots(comparison, watermark=watermark, decimal_comma=style.decimal_comma)
     drawn |= told_plots(diagnosis, style)
@@ -88,6 +88,8 @@ def build_content(
     marks = []
     if info.simulated:
         marks.append(("simulated", f"{SIMULATED}: made by simulation, not a measurement of a tire."))
+    if use.draft:
+        marks.append(("draft", f"Calibration {use.id}: {use.status}."))
     if use.unverified:
         marks.append(
             (
@@ -101,7 +103,7 @@ def build_content(
         tables=tables,
         plots=plots,
         conditions=_conditions(result, values, tables, list(plots), len(listed)),
-        calibrations=((use.id, use.sha256, use.unverified),),
+        calibrations=(use,),
         title=str(values["report.title"].value),
         identity=str(values["report.id"].value),
         subject="Tire force and moment",
@@ -115,7 +117,8 @@ def build_content(
 def report_id(result: TestResult, details: ReportDetails | None = None) -> str:
     """Return an id made from the inputs: the same recordings and calibration give the same id.
 
-    A report that replaces another one has an id of its own, although it rests on the same inputs.
+    A report that replaces another one has an id of its own, although it rests on the same inputs; that of a
+    draft says so.
     """
     reduced = result.reduced
     parts = sorted({c.file_sha256 for c in reduced.conditions})
@@ -123,7 +126,8 @@ def report_id(result: TestResult, details: ReportDetails | None = None) -> str:
         parts += [details.amends, details.amendment or ""]
     digest = sha256_bytes("\n".join([reduced.info.name, reduced.calibration.sha256, *parts]).encode())
     date = "".join(ch for ch in (reduced.info.date or "") if ch.isdigit())
-    return "-".join(part for part in ("TR", date, digest[:8].upper()) if part)
+    draft = DRAFT if reduced.calibration.draft else ""
+    return "-".join(part for part in (draft, "TR", date, digest[:8].upper()) if part)
 
 
 def _values(
@@ -165,7 +169,7 @@ def _values(
         "calibration.id": use.id,
         "calibration.hash": use.sha256,
         "calibration.instrument": record.instrument if record else info.machine,
-        "calibration.status": "unverified (legacy import)" if use.unverified else "verified",
+        "calibration.status": use.status,
         "report.id": report_id(result),
         "report.title": "Tire force and moment test" + (f" {info.tire_size}" if info.tire_size else ""),
         "software.name": "toolkit",
@@ -289,7 +293,8 @@ def _conditions(
         "simulated": info.simulated,
         "measured": not info.simulated,
         "unverified": result.reduced.calibration.unverified,
-        "verified": not result.reduced.calibration.unverified,
+        "verified": not (result.reduced.calibration.unverified or result.reduced.calibration.draft),
+        "draft": result.reduced.calibration.draft,
         "pull": pull,
         "no_pull": not pull,
         "reverse": any(c.rotation == "reverse" for c in result.reduced.used()),

@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass, field
 from typing import Literal
 
+from toolkit.calibration.records.use import CalibrationUse, mark_of
 from toolkit.report.columns import Column
 from toolkit.report.style import Style
 from toolkit.report.tags import format_number
@@ -87,13 +88,16 @@ class Plot:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ReportContent:
-    """A report's content. ``marks`` must stand in the document whatever the template says."""
+    """A report's content. ``marks`` must stand in the document whatever the template says.
+
+    What stands on every page, and the word in every figure, follows from ``calibrations``.
+    """
 
     values: dict[str, Value]
     tables: dict[str, Table]
     plots: dict[str, Plot]
     conditions: dict[str, bool]
-    calibrations: tuple[tuple[str, str, bool], ...]
+    calibrations: tuple[CalibrationUse, ...]
     title: str
     author: str
     identity: str
@@ -102,6 +106,18 @@ class ReportContent:
     marks: tuple[tuple[str, str], ...] = ()
     style: Style = field(default_factory=Style)
     vocabulary: Vocabulary = REPORT
+
+    @property
+    def page_mark(self) -> str | None:
+        """The line that every page carries; None where every record may issue its numbers."""
+        return mark_of(self.calibrations)
+
+    @property
+    def draft_reasons(self) -> tuple[str, ...]:
+        """Why this is a draft; empty where it is none."""
+        return tuple(
+            dict.fromkeys(f"{one.id}: {reason}" for one in self.calibrations for reason in one.draft_reasons)
+        )
 
     def holds(self, name: str) -> bool:
         """Tell whether ``tk:if.<name>`` is kept: it is true, or the figure, table or value is there."""

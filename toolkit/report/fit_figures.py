@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -33,15 +34,16 @@ def fit_figures(
     curves: Sequence[CurveFit],
     models: Sequence[ModelFit],
     comparison: Comparison,
+    watermark: str | None = None,
 ) -> dict[str, bytes]:
     """Return the figures by file name: two a model and channel (PNG), one comparison a channel (PNG, SVG)."""
     made = {}
     for plot in fit_plots(data, curves, models):
-        made[f"{plot.name}.png"] = draw(plot).png
+        made[f"{plot.name}.png"] = draw(replace(plot, watermark=watermark)).png
     if len(comparison.models) > 1:
         for condition, channel in comparison.conditions:
             name = f"comparison_{condition}_{channel}"
-            bars = model_plot(comparison, condition, channel, name=name)
+            bars = model_plot(comparison, condition, channel, name=name, watermark=watermark)
             if bars is not None:
                 made |= {f"{name}.png": draw(bars).png, f"{name}.svg": draw_svg(bars)}
     return made

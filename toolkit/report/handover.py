@@ -54,10 +54,9 @@ def manifest_json(
         "issued": content.issued,
         "content_sha256": digest,
         "template": {"name": template.path.name, "sha256": template.sha256},
-        "calibrations": [
-            {"id": one, "sha256": sha, "unverified": unverified}
-            for one, sha, unverified in content.calibrations
-        ],
+        "draft": bool(content.draft_reasons),
+        "draft_reasons": list(content.draft_reasons),
+        "calibrations": [one.as_dict() for one in content.calibrations],
         **provenance,
         "outputs": [
             {"name": one.name, "sha256": sha256_file(one), "bytes": one.stat().st_size} for one in outputs

@@ -83,7 +83,7 @@ def _texts() -> list[Spec]:
     calibration.id|id of the calibration record that computed the forces
     calibration.hash|SHA-256 of the calibration record
     calibration.instrument|instrument of the calibration record
-    calibration.status|verified or unverified
+    calibration.status|verified, unverified, or not approved and why
     report.id|id of the report, made from its inputs
     report.title|title of the report
     software.name|program
@@ -167,6 +167,7 @@ CONDITIONS = {
     "simulated": "the data are simulated",
     "measured": "the data are measured",
     "unverified": "the calibration record is a legacy import",
+    "draft": "the calibration record was not approved and in force on the test's date",
     "verified": "the calibration record reproduces from its stored data",
     "pull": "both directions of rotation gave a pull characteristic",
     "no_pull": "there is no pull characteristic, for instance for want of a reversed run",

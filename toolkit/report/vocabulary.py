@@ -84,6 +84,7 @@ REPORT = Vocabulary(
     marks={
         "simulated": frozenset({"if.simulated", "simulated"}),
         "unverified": frozenset({"if.unverified", "calibration.status"}),
+        "draft": frozenset({"calibration.status"}),
     },
     open_values=TERM,
 )

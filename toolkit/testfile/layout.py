@@ -70,5 +70,8 @@ def content_hash(result: TestResult) -> str:
     content = dataclasses.asdict(result)
     if not result.reduced.stated:  # a file from before there were any keeps its hash
         del content["reduced"]["stated"]
+    for name in ("draft_reasons", "since"):  # and one of a record in force has the hash of before too
+        if not content["reduced"]["calibration"][name]:
+            del content["reduced"]["calibration"][name]
     text = json.dumps(content, sort_keys=True, separators=(",", ":"), ensure_ascii=True)
     return hashlib.sha256(text.encode()).hexdigest()

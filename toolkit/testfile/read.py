@@ -123,6 +123,8 @@ def _result(sheets: dict[str, list[Row]], items: Row) -> TestResult:
             id=items["calibration.id"],
             sha256=items["calibration.sha256"],
             unverified=bool(items["calibration.unverified"]),
+            draft_reasons=_numbered(items, "calibration.draft_reason"),
+            since=_numbered(items, "calibration.since"),
         ),
         conditions=tuple(_condition(row) for row in sheets["reduced"]),
         tare=Tare(
@@ -193,6 +195,10 @@ def _findings(rows: list[Row]) -> tuple[Finding, ...]:
         )
         for row in rows
     )
+
+
+def _numbered(items: Row, name: str) -> tuple[str, ...]:
+    return tuple(str(value) for key, value in items.items() if key.startswith(f"{name}."))
 
 
 def _estimate(value: Any, u: Any, dof: Any, unit: Any) -> Estimate | None:

@@ -49,7 +49,8 @@ def _workbook(result: TestResult, digest: str, recordings: Mapping[str, Recordin
     from openpyxl import Workbook
 
     book = Workbook(write_only=True)
-    mark_workbook(book, simulated=result.reduced.info.simulated, machine=result.reduced.info.machine)
+    use, info = result.reduced.calibration, result.reduced.info
+    mark_workbook(book, simulated=info.simulated, machine=info.machine, word=use.word)
     for name, rows in (
         ("provenance", _provenance(result, digest)),
         ("reduced", _reduced(result)),
@@ -64,18 +65,21 @@ def _workbook(result: TestResult, digest: str, recordings: Mapping[str, Recordin
         ("findings", _findings(result.reduced.findings)),
         ("raw", _raw(recordings)),
     ):
-        _sheet(book, name, rows)
+        _sheet(book, name, rows, use.mark)
     made = BytesIO()
     book.save(made)
     return made.getvalue()
 
 
-def _sheet(book: Any, name: str, rows: Rows) -> None:
+def _sheet(book: Any, name: str, rows: Rows, mark: str | None) -> None:
     from openpyxl.cell import WriteOnlyCell
     from openpyxl.styles import Font
 
     sheet = book.create_sheet(name)
     sheet.freeze_panes = "A2"
+    if mark is not None:
+        # In the header of every printed page; "&" begins a code of the format there.
+        sheet.oddHeader.center.text = mark.replace("&", "&&")
     bold = Font(bold=True)
 
     def made(value: Any, *, head: bool) -> Any:
@@ -120,8 +124,13 @@ def _provenance(result: TestResult, digest: str) -> Rows:
     yield ("axes", reduced.axes)
     yield ("averaging", reduced.averaging)
     yield ("protocol", reduced.protocol)
-    for field in dataclasses.fields(reduced.calibration):
-        yield (f"calibration.{field.name}", getattr(reduced.calibration, field.name))
+    use = reduced.calibration
+    if use.mark is not None:
+        yield (str(use.word or "MARK"), use.mark)
+    for name in ("id", "sha256", "unverified", "draft"):
+        yield (f"calibration.{name}", getattr(use, name))
+    for name, texts in (("draft_reason", use.draft_reasons), ("since", use.since)):
+        yield from ((f"calibration.{name}.{number}", text) for number, text in enumerate(texts, start=1))
     yield ("tare.source", reduced.tare.source)
     yield ("tare.unit", reduced.tare.unit)
     for name, value in reduced.tare.values:

@@ -50,6 +50,11 @@ class TirFile:
                 found[line.section].append((line.key, line.value))
         return tuple((name, tuple(entries)) for name, entries in found.items())
 
+    def comment(self, begins: str) -> str | None:
+        """Return the first comment that begins with a text, without its sign; None where there is none."""
+        found = (line.text.lstrip("!$ ") for line in self.lines if not line.key and line.text)
+        return next((text.rstrip() for text in found if text.startswith(begins)), None)
+
     def section(self, name: str) -> dict[str, str | float]:
         """Return a section's entries, empty where there is none."""
         return {line.key: line.value for line in self.lines if line.key and line.section == name}

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from toolkit.calibration.control.as_found import as_found_history
-from toolkit.calibration.registry.interval import parse_interval
+from toolkit.calibration.registry.standing import due_date
 from toolkit.findings import Finding
 
 if TYPE_CHECKING:
@@ -75,7 +75,7 @@ def due_of(registry: Registry, instrument: str, on: dt.date) -> Due:
     record = registry.in_force(instrument, on=on)
     status = registry.status(record.id)
     day = dt.date.fromisoformat(record.date)
-    due = None if status.recall is None else parse_interval(status.recall).after(day)
+    due = due_date(record, status)
     history = [one for one in as_found_history(registry, instrument) if one.date <= on]
     return Due(
         instrument=instrument,

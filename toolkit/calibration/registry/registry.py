@@ -156,31 +156,29 @@ class Registry:
         """
         ledger = self._sound(instrument)
         known = known_at or today()
-        best: tuple[bool, date, int, str] | None = None
-        told: list[str] = []
-        for record_id in ledger.entered():
-            entries = ledger.of(record_id)
-            status = status_of(record_id, entries, known)
-            told.append(_told(status))
-            for entry in entries:
-                if entry.event != "approved" or entry.since is None or entry.since > on:
-                    continue
-                if status.void_from is not None and on >= status.void_from:
-                    continue
-                was_known = entry.known_on is not None and entry.known_on <= known
-                rank = (was_known, entry.since, entry.seq, record_id)
-                best = rank if best is None else max(best, rank)
+        best = _best(ledger, on, known)
         if best is None:
+            told = [_told(status_of(one, ledger.of(one), known)) for one in ledger.entered()]
             raise RegistryError(
                 f"no calibration of {instrument} is in force on {on.isoformat()}",
                 where=self.folder / instrument,
                 got="; ".join(told) or "no record",
                 expected=f"an approved record in force on {on.isoformat()}, as known on {known.isoformat()}",
                 next_step="approve one with 'toolkit calibration approve ID --in-force-from DATE', "
-                "or name one with --calibration ID",
+                "or make a draft with --calibration ID --draft",
                 rule="no-record-in-force",
             )
-        return load_checked(self.folder / instrument, best[3], ledger)
+        return load_checked(self.folder / instrument, best, ledger)
+
+    def id_in_force(self, instrument: str, *, on: date, known_at: date | None = None) -> str | None:
+        """Return the id of the record that `in_force` returns, without reading it; None where none applies.
+
+        Raises
+        ------
+        RegistryError
+            the ledger is damaged
+        """
+        return _best(self._sound(instrument), on, known_at or today())
 
     def _sound(self, instrument: str) -> Ledger:
         ledger = self.ledger(instrument)
@@ -295,6 +293,23 @@ def _data_file(record_id: str, path: Path, expected: str) -> bytes:
     if (found := sha256_bytes(data)) != expected:
         raise _bad(record_id, path, f"{path.name} with sha256 {found}", f"{expected} as entered", "data")
     return data
+
+
+def _best(ledger: Ledger, on: date, known: date) -> str | None:
+    """Return the id of the record in force; see `Registry.in_force` for the order."""
+    best: tuple[bool, date, int, str] | None = None
+    for record_id in ledger.entered():
+        entries = ledger.of(record_id)
+        void_from = status_of(record_id, entries, known).void_from
+        for entry in entries:
+            if entry.event != "approved" or entry.since is None or entry.since > on:
+                continue
+            if void_from is not None and on >= void_from:
+                continue
+            was_known = entry.known_on is not None and entry.known_on <= known
+            rank = (was_known, entry.since, entry.seq, record_id)
+            best = rank if best is None else max(best, rank)
+    return None if best is None else best[3]
 
 
 def _told(status: RecordStatus) -> str:

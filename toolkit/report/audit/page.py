@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from toolkit.audit.since_good import DriftedFile, DriftedTest
+from toolkit.calibration.records.use import mark_of
 from toolkit.files import atomic_path
 from toolkit.recording.marks import OWN_OUTPUT
 from toolkit.report.audit.svg import COLOURS, rows_of, timeline
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
     from toolkit.audit.since_good import Drift
     from toolkit.audit.timeline import Timeline
     from toolkit.audit.traces import Trace
+    from toolkit.calibration.records.use import CalibrationUse
 
 MOST_ROWS = 20_000
 """Beyond so many files the table leaves out those that are right, and says so."""
@@ -45,7 +47,10 @@ _NAMES = {
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class AuditView:
-    """What the page shows. ``rules``: rule id -> what it means and what to do."""
+    """What the page shows. ``rules``: rule id -> what it means and what to do.
+
+    ``uses``: the records in force by which repairs were computed.
+    """
 
     made: ArchiveAudit
     rules: Mapping[str, Mapping[str, str]]
@@ -55,6 +60,7 @@ class AuditView:
     drift: Drift | None = None
     drifted: Sequence[DriftedFile] = ()
     drifted_tests: Sequence[DriftedTest] = ()
+    uses: tuple[CalibrationUse, ...] = ()
 
 
 def write_page(path: Path, view: AuditView) -> None:
@@ -81,6 +87,8 @@ def page(view: AuditView) -> Iterator[str]:
         "script-src 'unsafe-inline'; img-src data:\">"
         f"<style>{_asset('page.css')}</style></head><body><main>"
     )
+    if (mark := mark_of(view.uses)) is not None:
+        yield f"<p><strong>{escape(mark)}</strong></p>"
     yield from _summary(view, title)
     for one in view.timelines:
         yield f"<h2>Versions of {escape(one.instrument)}</h2>"

@@ -11,6 +11,7 @@ from toolkit.calibration.control.as_found import as_found, as_found_before
 from toolkit.calibration.records.record import from_bytes
 from toolkit.calibration.registry.clock import today
 from toolkit.calibration.registry.gates import unverifiable
+from toolkit.calibration.registry.standing import Reason, not_in_force, unapproved
 from toolkit.calibration.registry.stored import stored_check, stored_loads
 from toolkit.calibration.session.statements import Statements, statements_of
 from toolkit.errors import ConfigError, RecordError, ToolkitError
@@ -67,7 +68,7 @@ def collect(
     day = issued or today()
     record = registry.load(record_id)
     status = registry.status(record_id, known_at=day)
-    draft = _admit(record, status, day, draft)
+    reasons = _admit(registry, record, status, day, draft)
     later = registry.status(record_id)
     statements = statements_of(record)
     stated = read_stated(statements.certificate, style, recall=status.recall, where=record.id)
@@ -91,9 +92,9 @@ def collect(
         issued=day,
         received=stated.received,
         calibrated=statements.date,
-        approved_on=None if draft else status.known_on,
-        in_force_from=None if draft else status.in_force_from,
-        draft=draft,
+        approved_on=None if reasons else status.known_on,
+        in_force_from=None if reasons else status.in_force_from,
+        draft_reasons=reasons,
         simulated=_simulated(record.instrument),
         withdrawn=_withdrawn(later),
         replaces=replaces,
@@ -124,8 +125,8 @@ def collect(
         interval=stated.interval,
         opinions=stated.get("opinions"),
         entered_by=record.entered_by,
-        checked_by=None if draft else status.checked_by,
-        approved_by=None if draft else status.approved_by,
+        checked_by=None if reasons else status.checked_by,
+        approved_by=None if reasons else status.approved_by,
         status=later.state,
         record=record.id,
         record_sha256=record.sha256,
@@ -141,7 +142,7 @@ def collect(
             *stated.findings,
             *gap_findings(record, gaps),
             *result_findings(record, results, check is None, stated),
-            *state_findings(record, draft, later, _same_number(registry, record, stated)),
+            *state_findings(record, reasons, later, _same_number(registry, record, stated)),
         ),
     )
 
@@ -150,8 +151,10 @@ def _simulated(instrument: str) -> bool:
     return instrument in machine_names() and load_machine(instrument).simulated
 
 
-def _admit(record: CalibrationRecord, status: RecordStatus, day: dt.date, draft: bool) -> bool:
-    """Return whether the paper is a draft; refuse what may have no certificate at all."""
+def _admit(
+    registry: Registry, record: CalibrationRecord, status: RecordStatus, day: dt.date, draft: bool
+) -> tuple[str, ...]:
+    """Return why the paper is a draft, empty where it is none; refuse what may have no certificate at all."""
     if not record.verified:
         raise _refused(
             record.id, "certificate-unverified", "a legacy import, without its reference loads",
@@ -172,13 +175,16 @@ def _admit(record: CalibrationRecord, status: RecordStatus, day: dt.date, draft:
             record.id, "certificate-date", f"an issue on {day.isoformat()}",
             f"a day not before the calibration on {record.date}",
         )  # fmt: skip
-    approved = status.state == "approved" and (status.known_on is None or status.known_on <= day)
-    if not approved and not draft:
-        raise _refused(
-            record.id, "certificate-candidate", f"not approved on {day.isoformat()}",
-            "an approved record: 'toolkit calibration approve', or --draft for a paper that says DRAFT",
-        )  # fmt: skip
-    return not approved
+    reasons = unapproved(registry, record, status)
+    if status.known_on is not None and status.known_on > day:
+        text = f"not approved on {day.isoformat()}: the approval is of {status.known_on.isoformat()}"
+        reasons = (Reason(text=text, next_step="name a later day of issue with --known-at"),)
+    if reasons and not draft:
+        expected = f"a record that is approved on {day.isoformat()}, the day of issue"
+        raise not_in_force(
+            record.id, reasons, where=record.id, expected=expected, rule="certificate-candidate"
+        )
+    return tuple(one.text for one in reasons)
 
 
 def _identity(record: CalibrationRecord, stated: Stated, replaces: str | None, amendment: str | None) -> str:

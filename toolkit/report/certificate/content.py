@@ -70,7 +70,7 @@ def build_content(certificate: Certificate, style: Style | None = None) -> Repor
     if certificate.simulated:
         marks.append(("simulated", SIMULATED))
     if certificate.draft:
-        marks.append(("draft", DRAFT))
+        marks.append(("draft", draft_text(certificate)))
     if certificate.withdrawn:
         marks.append(("withdrawn", f"WITHDRAWN: {certificate.withdrawn}"))
     if certificate.replaces:
@@ -82,7 +82,7 @@ def build_content(certificate: Certificate, style: Style | None = None) -> Repor
         tables=tables,
         plots=plots,
         conditions=conditions,
-        calibrations=((certificate.record, certificate.record_sha256, False),),
+        calibrations=(certificate.use,),
         title=f"Calibration certificate {certificate.id}",
         author=certificate.laboratory or "laboratory not stated",
         identity=certificate.id,
@@ -92,6 +92,11 @@ def build_content(certificate: Certificate, style: Style | None = None) -> Repor
         style=style,
         vocabulary=CERTIFICATE,
     )
+
+
+def draft_text(c: Certificate) -> str:
+    """Return what a paper that is no certificate says of itself, and why."""
+    return f"{DRAFT} {c.record}: {'; '.join(c.draft_reasons)}."
 
 
 def _texts(c: Certificate, style: Style) -> dict[str, str | None]:
@@ -128,7 +133,7 @@ def _texts(c: Certificate, style: Style) -> dict[str, str | None]:
         "approved_by": c.approved_by
         or ("DRAFT: not approved" if c.draft else f"{c.checked_by or GAP} (checked and released)"),
         "in_force_from": None if c.in_force_from is None else c.in_force_from.isoformat(),
-        "status": c.status,
+        "status": f"not approved: {'; '.join(c.draft_reasons)}" if c.draft else c.status,
         "withdrawn": c.withdrawn,
         "record": c.record,
         "record_hash": c.record_sha256,

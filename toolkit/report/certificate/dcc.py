@@ -126,7 +126,7 @@ def _persons(c: Certificate) -> list[Node]:
 
 def _statements(c: Certificate) -> list[Node]:
     told: list[tuple[str, str | None]] = [
-        ("State", words.DRAFT if c.draft else None),
+        ("State", words.draft_text(c) if c.draft else None),
         ("Simulation", words.SIMULATED if c.simulated else None),
         ("Withdrawal", c.withdrawn),
         ("Items", "The results relate only to the items calibrated."),

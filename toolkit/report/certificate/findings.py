@@ -102,12 +102,12 @@ def result_findings(
 
 
 def state_findings(
-    record: CalibrationRecord, draft: bool, later: RecordStatus, same: str | None
+    record: CalibrationRecord, reasons: tuple[str, ...], later: RecordStatus, same: str | None
 ) -> list[Finding]:
     """Return the findings about the record's state and the uniqueness of the certificate's number."""
     made = []
-    if draft:
-        message = "the record is not approved: the paper says DRAFT and is no certificate"
+    if reasons:
+        message = f"the paper says DRAFT and is no certificate: {'; '.join(reasons)}"
         made.append(Finding(rule="certificate-draft", where=record.id, message=message))
     if later.state == "withdrawn":
         message = f"withdrawn since the day asked for: {later.reason or 'no reason stated'}"

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from toolkit.calibration.records.record import DataFile, Indication
+from toolkit.calibration.records.use import CalibrationUse
 from toolkit.findings import Finding
 
 Verdict = Literal["pass", "conditionalPass", "conditionalFail", "fail"]
@@ -141,9 +142,9 @@ class LoadResult:
 class Certificate:
     """A calibration certificate's content.
 
-    ``simulated``: the instrument is a virtual machine. ``draft``: the record is not approved, the paper is
-    no certificate. ``rule`` is ``simple``, ``guard_band`` or None where no decision rule was agreed: then no
-    conformity is stated.
+    ``simulated``: the instrument is a virtual machine. ``draft_reasons``: why the record is not
+    approved, and the paper no certificate. ``rule`` is ``simple``, ``guard_band`` or None where no decision
+    rule was agreed: then no conformity is stated.
     ``gaps`` names what a certificate should say and nobody stated; ``findings`` has them too.
     """
 
@@ -153,7 +154,7 @@ class Certificate:
     calibrated: dt.date
     approved_on: dt.date | None
     in_force_from: dt.date | None
-    draft: bool
+    draft_reasons: tuple[str, ...]
     simulated: bool
     withdrawn: str | None
     replaces: str | None
@@ -193,6 +194,22 @@ class Certificate:
     loads: tuple[LoadResult, ...]
     gaps: tuple[str, ...]
     findings: tuple[Finding, ...]
+
+    @property
+    def draft(self) -> bool:
+        """True where the record is not approved on the day of issue."""
+        return bool(self.draft_reasons)
+
+    @property
+    def use(self) -> CalibrationUse:
+        """The record with its standing, from which the marks of every page follow."""
+        return CalibrationUse(
+            id=self.record,
+            sha256=self.record_sha256,
+            unverified=False,
+            draft_reasons=self.draft_reasons,
+            since=(self.withdrawn,) if self.withdrawn else (),
+        )
 
     @property
     def unverifiable(self) -> tuple[tuple[str, str], ...]:

@@ -25,6 +25,7 @@ from toolkit.report.comparison.vocabulary import COMPARISON, TABLES
 from toolkit.report.content import Cell, Plot, ReportContent, Table, Value
 
 if TYPE_CHECKING:
+    from toolkit.calibration.records.use import CalibrationUse
     from toolkit.findings import Finding
     from toolkit.report.style import Style
 
@@ -61,9 +62,7 @@ def build_comparison_content(
         tables=tables,
         plots=plots,
         conditions=_conditions(found, values, tables, plots, findings),
-        calibrations=tuple(
-            dict.fromkeys((c[0], c[1], one.unverified) for one in found.entries if (c := one.calibration))
-        ),
+        calibrations=found.uses,
         title=str(values["comparison.title"].value),
         author=style.laboratory or "toolkit",
         identity=str(values["comparison.id"].value),
@@ -79,9 +78,12 @@ def _marks(found: Comparison) -> tuple[tuple[str, str], ...]:
     marks = []
     if any(one.simulated for one in found.entries):
         marks.append(("simulated", "SIMULATED: a test of the virtual machine is compared."))
-    legacy = ", ".join(one.label for one in found.entries if one.unverified)
+    legacy = ", ".join(one.label for one in found.entries if one.calibration and one.calibration.unverified)
     if legacy:
         marks.append(("unverified", f"UNVERIFIED: computed by a legacy import: {legacy}."))
+    drafts = "; ".join(f"{one.id}: {one.status}" for one in found.uses if one.draft)
+    if drafts:
+        marks.append(("draft", f"Calibrations: {drafts}."))
     return tuple(marks)
 
 
@@ -97,7 +99,8 @@ def _conditions(
     made |= {name: bool(table.rows) for name, table in tables.items()} | dict.fromkeys(plots, True)
     return made | {
         "simulated": any(one.simulated for one in found.entries),
-        "unverified": any(one.unverified for one in found.entries),
+        "unverified": any(one.unverified for one in found.uses),
+        "draft": any(one.draft for one in found.uses),
         "repeats": found.repeats is not None,
         "no_findings": not findings,
     }
@@ -105,11 +108,7 @@ def _conditions(
 
 def _texts(found: Comparison) -> dict[str, str | None]:
     key = "\n".join(one.identity for one in found.entries)
-    calibrations = dict.fromkeys(
-        f"{one.calibration[0]} ({one.calibration[1]})" + (" UNVERIFIED" if one.unverified else "")
-        for one in found.entries
-        if one.calibration
-    )
+    calibrations = dict.fromkeys(_calibration(one) for one in found.uses)
     names = ", ".join(one.label for one in found.entries)
     return {
         "id": f"CMP-{sha256_bytes(f'{found.mode}|{key}'.encode())[:8].upper()}",
@@ -127,6 +126,11 @@ def _texts(found: Comparison) -> dict[str, str | None]:
         "left_out": "; ".join(found.left_out) or None,
         "software": f"toolkit {__version__}",
     }
+
+
+def _calibration(one: CalibrationUse) -> str:
+    said = f", {one.status}" if one.draft or one.since else " UNVERIFIED" if one.unverified else ""
+    return f"{one.id} ({one.sha256}){said}"
 
 
 def _tables(

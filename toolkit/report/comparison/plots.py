@@ -89,7 +89,9 @@ def _plot(comparison: Comparison, wanted: _Wanted, style: Style) -> Plot | None:
         said.append(f"{entry.label}: {listed} {load_unit}")
     if len(curves) < 2:
         return None
-    marked = any(one.simulated for one in comparison.entries)
+    simulated = any(one.simulated for one in comparison.entries)
+    words = (*(one.word for one in comparison.uses), "SIMULATED" if simulated else None)
+    mark = " - ".join(dict.fromkeys(one for one in words if one))
     way = _WAYS.get(wanted.quantities[0].partition("_")[0])
     title = wanted.title + (f", {way}, drum forward" if way else "")
     title = title[:1].upper() + title[1:]
@@ -99,11 +101,11 @@ def _plot(comparison: Comparison, wanted: _Wanted, style: Style) -> Plot | None:
         y_label=f"{wanted.title} [{shown_unit}]",
         curves=tuple(curves),
         caption=f"{title} against load; bars: expanded uncertainty (95 %). SAE J670 axes.",
-        alt=("SIMULATED. " if marked else "")
+        alt=(f"{mark}. " if mark else "")
         + f"{title} [{shown_unit}] against load with expanded uncertainty. "
         + "; ".join(said)
         + ". Axis system: SAE J670.",
-        watermark="SIMULATED" if marked else None,
+        watermark=mark or None,
         legend_title="compared",
     )
 

@@ -116,6 +116,7 @@ CONDITIONS = conditions_of(
     {
         "simulated": "one of the tests is of a virtual machine",
         "unverified": "one of the tests was computed by an unverified record",
+        "draft": "one of the tests was computed by a record that was not in force for it",
         "repeats": "the tests are repeats of one tire",
         "no_findings": "nothing departs from what was expected",
     },
@@ -134,5 +135,6 @@ COMPARISON = Vocabulary(
     marks={
         "simulated": frozenset({"if.simulated"}),
         "unverified": frozenset({"if.unverified", "comparison.calibrations"}),
+        "draft": frozenset({"comparison.calibrations"}),
     },
 )

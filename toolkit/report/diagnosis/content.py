@@ -19,7 +19,7 @@ from toolkit.report.diagnosis.plots import diagnosis_plots
 from toolkit.report.diagnosis.vocabulary import DIAGNOSIS, TABLES
 
 if TYPE_CHECKING:
-    from toolkit.calibration.records.record import CalibrationRecord
+    from toolkit.calibration.records.use import CalibrationUse
     from toolkit.diagnosis.answer import Diagnosis, FoundEffect
     from toolkit.diagnosis.case import Case
     from toolkit.diagnosis.diagnose import Result
@@ -38,7 +38,7 @@ def build_diagnosis_content(
     style: Style,
     *,
     issued: dt.date,
-    record: CalibrationRecord | None = None,
+    use: CalibrationUse | None = None,
     model_sha256: str | None = None,
     by: str | None = None,
 ) -> ReportContent:
@@ -46,7 +46,7 @@ def build_diagnosis_content(
 
     Parameters
     ----------
-    record : the calibration that the case names
+    use : the calibration that the case names, and how it stands
     model_sha256 : of the answer's model file
     by : who has released the opinion on the cause; without a name the document says that nobody has
     """
@@ -56,31 +56,34 @@ def build_diagnosis_content(
         name: Table(name=name, columns=TABLES[name][1], rows=tuple(rows))
         for name, rows in _tables(case, made, style).items()
     }
-    texts = _texts(case, made, style, record=record, model_sha256=model_sha256, by=by)
+    texts = _texts(case, made, style, use=use, model_sha256=model_sha256, by=by)
     values = {f"diagnosis.{name}": Value(kind="text", value=text) for name, text in texts.items()}
     values["diagnosis.issued"] = Value(kind="date", value=issued.isoformat())
     values |= {f"caption.{name}": Value(kind="text", value=plot.caption) for name, plot in plots.items()}
-    unverified = record is not None and not record.verified
+    unverified, draft = use is not None and use.unverified, use is not None and use.draft
     conditions = dict.fromkeys(DIAGNOSIS.conditions, False)
     conditions |= {path: not value.missing for path, value in values.items()}
     conditions |= {name: bool(table.rows) for name, table in tables.items()} | dict.fromkeys(plots, True)
     conditions |= {
-        "unverified": unverified, "effects": bool(made.effects), "no_effects": not made.effects,
+        "unverified": unverified, "draft": draft,
+        "effects": bool(made.effects), "no_effects": not made.effects,
         "incomplete": not made.complete,
     }  # fmt: skip
-    marks = (("unverified", "UNVERIFIED: the calibration is a legacy import."),) if unverified else ()
+    marks = [("unverified", "UNVERIFIED: the calibration is a legacy import.")] if unverified else []
+    if use is not None and use.draft:
+        marks.append(("draft", f"Calibration {use.id}: {use.status}."))
     return ReportContent(
         values=values,
         tables=tables,
         plots=plots,
         conditions=conditions,
-        calibrations=() if record is None else ((record.id, record.sha256, unverified),),
+        calibrations=() if use is None else (use,),
         title=made.title,
         author=style.laboratory or "toolkit",
         identity=str(texts["id"]),
         subject="Diagnosis: simulation against recording",
         issued=issued.isoformat(),
-        marks=marks,
+        marks=tuple(marks),
         style=style,
         vocabulary=DIAGNOSIS,
     )
@@ -91,14 +94,14 @@ def _texts(
     made: Diagnosis,
     style: Style,
     *,
-    record: CalibrationRecord | None,
+    use: CalibrationUse | None,
     model_sha256: str | None,
     by: str | None,
 ) -> dict[str, str | None]:
     return answer_texts(made, style, by=by) | {
         "case": f"{case.path.name}, SHA-256 {made.case_sha256}",
-        "calibrations": "none" if record is None else f"{record.id} ({record.sha256})"
-        + ("" if record.verified else " UNVERIFIED"),
+        "calibrations": "none" if use is None else f"{use.id} ({use.sha256})"
+        + (f", {use.status}" if use.draft else " UNVERIFIED" if use.unverified else ""),
         "model": None if model_sha256 is None else f"model.toml, SHA-256 {model_sha256}",
         "software": f"toolkit {__version__}",
     }  # fmt: skip

@@ -17,6 +17,7 @@ from toolkit.report.diagnosis.numbers import few, over
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from toolkit.calibration.records.use import CalibrationUse
     from toolkit.diagnosis.answer import Diagnosis, FoundEffect, Mismatch
     from toolkit.diagnosis.diagnose import Result
 
@@ -36,6 +37,8 @@ body{font:15px/1.5 Carlito,Calibri,"Liberation Sans",sans-serif;color:#222;backg
   margin:2rem auto;padding:0 1rem}
 h1{font-size:1.5rem;margin:0}h2{font-size:1.15rem;margin:2rem 0 .4rem;border-bottom:1px solid #ddd}
 .verdict{border-left:.5rem solid VAR;padding:.6rem 1rem;background:#f6f6f6;margin:1rem 0}
+.mark{border:1px solid #b00000;color:#b00000;font-weight:bold;padding:.3rem .6rem;position:sticky;top:0;
+  background:#fff}
 .verdict b{font-size:1.2rem}table{border-collapse:collapse;margin:.5rem 0}
 th,td{padding:.2rem .7rem;text-align:left;border-bottom:1px solid #e4e4e4}
 td.n,th.n{text-align:right;font-variant-numeric:tabular-nums}img{max-width:100%}
@@ -69,14 +72,16 @@ def write_page(path: Path, result: Result) -> None:
     write_atomic(path, page(result))
 
 
-def page(result: Result) -> str:
-    """Return the page's HTML."""
+def page(result: Result, use: CalibrationUse | None = None) -> str:
+    """Return the page's HTML; ``use`` is the calibration that the case names."""
     made = result.diagnosis
+    mark = None if use is None else use.mark
     parts = [
         '<!doctype html><html lang="en"><head><meta charset="utf-8">',
         '<meta name="viewport" content="width=device-width">',
         f"<title>Diagnosis: {escape(made.title)}</title>",
         f"<style>{_STYLE.replace('VAR', _COLOURS[made.verdict])}</style></head><body>",
+        *([f'<p class="mark">{escape(mark)}</p>'] if mark else []),
         f"<h1>{escape(made.title)}</h1>",
         f'<div class="verdict"><b>{escape(headline(made))}</b><br>{_sentence(made)}</div>',
         *(

@@ -9,6 +9,7 @@ from toolkit.report.vocabulary import Vocabulary
 CONDITIONS = conditions_of(
     {
         "unverified": "a calibration of the case is not verified",
+        "draft": "a calibration of the case is not approved",
         "effects": "an effect was found",
         "no_effects": "no effect was found",
         "incomplete": "the budget was spent before the search was at its end",
@@ -25,7 +26,10 @@ DIAGNOSIS = Vocabulary(
     tables=TABLES,
     conditions=CONDITIONS,
     required=("tk:diagnosis.case", "tk:diagnosis.id"),
-    marks={"unverified": frozenset({"if.unverified", "diagnosis.calibrations"})},
+    marks={
+        "unverified": frozenset({"if.unverified", "diagnosis.calibrations"}),
+        "draft": frozenset({"diagnosis.calibrations"}),
+    },
 )
 
 __all__ = ["CONDITIONS", "DIAGNOSIS", "FIGURES", "TABLES", "WHERE"]

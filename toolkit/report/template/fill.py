@@ -31,6 +31,7 @@ from toolkit.report.template.fields import number_captions
 from toolkit.report.template.filled import Entry, Filled
 from toolkit.report.template.headings import levelled
 from toolkit.report.template.package import Template, open_package
+from toolkit.report.template.page_marks import PAGE_MARK, mark_pages
 from toolkit.report.template.pages import drop_notes, headers_shown
 from toolkit.report.template.pictures import Ids, free_height, insert_at_mark, picture_run
 from toolkit.report.template.properties import set_properties
@@ -166,6 +167,10 @@ class _Filler:
             if site.form == "control" and site.tag.family == "figure":
                 self._figure_control(site)
         added = self._marks(used)
+        page_mark = self.content.page_mark
+        if page_mark is not None:
+            mark_pages(self.package, page_mark)
+            self.log.manifest.append(Entry(tag=PAGE_MARK, text=page_mark, part=self.parts[0].name))
         number_captions(body)
         contents = write_contents(self.package, body)
         cells = tuple(row if isinstance(row, tuple) else row_texts(row) for row in self.log.rows)
@@ -182,6 +187,7 @@ class _Filler:
             missing=tuple(dict.fromkeys(self.log.missing)),
             lint=lint,
             marks_added=added,
+            page_mark=page_mark,
             contents=contents,
             main_part=self.parts[0].name,
             pictures=tuple(dict.fromkeys(self.log.pictures)),

@@ -30,7 +30,8 @@ class Filled:
     ``pictures`` the SHA-256 of each figure as it was drawn; ``never_shown`` the headers and footers that no
     page can show, ``perhaps_shown`` those that depend on the number of pages, with their own words;
     ``of_the_run`` the tags whose values differ from run to run, and ``rows_of_the_run`` the rows with them;
-    ``in_margins`` the figures that stand in headers and footers alone.
+    ``in_margins`` the figures that stand in headers and footers alone; ``page_mark`` the line that every page
+    carries.
     """
 
     docx: bytes
@@ -48,3 +49,4 @@ class Filled:
     of_the_run: frozenset[str] = frozenset()
     rows_of_the_run: frozenset[int] = frozenset()
     in_margins: frozenset[str] = frozenset()
+    page_mark: str | None = None

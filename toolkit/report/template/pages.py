@@ -22,10 +22,10 @@ def headers_shown(
     ask for them; the others then depend on how many pages there are.
     """
     main = package.main_document_part
-    even = _switched_on(getattr(_settings(main), "element", None), "w:evenAndOddHeaders")
+    even = switched_on(getattr(settings_of(main), "element", None), "w:evenAndOddHeaders")
     certain: set[str] = set()
     possible: set[str] = set()
-    title_somewhere = any(_switched_on(s, "w:titlePg") for s in main.element.iter(q("w:sectPr")))
+    title_somewhere = any(switched_on(s, "w:titlePg") for s in main.element.iter(q("w:sectPr")))
     for section in main.element.iter(q("w:sectPr")):
         for reference in section.iter(q("w:headerReference"), q("w:footerReference")):
             rel = main.rels.get(reference.get(q("r:id")))
@@ -34,7 +34,7 @@ def headers_shown(
             name = str(rel.target_part.partname).lstrip("/")
             kind = reference.get(q("w:type")) or "default"
             # A later section may show the first page's header of the one before.
-            if kind == "default" and not even and not _switched_on(section, "w:titlePg"):
+            if kind == "default" and not even and not switched_on(section, "w:titlePg"):
                 certain.add(name)
             elif kind == "default" or (kind == "first" and title_somewhere) or (kind == "even" and even):
                 possible.add(name)
@@ -83,7 +83,8 @@ def drop_notes(parts: list[Story]) -> None:
                     story.root.remove(note)
 
 
-def _settings(main: Any) -> Any:
+def settings_of(main: Any) -> Any:
+    """Return the part with the document's settings, None where it has none."""
     return next(
         (
             rel.target_part
@@ -94,6 +95,7 @@ def _settings(main: Any) -> Any:
     )
 
 
-def _switched_on(element: Any, name: str) -> bool:
+def switched_on(element: Any, name: str) -> bool:
+    """Tell whether a child that is a switch is on."""
     found = None if element is None else element.find(q(name))
     return found is not None and (found.get(q("w:val")) or "1").lower() not in _OFF

@@ -6,6 +6,7 @@ import datetime as dt
 from typing import Any
 
 from toolkit import __version__
+from toolkit.calibration.records.use import DRAFT
 from toolkit.recording.marks import output_keywords
 from toolkit.report.content import ReportContent
 from toolkit.report.template.xml import clean
@@ -18,7 +19,8 @@ def set_properties(package: Any, content: ReportContent) -> None:
     day = dt.datetime.combine(dt.date.fromisoformat(content.issued), dt.time(), tzinfo=dt.UTC).replace(
         tzinfo=None
     )
-    core.title, core.author = clean(content.title)[:255], clean(content.author)[:255]
+    title = f"{DRAFT}: {content.title}" if content.draft_reasons else content.title
+    core.title, core.author = clean(title)[:255], clean(content.author)[:255]
     core.last_modified_by = f"toolkit {__version__}"
     core.subject = clean(content.subject)[:255]
     core.identifier = content.identity

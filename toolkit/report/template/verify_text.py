@@ -71,6 +71,11 @@ def text_checks(text: str, filled: Filled) -> list[Check]:
             message="; ".join(rows_left[:5]) or f"{sum(map(len, filled.cells))} table cells found in the PDF",
         ),
     ]
+    if filled.page_mark is not None:
+        mark = squeeze(filled.page_mark)
+        bare = [str(number) for number, sheet in enumerate(sheets[:-1], start=1) if mark not in sheet]
+        said = f"{filled.page_mark[:40]!r} is not on page {', '.join(bare[:5])}"
+        checks.append(Check(name="marks", ok=not bare, message=said if bare else "the mark is on every page"))
     if unreadable:
         checks.append(
             Check(

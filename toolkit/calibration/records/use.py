@@ -1,0 +1,92 @@
+"""How a record stands for a result, as it travels with the result: every mark follows from it alone.
+
+`registry.standing` decides it; pages, figures, files and answers only say it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from toolkit.calibration.records.record import CalibrationRecord
+
+DRAFT = "DRAFT"
+DRAFT_MARK = f"{DRAFT}, NOT APPROVED"
+UNVERIFIED = "UNVERIFIED CALIBRATION"
+_LONGEST = 130  # characters of a part of the mark that stands on every page
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CalibrationUse:
+    """Which record computed a result, and how it stood for it.
+
+    ``unverified``: it is a legacy import. ``draft_reasons``: why it may not make a number that is issued;
+    empty for a record in force. ``since``: what became known of it after the day that the result is
+    judged by.
+    """
+
+    id: str
+    sha256: str
+    unverified: bool
+    draft_reasons: tuple[str, ...] = ()
+    since: tuple[str, ...] = ()
+
+    @property
+    def draft(self) -> bool:
+        """True where the result may not be issued."""
+        return bool(self.draft_reasons)
+
+    @property
+    def status(self) -> str:
+        """The record's status in words, as the first page of a document says it."""
+        said = "unverified (legacy import)" if self.unverified else "verified"
+        if self.draft:
+            said = f"not approved: {'; '.join(self.draft_reasons)}" + (f"; {said}" if self.unverified else "")
+        return said + (f"; known since: {'; '.join(self.since)}" if self.since else "")
+
+    @property
+    def word(self) -> str | None:
+        """The mark of a figure; None for a record that needs none."""
+        return DRAFT if self.draft else "UNVERIFIED" if self.unverified else None
+
+    @property
+    def mark(self) -> str | None:
+        """The line that stands on every page of a document; None for a record that needs none."""
+        return mark_of((self,))
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the use under the keys of the answers and manifests."""
+        said = {"id": self.id, "sha256": self.sha256, "unverified": self.unverified}
+        return said | ({"draft": True} if self.draft else {})
+
+
+def mark_of(uses: Sequence[CalibrationUse]) -> str | None:
+    """Return the one line that says how the records of a document stand; None where it needs none.
+
+    It names every record; why, as far as a line of a page has room for it.
+    """
+    said = []
+    for word, chosen, why in (
+        (DRAFT_MARK, [one for one in uses if one.draft], "draft_reasons"),
+        (UNVERIFIED, [one for one in uses if one.unverified], None),
+        ("KNOWN SINCE", [one for one in uses if one.since], "since"),
+    ):
+        if chosen:
+            text = f"{word}: {', '.join(dict.fromkeys(one.id for one in chosen))}"
+            if why and len(chosen) == 1:
+                text += f": {'; '.join(getattr(chosen[0], why))}"
+            said.append(text if len(text) <= _LONGEST else f"{text[: _LONGEST - 3].rstrip()}...")
+    return " - ".join(said) or None
+
+
+def not_asked(record: CalibrationRecord) -> CalibrationUse:
+    """Return the use of a record that no registry was asked about: what it computes is a draft."""
+    return CalibrationUse(
+        id=record.id,
+        sha256=record.sha256,
+        unverified=not record.verified,
+        draft_reasons=("no registry was asked whether it is in force",),
+    )

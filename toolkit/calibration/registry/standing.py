@@ -1,0 +1,251 @@
+"""Whether a record may make a number: one rule for every command.
+
+A record may, where it belongs to the test's machine, was approved, is in force on the test's day as known on
+the day of the report, and is not expired then. Everything else is at most a draft. A `CalibrationUse` carries
+the answer with every result, and each mark on a page, figure or file follows from it alone.
+
+*Expired*: the laboratory stated a recall interval when it approved the record, and the test's day lies after
+the session's day plus that interval. The record is not void by that: audits still find it in force.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from datetime import date
+from typing import TYPE_CHECKING
+
+from toolkit.calibration.records.use import CalibrationUse
+from toolkit.calibration.registry.clock import today
+from toolkit.calibration.registry.gates import GateResult
+from toolkit.calibration.registry.interval import parse_interval
+from toolkit.calibration.registry.judgement import judge_stored
+from toolkit.errors import RecordError, ToolkitError
+
+if TYPE_CHECKING:
+    from toolkit.calibration.records.record import CalibrationRecord
+    from toolkit.calibration.registry.registry import Registry
+    from toolkit.calibration.registry.status import RecordStatus
+
+_PLACES = 4  # of a failed gate that are named
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Reason:
+    """One reason why a record may make no number that is issued, and what to do about it."""
+
+    text: str
+    next_step: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Standing:
+    """A record, and why it may not make a number of a test; without ``reasons`` it may.
+
+    A ``discarded`` one makes no draft either: a laboratory has said that nothing shall rest on it.
+    """
+
+    record: CalibrationRecord
+    instrument: str
+    on: date | None
+    known_at: date
+    reasons: tuple[Reason, ...]
+    since: tuple[str, ...] = ()
+    discarded: bool = False
+
+    def use(self, *, draft: bool, where: object = None) -> CalibrationUse:
+        """Return what goes with every result of the record; ``where`` names the test in an error.
+
+        Raises
+        ------
+        RecordError
+            ``not-in-force``: there are reasons against it, and no draft was asked for
+        """
+        if self.reasons and (self.discarded or not draft):
+            when = "on the test's day" if self.on is None else f"on {self.on.isoformat()}"
+            raise not_in_force(
+                self.record.id,
+                self.reasons,
+                where=self.record.id if where is None else f"{where}, record {self.record.id}",
+                expected=f"a record of {self.instrument} that is approved and in force {when}, as known on "
+                f"{self.known_at.isoformat()}",
+                draft=not self.discarded,
+            )
+        return CalibrationUse(
+            id=self.record.id,
+            sha256=self.record.sha256,
+            unverified=not self.record.verified,
+            draft_reasons=tuple(one.text for one in self.reasons),
+            since=self.since,
+        )
+
+
+def not_in_force(
+    record_id: str,
+    reasons: tuple[Reason, ...],
+    *,
+    where: object,
+    expected: str,
+    rule: str = "not-in-force",
+    draft: bool = True,
+) -> RecordError:
+    """Return the error of a record that may not make a number, with its reasons and the next steps.
+
+    ``draft`` tells whether a draft may be made of it.
+    """
+    steps = list(dict.fromkeys(one.next_step for one in reasons))
+    if draft:
+        steps.append("or add --draft: every page then says that it is a draft")
+    return RecordError(
+        f"{record_id} may not be used: it is not approved and in force",
+        where=where,
+        got="; ".join(one.text for one in reasons),
+        expected=expected,
+        next_step="; ".join(steps),
+        rule=rule,
+    )
+
+
+def standing(
+    registry: Registry,
+    instrument: str,
+    *,
+    on: date | None,
+    known_at: date | None = None,
+    named: str | None = None,
+) -> Standing:
+    """Return the record for a test of an instrument, and how it stands.
+
+    Parameters
+    ----------
+    on : the test's day, None where it is not known
+    known_at : day of knowledge, default today
+    named : id of the record; default the one in force on the test's day, and then ``on`` is needed
+
+    Raises
+    ------
+    RegistryError, RecordError
+        no record is in force on that day; the named record or the ledger cannot be used
+    """
+    known = known_at or today()
+    if named is None:
+        if on is None:
+            raise TypeError("a record is chosen by its name or by the test's day")
+        record = registry.in_force(instrument, on=on, known_at=known)
+    else:
+        record = registry.load(named)
+    reasons = _reasons(registry, record, instrument, on, known)
+    told = {one.text for one in reasons}
+    later = () if known >= today() else _reasons(registry, record, instrument, on, today())
+    return Standing(
+        record=record,
+        instrument=instrument,
+        on=on,
+        known_at=known,
+        reasons=reasons,
+        since=tuple(one.text for one in later if one.text not in told),
+        discarded=registry.status(record.id, known_at=known).state == "discarded",
+    )
+
+
+def unapproved(registry: Registry, record: CalibrationRecord, status: RecordStatus) -> tuple[Reason, ...]:
+    """Return why a record is not approved: its gates that fail, or that nobody has approved it yet."""
+    if status.in_force_from is not None:
+        return ()
+    state = "a candidate that nobody has approved" if status.state == "candidate" else status.state
+    try:
+        failed = failed_gates(registry, record)
+    except ToolkitError as error:
+        return (Reason(text=f"{state}; its gates cannot be run: {error.what}", next_step=_VERIFY),)
+    if status.state == "discarded":
+        why = f"discarded: {status.reason or 'no reason stated'}"
+        return (Reason(text=why, next_step="name another record, or calibrate the instrument again"),)
+    if not failed:
+        step = f"approve it: 'toolkit calibration approve {record.id} --in-force-from DATE'"
+        return (Reason(text=f"{state}; no gate fails", next_step=step),)
+    step = "correct the session and calibrate again: 'approve' refuses this record"
+    return (Reason(text=f"{state}; failed {_gates(failed)}", next_step=step),)
+
+
+def withdrawal(status: RecordStatus, on: date | None = None) -> tuple[Reason, ...]:
+    """Return that a record is void on a day by its withdrawal; without a day any void day counts."""
+    if status.void_from is None or (on is not None and on < status.void_from):
+        return ()
+    when = f" on {status.known_on.isoformat()}" if status.known_on else ""
+    void = "" if status.void_always else f", void from {status.void_from.isoformat()}"
+    text = f"{status.state}{when}{void}: {status.reason or 'no reason stated'}"
+    return (Reason(text=text, next_step="see 'toolkit calibration list'"),)
+
+
+def failed_gates(registry: Registry, record: CalibrationRecord) -> tuple[GateResult, ...]:
+    """Return the gates of an approval that a record fails."""
+    return judge_stored(registry, record, registry.ledger(record.instrument)).failed
+
+
+_VERIFY = "see 'toolkit calibration verify'"
+
+
+def _reasons(
+    registry: Registry, record: CalibrationRecord, instrument: str, on: date | None, known: date
+) -> tuple[Reason, ...]:
+    status = registry.status(record.id, known_at=known)
+    found: list[Reason] = []
+    if record.instrument != instrument:
+        text = f"it is a record of {record.instrument}, the test is of {instrument}"
+        found.append(Reason(text=text, next_step=f"name a record of {instrument}"))
+    void = withdrawal(status, on)
+    if void:
+        found += (replace(one, next_step=_other(registry, instrument, on, known)) for one in void)
+    else:
+        found += unapproved(registry, record, status)
+    if on is None:
+        text = "the test has no date: which record was in force cannot be told"
+        found.append(Reason(text=text, next_step="write 'date = YYYY-MM-DD' into test.toml"))
+    elif not void and status.in_force_from is not None:
+        found += _by_day(registry, record, status, on, known)
+    return tuple(found)
+
+
+def _by_day(
+    registry: Registry, record: CalibrationRecord, status: RecordStatus, on: date, known: date
+) -> list[Reason]:
+    """Return what the test's day says against an approved record."""
+    found: list[Reason] = []
+    winner = registry.id_in_force(record.instrument, on=on, known_at=known)
+    if status.in_force_from is not None and on < status.in_force_from:
+        text = f"not in force until {status.in_force_from.isoformat()}"
+        found.append(Reason(text=text, next_step=_other(registry, record.instrument, on, known)))
+    elif winner not in (None, record.id):
+        begin = registry.status(str(winner), known_at=known).in_force_from
+        text = f"superseded by {winner}" + (f", in force from {begin.isoformat()}" if begin else "")
+        if begin is not None and status.in_force_from is not None and begin < status.in_force_from:
+            text = f"approved only after {known.isoformat()}: {winner} was in force then"
+        found.append(Reason(text=text, next_step=_other(registry, record.instrument, on, known)))
+    due = due_date(record, status)
+    if due is not None and on > due:
+        text = f"expired: its recall interval of {status.recall} ended on {due.isoformat()}"
+        step = "calibrate the instrument, or approve the record again with a longer --recall and the reason"
+        found.append(Reason(text=text, next_step=step))
+    return found
+
+
+def due_date(record: CalibrationRecord, status: RecordStatus) -> date | None:
+    """Return the day by which a record's instrument is due again; None where no interval was stated."""
+    if status.recall is None:
+        return None
+    return parse_interval(status.recall).after(date.fromisoformat(record.date))
+
+
+def _other(registry: Registry, instrument: str, on: date | None, known: date) -> str:
+    winner = None if on is None else registry.id_in_force(instrument, on=on, known_at=known)
+    if winner is None:
+        return "see 'toolkit calibration list' for the records and the days from which they are in force"
+    return f"use {winner}, the record in force: leave --calibration away, or process the recordings again"
+
+
+def _gates(failed: tuple[GateResult, ...]) -> str:
+    told = []
+    for rule in dict.fromkeys(one.rule for one in failed):
+        places = [one.where for one in failed if one.rule == rule]
+        more = f" and {len(places) - _PLACES} more" if len(places) > _PLACES else ""
+        told.append(f"{rule} ({'; '.join(places[:_PLACES])}{more})")
+    return f"gate{'' if len(told) == 1 else 's'} {', '.join(told)}"
