@@ -1,0 +1,180 @@
+"""The cells' pattern: what three cells say together, held against what a wheel can do to them.
+
+The cells measure three loads, FY, MZ and the overturning moment MX, and physics knows the third: the side force
+acts at the road, a loaded radius below the hub, so that
+
+    MX = lever FY + offset FZ + const,          lever between `limits.LEVER`
+
+With the force in cell i, f_i = (dFY/d indication_i) indication_i by the record, and its lever in the machine
+definition, MX = sum lever_i f_i. A cell that was turned round, exchanged or is dead breaks this or another law;
+which single change of a cell puts all of them right is searched among the turns and the exchanges of two.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from toolkit.channels import Reversal, seen_by_cells, signs
+from toolkit.findings import Finding
+from toolkit.reduction import limits
+from toolkit.reduction.averaging import free_radius_m
+from toolkit.reduction.physics import Departure, Readings, departures
+from toolkit.units import si_scale
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from toolkit.calibration.records.record import CalibrationRecord
+    from toolkit.machine import Machine
+    from toolkit.recording.model import TestInfo
+    from toolkit.reduction.model import Condition
+
+_LEAST_FORCE = 0.3  # span of FY over the mean load from which a lever can be told
+_LEFT = 0.15  # of the moment's span: what may be left of it beside lever and offset
+_FEWEST = 5
+
+
+@dataclasses.dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Cells:
+    """The cells of a test: readings in SI, and each cell's part of FY, of MZ and of MX.
+
+    ``forces`` (n, cells) [N] in machine axes; ``moments`` (n, cells) [N·m]; ``levers`` (cells,) [m] of the
+    overturning moment, None where the machine names none; ``FY_sign`` (n,) and ``MZ_sign`` (n,) from machine axes.
+    """
+
+    names: tuple[str, ...]
+    indications: NDArray[np.float64]
+    per_FY: NDArray[np.float64]
+    per_MZ: NDArray[np.float64]
+    levers: NDArray[np.float64] | None
+    FY_sign: NDArray[np.float64]
+    MZ_sign: NDArray[np.float64]
+
+
+def physics_findings(
+    conditions: Sequence[Condition], *, record: CalibrationRecord, machine: Machine, info: TestInfo
+) -> list[Finding]:
+    """Return what no tire and no wheel can do in a test's corrected values, as findings of level error."""
+    if not conditions:
+        return []
+    readings = _readings(conditions, info)
+    cells = _cells(conditions, record, machine, info.reversal)
+    broken = _all(readings, cells)
+    if not broken:
+        return []
+    cures = [text for text, changed in _changes(readings, cells) if not _all(*changed)]
+    more = f"with {' or with '.join(cures)} every value is possible" if cures else ""
+    return [one.finding(more=more if index == 0 else "") for index, one in enumerate(broken)]
+
+
+def _all(readings: Readings, cells: Cells) -> tuple[Departure, ...]:
+    return (*departures(readings), *pattern(readings, cells))
+
+
+def pattern(readings: Readings, cells: Cells) -> tuple[Departure, ...]:
+    """Return where the overturning moment in the cells does not follow the side force."""
+    if cells.levers is None or len(readings.FZ) < _FEWEST:
+        return ()
+    forces = cells.indications * cells.per_FY
+    FY, MX = forces.sum(axis=1), forces @ cells.levers
+    FZ = readings.FZ
+    if np.ptp(FY) < _LEAST_FORCE * FZ.mean():
+        return ()
+    design = np.column_stack([FY, FZ, np.ones(len(FY))])
+    solution, *_ = np.linalg.lstsq(design, MX, rcond=None)
+    lever = float(solution[0])
+    rest = MX - design @ solution
+    low, high = limits.LEVER.low, limits.LEVER.high
+    if readings.radius_m is not None:
+        low, high = (one * readings.radius_m for one in (limits.LEVER_PER_RADIUS.low, limits.LEVER_PER_RADIUS.high))
+    found = []
+    if not low <= lever <= high:
+        found.append(
+            Departure(
+                rule="impossible-cells",
+                where=f"cells {', '.join(cells.names)}",
+                message=f"the overturning moment in the cells follows the side force by {lever:.3f} m; a wheel "
+                f"gives its loaded radius, {low:.2f} to {high:.2f} m: two cells are exchanged, one is turned "
+                "round, or one is dead",
+            )
+        )
+    left = float(np.sqrt(np.mean(rest**2)) / np.ptp(MX)) if np.ptp(MX) > 0 else 0.0
+    if left > _LEFT:
+        worst = int(np.argmax(np.abs(rest)))
+        found.append(
+            Departure(
+                rule="impossible-cells",
+                where=readings.place[worst],
+                message=f"the overturning moment in the cells leaves the line of the side force by "
+                f"{100 * left:.0f} % of its span (rms; at most {100 * _LEFT:g} %): a cell changed its sign, its "
+                "place or its sensitivity during the test",
+            )
+        )
+    return tuple(found)
+
+
+def _readings(conditions: Sequence[Condition], info: TestInfo) -> Readings:
+    def column(name: str) -> NDArray[np.float64]:
+        return np.array([getattr(c, name) for c in conditions], dtype=np.float64)
+
+    return Readings(
+        place=tuple(f"{c.file}, rows {c.first_row}-{c.last_row}" for c in conditions),
+        FZ=column("FZ"), SA=column("SA"), FY=column("FY"), MZ=column("MZ"),
+        reverse=np.array([c.rotation == "reverse" for c in conditions]),
+        block=tuple((c.step_SA, c.step_FZ) for c in conditions),
+        u_FY=column("u_FY_zero"), u_MZ=column("u_MZ_zero"), radius_m=free_radius_m(info.tire_size),
+    )  # fmt: skip
+
+
+def _cells(
+    conditions: Sequence[Condition], record: CalibrationRecord, machine: Machine, reversal: Reversal
+) -> Cells:
+    levers = dict(machine.overturning_lever_m)
+    turns = [signs(machine.axes, "SAE", seen_by_cells(c.rotation, reversal)) for c in conditions]
+    return Cells(
+        names=record.indications,
+        indications=np.array([c.indications for c in conditions]),
+        per_FY=_linear(record, "FY"),
+        per_MZ=_linear(record, "MZ"),
+        levers=np.array([levers[name] for name in record.indications])
+        if set(record.indications) <= set(levers)
+        else None,
+        FY_sign=np.array([float(one["FY"]) for one in turns]),
+        MZ_sign=np.array([float(one["MZ"]) for one in turns]),
+    )
+
+
+def _linear(record: CalibrationRecord, load: str) -> NDArray[np.float64]:
+    one = record.load(load)
+    by_term = dict(zip(one.terms, one.coefficients, strict=True))
+    return np.array([by_term.get(name, 0.0) for name in record.indications]) * si_scale(one.unit)
+
+
+def _changes(readings: Readings, cells: Cells) -> list[tuple[str, tuple[Readings, Cells]]]:
+    """Return every single turn of a cell and exchange of two, in words, and the test with it undone."""
+    n = len(cells.names)
+    changes = []
+    for i in range(n):
+        turned = np.eye(n)
+        turned[i, i] = -1.0
+        changes.append((f"{cells.names[i]} turned", turned))
+    for i, j in itertools.combinations(range(n), 2):
+        order = list(range(n))
+        order[i], order[j] = j, i
+        changes.append((f"{cells.names[i]} and {cells.names[j]} exchanged", np.eye(n)[order]))
+    made = []
+    for text, matrix in changes:
+        now = cells.indications @ matrix
+        step = now - cells.indications
+        other = dataclasses.replace(
+            readings,
+            FY=readings.FY + cells.FY_sign * (step @ cells.per_FY),
+            MZ=readings.MZ + cells.MZ_sign * (step @ cells.per_MZ),
+        )
+        made.append((text, (other, dataclasses.replace(cells, indications=now))))
+    return made

@@ -1,0 +1,97 @@
+"""What a tire and the carriage that holds it can do: the bounds of every check of physics, with their sources.
+
+A bound is no typical value: it stands beyond every published tire, and a number beyond the bound is a fault of
+the measurement. Where sources differ the wider one counts, with a margin of a quarter or more over the
+largest value of the public sets: SAE 870421 (passenger), Goodyear G275 (truck), Schwalbe Energizer (bicycle),
+FSAE TTC (racing, its amplitude obscured).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+# The least load [N] at which a tire is tested: kilonewtons named newtons; a bicycle tire is tested at some 300.
+LEAST_LOAD_N = 25.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Limit:
+    """One bound in SI: ``low`` to ``high``, what it bounds, and where it comes from."""
+
+    low: float
+    high: float
+    unit: str
+    text: str
+    source: str
+
+
+FRICTION = Limit(
+    low=0.0,
+    high=2.0,
+    unit="1",
+    text="side force over load",
+    source="road tires reach 0.8 to 1.2 on dry laboratory surfaces (Gillespie, Fundamentals of Vehicle Dynamics, "
+    "1992, ch. 10; the public sets 0.5 to 1.14), the racing tire of the FSAE TTC set 1.54",
+)
+STIFFNESS = Limit(
+    low=1.0,
+    high=40.0,
+    unit="1/rad",
+    text="cornering stiffness over load",
+    source="0.08 to 0.19 per degree for car tires and 0.30 for low ones (Gillespie 1992, pp. 347-355), that is 5 "
+    "to 17 per rad; SAE 870421 22 at light load, a truck tire past its load 3, the FSAE TTC racing tire 32",
+)
+PULL = Limit(
+    low=0.0,
+    high=0.15,
+    unit="1",
+    text="side force over load at zero slip angle",
+    source="conicity and plysteer: 0.04 of the load for a truck tire (Goodyear G275), 0.08 for a bicycle tire; a "
+    "plysteer of 0.4 deg on the stiffest car tire 0.15",
+)
+STEER_ZERO = Limit(
+    low=0.0,
+    high=math.radians(0.5),
+    unit="rad",
+    text="error of the slip angle's zero",
+    source="rack and pinion steering in 1 deg steps, zero set anew for each test: 0.1 to 0.5 deg",
+)
+TRAIL = Limit(
+    low=0.0,
+    high=0.15,
+    unit="m",
+    text="pneumatic trail",
+    source="no longer than half the contact length, since the pressure ends there; a third of that for small slip "
+    "(brush model: Pacejka, Tire and Vehicle Dynamics, ch. 3). Public sets: 8 to 77 mm",
+)
+TRAIL_PER_RADIUS = Limit(
+    low=0.0,
+    high=0.3,
+    unit="1",
+    text="pneumatic trail over free radius",
+    source="half the contact length at a deflection of 5 % of the radius is 0.31 of it (chord of a circle); the "
+    "public sets reach 0.23, far beyond their rated load",
+)
+RESIDUAL_MOMENT = Limit(
+    low=0.0,
+    high=0.02,
+    unit="m",
+    text="aligning moment over load where there is no side force",
+    source="twice the largest residual of the public sets, 8 mm, with an angle error of 0.5 deg on it",
+)
+LEVER = Limit(
+    low=0.10,
+    high=0.70,
+    unit="m",
+    text="overturning moment at the hub over side force",
+    source="the loaded radius, 0.15 (kart) to 0.6 m (truck); over the rows of Figure 4.4 0.23 m",
+)
+LEVER_PER_RADIUS = Limit(
+    low=0.4,
+    high=1.3,
+    unit="1",
+    text="overturning moment at the hub over side force and free radius",
+    source="the loaded radius is 0.85 to 0.98 of the free one; Figure 4.4's 0.23 m is 0.72 of a 205/55R16's",
+)
+LARGEST_TRAIL_M = 0.5  # in a table of any tire, aircraft and earth movers among them
