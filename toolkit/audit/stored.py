@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolkit.reduction.physics import departures, of_blocks
+from toolkit.reduction.physics import departures, of_sizes
 
 if TYPE_CHECKING:
     from toolkit.findings import Finding
@@ -41,7 +41,7 @@ def impossible(
     )
     FZ, SA, FY, MZ = table.T
     found = departures(
-        of_blocks(
+        of_sizes(
             [f"{where}, {name}" for name, _ in known], FZ=FZ, SA=SA, FY=FY, MZ=np.nan_to_num(MZ, nan=0.0)
         )
     )

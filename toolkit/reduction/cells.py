@@ -14,16 +14,16 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolkit.channels import Reversal, seen_by_cells, signs
+from toolkit.channels import seen_by_cells, signs
 from toolkit.findings import Finding
 from toolkit.reduction import limits
 from toolkit.reduction.averaging import free_radius_m
-from toolkit.reduction.physics import Departure, Readings, departures
+from toolkit.reduction.physics import Departure, Readings, departures, longest_trail
 from toolkit.units import si_scale
 
 if TYPE_CHECKING:
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from toolkit.calibration.records.record import CalibrationRecord
     from toolkit.machine import Machine
     from toolkit.recording.model import TestInfo
-    from toolkit.reduction.model import Condition
+    from toolkit.reduction.model import Condition, Tare
 
 _LEAST_FORCE = 0.3  # span of FY over the mean load from which a lever can be told
 _LEFT = 0.15  # of the moment's span: what may be left of it beside lever and offset
@@ -43,8 +43,9 @@ _FEWEST = 5
 class Cells:
     """The cells of a test: readings in SI, and each cell's part of FY, of MZ and of MX.
 
-    ``forces`` (n, cells) [N] in machine axes; ``moments`` (n, cells) [N·m]; ``levers`` (cells,) [m] of the
-    overturning moment, None where the machine names none; ``FY_sign`` (n,) and ``MZ_sign`` (n,) from machine axes.
+    ``indications`` (n, cells) minus ``tares`` (n, cells), in the record's units; ``per_FY`` [N] and ``per_MZ``
+    [N·m] (cells,) of one unit of indication; ``levers`` (cells,) [m] of the overturning moment, None where the
+    machine names none; ``radius_m`` the tire's free radius; ``FY_sign`` and ``MZ_sign`` (n,) from machine axes.
     """
 
     names: tuple[str, ...]
@@ -52,23 +53,33 @@ class Cells:
     per_FY: NDArray[np.float64]
     per_MZ: NDArray[np.float64]
     levers: NDArray[np.float64] | None
+    radius_m: float | None
+    tares: NDArray[np.float64]
     FY_sign: NDArray[np.float64]
     MZ_sign: NDArray[np.float64]
 
 
 def physics_findings(
-    conditions: Sequence[Condition], *, record: CalibrationRecord, machine: Machine, info: TestInfo
+    conditions: Sequence[Condition],
+    *,
+    record: CalibrationRecord,
+    machine: Machine,
+    info: TestInfo,
+    tares: Mapping[str, Tare],
 ) -> list[Finding]:
-    """Return what no tire and no wheel can do in a test's corrected values, as findings of level error."""
+    """Return what no tire and no wheel can do in a test's corrected values, as findings of level error.
+
+    ``tares`` are those of the files by their names.
+    """
     if not conditions:
         return []
     readings = _readings(conditions, info)
-    cells = _cells(conditions, record, machine, info.reversal)
+    cells = _cells(conditions, record, machine, info, tares)
     broken = _all(readings, cells)
     if not broken:
         return []
-    cures = [text for text, changed in _changes(readings, cells) if not _all(*changed)]
-    more = f"with {' or with '.join(cures)} every value is possible" if cures else ""
+    cures = dict.fromkeys(text for text, changed in _changes(readings, cells) if not _all(*changed))
+    more = f"all is possible with {' or '.join(cures)}" if cures else ""
     return [one.finding(more=more if index == 0 else "") for index, one in enumerate(broken)]
 
 
@@ -90,8 +101,8 @@ def pattern(readings: Readings, cells: Cells) -> tuple[Departure, ...]:
     lever = float(solution[0])
     rest = MX - design @ solution
     low, high = limits.LEVER.low, limits.LEVER.high
-    if readings.radius_m is not None:
-        low, high = (one * readings.radius_m for one in (limits.LEVER_PER_RADIUS.low, limits.LEVER_PER_RADIUS.high))
+    if cells.radius_m is not None:
+        low, high = (part * cells.radius_m for part in (limits.LEVER_PER_RADIUS.low, limits.LEVER_PER_RADIUS.high))
     found = []
     if not low <= lever <= high:
         found.append(
@@ -122,20 +133,30 @@ def _readings(conditions: Sequence[Condition], info: TestInfo) -> Readings:
     def column(name: str) -> NDArray[np.float64]:
         return np.array([getattr(c, name) for c in conditions], dtype=np.float64)
 
+    none = np.zeros(len(conditions))
     return Readings(
         place=tuple(f"{c.file}, rows {c.first_row}-{c.last_row}" for c in conditions),
         FZ=column("FZ"), SA=column("SA"), FY=column("FY"), MZ=column("MZ"),
         reverse=np.array([c.rotation == "reverse" for c in conditions]),
         block=tuple((c.step_SA, c.step_FZ) for c in conditions),
-        u_FY=column("u_FY_zero"), u_MZ=column("u_MZ_zero"), radius_m=free_radius_m(info.tire_size),
+        u_FY=column("u_FY_zero"), u_MZ=column("u_MZ_zero"), FX=none, IA=none,
+        trail_m=longest_trail(free_radius_m(info.tire_size)),
     )  # fmt: skip
 
 
 def _cells(
-    conditions: Sequence[Condition], record: CalibrationRecord, machine: Machine, reversal: Reversal
+    conditions: Sequence[Condition],
+    record: CalibrationRecord,
+    machine: Machine,
+    info: TestInfo,
+    tares: Mapping[str, Tare],
 ) -> Cells:
     levers = dict(machine.overturning_lever_m)
-    turns = [signs(machine.axes, "SAE", seen_by_cells(c.rotation, reversal)) for c in conditions]
+    turns = [signs(machine.axes, "SAE", seen_by_cells(c.rotation, info.reversal)) for c in conditions]
+    zeros = {
+        name: [dict(tare.values).get(cell, 0.0) if tare.source != "none" else 0.0 for cell in record.indications]
+        for name, tare in tares.items()
+    }
     return Cells(
         names=record.indications,
         indications=np.array([c.indications for c in conditions]),
@@ -144,6 +165,8 @@ def _cells(
         levers=np.array([levers[name] for name in record.indications])
         if set(record.indications) <= set(levers)
         else None,
+        radius_m=free_radius_m(info.tire_size),
+        tares=np.array([zeros[c.file] for c in conditions]),
         FY_sign=np.array([float(one["FY"]) for one in turns]),
         MZ_sign=np.array([float(one["MZ"]) for one in turns]),
     )
@@ -158,23 +181,23 @@ def _linear(record: CalibrationRecord, load: str) -> NDArray[np.float64]:
 def _changes(readings: Readings, cells: Cells) -> list[tuple[str, tuple[Readings, Cells]]]:
     """Return every single turn of a cell and exchange of two, in words, and the test with it undone."""
     n = len(cells.names)
-    changes = []
+    raw, made = cells.indications + cells.tares, []
     for i in range(n):
-        turned = np.eye(n)
-        turned[i, i] = -1.0
-        changes.append((f"{cells.names[i]} turned", turned))
+        for when, tares in (("", np.zeros_like(raw)), (" after its tare", cells.tares)):
+            now = np.where(np.arange(n) == i, -(cells.indications + tares) - tares, cells.indications)
+            made.append((f"{cells.names[i]} turned round{when}", now))
     for i, j in itertools.combinations(range(n), 2):
         order = list(range(n))
         order[i], order[j] = j, i
-        changes.append((f"{cells.names[i]} and {cells.names[j]} exchanged", np.eye(n)[order]))
-    made = []
-    for text, matrix in changes:
-        now = cells.indications @ matrix
-        step = now - cells.indications
-        other = dataclasses.replace(
-            readings,
-            FY=readings.FY + cells.FY_sign * (step @ cells.per_FY),
-            MZ=readings.MZ + cells.MZ_sign * (step @ cells.per_MZ),
-        )
-        made.append((text, (other, dataclasses.replace(cells, indications=now))))
-    return made
+        made.append((f"{cells.names[i]} and {cells.names[j]} exchanged", raw[:, order] - cells.tares))
+    return [(text, _with(readings, cells, now)) for text, now in made]
+
+
+def _with(readings: Readings, cells: Cells, now: NDArray[np.float64]) -> tuple[Readings, Cells]:
+    step = now - cells.indications
+    changed = dataclasses.replace(
+        readings,
+        FY=readings.FY + cells.FY_sign * (step @ cells.per_FY),
+        MZ=readings.MZ + cells.MZ_sign * (step @ cells.per_MZ),
+    )
+    return changed, dataclasses.replace(cells, indications=now)

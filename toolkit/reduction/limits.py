@@ -50,6 +50,14 @@ PULL = Limit(
     source="conicity and plysteer: 0.04 of the load for a truck tire (Goodyear G275), 0.08 for a bicycle tire; a "
     "plysteer of 0.4 deg on the stiffest car tire 0.15",
 )
+CAMBER = Limit(
+    low=0.0,
+    high=1.5,
+    unit="1/rad",
+    text="camber stiffness over load",
+    source="about 1 per rad, tan(IA) of the load, for motorcycle tires and less for car tires (Pacejka, Tire and "
+    "Vehicle Dynamics, ch. 11)",
+)
 STEER_ZERO = Limit(
     low=0.0,
     high=math.radians(0.5),

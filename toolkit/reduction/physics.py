@@ -1,6 +1,7 @@
 """Physics of reduced values: what no tire can do, whatever calibration computed it.
 
-    |FY| <= min(FRICTION FZ, STIFFNESS FZ (|SA| + STEER_ZERO) + PULL FZ) + 3 u0
+    |FY| <= min(FRICTION FZ, STIFFNESS FZ (|SA| + STEER_ZERO) + PULL FZ + CAMBER FZ |IA|) + 3 u0
+    hypot(FX, FY) <= FRICTION FZ
     |MZ| <= TRAIL |FY| + RESIDUAL_MOMENT FZ + 3 u0
     1 <= -(dFY/dSA) / FZ <= 40 per rad,    0 <= (dMZ/dSA) / -(dFY/dSA) <= TRAIL          about zero slip
     FY(forward) and FY(reverse) agree but for pull, in axes that follow the travel
@@ -45,9 +46,9 @@ class Readings:
     """Values to be judged, each array (n,): SI, FZ positive, FY, MZ and SA in SAE axes with the travel.
 
     ``place`` names each value for a reader, ``block`` its slip-angle and load step (equal: comparable),
-    ``reverse`` its direction. ``u_FY`` and ``u_MZ`` are standard uncertainties of the zero. ``radius_m`` is
-    the tire's free radius, None where it is not known. ``signed`` False: the directions of travel and axes are
-    not known, so only sizes are judged.
+    ``reverse`` its direction. ``u_FY`` and ``u_MZ`` are standard uncertainties of the zero. ``FX`` and the
+    inclination angle ``IA`` are zeros where they are not measured. ``trail_m`` is the longest trail that the
+    tire can have. ``signed`` False: directions of travel and axes are not known, so only sizes are judged.
     """
 
     place: tuple[str, ...]
@@ -59,7 +60,9 @@ class Readings:
     block: tuple[tuple[float | None, float | None], ...]
     u_FY: NDArray[np.float64]
     u_MZ: NDArray[np.float64]
-    radius_m: float | None = None
+    FX: NDArray[np.float64]
+    IA: NDArray[np.float64]
+    trail_m: float = limits.TRAIL.high
     signed: bool = True
 
     def part(self, rows: NDArray[np.bool_]) -> Readings:
@@ -69,15 +72,9 @@ class Readings:
             place=tuple(self.place[i] for i in index),
             FZ=self.FZ[index], SA=self.SA[index], FY=self.FY[index], MZ=self.MZ[index],
             reverse=self.reverse[index], block=tuple(self.block[i] for i in index),
-            u_FY=self.u_FY[index], u_MZ=self.u_MZ[index], radius_m=self.radius_m, signed=self.signed,
+            u_FY=self.u_FY[index], u_MZ=self.u_MZ[index], FX=self.FX[index], IA=self.IA[index],
+            trail_m=self.trail_m, signed=self.signed,
         )  # fmt: skip
-
-    @property
-    def trail_m(self) -> float:
-        """The longest trail [m] that the tire can have."""
-        if self.radius_m is None:
-            return limits.TRAIL.high
-        return min(limits.TRAIL.high, limits.TRAIL_PER_RADIUS.high * self.radius_m)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -108,9 +105,10 @@ def departures(readings: Readings, *, share: float = 0.0) -> tuple[Departure, ..
 def _force(r: Readings, share: float) -> list[Departure]:
     # Without a slip angle (NaN) friction alone bounds a force.
     angle = np.abs(r.SA) + limits.STEER_ZERO.high
-    bound = np.fmin(limits.FRICTION.high, limits.STIFFNESS.high * angle + limits.PULL.high)
+    thrust = limits.PULL.high + limits.CAMBER.high * np.abs(r.IA)
+    bound = np.fmin(limits.FRICTION.high, limits.STIFFNESS.high * angle + thrust)
     use = np.maximum(np.abs(r.FY) - _SURE * r.u_FY, 0.0) / r.FZ
-    excess = np.where(r.FZ > 0, use / bound, 0.0)
+    excess = np.maximum(use / bound, np.hypot(use, r.FX / r.FZ) / limits.FRICTION.high)
     over = np.flatnonzero(excess > 1.0)
     if len(over) <= share * len(excess):
         return []
@@ -125,13 +123,20 @@ def _force(r: Readings, share: float) -> list[Departure]:
         Departure(
             rule="impossible-force",
             where=r.place[worst],
-            message=f"|FY| is {abs(r.FY[worst]) / r.FZ[worst]:.2f} of the load at "
+            message=_use(r, worst)
             + (f"{math.degrees(r.SA[worst]):+.2f} deg of slip and " if np.isfinite(r.SA[worst]) else "")
             + f"{r.FZ[worst]:.0f} N; no tire exceeds "
             f"{bound[worst]:.2f} there ({usual}). {_count(over, r)} beyond the bound. A cell is "
             "turned round, a coefficient has a wrong sign, or forces or loads are in another unit",
         )
     ]
+
+
+def _use(r: Readings, index: int) -> str:
+    FX, FY, FZ = r.FX[index], r.FY[index], r.FZ[index]
+    if FX:
+        return f"the force in the road's plane is {math.hypot(FX, FY) / FZ:.2f} of the load at "
+    return f"|FY| is {abs(FY) / FZ:.2f} of the load at "
 
 
 def _moment(r: Readings, share: float) -> list[Departure]:
@@ -205,28 +210,30 @@ def _slope(run: Readings, load: float | None) -> tuple[float, float, float] | No
 
 def _reversal(r: Readings) -> list[Departure]:
     # Every two values at one step of slip angle and load, of two files: pull is left, never a mirror image.
-    sums = {"same": 0.0, "other": 0.0}
+    sums, differences = [], []
     places: list[str] = []
     groups: dict[tuple[float | None, float | None], list[int]] = {}
     for index, block in enumerate(r.block):
-        if block[0] is not None and block[1] is not None and abs(r.SA[index]) > _LARGE:
+        if None not in block and abs(r.SA[index]) > _LARGE:
             groups.setdefault(block, []).append(index)
     for group in groups.values():
         for first, second in zip(group, group[1:], strict=False):
-            sums["same"] += (r.FY[first] + r.FY[second]) ** 2
-            sums["other"] += (r.FY[first] - r.FY[second]) ** 2
+            sums.append(r.FY[first] + r.FY[second])
+            differences.append(r.FY[first] - r.FY[second])
             if r.FY[first] * r.FY[second] < 0:
                 places.append(r.place[second])
-    if sums["other"] <= sums["same"] or not places:
+    if not places:
+        return []
+    same, other = (float(np.sqrt(np.mean(np.square(one)))) for one in (sums, differences))
+    if other <= same:
         return []
     return [
         Departure(
             rule="impossible-reversal",
             where=places[0],
-            message=f"at equal slip angle and load FY has opposite signs in {len(places)} pairs of runs, and "
-            f"their difference is {math.sqrt(sums['other'] / max(sums['same'], 1e-300)):.3g} times their sum; "
-            "a tire keeps its side force in axes that follow the travel, but for its pull: a reversed run is "
-            "not named as such in test.toml, or a cell was turned round between the runs",
+            message=f"at equal slip angle and load FY has opposite signs in {len(places)} of {len(sums)} pairs "
+            f"of runs: they differ by {other:.0f} N (rms) where their sum is {same:.0f} N; a tire keeps its side "
+            "force in axes that follow the travel, but for its pull: a reversed run is not named as such in test.toml, or a cell was turned round between the runs",
         )
     ]
 
@@ -235,18 +242,28 @@ def _count(over: NDArray[np.intp], r: Readings) -> str:
     return f"{len(over)} of {len(r.FZ)} values {'lies' if len(over) == 1 else 'lie'}"
 
 
-def of_blocks(
+def of_sizes(
     places: Sequence[str],
     *,
     FZ: NDArray[np.float64],
     SA: NDArray[np.float64],
     FY: NDArray[np.float64],
     MZ: NDArray[np.float64],
-    radius_m: float | None = None,
+    FX: NDArray[np.float64] | None = None,
+    IA: NDArray[np.float64] | None = None,
+    trail_m: float = limits.TRAIL.high,
 ) -> Readings:
-    """Return readings of which only sizes can be judged: blocks of one file, or rows of a table."""
+    """Return readings of which only sizes can be judged: blocks of one file, or rows of a table; FZ > 0."""
     none = np.zeros(len(FZ))
     return Readings(
-        place=tuple(places), FZ=FZ, SA=SA, FY=FY, MZ=MZ, reverse=np.zeros(len(FZ), dtype=bool),
-        block=((None, None),) * len(FZ), u_FY=none, u_MZ=none, radius_m=radius_m, signed=False,
+        place=tuple(places), FZ=FZ, SA=SA, FY=FY, MZ=MZ, reverse=none.astype(bool),
+        block=((None, None),) * len(FZ), u_FY=none, u_MZ=none, FX=none if FX is None else FX,
+        IA=none if IA is None else IA, trail_m=trail_m, signed=False,
     )  # fmt: skip
+
+
+def longest_trail(radius_m: float | None) -> float:
+    """Return the longest trail [m] that a tire of a free radius can have; None: of any tire on the machine."""
+    if radius_m is None:
+        return limits.TRAIL.high
+    return min(limits.TRAIL.high, limits.TRAIL_PER_RADIUS.high * radius_m)

@@ -73,7 +73,13 @@ def reduce_test(
     conditions = _ordered(_at_common_load(_own_loads(measured)), machine)
     protocol = machine.protocol
     findings = [
-        *physics_findings(conditions, record=record, machine=machine, info=info),
+        *physics_findings(
+            conditions,
+            record=record,
+            machine=machine,
+            info=info,
+            tares={file.name: file.tare for file in files},
+        ),
         *plan.check(placed, later, protocol, protocol.rotations or machine.rotations),
         *drift_findings(conditions, protocol),
         *correction_findings(machine),
