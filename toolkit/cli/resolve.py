@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import date
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
@@ -152,6 +152,7 @@ def _from_file(test: Path, registry: Registry, *, calibration: str | None, known
     from toolkit.errors import RecordError
     from toolkit.recording.gate import gate
     from toolkit.recording.marks import is_own_output
+    from toolkit.reduction.cells import checked
     from toolkit.testfile import read_test_file
 
     if not test.exists():
@@ -174,6 +175,7 @@ def _from_file(test: Path, registry: Registry, *, calibration: str | None, known
             rule="not-a-test",
         )
     result = read_test_file(test)
+    result = replace(result, reduced=checked(result.reduced))
     used = result.reduced.calibration
     record = registry.load(used.id)
     if record.sha256 != used.sha256 or calibration not in (None, used.id):

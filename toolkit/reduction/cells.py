@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from toolkit.calibration.records.record import CalibrationRecord
     from toolkit.machine import Machine
     from toolkit.recording.model import TestInfo
-    from toolkit.reduction.model import Condition, Tare
+    from toolkit.reduction.model import Condition, ReducedTest, Tare
 
 _LEAST_FORCE = 0.3  # span of FY over the mean load from which a lever can be told
 _LEFT = 0.15  # of the moment's span: what may be left of it beside lever and offset
@@ -81,6 +81,17 @@ def physics_findings(
     cures = dict.fromkeys(text for text, changed in _changes(readings, cells) if not _all(*changed))
     more = f"all is possible with {' or '.join(cures)}" if cures else ""
     return [one.finding(more=more if index == 0 else "") for index, one in enumerate(broken)]
+
+
+def checked(reduced: ReducedTest) -> ReducedTest:
+    """Return a reduced test with what no tire can do told, where it was reduced before there was a gate.
+
+    Without the machine and the record, as a file of its own: the cells' pattern is left to the reduction.
+    """
+    if reduced.impossible or not reduced.conditions:
+        return reduced
+    found = tuple(one.finding() for one in departures(_readings(reduced.conditions, reduced.info)))
+    return dataclasses.replace(reduced, findings=(*found, *reduced.findings)) if found else reduced
 
 
 def _all(readings: Readings, cells: Cells) -> tuple[Departure, ...]:

@@ -232,8 +232,9 @@ def _reversal(r: Readings) -> list[Departure]:
             rule="impossible-reversal",
             where=places[0],
             message=f"at equal slip angle and load FY has opposite signs in {len(places)} of {len(sums)} pairs "
-            f"of runs: they differ by {other:.0f} N (rms) where their sum is {same:.0f} N; a tire keeps its side "
-            "force in axes that follow the travel, but for its pull: a reversed run is not named as such in test.toml, or a cell was turned round between the runs",
+            f"of runs: they differ by {other:.0f} N (rms) where their sum is {same:.0f} N; a tire keeps its "
+            "side force in axes that follow the travel, but for its pull: a reversed run is not named as such in "
+            "test.toml, or a cell was turned round between the runs",
         )
     ]
 

@@ -31,6 +31,7 @@ if TYPE_CHECKING:
 
 SIMULATED = "SIMULATED DATA"
 UNVERIFIED = "UNVERIFIED CALIBRATION"
+IMPOSSIBLE = "IMPOSSIBLE VALUES"
 
 
 def build_content(
@@ -94,6 +95,15 @@ def build_content(
                 "unverified",
                 f"{UNVERIFIED}: {use.id} is a legacy import; its coefficients are not reproduced "
                 "from reference data.",
+            )
+        )
+    if impossible := result.reduced.impossible:
+        told = ", ".join(dict.fromkeys(one.rule for one in impossible))
+        marks.append(
+            (
+                "impossible",
+                f"{IMPOSSIBLE}: no tire has the forces or moments of this test ({told}, see the findings); they "
+                "must not be used.",
             )
         )
     return ReportContent(
@@ -289,6 +299,7 @@ def _conditions(
         "simulated": info.simulated,
         "measured": not info.simulated,
         "unverified": result.reduced.calibration.unverified,
+        "impossible": bool(result.reduced.impossible),
         "verified": not result.reduced.calibration.unverified,
         "pull": pull,
         "no_pull": not pull,
@@ -303,4 +314,4 @@ def _conditions(
     }
 
 
-__all__ = ["SIMULATED", "UNITS", "UNVERIFIED", "Cell", "build_content", "report_id"]
+__all__ = ["IMPOSSIBLE", "SIMULATED", "UNITS", "UNVERIFIED", "Cell", "build_content", "report_id"]

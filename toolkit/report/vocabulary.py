@@ -84,6 +84,7 @@ REPORT = Vocabulary(
     marks={
         "simulated": frozenset({"if.simulated", "simulated"}),
         "unverified": frozenset({"if.unverified", "calibration.status"}),
+        "impossible": frozenset({"if.impossible"}),
     },
     open_values=TERM,
 )
