@@ -2,11 +2,11 @@
 
     python -m tests.campaigns.physics_gate [--tests 500] [--seed 18]
 
-A test is the whole protocol, forward and reverse. The first ones have one effect each, the others two to six at
-random, each within the typical range that its own file states and of either sign where it may have one. Left
-out are the four that are faults of the measurement and no physics (`FAULTS`), and dead bands of a hub cell in
-the upper half of their range (over 8 % of the cell's largest output); they are shown apart, with the turns,
-exchanges and losses of single cells. Prints a table and the exact 95 % limit of the rate of
+A test is the whole protocol, forward and reverse. The first ones have one effect each, the others two to six
+at random, each within the typical range that its own file states and of either sign where it may have one.
+Left out are the four that are faults of the measurement and no physics (`FAULTS`), and dead bands of a hub
+cell in the upper half of their range (over 8 % of the cell's largest output); they are shown apart, with the
+turns, exchanges and losses of single cells. Prints a table and the exact 95 % limit of the rate of
 false alarms; ends with 1 where one was raised.
 """
 
@@ -101,9 +101,7 @@ def alarms(test: ReducedTest) -> list[Finding]:
 
 def silent_effects() -> tuple[str, ...]:
     """Return the names of the effects that are physics of the machine and the tire, not faults."""
-    return tuple(
-        name for name, one in effects().items() if one.stage != "dynamics" and name not in FAULTS
-    )
+    return tuple(name for name, one in effects().items() if one.stage != "dynamics" and name not in FAULTS)
 
 
 def effect_text(name: str, rng: np.random.Generator) -> str:
@@ -112,9 +110,7 @@ def effect_text(name: str, rng: np.random.Generator) -> str:
     if name == "wrong_calibration":
         return "wrong_calibration=m15-virtual-r1"
     channel, source = _place(one, rng)
-    sized = [
-        f"{p.name}:{_size(p, one.name, channel, source, rng):.6g}" for p in one.parameters
-    ]
+    sized = [f"{p.name}:{_size(p, one.name, channel, source, rng):.6g}" for p in one.parameters]
     place = "".join(f".{part}" for part in (source, channel) if part)
     return f"{name}{place}" + (f"={','.join(sized)}" if sized else "")
 
@@ -229,16 +225,20 @@ def main() -> int:
         used.update(text.split(".")[0].split("=")[0] for text in texts)
         if found:
             alarmed.append((index, texts, found))
-            sys.stdout.write(f"alarm {index}: {texts}\n" + "".join(f"  {f.rule} {f.message}\n" for f in found))
+            sys.stdout.write(
+                f"alarm {index}: {texts}\n" + "".join(f"  {f.rule} {f.message}\n" for f in found)
+            )
     upper = limit(len(alarmed), chosen.tests)
     sys.stdout.write(
-        f"{chosen.tests} virtual tests with effects, {len(alarmed)} alarms (95 %: up to {100 * upper:.2f} %); "
+        f"{chosen.tests} virtual tests with effects, {len(alarmed)} alarms (95 %: to {100 * upper:.2f} %); "
         f"each effect in {min(used.values())} to {max(used.values())} of them\n\n"
     )
     test = simulate(base_plan())
     for name, edit in faults(dict(test.tare)).items():
         rules = Counter(one.rule for one in alarms(reduced(test, record, edit)))
-        sys.stdout.write(f"{name:30s} {', '.join(f'{n} {rule}' for rule, n in rules.items()) or 'not seen'}\n")
+        sys.stdout.write(
+            f"{name:30s} {', '.join(f'{n} {rule}' for rule, n in rules.items()) or 'not seen'}\n"
+        )
     return 1 if alarmed else 0
 
 

@@ -23,7 +23,7 @@ def sweep(
     reverse: bool = False,
     signed: bool = True,
 ) -> Readings:
-    """Return readings of forces FY(SA, FZ) [N] and moments MZ(SA, FZ) [N·m] at slip angles [rad] and loads."""
+    """Return readings of FY(SA, FZ) [N] and MZ(SA, FZ) [N·m] at slip angles [rad] and loads."""
     places, blocks = [], []
     for load in loads_N:
         places += [f"{np.degrees(a):+.1f} deg, {load:.0f} N" for a in SA]

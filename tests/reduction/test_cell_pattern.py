@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import itertools
 
 import pytest
@@ -44,8 +45,6 @@ def test_one_cell_wrong_is_seen_and_named(test: VirtualTest, fault: str) -> None
 def test_a_cell_turned_before_its_tare_is_named_so(test: VirtualTest, cell: str) -> None:
     turned = campaign.faults({})[f"{cell} turned"]
     tare = tuple((name, -value if name == cell else value) for name, value in test.tare)
-    import dataclasses
-
     other = dataclasses.replace(test, tare=tare)
     alarms = campaign.alarms(campaign.reduced(other, campaign.virtual_record(), turned))
     assert f"all is possible with {cell} turned round" in alarms[0].message
@@ -77,9 +76,11 @@ def test_an_exchange_without_any_change_of_FY_shows_in_the_trail(test: VirtualTe
     assert all("trail" in message for _, message in alarms)
 
 
-# What three cells cannot tell by themselves: values stay within what tires do. The calibration's own gates and
-# the protocol's load tolerance are for these.
-@pytest.mark.parametrize("fault", ["all cells in lbf read as N", "D51 times 1.3", "D52 times 1.3", "E5 times 0.7"])
+# What three cells cannot tell by themselves: values stay within what tires do. The calibration's own gates
+# and the protocol's load tolerance are for these.
+@pytest.mark.parametrize(
+    "fault", ["all cells in lbf read as N", "D51 times 1.3", "D52 times 1.3", "E5 times 0.7"]
+)
 def test_what_the_gate_cannot_see(test: VirtualTest, fault: str) -> None:
     assert found(test, fault) == []
 

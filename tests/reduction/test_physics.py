@@ -109,7 +109,9 @@ def coefficients(name: str) -> tuple[list[float], list[float]]:
     return forces, moments
 
 
-def magic_89(D: float, BCD: float, C: float, E: float, Sh: float, Sv: float, x: NDArray[np.float64]) -> object:
+def magic_89(
+    D: float, BCD: float, C: float, E: float, Sh: float, Sv: float, x: NDArray[np.float64]
+) -> object:
     B, X = BCD / (C * D), x + Sh
     return D * np.sin(C * np.arctan(B * X - E * (B * X - np.arctan(B * X)))) + Sv
 
@@ -147,9 +149,7 @@ def test_engineered_tires_of_a_simulator_are_possible() -> None:
         assert float(said[1]) < limits.FRICTION.high
     text = (folder / "van_TMeasyTireFull.json").read_text()
     part = text.split('"Lateral"')[1].split('"Aligning"')[0]
-    values = {
-        name: json.loads(array) for name, array in re.findall(r'"([^"]+)": (\[[^\]]*\])', part)
-    }
+    values = {name: json.loads(array) for name, array in re.findall(r'"([^"]+)": (\[[^\]]*\])', part)}
     trail = json.loads(re.search(r'"Normalized Trail at Zero Slip sy": (\[[^\]]*\])', text)[1])  # type: ignore[index]
     for index, FZ in enumerate((1900.0, 3800.0)):
         dF0, FM, FS, sM, sS = (one[index] for one in values.values())
@@ -188,7 +188,11 @@ def test_the_bound_of_a_force_near_zero_slip_and_of_friction() -> None:
     def one(SA_deg: float, use: float) -> set[str]:
         return rules(
             of_sizes(
-                ["x"], FZ=np.array([1000.0]), SA=np.radians([SA_deg]), FY=np.array([1000.0 * use]), MZ=np.zeros(1)
+                ["x"],
+                FZ=np.array([1000.0]),
+                SA=np.radians([SA_deg]),
+                FY=np.array([1000.0 * use]),
+                MZ=np.zeros(1),
             )
         )
 
@@ -259,9 +263,7 @@ def both_ways(**reverse: object) -> Readings:
         name: np.concatenate([getattr(one, name), getattr(other, name)])
         for name in ("FZ", "SA", "FY", "MZ", "reverse", "u_FY", "u_MZ", "FX", "IA")
     }
-    return dataclasses.replace(
-        one, place=one.place + other.place, block=one.block + other.block, **joined
-    )  # type: ignore[arg-type]
+    return dataclasses.replace(one, place=one.place + other.place, block=one.block + other.block, **joined)  # type: ignore[arg-type]
 
 
 def test_a_reversed_run_repeats_the_forward_one_but_for_pull() -> None:
@@ -272,14 +274,12 @@ def test_a_reversed_run_repeats_the_forward_one_but_for_pull() -> None:
     assert "impossible-reversal" not in rules(pulled)
     mirrored = dataclasses.replace(good, FY=np.where(good.reverse, -1, 1) * good.FY)
     assert rules(mirrored) == {"impossible-slope", "impossible-reversal"}
-    # The run is not named as reversed: its blocks are doubled, its slopes average out, the mirror image shows.
+    # The run is not named as reversed: its blocks are doubled, its slopes average out, the mirror shows.
     assert "impossible-reversal" in rules(dataclasses.replace(mirrored, reverse=np.zeros_like(good.reverse)))
 
 
 def test_a_zero_that_is_not_known_widens_the_bounds() -> None:
-    one = of_sizes(
-        ["x"], FZ=np.array([1000.0]), SA=np.zeros(1), FY=np.array([700.0]), MZ=np.zeros(1)
-    )
+    one = of_sizes(["x"], FZ=np.array([1000.0]), SA=np.zeros(1), FY=np.array([700.0]), MZ=np.zeros(1))
     assert rules(one) == {"impossible-force"}
     assert rules(dataclasses.replace(one, u_FY=np.array([100.0]))) == set()
 

@@ -1,7 +1,7 @@
 """What the files of an archive show together: copies, late edits, changed conventions, missing conditions.
 
-It changes no grade, and informs only, but for values that no tire has. Files are added one by one, sorted by path, as plain answers; what is
-kept of each is a few bytes.
+It changes no grade; but for values that no tire has, it only informs. Files are added one by one, sorted by
+path, as plain answers; what is kept of each is a few bytes.
 """
 
 from __future__ import annotations

@@ -158,7 +158,10 @@ class Auditor:
             modified=recording.saved,
             changes=changed,
             estimate=estimate(columns, found.segments, screen) if found.grade == "unknown" else None,
-            notes=(*_impossible(name, changed), *quality(recording, name)),
+            notes=(
+                *_impossible(name, changed, in_force.id if in_force is not None else None),
+                *quality(recording, name),
+            ),
         )
 
     def _context(self, path: Path, data: bytes) -> tuple[Context, str | None]:
@@ -192,10 +195,22 @@ class Auditor:
         return cast("Rotation", said) if said in ROTATIONS else "forward"
 
 
-def _impossible(name: str, blocks: tuple[Change, ...]) -> tuple[Finding, ...]:
-    means = [(b.FZ_N, None if b.SA_deg is None else math.radians(b.SA_deg), b.FY_N, b.MZ_Nm) for b in blocks]
+def _impossible(name: str, blocks: tuple[Change, ...], in_force: str | None) -> tuple[Finding, ...]:
     rows = [f"rows {b.first_row}-{b.last_row}" for b in blocks]
-    return impossible(name, rows, means, values="the stored Fy and Mz are impossible")
+    angles = [None if b.SA_deg is None else math.radians(b.SA_deg) for b in blocks]
+    own = [(b.FZ_N, SA, b.FY_N, b.MZ_Nm) for b, SA in zip(blocks, angles, strict=True)]
+    found = impossible(name, rows, own, values="the stored Fy and Mz are impossible")
+    if in_force is None:
+        return found
+    new = [
+        (b.FZ_N, SA, _sum(b.FY_N, b.FY_change_N), _sum(b.MZ_Nm, b.MZ_change_Nm))
+        for b, SA in zip(blocks, angles, strict=True)
+    ]
+    return (*found, *impossible(name, rows, new, values=f"Fy and Mz by {in_force} are impossible too"))
+
+
+def _sum(own: float | None, change: float | None) -> float | None:
+    return None if own is None or change is None else own + change
 
 
 def unreadable(

@@ -1,4 +1,4 @@
-"""What a file's own Fy and Mz, or corrected ones, claim of the tire: judged by physics alone, without a registry."""
+"""What a file's Fy and Mz, its own or corrected ones, claim of the tire: judged by physics alone."""
 
 from __future__ import annotations
 
@@ -32,7 +32,9 @@ def impossible(
     values : what the values are, such as ``stored Fy and Mz``
     """
     known = [
-        (name, block) for name, block in zip(rows, blocks, strict=True) if block[0] > 0 and block[2] is not None
+        (name, block)
+        for name, block in zip(rows, blocks, strict=True)
+        if block[0] > 0 and block[2] is not None
     ]
     if not known:
         return ()

@@ -158,7 +158,7 @@ def text_of(told: Answer) -> str:
     impossible = {one.where for one in made.findings if one.rule in RULES}
     if impossible:
         some = ", ".join(sorted(impossible)[:3]) + (", ..." if len(impossible) > 3 else "")
-        lines.append(f"{len(impossible)} files hold Fy or Mz that no tire has: {some}; --json tells why")
+        lines.append(f"Fy or Mz that no tire has, in files: {len(impossible)} ({some}); --json tells why")
     settings = Counter(one.message for one in made.findings if one.rule == "test-toml")
     lines += [f"{count} files: {said}" for said, count in settings.most_common(_SETTINGS)]
     if len(settings) > _SETTINGS:

@@ -365,9 +365,11 @@ def _text(made: Made) -> str:
     if resolved is None or isinstance(done, Exception):
         return f"{made.test}: no report\n{done}"
     use = resolved.result.reduced.calibration
-    marks = ("  SIMULATED" if resolved.result.reduced.info.simulated else "") + (
-        "  UNVERIFIED" if use.unverified else ""
-    ) + ("  IMPOSSIBLE VALUES" if resolved.result.reduced.impossible else "")
+    marks = (
+        ("  SIMULATED" if resolved.result.reduced.info.simulated else "")
+        + ("  UNVERIFIED" if use.unverified else "")
+        + ("  IMPOSSIBLE VALUES" if resolved.result.reduced.impossible else "")
+    )
     lines = [
         *(f"{path}" for path in (done.pdf, done.docx, done.manifest, *done.extras) if path is not None),
         f"{done.pages} pages, {len(done.filled.figures)} figures, "

@@ -1,13 +1,19 @@
 """The cells' pattern: what three cells say together, held against what a wheel can do to them.
 
-The cells measure three loads, FY, MZ and the overturning moment MX, and physics knows the third: the side force
-acts at the road, a loaded radius below the hub, so that
+The cells measure three loads, FY, MZ and the overturning moment MX, and physics knows the third: the side
+force acts at the road, a loaded radius below the hub, so that
 
-    MX = lever FY + offset FZ + const,          lever between `limits.LEVER`
+    MX = lever FY + offset FZ + const,          lever between the bounds of `limits.LEVER`
 
 With the force in cell i, f_i = (dFY/d indication_i) indication_i by the record, and its lever in the machine
-definition, MX = sum lever_i f_i. A cell that was turned round, exchanged or is dead breaks this or another law;
-which single change of a cell puts all of them right is searched among the turns and the exchanges of two.
+definition, MX = sum lever_i f_i. The tire's own overturning moment, its load times its lateral deflection,
+takes up to an eighth of the radius from the lever and leaves a twentieth of MX beside the line. A cell that
+was turned round, exchanged or is dead breaks this or another law; which single change of a cell puts all of
+them right is searched among the turns and the exchanges of two.
+
+Every single turn, exchange and dead cell is seen in a whole test. Not seen, because a tire could do it: all
+cells wrong by one factor that stays within the bounds (lbf read as N), loads likewise (N read as lbf), one
+cell's sensitivity wrong by a third or less (`tests/campaigns/physics_gate.py` shows each).
 """
 
 from __future__ import annotations
@@ -43,9 +49,10 @@ _FEWEST = 5
 class Cells:
     """The cells of a test: readings in SI, and each cell's part of FY, of MZ and of MX.
 
-    ``indications`` (n, cells) minus ``tares`` (n, cells), in the record's units; ``per_FY`` [N] and ``per_MZ``
-    [N·m] (cells,) of one unit of indication; ``levers`` (cells,) [m] of the overturning moment, None where the
-    machine names none; ``radius_m`` the tire's free radius; ``FY_sign`` and ``MZ_sign`` (n,) from machine axes.
+    ``indications`` (n, cells) minus ``tares`` (n, cells), in the record's units; ``per_FY`` [N] and
+    ``per_MZ`` [N·m] (cells,) of one unit of indication; ``levers`` (cells,) [m] of the overturning moment,
+    None where the machine names none; ``radius_m`` the tire's free radius; ``FY_sign`` and ``MZ_sign`` (n,)
+    from machine axes.
     """
 
     names: tuple[str, ...]
@@ -113,16 +120,18 @@ def pattern(readings: Readings, cells: Cells) -> tuple[Departure, ...]:
     rest = MX - design @ solution
     low, high = limits.LEVER.low, limits.LEVER.high
     if cells.radius_m is not None:
-        low, high = (part * cells.radius_m for part in (limits.LEVER_PER_RADIUS.low, limits.LEVER_PER_RADIUS.high))
+        low, high = (
+            part * cells.radius_m for part in (limits.LEVER_PER_RADIUS.low, limits.LEVER_PER_RADIUS.high)
+        )
     found = []
     if not low <= lever <= high:
         found.append(
             Departure(
                 rule="impossible-cells",
                 where=f"cells {', '.join(cells.names)}",
-                message=f"the overturning moment in the cells follows the side force by {lever:.3f} m; a wheel "
-                f"gives its loaded radius, {low:.2f} to {high:.2f} m: two cells are exchanged, one is turned "
-                "round, or one is dead",
+                message=f"the overturning moment in the cells follows the side force by {lever:.3f} m; a "
+                f"wheel gives its loaded radius, {low:.2f} to {high:.2f} m",
+                cause="two cells are exchanged, one is turned round, or one is dead",
             )
         )
     left = float(np.sqrt(np.mean(rest**2)) / np.ptp(MX)) if np.ptp(MX) > 0 else 0.0
@@ -133,8 +142,8 @@ def pattern(readings: Readings, cells: Cells) -> tuple[Departure, ...]:
                 rule="impossible-cells",
                 where=readings.place[worst],
                 message=f"the overturning moment in the cells leaves the line of the side force by "
-                f"{100 * left:.0f} % of its span (rms; at most {100 * _LEFT:g} %): a cell changed its sign, its "
-                "place or its sensitivity during the test",
+                f"{100 * left:.0f} % of its span (rms; at most {100 * _LEFT:g} %)",
+                cause="a cell changed its sign, its place or its sensitivity during the test",
             )
         )
     return tuple(found)
@@ -165,7 +174,9 @@ def _cells(
     levers = dict(machine.overturning_lever_m)
     turns = [signs(machine.axes, "SAE", seen_by_cells(c.rotation, info.reversal)) for c in conditions]
     zeros = {
-        name: [dict(tare.values).get(cell, 0.0) if tare.source != "none" else 0.0 for cell in record.indications]
+        name: [
+            dict(tare.values).get(cell, 0.0) if tare.source != "none" else 0.0 for cell in record.indications
+        ]
         for name, tare in tares.items()
     }
     return Cells(

@@ -6,12 +6,13 @@
     1 <= -(dFY/dSA) / FZ <= 40 per rad,    0 <= (dMZ/dSA) / -(dFY/dSA) <= TRAIL          about zero slip
     FY(forward) and FY(reverse) agree but for pull, in axes that follow the travel
 
-``u0`` is the standard uncertainty of a zero. The bounds are those of `limits`; values are in SAE J670 axes that
-follow the travel. A departure is a wrong measurement: nothing here is a judgement of the tire.
+``u0`` is the standard uncertainty of a zero. The bounds are those of `limits`; values are in SAE J670 axes
+that follow the travel. A departure is a wrong measurement: nothing here is a judgement of the tire.
 """
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -79,15 +80,22 @@ class Readings:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Departure:
-    """One law that values break: the rule, where, and the sentence with number and bound."""
+    """One law that values break: the rule, where, number and bound, and what it usually means."""
 
     rule: Rule
     where: str
     message: str
+    cause: str
 
-    def finding(self, level: Level = "error", *, of: str = "", more: str = "") -> Finding:
-        """Return it as a finding; ``of`` says whose values they are, ``more`` is a further sentence."""
-        text = (f"{of}: " if of else "") + self.message + (f"; {more}" if more else "")
+    def finding(
+        self, level: Level = "error", *, of: str = "", cause: str | None = None, more: str = ""
+    ) -> Finding:
+        """Return it as a finding.
+
+        ``of`` says whose values they are, ``cause`` replaces the usual one, ``more`` is a further sentence.
+        """
+        text = f"{of}: " if of else ""
+        text += f"{self.message}: {self.cause if cause is None else cause}" + (f"; {more}" if more else "")
         return Finding(rule=self.rule, where=self.where, message=text, level=level)
 
 
@@ -126,8 +134,9 @@ def _force(r: Readings, share: float) -> list[Departure]:
             message=_use(r, worst)
             + (f"{math.degrees(r.SA[worst]):+.2f} deg of slip and " if np.isfinite(r.SA[worst]) else "")
             + f"{r.FZ[worst]:.0f} N; no tire exceeds "
-            f"{bound[worst]:.2f} there ({usual}). {_count(over, r)} beyond the bound. A cell is "
-            "turned round, a coefficient has a wrong sign, or forces or loads are in another unit",
+            f"{bound[worst]:.2f} there ({usual}); {_count(over, r)} beyond the bound",
+            cause="a cell is turned round, a coefficient has a wrong sign, or forces or loads are in another "
+            "unit",
         )
     ]
 
@@ -152,9 +161,9 @@ def _moment(r: Readings, share: float) -> list[Departure]:
             where=r.place[worst],
             message=f"|MZ| is {abs(r.MZ[worst]):.1f} N·m beside a side force of {abs(r.FY[worst]):.0f} N at "
             f"{r.FZ[worst]:.0f} N; no tire exceeds {bound[worst]:.1f} N·m there (a trail of "
-            f"{1e3 * r.trail_m:.0f} mm and {1e3 * limits.RESIDUAL_MOMENT.high:g} mm of the load). "
-            f"{_count(over, r)} beyond the bound. Two cells are exchanged, a coefficient has a wrong sign, "
-            "or moments are in another unit",
+            f"{1e3 * r.trail_m:.0f} mm and {1e3 * limits.RESIDUAL_MOMENT.high:g} mm of the load); "
+            f"{_count(over, r)} beyond the bound",
+            cause="two cells are exchanged, a coefficient has a wrong sign, or moments are in another unit",
         )
     ]
 
@@ -163,7 +172,7 @@ def _slopes(r: Readings) -> list[Departure]:
     found = []
     for reverse in (False, True):
         run = r.part(r.reverse == reverse)
-        slopes = [one for one in (_slope(run, load) for load in {b for _, b in run.block}) if one is not None]
+        slopes = [one for one in (_slope(run, load) for load in {b for _, b in run.block}) if one]
         if not slopes:
             continue
         FZ, CF, CM = (float(sum(column)) for column in zip(*slopes, strict=True))
@@ -182,7 +191,8 @@ def _slopes(r: Readings) -> list[Departure]:
                     rule="impossible-slope",
                     where=f"{where}, FY",
                     message=f"the cornering stiffness is {stiffness:.3g} times the load per rad over "
-                    f"{len(slopes)} loads; that of tires is {low:g} to {high:g}: {cause}",
+                    f"{len(slopes)} loads; that of tires is {low:g} to {high:g}",
+                    cause=cause,
                 )
             )
         elif not 0.0 <= trail <= r.trail_m:
@@ -190,9 +200,11 @@ def _slopes(r: Readings) -> list[Departure]:
                 Departure(
                     rule="impossible-slope",
                     where=f"{where}, MZ",
-                    message=f"the trail at small slip, aligning over cornering stiffness, is {1e3 * trail:.1f} mm "
-                    f"over {len(slopes)} loads; that of the tire lies between 0 and {1e3 * r.trail_m:.0f} mm: "
-                    "two cells are exchanged, one is turned round, or a coefficient of MZ has a wrong sign",
+                    message="the trail at small slip, aligning over cornering stiffness, is "
+                    f"{1e3 * trail:.1f} mm over {len(slopes)} loads; that of the tire lies between "
+                    f"0 and {1e3 * r.trail_m:.0f} mm",
+                    cause="two cells are exchanged, one is turned round, or a coefficient of MZ has a wrong "
+                    "sign",
                 )
             )
     return found
@@ -200,6 +212,8 @@ def _slopes(r: Readings) -> list[Departure]:
 
 def _slope(run: Readings, load: float | None) -> tuple[float, float, float] | None:
     # Mean load, cornering and aligning stiffness [N/rad, N·m/rad] about zero slip, None where too few points.
+    if load is None:
+        return None
     near = np.array([b == load for _, b in run.block]) & (np.abs(run.SA) <= _SMALL)
     SA = run.SA[near]
     if len(SA) < 2 or np.ptp(SA) < _SPAN:
@@ -217,7 +231,7 @@ def _reversal(r: Readings) -> list[Departure]:
         if None not in block and abs(r.SA[index]) > _LARGE:
             groups.setdefault(block, []).append(index)
     for group in groups.values():
-        for first, second in zip(group, group[1:], strict=False):
+        for first, second in itertools.pairwise(group):
             sums.append(r.FY[first] + r.FY[second])
             differences.append(r.FY[first] - r.FY[second])
             if r.FY[first] * r.FY[second] < 0:
@@ -231,10 +245,11 @@ def _reversal(r: Readings) -> list[Departure]:
         Departure(
             rule="impossible-reversal",
             where=places[0],
-            message=f"at equal slip angle and load FY has opposite signs in {len(places)} of {len(sums)} pairs "
-            f"of runs: they differ by {other:.0f} N (rms) where their sum is {same:.0f} N; a tire keeps its "
-            "side force in axes that follow the travel, but for its pull: a reversed run is not named as such in "
-            "test.toml, or a cell was turned round between the runs",
+            message=f"at equal slip angle and load FY has opposite signs in {len(places)} of {len(sums)} "
+            f"pairs of runs: they differ by {other:.0f} N (rms) where their sum is {same:.0f} N; a tire keeps "
+            "its side force in axes that follow the travel, but for its pull",
+            cause="a reversed run is not named as such in test.toml, or a cell was turned round between the "
+            "runs",
         )
     ]
 
@@ -264,7 +279,7 @@ def of_sizes(
 
 
 def longest_trail(radius_m: float | None) -> float:
-    """Return the longest trail [m] that a tire of a free radius can have; None: of any tire on the machine."""
+    """Return the longest trail [m] of a tire by its free radius; None: of any tire on the machine."""
     if radius_m is None:
         return limits.TRAIL.high
     return min(limits.TRAIL.high, limits.TRAIL_PER_RADIUS.high * radius_m)

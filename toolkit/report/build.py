@@ -102,8 +102,8 @@ def build_content(
         marks.append(
             (
                 "impossible",
-                f"{IMPOSSIBLE}: no tire has the forces or moments of this test ({told}, see the findings); they "
-                "must not be used.",
+                f"{IMPOSSIBLE}: no tire has the forces or moments of this test ({told}, see the findings); "
+                "they must not be used.",
             )
         )
     return ReportContent(

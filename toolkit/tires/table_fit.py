@@ -158,7 +158,8 @@ def row_findings(table: TireTable) -> tuple[Finding, ...]:
         FZ=FZ[rows], SA=table["SA"][rows], FY=column("FY"), MZ=column("MZ"), FX=column("FX"),
         IA=column("IA"), trail_m=LARGEST_TRAIL_M,
     )  # fmt: skip
-    return tuple(one.finding(level="warning") for one in departures(readings, share=_OUTLIERS))
+    cause = "is a column in another unit than its header says?"
+    return tuple(one.finding("warning", cause=cause) for one in departures(readings, share=_OUTLIERS))
 
 
 def axes_findings(table: TireTable, fits: Sequence[CurveFit]) -> list[Finding]:
