@@ -235,9 +235,10 @@ def test_signs_of_the_stiffnesses() -> None:
     [
         ({"FZ": 1 / LBF}, {"impossible-force", "impossible-slope"}),  # pounds read as newtons
         ({"FZ": 1e-3}, {"impossible-force", "impossible-slope"}),  # kN read as N
-        ({"FZ": 1e3}, {"impossible-slope"}),
+        ({"FZ": 1e3}, {"impossible-slope", "implausible-friction"}),
         ({"FY": LBF}, {"impossible-force", "impossible-slope"}),
-        ({"FY": 1e-3, "MZ": 1e-3}, {"impossible-slope"}),
+        ({"FY": 1e-3, "MZ": 1e-3}, {"impossible-slope", "implausible-friction"}),
+        ({"FY": 1 / LBF, "MZ": 1 / LBF_FT}, {"implausible-friction"}),  # pounds read as newtons
         ({"MZ": 12.0}, {"impossible-moment", "impossible-slope"}),  # lbf·in read as lbf·ft
         ({"SA": np.pi / 180}, {"impossible-force"}),  # radians read as deg: the span is too short for a slope
     ],

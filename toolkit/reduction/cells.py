@@ -6,14 +6,15 @@ force acts at the road, a loaded radius below the hub, so that
     MX = lever FY + offset FZ + const,          lever between the bounds of `limits.LEVER`
 
 With the force in cell i, f_i = (dFY/d indication_i) indication_i by the record, and its lever in the machine
-definition, MX = sum lever_i f_i. The tire's own overturning moment, its load times its lateral deflection,
-takes up to an eighth of the radius from the lever and leaves a twentieth of MX beside the line. A cell that
-was turned round, exchanged or is dead breaks this or another law; which single change of a cell puts all of
-them right is searched among the turns and the exchanges of two.
+definition, MX = sum lever_i f_i; without levers MX is the record's own. The tire's own overturning moment,
+its load times its lateral deflection, takes up to an eighth of the radius from the lever and leaves a
+twentieth of MX beside the line. A cell that was turned round, exchanged or is dead breaks this or another
+law; which single change of a cell puts all of them right is searched among the turns and the exchanges of
+two.
 
 Every single turn, exchange and dead cell is seen in a whole test. Not seen, because a tire could do it: all
-cells wrong by one factor that stays within the bounds (lbf read as N), loads likewise (N read as lbf), one
-cell's sensitivity wrong by a third or less (`tests/campaigns/physics_gate.py` shows each).
+cells or all loads wrong by one factor that stays within the bounds, one cell's sensitivity wrong by a third
+or less (`tests/campaigns/physics_gate.py` shows each).
 """
 
 from __future__ import annotations
@@ -49,17 +50,17 @@ _FEWEST = 5
 class Cells:
     """The cells of a test: readings in SI, and each cell's part of FY, of MZ and of MX.
 
-    ``indications`` (n, cells) minus ``tares`` (n, cells), in the record's units; ``per_FY`` [N] and
-    ``per_MZ`` [N·m] (cells,) of one unit of indication; ``levers`` (cells,) [m] of the overturning moment,
-    None where the machine names none; ``radius_m`` the tire's free radius; ``FY_sign`` and ``MZ_sign`` (n,)
-    from machine axes.
+    ``indications`` (n, cells) minus ``tares`` (n, cells), in the record's units; ``per_FY`` [N],
+    ``per_MZ`` and ``per_MX`` [N·m] (cells,) of one unit of indication, the last None where neither the
+    machine names its levers nor the record holds MX; ``radius_m`` the tire's free radius; ``FY_sign`` and
+    ``MZ_sign`` (n,) from machine axes.
     """
 
     names: tuple[str, ...]
     indications: NDArray[np.float64]
     per_FY: NDArray[np.float64]
     per_MZ: NDArray[np.float64]
-    levers: NDArray[np.float64] | None
+    per_MX: NDArray[np.float64] | None
     radius_m: float | None
     tares: NDArray[np.float64]
     FY_sign: NDArray[np.float64]
@@ -107,10 +108,9 @@ def _all(readings: Readings, cells: Cells) -> tuple[Departure, ...]:
 
 def pattern(readings: Readings, cells: Cells) -> tuple[Departure, ...]:
     """Return where the overturning moment in the cells does not follow the side force."""
-    if cells.levers is None or len(readings.FZ) < _FEWEST:
+    if cells.per_MX is None or len(readings.FZ) < _FEWEST:
         return ()
-    forces = cells.indications * cells.per_FY
-    FY, MX = forces.sum(axis=1), forces @ cells.levers
+    FY, MX = cells.indications @ cells.per_FY, cells.indications @ cells.per_MX
     FZ = readings.FZ
     if np.ptp(FY) < _LEAST_FORCE * FZ.mean():
         return ()
@@ -171,7 +171,7 @@ def _cells(
     info: TestInfo,
     tares: Mapping[str, Tare],
 ) -> Cells:
-    levers = dict(machine.overturning_lever_m)
+    per_FY, levers = _linear(record, "FY"), dict(machine.overturning_lever_m)
     turns = [signs(machine.axes, "SAE", seen_by_cells(c.rotation, info.reversal)) for c in conditions]
     zeros = {
         name: [
@@ -182,16 +182,23 @@ def _cells(
     return Cells(
         names=record.indications,
         indications=np.array([c.indications for c in conditions]),
-        per_FY=_linear(record, "FY"),
+        per_FY=per_FY,
         per_MZ=_linear(record, "MZ"),
-        levers=np.array([levers[name] for name in record.indications])
-        if set(record.indications) <= set(levers)
-        else None,
+        per_MX=_overturning(record, per_FY, levers),
         radius_m=free_radius_m(info.tire_size),
         tares=np.array([zeros[c.file] for c in conditions]),
         FY_sign=np.array([float(one["FY"]) for one in turns]),
         MZ_sign=np.array([float(one["MZ"]) for one in turns]),
     )
+
+
+def _overturning(
+    record: CalibrationRecord, per_FY: NDArray[np.float64], levers: Mapping[str, float]
+) -> NDArray[np.float64] | None:
+    # By the drawing, which the record did not touch; else by the record's own fit.
+    if set(record.indications) <= set(levers):
+        return per_FY * [levers[name] for name in record.indications]
+    return _linear(record, "MX") if any(one.load == "MX" for one in record.loads) else None
 
 
 def _linear(record: CalibrationRecord, load: str) -> NDArray[np.float64]:
@@ -206,6 +213,8 @@ def _changes(readings: Readings, cells: Cells) -> list[tuple[str, tuple[Readings
     raw, made = cells.indications + cells.tares, []
     for i in range(n):
         for when, tares in (("", np.zeros_like(raw)), (" after its tare", cells.tares)):
+            if when and not tares[:, i].any():
+                continue
             now = np.where(np.arange(n) == i, -(cells.indications + tares) - tares, cells.indications)
             made.append((f"{cells.names[i]} turned round{when}", now))
     for i, j in itertools.combinations(range(n), 2):

@@ -12,7 +12,7 @@ import math
 from dataclasses import dataclass
 
 LEAST_LOAD_N = 25.0
-"""The least load at which a tire is tested: below are kilonewtons named newtons; a bicycle tire has some 300."""
+"""The least load of any tire test, of a bicycle's some 200: below are kilonewtons named newtons."""
 LARGEST_TRAIL_M = 0.5
 """In a table of any tire, those of aircraft and earth movers among them."""
 
@@ -35,6 +35,14 @@ FRICTION = Limit(
     text="force in the road's plane over load",
     source="road tires reach 0.8 to 1.2 on dry laboratory surfaces (Gillespie, Fundamentals of Vehicle "
     "Dynamics, 1992, ch. 10; the public sets 0.45 to 1.14), the racing tire of the FSAE TTC set 1.54",
+)
+SLIDING = Limit(
+    low=0.3,
+    high=FRICTION.high,
+    unit="1",
+    text="side force over load at 8 deg of slip and more, mean of all loads, on a dry laboratory surface",
+    source="rubber on dry steel, sandpaper or asphalt slides at 0.5 and more (Gillespie 1992, ch. 10); the "
+    "public sets 0.54 to 0.98. Ice and a flooded surface have less: a warning, no impossibility",
 )
 STIFFNESS = Limit(
     low=1.0,

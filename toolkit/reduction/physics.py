@@ -3,6 +3,7 @@
     |FY| <= min(FRICTION FZ, STIFFNESS FZ (|SA| + STEER_ZERO) + PULL FZ + CAMBER FZ |IA|) + 3 u0
     hypot(FX, FY) <= FRICTION FZ
     |MZ| <= TRAIL |FY| + RESIDUAL_MOMENT FZ + 3 u0
+    mean |FY| >= SLIDING mean FZ                                     at 8 deg of slip and more; else a warning
     1 <= -(dFY/dSA) / FZ <= 40 per rad,    0 <= (dMZ/dSA) / -(dFY/dSA) <= TRAIL          about zero slip
     FY(forward) and FY(reverse) agree but for pull, in axes that follow the travel
 
@@ -27,7 +28,12 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 Rule = Literal[
-    "impossible-force", "impossible-moment", "impossible-slope", "impossible-reversal", "impossible-cells"
+    "impossible-force",
+    "impossible-moment",
+    "impossible-slope",
+    "impossible-reversal",
+    "impossible-cells",
+    "implausible-friction",
 ]
 RULES: tuple[Rule, ...] = (
     "impossible-force",
@@ -38,6 +44,7 @@ RULES: tuple[Rule, ...] = (
 )
 _SMALL = math.radians(4.5)  # slopes are taken within this slip angle,
 _SPAN = math.radians(1.5)  # over at least this span;
+_SLIDING = math.radians(7.5)  # where a tire slides, whatever its stiffness
 _LARGE = math.radians(1.5)  # and the direction of a force counts beyond this
 _SURE = 3.0  # standard uncertainties of a zero
 
@@ -90,12 +97,13 @@ class Departure:
     def finding(
         self, level: Level = "error", *, of: str = "", cause: str | None = None, more: str = ""
     ) -> Finding:
-        """Return it as a finding.
+        """Return it as a finding, of a level that is no error where it is only implausible.
 
         ``of`` says whose values they are, ``cause`` replaces the usual one, ``more`` is a further sentence.
         """
         text = f"{of}: " if of else ""
         text += f"{self.message}: {self.cause if cause is None else cause}" + (f"; {more}" if more else "")
+        level = level if self.rule in RULES else "warning"
         return Finding(rule=self.rule, where=self.where, message=text, level=level)
 
 
@@ -106,7 +114,7 @@ def departures(readings: Readings, *, share: float = 0.0) -> tuple[Departure, ..
     """
     found = [*_force(readings, share), *_moment(readings, share)]
     if readings.signed:
-        found += [*_slopes(readings), *_reversal(readings)]
+        found += [*_slopes(readings), *_reversal(readings), *_sliding(readings)]
     return tuple(found)
 
 
@@ -246,10 +254,28 @@ def _reversal(r: Readings) -> list[Departure]:
             rule="impossible-reversal",
             where=places[0],
             message=f"at equal slip angle and load FY has opposite signs in {len(places)} of {len(sums)} "
-            f"pairs of runs: they differ by {other:.0f} N (rms) where their sum is {same:.0f} N; a tire keeps "
-            "its side force in axes that follow the travel, but for its pull",
+            f"pairs of runs: they differ by {other:.0f} N (rms) where their sum is {same:.0f} N; a tire "
+            "keeps its side force in axes that follow the travel, but for its pull",
             cause="a reversed run is not named as such in test.toml, or a cell was turned round between the "
             "runs",
+        )
+    ]
+
+
+def _sliding(r: Readings) -> list[Departure]:
+    far = np.abs(r.SA) >= _SLIDING
+    if not far.any():
+        return []
+    use = float(np.abs(r.FY[far]).sum() / r.FZ[far].sum())
+    if use >= limits.SLIDING.low:
+        return []
+    return [
+        Departure(
+            rule="implausible-friction",
+            where=f"{int(far.sum())} values from {math.degrees(_SLIDING):g} deg",
+            message=f"the side force is {use:.2f} of the load where a tire slides; on a dry surface it is "
+            f"{limits.SLIDING.low:g} and more",
+            cause="the surface was wet or icy, or forces or loads are in another unit",
         )
     ]
 
