@@ -5,9 +5,9 @@
 A test is the whole protocol, forward and reverse. The first ones have one effect each, the others two to six
 at random, each within the typical range that its own file states and of either sign where it may have one.
 Left out are the four that are faults of the measurement and no physics (`FAULTS`), and dead bands and
-hysteresis in the upper half of their range (over 8 % and 1.4 % of the largest value; of real cells 0.2 %): a
-channel that says nothing over a tenth of its range makes values that no tire has. Faults are shown apart, with
-the turns, exchanges and losses of single cells. Prints a table and the exact 95 % limit of the rate of
+hysteresis in the upper half of their range (over 8 % and 1.4 % of the largest value; real cells 0.2 %): a
+channel that says nothing over a tenth of its range makes values that no tire has. Faults are shown apart,
+with the turns, exchanges and losses of single cells. Prints a table and the exact 95 % limit of the rate of
 false alarms; ends with 1 where one was raised.
 """
 
