@@ -7,7 +7,7 @@ from typer.testing import CliRunner
 
 from toolkit.cli import inspect
 from toolkit.errors import ToolkitError
-from toolkit.examples.fig4_4 import packaged_fig4_4
+from toolkit.examples.fig4_4 import ROWS, SYMBOLS, packaged_fig4_4
 from toolkit.machine import load_machine
 from toolkit.recording.labview import write_labview
 
@@ -69,7 +69,12 @@ def test_without_a_home_the_file_is_still_shown(run, tmp_path, monkeypatch):
     assert found.return_value == 1
     answer = json.loads(found.stdout)
     assert answer["calibration"] is None
-    assert answer["findings"][0]["rule"] == "no-home"
+    assert [(one["rule"], one["level"]) for one in answer["findings"]] == [
+        ("impossible-force", "error"),
+        ("no-home", "warning"),
+    ]
+    # |Fy| of the first block over its load, by hand: (371.3554 + 371.3506) / (248.8146 + 250.0319)
+    assert "1.49 of the load at -0.30 deg" in answer["findings"][0]["message"]
 
 
 def test_quiet_says_nothing(run, tmp_path):
@@ -143,3 +148,18 @@ def test_one_bad_file_of_many_does_not_hide_the_others(run, tmp_path):
     good, refused = json.loads(found.stdout)["files"]
     assert good["rows"] == 10
     assert refused["error"]["rule"].startswith("zip-")
+
+
+def test_corrected_values_are_held_against_physics_too(run, tmp_path):
+    from toolkit.cli.home import packaged_home
+
+    # Figure 4.4 with E5 as if the cell had been turned: what the good record makes of it is impossible too.
+    columns = {s: v.copy() for s, v in zip(SYMBOLS, np.array(ROWS).T, strict=True)}
+    columns["E5"] = -columns["E5"]
+    write_labview(tmp_path / "x.xlsx", load_machine("m15"), columns, simulated=False)
+    found = run(tmp_path / "x.xlsx", "--calibrations", packaged_home() / "calibrations", "--json")
+    messages = [f["message"] for f in json.loads(found.stdout)["findings"] if f["rule"] == "impossible-force"]
+    assert [message.split(":")[0] for message in messages] == [
+        "the stored Fy and Mz are impossible",
+        "Fy and Mz by m15-r2 are impossible too",
+    ]

@@ -1,7 +1,7 @@
 """What the files of an archive show together: copies, late edits, changed conventions, missing conditions.
 
-All of it informs and changes no grade. Files are added one by one, sorted by path, as plain answers; what is
-kept of each is a few bytes.
+It changes no grade; but for values that no tire has, it only informs. Files are added one by one, sorted by
+path, as plain answers; what is kept of each is a few bytes.
 """
 
 from __future__ import annotations
@@ -13,7 +13,8 @@ from typing import Any
 
 from toolkit.audit.effects import TestSums
 from toolkit.audit.lines import Lines
-from toolkit.findings import Finding
+from toolkit.findings import Finding, Level
+from toolkit.reduction.physics import RULES
 
 _LATE_DAYS = 1  # a file is often saved on the day after its test
 
@@ -33,7 +34,7 @@ class Across:
         """Take a file and yield what can be said at once."""
         path = one["path"]
         for note in one["notes"]:
-            yield Finding(rule=note["rule"], where=path, message=note["message"], level="note")
+            yield noted(note, path)
         yield from self._copies(one)
         if one["units"]:
             units = tuple(sorted(one["units"].items()))
@@ -109,6 +110,12 @@ class Across:
                         f"{told}: {count} file{'s' if count > 1 else ''} of {instrument}, such as {some[0]}"
                     )
                     yield Finding(rule="units-changed", where=some[0], message=message, level="note")
+
+
+def noted(note: Mapping[str, str], path: str) -> Finding:
+    """Return what a file's rows show, from its plain answer: it informs, but for what no tire can do."""
+    level: Level = "error" if note["rule"] in RULES else "note"
+    return Finding(rule=note["rule"], where=path, message=note["message"], level=level)
 
 
 def _days(text: str) -> int:

@@ -12,6 +12,7 @@ from toolkit.audit.columns import Columns, columns_of
 from toolkit.audit.context import Context, context_of
 from toolkit.audit.identify import identify_columns, recompute
 from toolkit.audit.model import CLEAN, TELLS, Identification
+from toolkit.audit.stored import impossible
 from toolkit.errors import RecordError, RegistryError
 from toolkit.findings import Finding
 from toolkit.recording.read import read_recording
@@ -20,6 +21,8 @@ from toolkit.reduction.opened import split_blocks
 from toolkit.units import si_scale
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     import numpy as np
     from numpy.typing import NDArray
 
@@ -190,7 +193,24 @@ def inspect_file(
         corrected_by=corrector.id if corrector is not None and corrected else None,
         unverified=corrector is not None and not corrector.verified,
         choice=choice,
-        findings=_findings(path, identification, choice),
+        findings=(*_impossible(path, blocks, corrector), *_findings(path, identification, choice)),
+    )
+
+
+def _impossible(
+    path: Path, blocks: Sequence[LoadBlock], corrector: CalibrationRecord | None
+) -> tuple[Finding, ...]:
+    """Return what no tire can do, of the file's own values and of the corrected ones."""
+    loads = [block for block in blocks if not block.tare]
+    rows = [f"rows {block.first_row}-{block.last_row}" for block in loads]
+    own = [(b.FZ_N, b.SA_rad, b.FY_file_N, b.MZ_file_Nm) for b in loads]
+    found = impossible(path.name, rows, own, values="the stored Fy and Mz are impossible")
+    if corrector is None:
+        return found
+    new = [(b.FZ_N, b.SA_rad, b.FY_N, b.MZ_Nm) for b in loads]
+    return (
+        *found,
+        *impossible(path.name, rows, new, values=f"Fy and Mz by {corrector.id} are impossible too"),
     )
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import datetime as dt
 import functools
+import math
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -19,6 +20,7 @@ from toolkit.audit.estimate import Estimate, estimate
 from toolkit.audit.identify import identify_columns, recompute
 from toolkit.audit.model import Grade, Identification
 from toolkit.audit.quality import quality
+from toolkit.audit.stored import impossible
 from toolkit.calibration.registry.registry import Registry
 from toolkit.channels import REVERSALS, ROTATIONS, Rotation, seen_by_cells, signs
 from toolkit.errors import ToolkitError
@@ -136,6 +138,7 @@ class Auditor:
         reversal = table.get("reversal")
         seen = seen_by_cells(rotation, reversal) if reversal in REVERSALS else rotation
         sae = signs(context.machine.axes, "SAE", seen)
+        changed = changes(recording, columns, blocks, new, turn=sae["SA"])
         return FileAudit(
             path=name,
             sha256=recording.sha256,
@@ -153,15 +156,12 @@ class Auditor:
             units=tuple((one.symbol, one.unit) for one in recording.series),
             values_sha256=sha256_bytes(b"".join(one.values.tobytes() for one in recording.series)),
             modified=recording.saved,
-            changes=changes(
-                recording,
-                columns,
-                blocks,
-                new,
-                turn=sae["SA"],
-            ),
+            changes=changed,
             estimate=estimate(columns, found.segments, screen) if found.grade == "unknown" else None,
-            notes=quality(recording, name),
+            notes=(
+                *_impossible(name, changed, in_force.id if in_force is not None else None),
+                *quality(recording, name),
+            ),
         )
 
     def _context(self, path: Path, data: bytes) -> tuple[Context, str | None]:
@@ -193,6 +193,24 @@ class Auditor:
             inside = here.relative_to(context.test_toml.parent).as_posix()
             said = own.get(inside, own.get(path.name, said))
         return cast("Rotation", said) if said in ROTATIONS else "forward"
+
+
+def _impossible(name: str, blocks: tuple[Change, ...], in_force: str | None) -> tuple[Finding, ...]:
+    rows = [f"rows {b.first_row}-{b.last_row}" for b in blocks]
+    angles = [None if b.SA_deg is None else math.radians(b.SA_deg) for b in blocks]
+    own = [(b.FZ_N, SA, b.FY_N, b.MZ_Nm) for b, SA in zip(blocks, angles, strict=True)]
+    found = impossible(name, rows, own, values="the stored Fy and Mz are impossible")
+    if in_force is None:
+        return found
+    new = [
+        (b.FZ_N, SA, _sum(b.FY_N, b.FY_change_N), _sum(b.MZ_Nm, b.MZ_change_Nm))
+        for b, SA in zip(blocks, angles, strict=True)
+    ]
+    return (*found, *impossible(name, rows, new, values=f"Fy and Mz by {in_force} are impossible too"))
+
+
+def _sum(own: float | None, change: float | None) -> float | None:
+    return None if own is None or change is None else own + change
 
 
 def unreadable(

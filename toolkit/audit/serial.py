@@ -7,14 +7,14 @@ from collections.abc import Mapping
 from dataclasses import asdict, fields
 from typing import Any
 
+from toolkit.audit.across import noted
 from toolkit.audit.conditions import Change
 from toolkit.audit.estimate import Coefficient, Equation, Estimate, Nearest
 from toolkit.audit.model import Identification, Repair, Segment, Skipped
 from toolkit.audit.one_file import FileAudit
-from toolkit.findings import Finding
 
 _CHANGE = tuple(field.name for field in fields(Change))
-SHAPE = 4
+SHAPE = 5
 """Of what is written here; results of another one are not used again."""
 
 
@@ -83,10 +83,7 @@ def from_plain(plain: Mapping[str, Any]) -> FileAudit:
         modified=_date(plain["modified"]),
         changes=tuple(_changed(one) for one in plain["conditions"]),
         estimate=None if estimate is None else _estimated(estimate),
-        notes=tuple(
-            Finding(rule=note["rule"], where=plain["path"], message=note["message"], level="note")
-            for note in plain["notes"]
-        ),
+        notes=tuple(noted(note, plain["path"]) for note in plain["notes"]),
     )
 
 

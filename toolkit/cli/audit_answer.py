@@ -152,6 +152,8 @@ def write_table(target: Path, told: Answer) -> Path:
 
 def text_of(told: Answer) -> str:
     """Return the answer for people."""
+    from toolkit.reduction.physics import RULES
+
     made = told.made
     rows = list(_rows(made))
     bad = len(made.files) - made.grades["exact"] - made.grades["rounding"]
@@ -164,6 +166,10 @@ def text_of(told: Answer) -> str:
     notes = Counter(one.rule for one in made.findings if one.level == "note")
     if notes:
         lines.append("also: " + ", ".join(f"{count} {rule}" for rule, count in sorted(notes.items())))
+    impossible = {one.where for one in made.findings if one.rule in RULES}
+    if impossible:
+        some = ", ".join(sorted(impossible)[:3]) + (", ..." if len(impossible) > 3 else "")
+        lines.append(f"Fy or Mz that no tire has, in files: {len(impossible)} ({some}); --json tells why")
     settings = Counter(one.message for one in made.findings if one.rule == "test-toml")
     lines += [f"{count} files: {said}" for said, count in settings.most_common(_SETTINGS)]
     if len(settings) > _SETTINGS:

@@ -169,6 +169,7 @@ def test_payload(resolved: Resolved) -> dict[str, Any]:
                 for b in characteristics.budgets
             ],
         },
+        "impossible": [finding.as_dict() for finding in reduced.impossible],
         "findings": [finding.as_dict() for finding in resolved.findings],
     }
 
@@ -205,6 +206,7 @@ def _text(resolved: Resolved, out: Path | None, style: Style) -> str:
         f"{reduced.info.name}: {used} conditions of {len({c.file for c in reduced.conditions})} files{mark}",
         f"calibration {reduced.calibration.id} ({reduced.calibration.sha256[:12]}...)"
         + mark_words(reduced.calibration),
+        *(["IMPOSSIBLE VALUES: no tire has them, see the findings"] if reduced.impossible else []),
         f"averaging: {reduced.averaging}",
         f"tare: {reduced.tare.source}",
         *(["reversed runs: the tire turned round on the hub"] if reduced.info.reversal == "tire" else []),

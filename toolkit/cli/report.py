@@ -355,6 +355,7 @@ def report_payload(made: Made) -> dict[str, Any]:
         "manifest_file": done.manifest,
         "handed_over": list(done.extras),
         "simulated": resolved.result.reduced.info.simulated,
+        "impossible": [finding.as_dict() for finding in resolved.result.reduced.impossible],
         "findings": [finding.as_dict() for finding in resolved.findings],
     }
 
@@ -368,7 +369,11 @@ def _text(made: Made) -> str:
     if resolved is None or isinstance(done, Exception):
         return f"{made.test}: no report\n{done}"
     use = resolved.result.reduced.calibration
-    marks = ("  SIMULATED" if resolved.result.reduced.info.simulated else "") + mark_words(use)
+    marks = (
+        ("  SIMULATED" if resolved.result.reduced.info.simulated else "")
+        + mark_words(use)
+        + ("  IMPOSSIBLE VALUES" if resolved.result.reduced.impossible else "")
+    )
     lines = [
         *(f"{path}" for path in (done.pdf, done.docx, done.manifest, *done.extras) if path is not None),
         f"{done.pages} pages, {len(done.filled.figures)} figures, "

@@ -139,6 +139,7 @@ def _from_file(
     from toolkit.errors import RecordError
     from toolkit.recording.gate import gate
     from toolkit.recording.marks import is_own_output
+    from toolkit.reduction.cells import checked
     from toolkit.testfile import read_test_file
 
     if not test.exists():
@@ -161,6 +162,7 @@ def _from_file(
             rule="not-a-test",
         )
     result = read_test_file(test)
+    result = replace(result, reduced=checked(result.reduced))
     used = result.reduced.calibration
     record = registry.load(used.id)
     if record.sha256 != used.sha256 or calibration not in (None, used.id):

@@ -9,6 +9,7 @@ from toolkit.calibration.records.use import CalibrationUse
 from toolkit.channels import Rotation
 from toolkit.findings import Finding
 from toolkit.recording.model import TestInfo
+from toolkit.reduction.physics import RULES
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -92,6 +93,11 @@ class ReducedTest:
     axes: str = "SAE"
     protocol: str = ""
     stated: tuple[TypeB, ...] = ()
+
+    @property
+    def impossible(self) -> tuple[Finding, ...]:
+        """The findings of the gate of physics: corrected values that no tire has, level ``error``."""
+        return tuple(one for one in self.findings if one.rule in RULES)
 
     def used(self, rotation: Rotation | None = None) -> tuple[Condition, ...]:
         """Return the conditions that feed results, optionally of one direction of rotation."""

@@ -14,6 +14,7 @@ from toolkit.channels import Reversal, Rotation, seen_by_cells, signs
 from toolkit.reduction import protocol as plan
 from toolkit.reduction import remarks
 from toolkit.reduction.averaging import Window, means
+from toolkit.reduction.cells import physics_findings
 from toolkit.reduction.common_load import at_one_angle, carry, slopes
 from toolkit.reduction.corrections import correction_findings
 from toolkit.reduction.model import CalibrationUse, Condition, ReducedTest, Tare
@@ -75,6 +76,13 @@ def reduce_test(
     conditions = _ordered(_at_common_load(_own_loads(measured)), machine)
     protocol = machine.protocol
     findings = [
+        *physics_findings(
+            conditions,
+            record=record,
+            machine=machine,
+            info=info,
+            tares={file.name: file.tare for file in files},
+        ),
         *plan.check(placed, later, protocol, protocol.rotations or machine.rotations),
         *drift_findings(conditions, protocol),
         *correction_findings(machine),

@@ -13,7 +13,7 @@ from toolkit.calibration.records.use import DRAFT, UNVERIFIED
 from toolkit.files import sha256_bytes
 from toolkit.recording.details import ReportDetails
 from toolkit.report.columns import UNITS
-from toolkit.report.content import Cell, ReportContent, Table, Value
+from toolkit.report.content import IMPOSSIBLE, Cell, ReportContent, Table, Value
 from toolkit.report.details import details_values
 from toolkit.report.diagnosis.in_report import Told, diagnosis_tables, diagnosis_values, told_plots
 from toolkit.report.models import model_plots
@@ -96,6 +96,15 @@ def build_content(
                 "unverified",
                 f"{UNVERIFIED}: {use.id} is a legacy import; its coefficients are not reproduced "
                 "from reference data.",
+            )
+        )
+    if impossible := result.reduced.impossible:
+        told = ", ".join(dict.fromkeys(one.rule for one in impossible))
+        marks.append(
+            (
+                "impossible",
+                f"{IMPOSSIBLE}: no tire has the forces or moments of this test ({told}, see the findings); "
+                "they must not be used.",
             )
         )
     return ReportContent(
@@ -293,6 +302,7 @@ def _conditions(
         "simulated": info.simulated,
         "measured": not info.simulated,
         "unverified": result.reduced.calibration.unverified,
+        "impossible": bool(result.reduced.impossible),
         "verified": not (result.reduced.calibration.unverified or result.reduced.calibration.draft),
         "draft": result.reduced.calibration.draft,
         "pull": pull,
@@ -308,4 +318,4 @@ def _conditions(
     }
 
 
-__all__ = ["SIMULATED", "UNITS", "UNVERIFIED", "Cell", "build_content", "report_id"]
+__all__ = ["IMPOSSIBLE", "SIMULATED", "UNITS", "UNVERIFIED", "Cell", "build_content", "report_id"]

@@ -15,6 +15,9 @@ from toolkit.report.vocabulary import REPORT, Vocabulary
 Cell = str | float | None
 
 
+IMPOSSIBLE = "IMPOSSIBLE VALUES"
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Value:
     """One value: text as it is, a number with unit and default format, or an ISO date."""
@@ -109,8 +112,12 @@ class ReportContent:
 
     @property
     def page_mark(self) -> str | None:
-        """The line that every page carries; None where every record may issue its numbers."""
-        return mark_of(self.calibrations)
+        """The line that every page carries; None where every record may issue its numbers.
+
+        Values that no tire has are told on every page too: a page is copied without its first one.
+        """
+        impossible = f"{IMPOSSIBLE}: see the findings" if self.conditions.get("impossible") else None
+        return " - ".join(part for part in (mark_of(self.calibrations), impossible) if part) or None
 
     @property
     def draft_reasons(self) -> tuple[str, ...]:

@@ -168,6 +168,7 @@ CONDITIONS = {
     "measured": "the data are measured",
     "unverified": "the calibration record is a legacy import",
     "draft": "the calibration record was not approved and in force on the test's date",
+    "impossible": "values of the test are such as no tire has",
     "verified": "the calibration record reproduces from its stored data",
     "pull": "both directions of rotation gave a pull characteristic",
     "no_pull": "there is no pull characteristic, for instance for want of a reversed run",

@@ -85,6 +85,7 @@ REPORT = Vocabulary(
         "simulated": frozenset({"if.simulated", "simulated"}),
         "unverified": frozenset({"if.unverified", "calibration.status"}),
         "draft": frozenset({"calibration.status"}),
+        "impossible": frozenset({"if.impossible"}),
     },
     open_values=TERM,
 )

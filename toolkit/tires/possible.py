@@ -1,7 +1,8 @@
 """What no tire does: values beyond it are a wrong unit or a slip of the pen, and would move a whole table.
 
 Single values are refused, generously: the largest aircraft tires carry some 300 kN. A unit that is wrong by
-a factor leaves every value possible, and shows only in what is fitted: such ratios are told, never refused.
+a factor leaves every value possible, and shows only in ratios, of the rows and of what is fitted: those are
+told, never refused, by the bounds that hold for every test (`toolkit.reduction.limits`).
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ from typing import TYPE_CHECKING
 
 from toolkit.errors import CellError
 from toolkit.findings import Finding
+from toolkit.reduction.limits import LARGEST_TRAIL_M, LEAST_LOAD_N, STIFFNESS
 
 if TYPE_CHECKING:
     from toolkit.tires.model import CurveFit
@@ -26,12 +28,6 @@ _CHARACTERISTIC = {
     "N": LARGEST["force"], "N*m": LARGEST["moment"], "N/rad": 1e8, "N*m/rad": 1e7, "rad": math.pi / 2,
 }  # fmt: skip
 _SHOWN = {"rad": "90 deg"}
-# Cornering stiffness over load, 1/rad. Published: 0.08 to 0.19 per degree for car tires, to 0.30 for low ones
-# (Gillespie, Fundamentals of Vehicle Dynamics (1992), ch. 10), that is 5 to 17 per rad; truck tires at their
-# load and overloaded ones come down to 3, racing tires at small loads up to 40.
-_PER_LOAD = (1.0, 80.0)
-_TRAIL_M = 0.5  # aligning over cornering stiffness: a third of the contact length, and no patch is so long
-_LEAST_LOAD = 25.0  # N: kilonewtons named newtons; a bicycle tire is tested at some 300
 _SURE = 3.0  # standard errors
 
 
@@ -72,7 +68,7 @@ def size_findings(fits: Sequence[CurveFit], where: str) -> tuple[Finding, ...]:
             slopes[fit.channel, fit.load_N] = abs(fit.slope_at_zero.value), fit.slope_at_zero.u
     ratios = [(value / load, u / load) for (name, load), (value, u) in slopes.items() if name == "FY"]
     found = []
-    low, high = _PER_LOAD
+    low, high = STIFFNESS.low, STIFFNESS.high
     odd = [value for value, u in ratios if value + _SURE * u < low or value - _SURE * u > high]
     if 2 * len(odd) > len(ratios):
         found.append(
@@ -89,7 +85,7 @@ def size_findings(fits: Sequence[CurveFit], where: str) -> tuple[Finding, ...]:
         for (name, load), (value, u) in slopes.items()
         if name == "MZ" and slopes.get(("FY", load), (0.0, 0.0))[0] > 0
     ]
-    long = [value for value, u in trails if value - _SURE * u > _TRAIL_M]
+    long = [value for value, u in trails if value - _SURE * u > LARGEST_TRAIL_M]
     if 2 * len(long) > len(trails):
         found.append(
             Finding(
@@ -97,11 +93,11 @@ def size_findings(fits: Sequence[CurveFit], where: str) -> tuple[Finding, ...]:
                 where=f"{where}, MZ",
                 message=f"the aligning stiffness is {_range(long)} m times the cornering stiffness in "
                 f"{len(long)} of {len(trails)} load blocks, a trail that is longer than any tire's "
-                f"({_TRAIL_M:g} m): is MZ in another unit than its header says, or FY?",
+                f"({LARGEST_TRAIL_M:g} m): is MZ in another unit than its header says, or FY?",
             )
         )
     loads = [load for _, load in slopes]
-    if loads and max(loads) < _LEAST_LOAD:
+    if loads and max(loads) < LEAST_LOAD_N:
         found.append(
             Finding(
                 rule="implausible-load",

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from toolkit.channels import Axes, signs
 from toolkit.errors import FitError
 from toolkit.findings import Finding
+from toolkit.reduction.limits import LARGEST_TRAIL_M, LEAST_LOAD_N
+from toolkit.reduction.physics import departures, of_sizes
 from toolkit.tires.blocks import load_blocks
 from toolkit.tires.catalog import fit_model
 from toolkit.tires.evaluate import slope_estimate_at
@@ -20,6 +23,9 @@ from toolkit.tires.possible import size_findings
 from toolkit.tires.table import TireTable
 from toolkit.units import in_both
 
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
 # Sign of dy/dSA at small angles of a tire, see `toolkit.channels`.
 _SLOPE_SIGN: dict[Axes, dict[str, int]] = {
     "SAE": {"FY": -1, "MZ": 1},
@@ -28,6 +34,7 @@ _SLOPE_SIGN: dict[Axes, dict[str, int]] = {
     "machine": {"FY": -1, "MZ": 1},
 }
 _NO_LOAD = 1.0  # N: a block below stands in the air, or its load was not recorded
+_OUTLIERS = 0.02  # of a table's rows
 _SURE = 4.0  # standard errors by which a slope must differ from zero before its sign counts
 
 
@@ -101,7 +108,7 @@ def fit_table(table: TireTable, models: tuple[TireModel, ...], *, loss: Loss = "
     findings += fit_findings(fits)
     if own := [fit for fit in fits if fit.model == "magic_formula"]:
         findings += gross_outliers(good, own)
-    findings += (*axes_findings(table, fits), *size_findings(fits, table.path.name))
+    findings += (*row_findings(table), *axes_findings(table, fits), *size_findings(fits, table.path.name))
     return TableFits(fits=tuple(fits), findings=tuple(findings))
 
 
@@ -129,6 +136,30 @@ def fit_findings(fits: list[CurveFit]) -> list[Finding]:
         elif fit.not_determined:
             found.append(Finding(rule="not-determined", where=where, message=fit.message, level="note"))
     return found
+
+
+def row_findings(table: TireTable) -> tuple[Finding, ...]:
+    """Return where the rows of a table hold forces or moments that no tire has at their loads and slips.
+
+    Only sizes are judged, axes by `axes_findings`; a fiftieth of the rows may be
+    gross outliers. A table may be of any tire: its trail is bounded by that of the largest.
+    """
+    FZ = table["FZ"]
+    rows = FZ >= LEAST_LOAD_N
+    if not rows.any():
+        return ()
+
+    def column(symbol: str) -> NDArray[np.float64]:
+        values = table.get(symbol)
+        return np.zeros(int(rows.sum())) if values is None else values[rows]
+
+    readings = of_sizes(
+        [f"{table.path.name}, row {index + 1}" for index in np.flatnonzero(rows)],
+        FZ=FZ[rows], SA=table["SA"][rows], FY=column("FY"), MZ=column("MZ"), FX=column("FX"),
+        IA=column("IA"), trail_m=LARGEST_TRAIL_M,
+    )  # fmt: skip
+    cause = "is a column in another unit than its header says?"
+    return tuple(one.finding("warning", cause=cause) for one in departures(readings, share=_OUTLIERS))
 
 
 def axes_findings(table: TireTable, fits: Sequence[CurveFit]) -> list[Finding]:

@@ -1,0 +1,234 @@
+"""The cells' pattern: what three cells say together, held against what a wheel can do to them.
+
+The cells measure three loads, FY, MZ and the overturning moment MX, and physics knows the third: the side
+force acts at the road, a loaded radius below the hub, so that
+
+    MX = lever FY + offset FZ + const,          lever between the bounds of `limits.LEVER`
+
+With the force in cell i, f_i = (dFY/d indication_i) indication_i by the record, and its lever in the machine
+definition, MX = sum lever_i f_i; without levers MX is the record's own. The tire's own overturning moment,
+its load times its lateral deflection, takes up to an eighth of the radius from the lever and leaves a
+twentieth of MX beside the line. A cell that was turned round, exchanged or is dead breaks this or another
+law; which single change of a cell puts all of them right is searched among the turns and the exchanges of
+two.
+
+Every single turn, exchange and dead cell is seen in a whole test. Not seen, because a tire could do it: all
+cells or all loads wrong by one factor that stays within the bounds, one cell's sensitivity wrong by a third
+or less (`tests/campaigns/physics_gate.py` shows each).
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from toolkit.channels import seen_by_cells, signs
+from toolkit.findings import Finding
+from toolkit.reduction import limits
+from toolkit.reduction.averaging import free_radius_m
+from toolkit.reduction.physics import Departure, Readings, departures, longest_trail
+from toolkit.units import si_scale
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from toolkit.calibration.records.record import CalibrationRecord
+    from toolkit.machine import Machine
+    from toolkit.recording.model import TestInfo
+    from toolkit.reduction.model import Condition, ReducedTest, Tare
+
+_LEAST_FORCE = 0.3  # span of FY over the mean load from which a lever can be told
+_LEFT = 0.15  # of the moment's span: what may be left of it beside lever and offset
+_FEWEST = 5
+
+
+@dataclasses.dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Cells:
+    """The cells of a test: readings in SI, and each cell's part of FY, of MZ and of MX.
+
+    ``indications`` (n, cells) minus ``tares`` (n, cells), in the record's units; ``per_FY`` [N],
+    ``per_MZ`` and ``per_MX`` [N·m] (cells,) of one unit of indication, the last None where neither the
+    machine names its levers nor the record holds MX; ``radius_m`` the tire's free radius; ``FY_sign`` and
+    ``MZ_sign`` (n,) from machine axes.
+    """
+
+    names: tuple[str, ...]
+    indications: NDArray[np.float64]
+    per_FY: NDArray[np.float64]
+    per_MZ: NDArray[np.float64]
+    per_MX: NDArray[np.float64] | None
+    radius_m: float | None
+    tares: NDArray[np.float64]
+    FY_sign: NDArray[np.float64]
+    MZ_sign: NDArray[np.float64]
+
+
+def physics_findings(
+    conditions: Sequence[Condition],
+    *,
+    record: CalibrationRecord,
+    machine: Machine,
+    info: TestInfo,
+    tares: Mapping[str, Tare],
+) -> list[Finding]:
+    """Return what no tire and no wheel can do in a test's corrected values, as findings of level error.
+
+    ``tares`` are those of the files by their names.
+    """
+    if not conditions:
+        return []
+    readings = _readings(conditions, info)
+    cells = _cells(conditions, record, machine, info, tares)
+    broken = _all(readings, cells)
+    if not broken:
+        return []
+    cures = dict.fromkeys(text for text, changed in _changes(readings, cells) if not _all(*changed))
+    more = f"all is possible with {' or '.join(cures)}" if cures else ""
+    return [one.finding(more=more if index == 0 else "") for index, one in enumerate(broken)]
+
+
+def checked(reduced: ReducedTest) -> ReducedTest:
+    """Return a reduced test with what no tire can do told, where it was reduced before there was a gate.
+
+    Without the machine and the record, as a file of its own: the cells' pattern is left to the reduction.
+    """
+    if reduced.impossible or not reduced.conditions:
+        return reduced
+    found = tuple(one.finding() for one in departures(_readings(reduced.conditions, reduced.info)))
+    return dataclasses.replace(reduced, findings=(*found, *reduced.findings)) if found else reduced
+
+
+def _all(readings: Readings, cells: Cells) -> tuple[Departure, ...]:
+    return (*departures(readings), *pattern(readings, cells))
+
+
+def pattern(readings: Readings, cells: Cells) -> tuple[Departure, ...]:
+    """Return where the overturning moment in the cells does not follow the side force."""
+    if cells.per_MX is None or len(readings.FZ) < _FEWEST:
+        return ()
+    FY, MX = cells.indications @ cells.per_FY, cells.indications @ cells.per_MX
+    FZ = readings.FZ
+    if np.ptp(FY) < _LEAST_FORCE * FZ.mean():
+        return ()
+    design = np.column_stack([FY, FZ, np.ones(len(FY))])
+    solution, *_ = np.linalg.lstsq(design, MX, rcond=None)
+    lever = float(solution[0])
+    rest = MX - design @ solution
+    low, high = limits.LEVER.low, limits.LEVER.high
+    if cells.radius_m is not None:
+        low, high = (
+            part * cells.radius_m for part in (limits.LEVER_PER_RADIUS.low, limits.LEVER_PER_RADIUS.high)
+        )
+    found = []
+    if not low <= lever <= high:
+        found.append(
+            Departure(
+                rule="impossible-cells",
+                where=f"cells {', '.join(cells.names)}",
+                message=f"the overturning moment in the cells follows the side force by {lever:.3f} m; a "
+                f"wheel gives its loaded radius, {low:.2f} to {high:.2f} m",
+                cause="two cells are exchanged, one is turned round, or one is dead",
+            )
+        )
+    left = float(np.sqrt(np.mean(rest**2)) / np.ptp(MX)) if np.ptp(MX) > 0 else 0.0
+    if left > _LEFT:
+        worst = int(np.argmax(np.abs(rest)))
+        found.append(
+            Departure(
+                rule="impossible-cells",
+                where=readings.place[worst],
+                message=f"the overturning moment in the cells leaves the line of the side force by "
+                f"{100 * left:.0f} % of its span (rms; at most {100 * _LEFT:g} %)",
+                cause="a cell changed its sign, its place or its sensitivity during the test",
+            )
+        )
+    return tuple(found)
+
+
+def _readings(conditions: Sequence[Condition], info: TestInfo) -> Readings:
+    def column(name: str) -> NDArray[np.float64]:
+        return np.array([getattr(c, name) for c in conditions], dtype=np.float64)
+
+    none = np.zeros(len(conditions))
+    return Readings(
+        place=tuple(f"{c.file}, rows {c.first_row}-{c.last_row}" for c in conditions),
+        FZ=column("FZ"), SA=column("SA"), FY=column("FY"), MZ=column("MZ"),
+        reverse=np.array([c.rotation == "reverse" for c in conditions]),
+        block=tuple((c.step_SA, c.step_FZ) for c in conditions),
+        u_FY=column("u_FY_zero"), u_MZ=column("u_MZ_zero"), FX=none, IA=none,
+        trail_m=longest_trail(free_radius_m(info.tire_size)),
+    )  # fmt: skip
+
+
+def _cells(
+    conditions: Sequence[Condition],
+    record: CalibrationRecord,
+    machine: Machine,
+    info: TestInfo,
+    tares: Mapping[str, Tare],
+) -> Cells:
+    per_FY, levers = _linear(record, "FY"), dict(machine.overturning_lever_m)
+    turns = [signs(machine.axes, "SAE", seen_by_cells(c.rotation, info.reversal)) for c in conditions]
+    zeros = {
+        name: [
+            dict(tare.values).get(cell, 0.0) if tare.source != "none" else 0.0 for cell in record.indications
+        ]
+        for name, tare in tares.items()
+    }
+    return Cells(
+        names=record.indications,
+        indications=np.array([c.indications for c in conditions]),
+        per_FY=per_FY,
+        per_MZ=_linear(record, "MZ"),
+        per_MX=_overturning(record, per_FY, levers),
+        radius_m=free_radius_m(info.tire_size),
+        tares=np.array([zeros[c.file] for c in conditions]),
+        FY_sign=np.array([float(one["FY"]) for one in turns]),
+        MZ_sign=np.array([float(one["MZ"]) for one in turns]),
+    )
+
+
+def _overturning(
+    record: CalibrationRecord, per_FY: NDArray[np.float64], levers: Mapping[str, float]
+) -> NDArray[np.float64] | None:
+    # By the drawing, which the record did not touch; else by the record's own fit.
+    if set(record.indications) <= set(levers):
+        return per_FY * [levers[name] for name in record.indications]
+    return _linear(record, "MX") if any(one.load == "MX" for one in record.loads) else None
+
+
+def _linear(record: CalibrationRecord, load: str) -> NDArray[np.float64]:
+    one = record.load(load)
+    by_term = dict(zip(one.terms, one.coefficients, strict=True))
+    return np.array([by_term.get(name, 0.0) for name in record.indications]) * si_scale(one.unit)
+
+
+def _changes(readings: Readings, cells: Cells) -> list[tuple[str, tuple[Readings, Cells]]]:
+    """Return every single turn of a cell and exchange of two, in words, and the test with it undone."""
+    n = len(cells.names)
+    raw, made = cells.indications + cells.tares, []
+    for i in range(n):
+        for when, tares in (("", np.zeros_like(raw)), (" after its tare", cells.tares)):
+            if when and not tares[:, i].any():
+                continue
+            now = np.where(np.arange(n) == i, -(cells.indications + tares) - tares, cells.indications)
+            made.append((f"{cells.names[i]} turned round{when}", now))
+    for i, j in itertools.combinations(range(n), 2):
+        order = list(range(n))
+        order[i], order[j] = j, i
+        made.append((f"{cells.names[i]} and {cells.names[j]} exchanged", raw[:, order] - cells.tares))
+    return [(text, _with(readings, cells, now)) for text, now in made]
+
+
+def _with(readings: Readings, cells: Cells, now: NDArray[np.float64]) -> tuple[Readings, Cells]:
+    step = now - cells.indications
+    changed = dataclasses.replace(
+        readings,
+        FY=readings.FY + cells.FY_sign * (step @ cells.per_FY),
+        MZ=readings.MZ + cells.MZ_sign * (step @ cells.per_MZ),
+    )
+    return changed, dataclasses.replace(cells, indications=now)
