@@ -154,3 +154,18 @@ def test_an_input_is_never_replaced(files):
     with pytest.raises(ToolkitError) as caught:
         run(tire, grid, "--out", grid)
     assert caught.value.rule == "original"
+
+
+@pytest.mark.parametrize("axes", AXES)
+def test_a_tire_that_rolls_backward_is_one_that_rolls_forward_turned_round(tmp_path, axes):
+    (tmp_path / "x.tir").write_text(TIRE.replace("PHY1 = 0.002", "PHY1 = 0").replace("QBZ1 = 9", "QBZ1 = 9\nQDZ8 = -0.1"))
+    (tmp_path / "back.csv").write_text("SA [deg],IA [deg],FZ [N],V [km/h]\n-4,2,4000,-60\n3,-1,3000,-30\n")
+    (tmp_path / "forth.csv").write_text("SA [deg],IA [deg],FZ [N],V [km/h]\n-4,-2,4000,60\n3,1,3000,30\n")
+    back, forth = (
+        json.loads(run(tmp_path / "x.tir", tmp_path / f"{name}.csv", "--axes", axes, "--json")[1])["rows"]
+        for name in ("back", "forth")
+    )
+    for one, other in zip(back, forth, strict=True):
+        assert one["FY"] == pytest.approx(-other["FY"], rel=1e-12)
+        assert one["MZ"] == pytest.approx(other["MZ"], rel=1e-12)
+        assert abs(one["MZ"]) > 1
