@@ -158,7 +158,9 @@ def test_an_input_is_never_replaced(files):
 
 @pytest.mark.parametrize("axes", AXES)
 def test_a_tire_that_rolls_backward_is_one_that_rolls_forward_turned_round(tmp_path, axes):
-    (tmp_path / "x.tir").write_text(TIRE.replace("PHY1 = 0.002", "PHY1 = 0").replace("QBZ1 = 9", "QBZ1 = 9\nQDZ8 = -0.1"))
+    (tmp_path / "x.tir").write_text(
+        TIRE.replace("PHY1 = 0.002", "PHY1 = 0").replace("QBZ1 = 9", "QBZ1 = 9\nQDZ8 = -0.1")
+    )
     (tmp_path / "back.csv").write_text("SA [deg],IA [deg],FZ [N],V [km/h]\n-4,2,4000,-60\n3,-1,3000,-30\n")
     (tmp_path / "forth.csv").write_text("SA [deg],IA [deg],FZ [N],V [km/h]\n-4,-2,4000,60\n3,1,3000,30\n")
     back, forth = (
@@ -181,9 +183,7 @@ def tire_of(fittyp, *more):
     head, rest = TIRE.replace("FITTYP = 61", f"FITTYP = {fittyp}").split("[LATERAL_COEFFICIENTS]\n")
     lateral, aligning = rest.split("[ALIGNING_COEFFICIENTS]\n")
     added = ["".join(parts) for parts in zip(*more, strict=True)]
-    return (
-        f"{head}{added[0]}[LATERAL_COEFFICIENTS]\n{lateral}{added[1]}[ALIGNING_COEFFICIENTS]\n{aligning}{added[2]}"
-    )
+    return f"{head}{added[0]}[LATERAL_COEFFICIENTS]\n{lateral}{added[1]}[ALIGNING_COEFFICIENTS]\n{aligning}{added[2]}"
 
 
 @pytest.mark.parametrize(
@@ -209,7 +209,11 @@ def test_names_of_the_other_magic_formula_change_nothing_and_are_told(tmp_path, 
 
 
 def test_names_that_change_nothing_anyway_are_not_told(tmp_path):
-    neutral = "RBX3 = 0\n", "RBY4 = 0\nPKY4 = 2\nPHY3 = 0\n", "PPZ1 = 0\n[SCALING_COEFFICIENTS]\nLKYC = 1\nLMUV = 0\n"
+    neutral = (
+        "RBX3 = 0\n",
+        "RBY4 = 0\nPKY4 = 2\nPHY3 = 0\n",
+        "PPZ1 = 0\n[SCALING_COEFFICIENTS]\nLKYC = 1\nLMUV = 0\n",
+    )
     (tmp_path / "g.csv").write_text("SA [deg],FZ [N]\n-4,4000\n")
     (tmp_path / "x.tir").write_text(tire_of(5, neutral))
     code, out = run(tmp_path / "x.tir", tmp_path / "g.csv", "--json")

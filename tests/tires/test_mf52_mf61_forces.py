@@ -185,7 +185,9 @@ def half_turn(p, **at):
 @pytest.mark.parametrize("KAPPA", [0.0, 0.06, -0.2])
 @pytest.mark.parametrize("angles", ["star", "raw"])
 def test_backward_is_forward_seen_after_a_half_turn(model, IA, KAPPA, angles):
-    p = {n: v for n, v in {**P, **MORE, "RBX3": -3.0, "RBY4": 5.0}.items() if n not in LEFT_RIGHT + BRAKE_DRIVE}
+    p = {
+        n: v for n, v in {**P, **MORE, "RBX3": -3.0, "RBY4": 5.0}.items() if n not in LEFT_RIGHT + BRAKE_DRIVE
+    }
     at = {"SA": SA, "IA": IA, "KAPPA": KAPPA, "V": -20.0, "FZ": 5000.0}
     back, forth = forces(model, p, angles=angles, **at), forces(model, p, angles=angles, **half_turn(p, **at))
     # The axes x and y are turned, z is not.
