@@ -167,7 +167,7 @@ def test_backward_turns_the_slip_angle():
     assert back.a == forth.a
 
 
-# What makes left and right, or braking and driving, differ: a half turn cannot carry it from forward to backward.
+# What makes left and right, or braking and driving, differ: a half turn does not carry it over.
 LEFT_RIGHT = "PHY1 PHY2 PVY1 PEY3 RBY3 RVY1 QHZ1 QDZ3 QBZ4 QDZ6 QDZ7 QEZ4 RHX1 SSZ1".split()
 BRAKE_DRIVE = "PHX1 PVX1 PEX4 RHY1 RVY3".split()
 

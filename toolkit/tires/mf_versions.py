@@ -4,7 +4,8 @@ FITTYP says which one a file is of. Files that went through several programs car
 too: zeros that fill a list, or numbers left from another fit. Such a name is not evaluated, in pure as in
 combined slip, whatever equation the two formulas share; where its number would change a force, it is named.
 
-MF 5.2: MF-Tyre 5.2 and PAC2002, Pacejka (2002). MF 6.x: Pacejka (2012), 4.E1 to 4.E78, Besselink et al. (2010).
+MF 5.2: MF-Tyre 5.2 and PAC2002, Pacejka (2002). MF 6.x: Pacejka (2012), 4.E1 to 4.E78;
+Besselink et al. (2010).
 """
 
 from __future__ import annotations

@@ -6,7 +6,7 @@ gamma* = sin(gamma); ``raw`` leaves both angles as they are, as MF-Tyre does.
 Backward rolling is forward rolling seen from behind: after a half turn about z the contact point moves
 forward again, the slip angle is the same (tan(alpha) = -Vy / Vx keeps both signs), camber and kappa change
 theirs, and so do FX and FY, but not MZ. Hence the trail and the residual moment turn with Vx: 4.E6 gives the
-trail the factor cos'(alpha) = Vx / V, 4.E42 and 4.E47 write sgn(Vx). Here ``cosine`` is that signed one, taken
+trail the factor cos'(alpha) = Vx / V, 4.E47 gives the residual moment sgn(Vx). Here ``cosine`` is that signed one, taken
 once. What is built into a tire (conicity, plysteer) and the difference between braking and driving keep the
 sign that the file gives them: the equations do not say how they turn.
 """
@@ -48,7 +48,7 @@ def readers(p: Mapping[str, float]) -> tuple[Reader, Reader]:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class State:
-    """alpha* with the slip angle's signed cosine, gamma*, kappa [1], load [N] and its change from the nominal.
+    """alpha*, the signed cosine of alpha, gamma*, kappa [1], load [N] and its change from the nominal.
 
     ``cosine`` is Vx / V (4.E6), negative for a tire that rolls backward.
     ``dp`` is (P - NOMPRES) / NOMPRES; ``mu_x``, ``mu_y`` the friction scale factors at the slip speed.

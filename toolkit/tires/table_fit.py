@@ -28,6 +28,7 @@ _SLOPE_SIGN: dict[Axes, dict[str, int]] = {
     "machine": {"FY": -1, "MZ": 1},
 }
 _NO_LOAD = 1.0  # N: a block below stands in the air, or its load was not recorded
+_COPIES = 0.1  # of the rows
 _SURE = 4.0  # standard errors by which a slope must differ from zero before its sign counts
 
 
@@ -129,6 +130,23 @@ def fit_findings(fits: list[CurveFit]) -> list[Finding]:
         elif fit.not_determined:
             found.append(Finding(rule="not-determined", where=where, message=fit.message, level="note"))
     return found
+
+
+def repeat_findings(table: TireTable) -> list[Finding]:
+    """Return a finding where over a tenth of the rows are copies of others in all columns but the time."""
+    rows = np.column_stack([values for symbol, values in table.columns if symbol != "t"])
+    _, count = np.unique(rows, axis=0, return_counts=True)
+    copies = int((count - 1).sum())
+    if copies <= _COPIES * len(rows):
+        return []
+    return [
+        Finding(
+            rule="duplicates",
+            where=table.path.name,
+            message=f"{copies} of {len(rows)} rows are copies of others, one of them stands {count.max()} "
+            "times: they count as measurements of their own, and standard errors come out too small",
+        )
+    ]
 
 
 def axes_findings(table: TireTable, fits: Sequence[CurveFit]) -> list[Finding]:

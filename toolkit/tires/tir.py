@@ -134,8 +134,8 @@ class TirFile:
             return ()
         other = {"5.2": "6.x", "6.x": "5.2"}[self.version]
         text = (
-            f"the file is of MF {self.version} ({self._kind_as_written(self.get('FITTYP'))}): {', '.join(names)} "
-            f"of MF {other} {'is' if len(names) == 1 else 'are'} not evaluated"
+            f"the file is of MF {self.version} ({self._kind_as_written(self.get('FITTYP'))}): "
+            f"{', '.join(names)} of MF {other} {'is' if len(names) == 1 else 'are'} not evaluated"
         )
         return (Finding(rule="tir-foreign-names", where=self.where, message=text),)
 

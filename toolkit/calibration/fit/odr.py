@@ -3,9 +3,10 @@
 Minimised: sum over rows of (load - f(x + delta))^2 / u_load^2 + sum of delta_j^2 / u_j^2. odrpack stops
 where the sum of squares does not move any more; a few Gauss-Newton steps then settle the last digits of the
 coefficients. Indications are taken from a zero near their mean, as the other fits take them: beside an
-indication of 50 with a span of 1 an adjustment of its last digits would be rounded away. The covariance follows from the stated uncertainties alone, as for `regression` with weights and
-in ISO/TS 28037 clause 7: at the solution it is odrpack's ``cov_beta``, which is unscaled, to more digits.
-``sd_beta``, rescaled by the residuals, is not used.
+indication of 50 with a span of 1 an adjustment of its last digits would be rounded away. The covariance
+follows from the stated uncertainties alone, as for `regression` with weights and in ISO/TS 28037 clause 7: at
+the solution it is odrpack's ``cov_beta``, which is unscaled, to more digits. ``sd_beta``, rescaled by the
+residuals, is not used.
 
 Reference: Boggs, Byrd, Schnabel, SIAM J. Sci. Stat. Comput. 8 (1987) 1052; ODRPACK95, ACM TOMS algorithm 869.
 """

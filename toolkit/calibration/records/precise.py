@@ -1,4 +1,4 @@
-"""Golden vectors of fits with shared errors, or errors in both variables: normal equations in 60 digits or more.
+"""Golden vectors of fits with shared errors, or errors in both variables: 60 digits or more.
 
 Decimal arithmetic on the raw terms, nothing centred, scaled or whitened, and nothing shared with the fit.
 Shared errors are solved as further unknowns with a prior of unit spread (Henderson's mixed-model equations),
