@@ -183,7 +183,8 @@ def tire_of(fittyp, *more):
     head, rest = TIRE.replace("FITTYP = 61", f"FITTYP = {fittyp}").split("[LATERAL_COEFFICIENTS]\n")
     lateral, aligning = rest.split("[ALIGNING_COEFFICIENTS]\n")
     added = ["".join(parts) for parts in zip(*more, strict=True)]
-    return f"{head}{added[0]}[LATERAL_COEFFICIENTS]\n{lateral}{added[1]}[ALIGNING_COEFFICIENTS]\n{aligning}{added[2]}"
+    lateral, aligning = lateral + added[1], aligning + added[2]
+    return f"{head}{added[0]}[LATERAL_COEFFICIENTS]\n{lateral}[ALIGNING_COEFFICIENTS]\n{aligning}"
 
 
 @pytest.mark.parametrize(

@@ -181,7 +181,7 @@ def test_conditions(tmp_path: Path) -> None:
         + f"<w:tbl><w:tblPr/><w:tblGrid><w:gridCol/></w:tblGrid>{rows}</w:tbl>"
     )
     full = filled(tmp_path, body)
-    assert "pull 69.0" in texts(full.docx)
+    assert "pull 69" in texts(full.docx)
     assert "inline both" in texts(full.docx)
     assert "never" not in texts(full.docx)
     assert "row" in texts(full.docx)

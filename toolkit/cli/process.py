@@ -28,6 +28,7 @@ from toolkit.cli.console import (
     table,
 )
 from toolkit.cli.console import reader as choose_reader
+from toolkit.estimate import plus_minus
 
 if TYPE_CHECKING:
     from toolkit.cli.resolve import Resolved
@@ -260,5 +261,5 @@ def _pull_table(resolved: Resolved, style: Style) -> str:
 def _shown(estimate: Estimate | None, factor: float, digits: int) -> str:
     if estimate is None:
         return "-"
-    U, _ = estimate.expanded()
-    return f"{estimate.value * factor:.{digits}f} ± {U * factor:.{digits}f}"
+    shown = estimate.scaled(factor, "")
+    return plus_minus(shown.value, shown.expanded()[0], spec=f".{digits}f")

@@ -60,7 +60,9 @@ def _table(name: str, rows: list[Row], style: Style) -> Table:
         unit, factor = style.unit(column.unit)
         digits = style.digits(f"{name}.{column.name}", column.name, unit)
         spec = f".{digits}f" if digits is not None and column.spec.endswith("f") else column.spec
-        columns.append(replace(column, unit=unit, spec=spec))
+        # Decimals by the column's full name rule; those by unit are for numbers without an uncertainty.
+        own = column.U if style.digits(f"{name}.{column.name}") is None else None
+        columns.append(replace(column, unit=unit, spec=spec, U=own))
         factors.append(factor)
     cells = tuple(
         tuple(_scaled(row.get(c.name), c, f) for c, f in zip(columns, factors, strict=True)) for row in rows

@@ -31,7 +31,7 @@ def shares(u: Array, used: NDArray[np.bool_]) -> Array:
     size = int(place.max()) + 1
     slot = place + size * np.arange(len(place))[:, None]
     count = np.bincount(slot.ravel(), used.ravel().astype(np.float64), size * len(place))
-    return used / np.maximum(count[slot], 1.0)
+    return np.asarray(used / np.maximum(count[slot], 1.0))
 
 
 def median(values: Array, share: Array, at: float = 0.5) -> Array:

@@ -6,9 +6,9 @@ gamma* = sin(gamma); ``raw`` leaves both angles as they are, as MF-Tyre does.
 Backward rolling is forward rolling seen from behind: after a half turn about z the contact point moves
 forward again, the slip angle is the same (tan(alpha) = -Vy / Vx keeps both signs), camber and kappa change
 theirs, and so do FX and FY, but not MZ. Hence the trail and the residual moment turn with Vx: 4.E6 gives the
-trail the factor cos'(alpha) = Vx / V, 4.E47 gives the residual moment sgn(Vx). Here ``cosine`` is that signed one, taken
-once. What is built into a tire (conicity, plysteer) and the difference between braking and driving keep the
-sign that the file gives them: the equations do not say how they turn.
+trail the factor cos'(alpha) = Vx / V, 4.E47 gives the residual moment sgn(Vx). Here ``cosine`` is that
+signed one, taken once. What is built into a tire (conicity, plysteer) and the difference between braking and
+driving keep the sign that the file gives them: the equations do not say how they turn.
 """
 
 from __future__ import annotations

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from toolkit.estimate import plus_minus
+
 if TYPE_CHECKING:
     from toolkit.calibration.fit.balance_report import BalanceReport
     from toolkit.calibration.fit.report import FitReport
@@ -187,7 +189,7 @@ def balance_text(report: BalanceReport) -> str:
             _table(
                 ["run", *(f"{one.load} [{one.unit}]" for one in report.loads)],
                 [
-                    [str(run), *(f"{v:+.4g} ± {u:.1g}" for v, u in zip(row, errors, strict=True))]
+                    [str(run), *(plus_minus(v, u) for v, u in zip(row, errors, strict=True))]
                     for run, row, errors in zip(
                         tares.runs, tares.values.tolist(), tares.standard_errors.tolist(), strict=True
                     )

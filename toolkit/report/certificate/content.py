@@ -8,7 +8,7 @@ from collections.abc import Iterable
 from dataclasses import replace
 
 from toolkit import __version__
-from toolkit.calibration.uncertainty.rounding import round_to_uncertainty, round_uncertainty
+from toolkit.estimate import round_to_uncertainty, round_uncertainty
 from toolkit.report.certificate.decision import RULES
 from toolkit.report.certificate.model import VERDICTS, Certificate, LoadResult
 from toolkit.report.certificate.plots import build_plots
