@@ -16,7 +16,7 @@ import typer
 
 from toolkit.cli.console import Json, Quiet, answer
 from toolkit.cli.home import packaged_home
-from toolkit.estimate import plus_minus
+from toolkit.estimate import plus_minus, round_uncertainty
 
 if TYPE_CHECKING:
     from toolkit.cli.resolve import Resolved
@@ -239,7 +239,9 @@ def _told_verify(payload: Payload) -> str:
 
 
 def _told_certificate(payload: Payload) -> str:
-    loads = ", ".join(f"{name} {one['U']:.2g} {one['unit']}" for name, one in payload["loads"].items())
+    loads = ", ".join(
+        f"{name} {round_uncertainty(one['U'])} {one['unit']}" for name, one in payload["loads"].items()
+    )
     state = "verified" if payload["verified"] else "not verified"
     return (
         f"certificate/{Path(payload['pdf']).name}: {payload['pages']} pages, {state}; U at full scale {loads}"

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from toolkit.estimate import plus_minus
+from toolkit.estimate import plus_minus, round_uncertainty
 
 if TYPE_CHECKING:
     from toolkit.calibration.fit.balance_report import BalanceReport
@@ -121,8 +121,8 @@ def report_text(report: FitReport) -> str:
         _table(
             ["term", "coefficient", "std error", "t", "sign sure", fs],
             [
-                [c.term, f"{c.value:.8g}", f"{c.standard_error:.2g}", f"{c.t:.1f}", _sure(c.sign_confidence),
-                 f"{c.percent_fs:.3g}"]
+                [c.term, f"{c.value:.8g}", round_uncertainty(c.standard_error), f"{c.t:.1f}",
+                 _sure(c.sign_confidence), f"{c.percent_fs:.3g}"]
                 for c in report.coefficients
             ],
         ),

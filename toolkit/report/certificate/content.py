@@ -212,7 +212,14 @@ def _tables(c: Certificate, style: Style) -> dict[str, Table]:
             for cell, resolution in zip(c.cells, c.resolutions, strict=True)
         ],
         "coefficients": [
-            [one.load, t.term, repr(t.full), repr(t.issued), f"{t.standard_error:.2g}", shown(t.unit)]
+            [
+                one.load,
+                t.term,
+                repr(t.full),
+                repr(t.issued),
+                round_uncertainty(t.standard_error),
+                shown(t.unit),
+            ]
             for one in c.loads
             for t in one.terms
         ],
@@ -249,8 +256,8 @@ def _budget(one: LoadResult) -> Iterable[list[str]]:
             continue  # the statement about U names what it does not hold
         dof = f"{part.dof:.0f}" if math.isfinite(part.dof) and part.dof < 1e4 else "∞"
         yield [
-            one.load, part.name, part.evaluation, part.distribution, f"{part.u:.2g}", shown(one.unit), dof,
-            f"{100 * part.share:.1f}", part.source,
+            one.load, part.name, part.evaluation, part.distribution, round_uncertainty(part.u),
+            shown(one.unit), dof, f"{100 * part.share:.1f}", part.source,
         ]  # fmt: skip
 
 
