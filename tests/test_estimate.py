@@ -32,7 +32,7 @@ def test_scaled_keeps_the_relative_uncertainty() -> None:
     assert one.dof == 5
 
 
-# Value, uncertainty, print: JCGM 100, 7.2.6; ILAC-P14:09/2020, 5.3 (at most two digits); zeros for whole places.
+# Value, uncertainty, print: JCGM 100, 7.2.6; ILAC-P14:09/2020 (at most two significant digits).
 PRINTS = [
     (-118.7, 97.2, "-119 ± 97"),
     (1301.2, 112.8, "1300 ± 110"),
