@@ -151,7 +151,9 @@ def traceability(c: Certificate, style: Style | None = None) -> str:
         f"{c.reference_certificate or GAP}."
     )
     for load, U, k, unit in c.reference_uncertainties:
-        told, factor = _signed(round_uncertainty(U), style), _signed(f"{k:g}", style)
+        # As the standard's own certificate states it, where that takes fewer digits.
+        stated = min(round_uncertainty(U), f"{U:g}", key=len)
+        told, factor = _signed(stated, style), _signed(f"{k:g}", style)
         text += f" Its uncertainty for {load}: U = {told} {shown(unit)}, k = {factor}."
     return text
 
