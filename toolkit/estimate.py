@@ -1,9 +1,14 @@
-"""Estimate: a value with its standard uncertainty, the result type of the GUM (JCGM 100:2008)."""
+"""Estimate: a value with its standard uncertainty, the result type of the GUM (JCGM 100:2008), and its print.
+
+An uncertainty is printed in two significant digits, a value to the last place of its uncertainty (GUM 7.2.6,
+ILAC-P14:09/2020): wherever people read both, they are made by the functions here. JSON keeps all digits.
+"""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from decimal import ROUND_CEILING, ROUND_HALF_EVEN, Decimal
 from functools import lru_cache
 
 
@@ -66,3 +71,91 @@ def effective_dof(contributions: list[tuple[float, float]]) -> float:
     total = sum(u * u for u, _ in contributions)
     bottom = sum(u**4 / dof for u, dof in contributions if not math.isinf(dof))
     return math.inf if bottom == 0 else total * total / bottom
+
+
+_MOST_LOWERED = Decimal("0.05")
+
+
+def round_uncertainty(U: float, *, digits: int = 2) -> str:
+    """Return U in at most two significant digits, as decimal text without an exponent.
+
+    ILAC-P14:09/2020 asks for at most two significant digits. Rounding is to nearest, and up where that would
+    lower U by more than 5 % (EA-4/02 M, 6.3).
+
+    >>> [round_uncertainty(U) for U in (0.17984, 1234.0, 0.996, 0.01)]
+    ['0.18', '1200', '1.0', '0.010']
+    >>> round_uncertainty(1.45, digits=1)
+    '2'
+    """
+    if U == 0:
+        return "0"
+    if not (math.isfinite(U) and U > 0):
+        return "not determined"
+    whole, place = _rounded(U, digits)
+    # As an integer, so that a last zero counts: 0.010 and not 0.01.
+    return format(Decimal(int(whole)).scaleb(place), "f")
+
+
+def round_to_uncertainty(value: float, U: float, *, digits: int = 2) -> str:
+    """Return a value to the last place of its rounded expanded uncertainty (GUM 7.2.6).
+
+    >>> round_to_uncertainty(1184.6932, 0.17984), round_to_uncertainty(1184.6932, 1234.0)
+    ('1184.69', '1200')
+    """
+    if not has_interval(value, U):
+        return repr(float(value))
+    place = last_place(U, digits=digits)
+    # int drops the exponent of a zero, which would print as 0 where its neighbours print 0.00.
+    whole = int(Decimal(repr(float(value))).scaleb(-place).to_integral_value(rounding=ROUND_HALF_EVEN))
+    return format(Decimal(whole).scaleb(place) + 0, "f")
+
+
+def plus_minus(value: float, U: float, *, spec: str = ".4g", decimal_comma: bool = False) -> str:
+    """Return ``-119 ± 97``: the uncertainty in two significant digits, the value to its last place.
+
+    Where there is no uncertainty, or the value is none, the value stands alone, by ``spec``.
+
+    >>> plus_minus(-118.7, 97.2), plus_minus(1301.2, 112.8), plus_minus(0.0, 0.0996)
+    ('-119 ± 97', '1300 ± 110', '0.00 ± 0.10')
+    >>> plus_minus(3.25, math.nan), plus_minus(8.983e-9, 8.7e-10), plus_minus(1.5, 0.25, decimal_comma=True)
+    ('3.25', '8.98e-9 ± 8.7e-10', '1,50 ± 0,25')
+    """
+    if has_interval(value, U):
+        text = f"{round_to_uncertainty(value, U)} ± {round_uncertainty(U)}"
+        if last_place(U) < _SMALL:
+            text = " ± ".join(format(Decimal(one), "e") if float(one) else "0" for one in text.split(" ± "))
+    else:
+        text = format(value, spec)
+    return text.replace(".", ",") if decimal_comma else text
+
+
+def has_interval(value: float, U: float) -> bool:
+    """Tell whether a value can be printed to the last place of an uncertainty: both finite, U above zero."""
+    return math.isfinite(value) and math.isfinite(U) and U > 0
+
+
+_SMALL = -7  # power of ten below which zeros behind the point are written as an exponent
+
+
+def last_place(U: float, *, digits: int = 2) -> int:
+    """Return the power of ten of a rounded uncertainty's last digit (l of JCGM 101, 7.9.2).
+
+    >>> last_place(0.17984), last_place(0.996), last_place(1234.0)
+    (-2, -1, 2)
+    """
+    return _rounded(U, digits)[1]
+
+
+def _rounded(U: float, digits: int) -> tuple[Decimal, int]:
+    """Return the whole number of ``digits`` digits and the power of ten that it is multiplied by."""
+    if digits not in (1, 2):
+        raise ValueError("an uncertainty is stated in one or two significant digits")
+    exact = Decimal(repr(float(U)))
+    place = exact.adjusted() - digits + 1
+    scaled = exact.scaleb(-place)
+    whole = scaled.to_integral_value(rounding=ROUND_HALF_EVEN)
+    if scaled - whole > _MOST_LOWERED * scaled:
+        whole = scaled.to_integral_value(rounding=ROUND_CEILING)
+    if whole == 10**digits:
+        return whole / 10, place + 1
+    return whole, place

@@ -10,11 +10,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 from archive_made import FY, MZ, dated, recording
+from audit_factory import record
 from typer.testing import CliRunner
 
 from toolkit.audit import resume
 from toolkit.audit.archive import audit_archive
+from toolkit.audit.columns import columns_of
 from toolkit.audit.corrected import write_copies
+from toolkit.audit.identify import identify_columns
 from toolkit.audit.one_file import unreadable
 from toolkit.calibration.registry.registry import Registry
 from toolkit.cli.main import _register, app
@@ -107,6 +110,36 @@ def test_single_precision_is_rounding_and_not_another_calibration(tmp_path):
         "right.tdms": "exact",
         "sign.tdms": "sign_variant",
     }
+
+
+CLOSE = (FY[0] + 2e-5, *FY[1:])
+
+
+@pytest.mark.parametrize(
+    "written", [float, str, "{:.15g}".format, "{:.9g}".format], ids=["all", "shortest", "15", "9"]
+)
+def test_single_precision_written_out_separates_sets_two_in_a_hundred_thousand_apart(tmp_path, written):
+    # An acquisition in single precision, its numbers written as text or doubles: nothing says so but they.
+    rng = np.random.default_rng(6)
+    table = recording(seed=6)
+    x = rng.uniform(-400, 400, (50, 3))
+    table |= dict(zip(("D51", "D52", "E5"), x.T, strict=True))
+    table |= {"FY": x @ CLOSE[:3] + CLOSE[3], "MZ": x @ MZ[:3] + MZ[3]}
+    table = {
+        name: np.array([float(written(one if written is str else float(one))) for one in values])
+        for name, values in ((name, np.asarray(values, dtype=np.float32)) for name, values in table.items())
+    }
+    machine, judged = load_machine("m15"), []
+    for file, data in every(table).items():
+        (tmp_path / file).write_bytes(data)
+        columns = columns_of(read_recording(tmp_path / file, machine))
+        found = identify_columns(
+            columns, (record("m15-r1", CLOSE, MZ), record("m15-r2", FY, MZ)), on=dt.date(2019, 6, 4),
+            in_force=record("m15-r1", CLOSE, MZ), void=(),
+        )  # fmt: skip
+        judged.append((file, found.grade, found.record))
+    assert len(judged) > 5
+    assert {(grade, one) for _, grade, one in judged} == {("exact", "m15-r1")}
 
 
 def run(*words):

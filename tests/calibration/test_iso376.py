@@ -151,6 +151,21 @@ def test_a_small_force_lowers_its_own_class_and_the_ranges_say_where_the_better_
     assert found.resolution == pytest.approx(1 / 3)
 
 
+@pytest.mark.parametrize(("least", "class_name"), [(0.02, "00"), (0.0199, None)])
+def test_no_class_holds_below_two_percent_of_the_largest_force(least: float, class_name: str | None) -> None:
+    # ISO 376, minimum force: not below 0.02 of the transducer's largest force, beside 4000 r for class 00.
+    force = 50_000.0 * np.array([least, 0.1, 0.2, 0.4, 0.6, 0.8, 0.9, 1.0])
+    line = tuple((force / 25_000).tolist())
+    runs = [Iso376Run(rotation_deg=angle, up=line, down=line) for angle in (0, 0, 120, 240)]
+    found = ideal(force=force, runs=runs, resolution=1e-7)
+    assert found.forces[0].class_name == found.class_name == class_name
+    assert {row.class_name for row in found.forces[1:]} == {"00"}
+    # The forces above it keep their class, and the ranges begin there.
+    assert {one.lower for one in found.ranges} == {force[0] if class_name else force[1]}
+    if class_name is None:
+        assert found.reasons == ("995: the force is 1.99 % of the largest, a class needs 2 %",)
+
+
 def test_a_class_that_does_not_reach_half_of_the_largest_force_is_no_range() -> None:
     uncertainty = np.where(FORCE < 5000, 0.015, 0.005)
     found = ideal(force_uncertainty=uncertainty)

@@ -173,6 +173,62 @@ def test_errors_in_both_variables_of_any_terms_against_sixty_digits(model: str) 
     assert (off * np.abs(term_matrix(terms, columns)).max(axis=0)).max() <= 1e-12 * np.abs(load).max()
 
 
+@pytest.mark.parametrize("zero", [50.0, -50.0, 5e3, 5e6])
+@pytest.mark.parametrize(
+    ("model", "degree", "names"),
+    [
+        ("linear", 1, "S"),
+        ("linear", 1, "ST"),
+        ("polynomial", 2, "S"),
+        ("polynomial", 3, "S"),
+        ("polynomial", 2, "ST"),
+    ],
+)
+def test_a_large_zero_of_an_indication_costs_nothing(
+    zero: float, model: str, degree: int, names: str
+) -> None:
+    # Moving the zero of an indication moves nothing else: the fitted loads stay.
+    rng = np.random.default_rng(3)
+    t = np.linspace(0, 1, 36)
+    columns = {
+        name: np.round((t if name == "S" else rng.permutation(t)) + rng.normal(0, 1e-3, 36), 6)
+        for name in names
+    }
+    load = np.round(sum(4000 * x for x in columns.values()) + rng.normal(0, 1, 36), 3)
+    terms, u, u_cells = model_terms(model, [*names], degree=degree), np.ones(36), np.full(len(names), 1e-3)
+    moved = {name: x + zero for name, x in columns.items()}
+    near, far = (fit_odr(terms=terms, columns=x, load=load, u=u, u_cells=u_cells) for x in (columns, moved))
+    assert far.residual_sd == pytest.approx(near.residual_sd, rel=1e-5)
+    assert far.chi2 == pytest.approx(near.chi2, rel=1e-5)
+    assert far.leverage == pytest.approx(near.leverage, rel=1e-5)
+    exact = solve_odr_precisely(
+        terms=terms, columns={k: v.tolist() for k, v in moved.items()}, load=load.tolist(), u=u.tolist(),
+        u_cells=u_cells.tolist(),
+    )  # fmt: skip
+    assert far.coefficients == pytest.approx([float(c) for c in exact], rel=1e-10)
+
+
+def test_a_session_with_a_large_zero_makes_a_record_that_verifies(tmp_path: Path) -> None:
+    rng = np.random.default_rng(5)
+    t = np.tile(np.linspace(0, 1, 12), 3)
+    rows = {
+        "run": np.repeat([1, 2, 3], 12), "direction": ["up"] * 36,
+        "S [mV/V]": np.round(50 + t - 0.02 * t**2 + rng.normal(0, 2e-5, 36), 6),
+        "FY [N]": np.round(4000 * t + rng.normal(0, 0.2, 36), 3),
+    }  # fmt: skip
+    head, lines = ",".join(rows), [",".join(map(str, row)) for row in zip(*rows.values(), strict=True)]
+    (tmp_path / "loads.csv").write_text("\n".join([head, *lines]) + "\n")
+    (tmp_path / "SESSION.toml").write_text(
+        'schema = 1\ninstrument = "rig"\ndate = 2026-03-01\noperator = "operator"\n'
+        'temperature = { value = 23, unit = "degC" }\nindications = ["S"]\nloads = ["FY"]\n'
+        'data = "loads.csv"\nmodel = "polynomial"\ndegree = 2\nmethod = "odr"\n'
+        '[reference]\nstandard = "deadweights"\ncertificate = "c"\n'
+        '[reference.uncertainty]\nFY = { U = 0.4, k = 2, unit = "N" }\n'
+        '[cells.S]\nserial = "s"\nu = { value = 2e-5, unit = "mV/V" }\n'
+    )
+    assert load_of(tmp_path, tmp_path / "SESSION.toml").load("FY").method == "odr"
+
+
 def test_small_errors_of_the_indications_give_the_weighted_fit() -> None:
     fit = fit_odr(terms=("x", "intercept"), columns={"x": X}, load=Y, u=U_Y, u_cells=np.array([1e-9]))
     plain = fit_terms(terms=("x", "intercept"), columns={"x": X}, load=Y, u=U_Y)

@@ -11,8 +11,8 @@ from uncertainty_factory import levels, record_of_table, table_of
 
 from toolkit.calibration.uncertainty.budget import calibration_budget, combine, predict
 from toolkit.calibration.uncertainty.conditions import Temperature
-from toolkit.calibration.uncertainty.rounding import round_uncertainty
 from toolkit.errors import SessionError
+from toolkit.estimate import round_uncertainty
 
 # JCGM 100:2008, H.3, table H.6: thermometer readings less 20 degC, and observed corrections.
 T = np.array([21.521, 22.012, 22.512, 23.003, 23.507, 23.999, 24.513, 25.002, 25.503, 26.010, 26.511])

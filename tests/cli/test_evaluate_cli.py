@@ -154,3 +154,68 @@ def test_an_input_is_never_replaced(files):
     with pytest.raises(ToolkitError) as caught:
         run(tire, grid, "--out", grid)
     assert caught.value.rule == "original"
+
+
+@pytest.mark.parametrize("axes", AXES)
+def test_a_tire_that_rolls_backward_is_one_that_rolls_forward_turned_round(tmp_path, axes):
+    (tmp_path / "x.tir").write_text(
+        TIRE.replace("PHY1 = 0.002", "PHY1 = 0").replace("QBZ1 = 9", "QBZ1 = 9\nQDZ8 = -0.1")
+    )
+    (tmp_path / "back.csv").write_text("SA [deg],IA [deg],FZ [N],V [km/h]\n-4,2,4000,-60\n3,-1,3000,-30\n")
+    (tmp_path / "forth.csv").write_text("SA [deg],IA [deg],FZ [N],V [km/h]\n-4,-2,4000,60\n3,1,3000,30\n")
+    back, forth = (
+        json.loads(run(tmp_path / "x.tir", tmp_path / f"{name}.csv", "--axes", axes, "--json")[1])["rows"]
+        for name in ("back", "forth")
+    )
+    for one, other in zip(back, forth, strict=True):
+        assert one["FY"] == pytest.approx(-other["FY"], rel=1e-12)
+        assert one["MZ"] == pytest.approx(other["MZ"], rel=1e-12)
+        assert abs(one["MZ"]) > 1
+
+
+FOREIGN_61 = "RBX3 = 40\nPPX1 = 0.3\n", "RBY4 = 60\nPKY6 = -2\nPEY5 = 3\n", "QDZ10 = 0.4\nPPZ1 = 0.3\n"
+FOREIGN_52 = "", "PHY3 = 0.05\n", ""
+COMBINED = "RBX1 = 12\nRCX1 = 1.1\n", "RBY1 = 8\nRCY1 = 1.05\nRVY5 = 1.9\nRVY6 = 20\n", "QDZ8 = -0.1\n"
+
+
+def tire_of(fittyp, *more):
+    """Return the tire with further lines (longitudinal, lateral, aligning)."""
+    head, rest = TIRE.replace("FITTYP = 61", f"FITTYP = {fittyp}").split("[LATERAL_COEFFICIENTS]\n")
+    lateral, aligning = rest.split("[ALIGNING_COEFFICIENTS]\n")
+    added = ["".join(parts) for parts in zip(*more, strict=True)]
+    lateral, aligning = lateral + added[1], aligning + added[2]
+    return f"{head}{added[0]}[LATERAL_COEFFICIENTS]\n{lateral}[ALIGNING_COEFFICIENTS]\n{aligning}"
+
+
+@pytest.mark.parametrize(
+    ("fittyp", "foreign", "names"),
+    [
+        (5, FOREIGN_61, "RBX3, PPX1, RBY4, PKY6, PEY5, QDZ10, PPZ1"),
+        (52, FOREIGN_61, "RBX3, PPX1, RBY4, PKY6, PEY5, QDZ10, PPZ1"),
+        (61, FOREIGN_52, "PHY3"),
+        (62, FOREIGN_52, "PHY3"),
+    ],
+)
+def test_names_of_the_other_magic_formula_change_nothing_and_are_told(tmp_path, fittyp, foreign, names):
+    grid = tmp_path / "g.csv"
+    grid.write_text("SA [deg],FZ [N],IA [deg],KAPPA [1]\n-4,4000,4,0.05\n3,3000,-3,-0.02\n2,3500,2,0\n")
+    (tmp_path / "plain.tir").write_text(tire_of(fittyp, COMBINED))
+    (tmp_path / "mixed.tir").write_text(tire_of(fittyp, COMBINED, foreign))
+    plain, mixed = (run(tmp_path / f"{name}.tir", grid, "--json") for name in ("plain", "mixed"))
+    assert (plain[0], mixed[0]) == (0, 1)
+    assert json.loads(mixed[1])["rows"] == json.loads(plain[1])["rows"]
+    (finding,) = json.loads(mixed[1])["findings"]
+    assert finding["rule"] == "tir-foreign-names"
+    assert f": {names} of MF " in finding["message"]
+
+
+def test_names_that_change_nothing_anyway_are_not_told(tmp_path):
+    neutral = (
+        "RBX3 = 0\n",
+        "RBY4 = 0\nPKY4 = 2\nPHY3 = 0\n",
+        "PPZ1 = 0\n[SCALING_COEFFICIENTS]\nLKYC = 1\nLMUV = 0\n",
+    )
+    (tmp_path / "g.csv").write_text("SA [deg],FZ [N]\n-4,4000\n")
+    (tmp_path / "x.tir").write_text(tire_of(5, neutral))
+    code, out = run(tmp_path / "x.tir", tmp_path / "g.csv", "--json")
+    assert (code, json.loads(out)["findings"]) == (0, [])

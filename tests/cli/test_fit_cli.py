@@ -148,3 +148,48 @@ def test_exact_data_have_standard_errors(tmp_path):
     assert one["not_determined"] == []
     assert one["parameters"] == pytest.approx(truth, rel=1e-8)
     assert all(0 < error < 1e-8 * abs(truth[name]) for name, error in one["standard_errors"].items())
+
+
+def sweep(noise_N, loads=(4000.0,), count=41):
+    """Return rows of a sweep as text, the Magic Formula's own curve and white noise."""
+    rng, lines = np.random.default_rng(4), []
+    for load in loads:
+        SA = np.radians(np.linspace(-10, 10, count))
+        FY = value(np.array([9.0, 1.4, -load, 0.1, 0.0, 0.0]), SA) + rng.normal(0, 1, count) * noise_N
+        MZ = (
+            value(np.array([7.0, 2.2, load / 40, -0.5, 0.0, 0.0]), SA)
+            + rng.normal(0, 1, count) * noise_N / 20
+        )
+        lines += [f"{np.degrees(a):.3f},{load:g},{y:.3f},{m:.3f}" for a, y, m in zip(SA, FY, MZ, strict=True)]
+    return lines
+
+
+@pytest.mark.parametrize("loss", ["linear", "robust"])
+@pytest.mark.parametrize("noise_N", [0.0, 8.0])
+@pytest.mark.parametrize("place", [0, 20, 41])
+def test_two_hundred_copies_of_a_row_are_told_and_leave_the_curve_to_the_others(
+    tmp_path, loss, noise_N, place
+):
+    rows = sweep(noise_N)
+    copies = rows[:place] + [rows[min(place, 40)]] * 200 + rows[place:]
+    answers = []
+    for name, lines in (("plain", rows), ("copies", copies)):
+        (tmp_path / f"{name}.csv").write_text("\n".join(["SA [deg],FZ [N],FY [N],MZ [N*m]", *lines]) + "\n")
+        answers.append(run(tmp_path / f"{name}.csv", "--loss", loss, "--json"))
+    (_, plain), (code, found) = answers
+    assert code == 1
+    told = [one for one in json.loads(found)["findings"] if one["level"] != "note"]
+    # No row is called an outlier because it is no copy.
+    assert {one["rule"] for one in told} <= {"duplicates", "not-converged"}
+    assert "200 of 241 rows are copies of others, one of them stands 201 times" in told[0]["message"]
+    for one, other in zip(json.loads(plain)["fits"], json.loads(found)["fits"], strict=True):
+        stiffness = [fit["cornering_stiffness_N_per_rad"] for fit in (one, other)]
+        if one["channel"] == "FY":
+            assert stiffness[1]["value"] == pytest.approx(stiffness[0]["value"], rel=0.01)
+
+
+def test_a_few_equal_rows_are_no_finding(tmp_path):
+    rows = sweep(8.0)
+    (tmp_path / "x.csv").write_text("\n".join(["SA [deg],FZ [N],FY [N],MZ [N*m]", *rows, *rows[:4]]) + "\n")
+    code, out = run(tmp_path / "x.csv", "--json")
+    assert (code, [one for one in json.loads(out)["findings"] if one["level"] != "note"]) == (0, [])

@@ -153,7 +153,7 @@ def test_every_result_names_its_corrections(faulty, virtual_record):
     notes = [one for one in reduced(folder, virtual_record, path).findings if one.rule == "machine-corrected"]
     assert [one.level for one in notes] == ["note", "note"]
     assert {one.where for one in notes} == {"m15-virtual, version 3"}
-    assert "0.3 ± 0.01 deg" in notes[0].message
+    assert "0.300 ± 0.010 deg" in notes[0].message
     assert "a" * 16 in notes[0].message
     assert "measured apart" in notes[0].message
     assert "crosstalk FZ to FY" in notes[1].message

@@ -97,6 +97,40 @@ def test_a_few_coarse_values_of_a_sign_have_the_finest_place_of_their_decade():
     np.testing.assert_array_equal(half_last_place(values), 5e-6)
 
 
+PRINTS = {
+    "all digits": float, "15 digits": lambda v: float(f"{v:.15g}"), "10 digits": lambda v: float(f"{v:.10g}"),
+    "9 digits": lambda v: float(f"{v:.9g}"), "8 digits": lambda v: float(f"{v:.8g}"),
+    "shortest": lambda v: float(str(np.float32(v))),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", PRINTS)
+@pytest.mark.parametrize("size", [1.0, 300.0, 40_000.0])
+def test_single_floats_are_known_in_every_print_and_the_bound_holds(name, size):
+    measured = np.random.default_rng(1).normal(0, size, 80)
+    single = measured.astype(np.float32)
+    values = np.array([PRINTS[name](float(v)) for v in single])
+    half = half_last_place(values)
+    assert np.all(np.abs(values - measured) <= half * (1 + 1e-12))
+    if name == "all digits":  # and nothing is added to half a step of the single float
+        np.testing.assert_array_equal(half, np.spacing(np.abs(single)).astype(float) / 2)
+
+
+@pytest.mark.parametrize("digits", [7, 8, 9, 12])
+def test_other_numbers_are_not_taken_for_single_floats(digits):
+    measured = np.random.default_rng(2).normal(0, 300, 80)
+    values = np.array([float(f"{v:.{digits}g}") for v in measured])
+    assert half_last_place(values).tolist() == pytest.approx(by_text(values.tolist()), rel=1e-12)
+    # One double among single floats: the column was not measured in them.
+    mixed = np.append(measured.astype(np.float32).astype(float), 1 / 3)
+    assert half_last_place(mixed)[:-1].max() == 0
+
+
+def test_whole_and_half_numbers_keep_their_own_places():
+    values = [1.0, 2.5, -3.5, 12.0, 1024.25]
+    assert half_last_place(values).tolist() == by_text(values)
+
+
 def test_columns_together_are_as_each_alone():
     rng = np.random.default_rng(3)
     columns = [

@@ -21,6 +21,7 @@ from toolkit.report.build import build_content
 from toolkit.report.content import Table, Value
 from toolkit.report.design.blocks import placeholder_png
 from toolkit.report.figures import Picture
+from toolkit.report.style import Style
 from toolkit.report.template.fill import Filled, fill
 from toolkit.report.template.package import read_template
 from toolkit.report.template.verify import verify_docx
@@ -181,7 +182,7 @@ def test_conditions(tmp_path: Path) -> None:
         + f"<w:tbl><w:tblPr/><w:tblGrid><w:gridCol/></w:tblGrid>{rows}</w:tbl>"
     )
     full = filled(tmp_path, body)
-    assert "pull 69.0" in texts(full.docx)
+    assert "pull 69" in texts(full.docx)
     assert "inline both" in texts(full.docx)
     assert "never" not in texts(full.docx)
     assert "row" in texts(full.docx)
@@ -392,3 +393,41 @@ def test_five_hundred_pages_of_tables_are_filled_and_found_again(tmp_path: Path)
     wrong = text.replace("file 15000 2142.86", "file 15000 2142.87")
     assert wrong != text
     assert not all(one.ok for one in text_checks(wrong, result))
+
+
+def test_a_value_ends_where_its_uncertainty_does_and_a_tag_s_own_format_rules(tmp_path: Path) -> None:
+    # Conicity at 4897 N: 20 + 0.01 x 4897 N with u = 6 N and 12 degrees of freedom: 69 +- 13.
+    tag = "summary.conicity"
+    body = p(f"{{{{tk:{tag}}}}} | {{{{tk:{tag}|.3f}}}} | {{{{tk:{tag}.with_U}}}}")
+    columns = ["{{tk:row.conicity}}", "{{tk:row.U_conicity}}", "{{tk:row.conicity|.2f}}", "{{tk:row.load}}"]
+    body += p("{{tk:table.pull}}") + tbl(["a", "b", "c", "d"], columns)
+
+    def made(style: Style) -> tuple[str, tuple[str, ...]]:
+        result = filled(tmp_path, body, build_content(make_result(), make_record(), style=style))
+        return texts(result.docx).splitlines()[0], result.cells[3]
+
+    first, row = made(Style())
+    assert first.split(" | ")[0] == "69"
+    assert re.fullmatch(r"6\d\.\d{3}", first.split(" | ")[1])
+    assert first.split(" | ")[2] == "69 ± 13"
+    assert (row[0], row[1], row[3]) == ("69", "13", "4897")
+    assert re.fullmatch(r"6\d\.\d\d", row[2])
+    # Decimals of a unit are for numbers without an uncertainty; those of the tag or column itself rule.
+    assert made(Style(decimals=(("N", 1),))) == (first, (*row[:3], "4897.0"))
+    first, row = made(Style(decimals=(("summary.conicity", 2), ("pull.conicity", 1)), decimal_comma=True))
+    assert re.fullmatch(r"6\d,\d\d", first.split(" | ")[0])
+    assert re.fullmatch(r"6\d,\d", row[0])
+    assert row[1] == "13"
+
+
+def test_an_uncertainty_that_is_not_known_leaves_the_value_its_format(tmp_path: Path) -> None:
+    body = p("{{tk:table.fits}}") + tbl(["a", "b"], ["{{tk:row.B}}", "{{tk:row.u_B}}"])
+    made = content()
+    table = made.tables["fits"]
+    at = {column.name: i for i, column in enumerate(table.columns)}
+    rows = tuple(
+        tuple(None if i == at["u_B"] else 11.25 if i == at["B"] else cell for i, cell in enumerate(row))
+        for row in table.rows
+    )
+    made = dataclasses.replace(made, tables={**made.tables, "fits": dataclasses.replace(table, rows=rows)})
+    assert filled(tmp_path, body, made).cells[0] == ("11.250", "n/a")

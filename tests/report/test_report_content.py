@@ -83,7 +83,7 @@ def test_figures_against_load_read_the_fitted_curves() -> None:
 def test_alternative_text_has_the_data_and_says_what_it_is() -> None:
     alt = content(simulated=True).plots["conicity"].alt
     assert alt.startswith("SIMULATED DATA.")
-    assert "31.1 ± 13.1 at 1112" in alt  # 20 + 0.01 x 1112; t(12) x 6
+    assert "31 ± 13 at 1112" in alt  # 20 + 0.01 x 1112; t(12) x 6
     assert "Axis system: SAE J670." in alt
 
 

@@ -132,3 +132,12 @@ def test_pseudo_angles_of_the_published_tire_are_not_for_a_file(tmp_path):
     )
     with pytest.raises(ConfigError):
         read_plan(tmp_path / "plan.toml")
+
+
+def test_a_file_tire_leaves_out_names_of_the_other_magic_formula(tmp_path):
+    text = TIRE.read_text()
+    version = next(line for line in text.splitlines() if line.startswith("FITTYP"))
+    (tmp_path / "mixed.tir").write_text(text.replace(version, "FITTYP = 5"))
+    found = read_file_tire(tmp_path / "mixed.tir")
+    assert "PKY6" not in found.tir.coefficients()
+    assert [one.rule for one in found.tir.findings()] == ["tir-foreign-names"]

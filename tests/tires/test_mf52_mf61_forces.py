@@ -167,6 +167,49 @@ def test_backward_turns_the_slip_angle():
     assert back.a == forth.a
 
 
+# What makes left and right, or braking and driving, differ: a half turn does not carry it over.
+LEFT_RIGHT = "PHY1 PHY2 PVY1 PEY3 RBY3 RVY1 QHZ1 QDZ3 QBZ4 QDZ6 QDZ7 QEZ4 RHX1 SSZ1".split()
+BRAKE_DRIVE = "PHX1 PVX1 PEX4 RHY1 RVY3".split()
+
+
+def half_turn(p, **at):
+    """Return (Vx, Vy, IA, Vsx) seen from axes turned by half a turn about z, as SA, IA, KAPPA, V again."""
+    V, SA = at["V"], at["SA"]
+    Vx, Vy = -V, V * np.tan(SA)  # -(Vy) with Vy = -V tan(SA)
+    Vsx = at["KAPPA"] * abs(V)  # -(Vsx) with Vsx = -KAPPA |V|
+    return {"V": Vx, "SA": np.arctan(-Vy / Vx), "IA": -at["IA"], "KAPPA": -Vsx / abs(Vx), "FZ": at["FZ"]}
+
+
+@MODELS
+@pytest.mark.parametrize("IA", [0.0, 0.05])
+@pytest.mark.parametrize("KAPPA", [0.0, 0.06, -0.2])
+@pytest.mark.parametrize("angles", ["star", "raw"])
+def test_backward_is_forward_seen_after_a_half_turn(model, IA, KAPPA, angles):
+    p = {
+        n: v for n, v in {**P, **MORE, "RBX3": -3.0, "RBY4": 5.0}.items() if n not in LEFT_RIGHT + BRAKE_DRIVE
+    }
+    at = {"SA": SA, "IA": IA, "KAPPA": KAPPA, "V": -20.0, "FZ": 5000.0}
+    back, forth = forces(model, p, angles=angles, **at), forces(model, p, angles=angles, **half_turn(p, **at))
+    # The axes x and y are turned, z is not.
+    assert back.FX == pytest.approx(-forth.FX, rel=1e-12, abs=1e-9)
+    assert back.FY == pytest.approx(-forth.FY, rel=1e-12, abs=1e-9)
+    assert back.MZ == pytest.approx(forth.MZ, rel=1e-12, abs=1e-9)
+
+
+@MODELS
+def test_the_side_force_acts_behind_the_contact_point_in_the_direction_of_travel(model):
+    # Trail alone: MZ = x FY, and x has the sign of -Vx.
+    p = {n: P[n] for n in "PCY1 PDY1 PKY1 PKY2 QBZ1 QCZ1 QDZ1".split()}
+    for V in (20.0, -20.0):
+        made = forces(model, p, SA=np.radians([-2.0, 3.0]), V=V)
+        assert np.all(np.sign(made.MZ / made.FY) == -np.sign(V))
+
+
+@pytest.mark.parametrize("V", [0.0, -0.0])
+def test_a_tire_that_stands_counts_as_forward(V):
+    assert forces(mf61, SA=0.03, V=V).MZ == forces(mf61, SA=0.03, V=1.0).MZ
+
+
 def test_equivalent_slip_keeps_sign_and_grows_with_kappa():
     slips = np.array([-2.0, -0.5, 0.0, 0.5, 2.0])
     assert np.array_equal(equivalent(slips, np.asarray(1.0), np.zeros(5)), slips)

@@ -21,6 +21,7 @@ from toolkit.cli.console import (
 from toolkit.cli.fit_report import Figures, Full, check_folder, tell
 from toolkit.cli.home import registry_to_write
 from toolkit.errors import ConfigError
+from toolkit.estimate import round_uncertainty
 
 if TYPE_CHECKING:
     from toolkit.calibration.registry.candidate import Candidate
@@ -149,7 +150,7 @@ def _text(made: Candidate, status: str) -> str:
         issued = record.load(one.setting.name).issued
         units = dict(zip(record.indications, record.indication_units, strict=True))
         rows = [
-            [term, f"{c:.10g}", f"{i:.8g}", f"{u:.2g}", _per(term, one.setting.unit, units)]
+            [term, f"{c:.10g}", f"{i:.8g}", round_uncertainty(u), _per(term, one.setting.unit, units)]
             for term, c, i, u in zip(
                 one.fit.terms, one.fit.coefficients, issued, one.fit.standard_errors, strict=True
             )

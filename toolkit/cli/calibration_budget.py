@@ -154,7 +154,7 @@ def _not_validated(record: CalibrationRecord, budget: Budget, result: MonteCarlo
 
 
 def _payload(budget: Budget, curve: tuple[Budget, ...], result: MonteCarlo | None) -> dict[str, Any]:
-    from toolkit.calibration.uncertainty.rounding import round_uncertainty
+    from toolkit.estimate import round_uncertainty
 
     return {
         "unit": budget.unit,
@@ -187,7 +187,7 @@ def _payload(budget: Budget, curve: tuple[Budget, ...], result: MonteCarlo | Non
 
 
 def _lines(budget: Budget, curve: tuple[Budget, ...], result: MonteCarlo | None) -> list[str]:
-    from toolkit.calibration.uncertainty.rounding import round_to_uncertainty, round_uncertainty
+    from toolkit.estimate import round_to_uncertainty, round_uncertainty
 
     unit = budget.unit
     stated = [one for one in budget.components if one.stated]
@@ -205,7 +205,8 @@ def _lines(budget: Budget, curve: tuple[Budget, ...], result: MonteCarlo | None)
             align="<<<>>><<",
         ),
         "",
-        f"combined standard uncertainty  u = {budget.u:.3g} {unit}, effective dof {_dof(budget.dof)}",
+        f"combined standard uncertainty  u = {round_uncertainty(budget.u)} {unit}, "
+        f"effective dof {_dof(budget.dof)}",
         f"expanded uncertainty           U = {round_uncertainty(budget.U)} {unit}, k = {budget.k:.2f}, "
         f"coverage probability {100 * budget.probability:.0f} %",
     ]  # fmt: skip
@@ -217,13 +218,16 @@ def _lines(budget: Budget, curve: tuple[Budget, ...], result: MonteCarlo | None)
         said = "validated" if result.validated else "NOT VALIDATED"
         lines += [
             "",
-            f"Monte Carlo, {result.trials} trials, seed {result.seed}: u = {result.u:.3g} {unit}",
+            f"Monte Carlo, {result.trials} trials, seed {result.seed}: "
+            f"u = {round_uncertainty(result.u)} {unit}",
             f"  interval {result.low:.7g} to {result.high:.7g}, budget {result.budget_low:.7g} to "
             f"{result.budget_high:.7g}",
             f"  ends differ by {result.low_difference:.2g} and {result.high_difference:.2g}, tolerance "
             f"{result.delta:g} ({result.digits} digits of u): {said}",
         ]
-    over = [[f"{one.at:.6g}", f"{one.u:.3g}", f"{one.k:.2f}", round_uncertainty(one.U)] for one in curve]
+    over = [
+        [f"{one.at:.6g}", round_uncertainty(one.u), f"{one.k:.2f}", round_uncertainty(one.U)] for one in curve
+    ]
     head = [f"{budget.load} [{unit}]", "u", "k", f"U [{unit}]"]
     return [*lines, "", "over the range:", table(head, over, align=">>>>"), ""]
 

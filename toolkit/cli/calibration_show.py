@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from toolkit.cli.console import table
+from toolkit.estimate import round_uncertainty
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -41,7 +42,7 @@ def described(record: CalibrationRecord, registry: Path) -> tuple[dict[str, Any]
             "check_max": misses.get(one.load),
         }
         terms = [
-            [term, repr(c), repr(i), "-" if u is None else f"{u:.2g}"]
+            [term, repr(c), repr(i), "-" if u is None else round_uncertainty(u)]
             for term, c, i, u in zip(one.terms, one.coefficients, one.issued, errors, strict=True)
         ]
         lines += [

@@ -16,6 +16,7 @@ import typer
 
 from toolkit.cli.console import Json, Quiet, answer
 from toolkit.cli.home import packaged_home
+from toolkit.estimate import plus_minus, round_uncertainty
 
 if TYPE_CHECKING:
     from toolkit.cli.resolve import Resolved
@@ -224,7 +225,7 @@ def _told_calibrate(payload: Payload) -> str:
     state = "reproduced, already recorded" if record["existing"] else record["status"]
     E5, error = FY["coefficients"]["E5"], FY["standard_errors"]["E5"]
     return (
-        f"{record['id']} ({state}): E5 in FY {E5:+.2f} ± {error:.1g} {FY['unit']} per "
+        f"{record['id']} ({state}): E5 in FY {plus_minus(E5, error)} {FY['unit']} per "
         f"{FY['indication_units']['E5']}, its sign sure by {abs(E5) / error:.0f} standard errors"
     )
 
@@ -238,7 +239,9 @@ def _told_verify(payload: Payload) -> str:
 
 
 def _told_certificate(payload: Payload) -> str:
-    loads = ", ".join(f"{name} {one['U']:.2g} {one['unit']}" for name, one in payload["loads"].items())
+    loads = ", ".join(
+        f"{name} {round_uncertainty(one['U'])} {one['unit']}" for name, one in payload["loads"].items()
+    )
     state = "verified" if payload["verified"] else "not verified"
     return (
         f"certificate/{Path(payload['pdf']).name}: {payload['pages']} pages, {state}; U at full scale {loads}"

@@ -62,13 +62,13 @@ def fit_table_models(
     from toolkit.tires.global_data import of_table
     from toolkit.tires.possible import size_findings
     from toolkit.tires.table import read_table
-    from toolkit.tires.table_fit import axes_findings, fit_table, row_findings
+    from toolkit.tires.table_fit import axes_findings, fit_table, repeat_findings, row_findings
 
     measured = read_table(table, axes=axes)
     data = of_table(measured, rated_load_N=rated_load_N, radius_m=radius_m or STAND_IN_RADIUS)
     single, every = _split(names)
     curves: tuple[CurveFit, ...] = ()
-    findings: tuple[Finding, ...] = ()
+    findings: tuple[Finding, ...] = (*repeat_findings(measured),)
     seconds: dict[str, float] = {}
     for one in single:
         started = time.perf_counter()
@@ -78,7 +78,7 @@ def fit_table_models(
         findings += tuple(finding for finding in result.findings if finding not in findings)
     made, more, found = _global(data, every, loss, weights, str(table), seconds)
     if not single:
-        findings = (
+        findings += (
             *row_findings(measured),
             *axes_findings(measured, found),
             *size_findings(found, table.name),

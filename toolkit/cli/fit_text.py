@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from toolkit.cli.console import finding_lines, table
 from toolkit.cli.delivery import draft_keys, mark_words
+from toolkit.estimate import plus_minus
 from toolkit.tires.table_fit import slope_sign
 
 if TYPE_CHECKING:
@@ -161,8 +162,7 @@ def _global_text(fit: GlobalFit) -> str:
     told = [
         [
             p.name,
-            f"{p.value:.5g}",
-            "-" if p.standard_error is None else f"{p.standard_error:.2g}",
+            *_value_and_error(p.value, p.standard_error),
             p.unit.replace("*", "·"),
             "not determined" if p.name in fit.not_determined else "",
         ]
@@ -187,12 +187,18 @@ def _global_text(fit: GlobalFit) -> str:
 
 def _stiffness(slope: Estimate, fit: CurveFit | GlobalFit) -> str:
     sign = slope_sign(fit.axes, fit.channel)  # type: ignore[arg-type]
-    return f"{sign * slope.value * _PER_DEGREE:.4g} ± {slope.u * _PER_DEGREE:.2g}"
+    return plus_minus(sign * slope.value * _PER_DEGREE, slope.u * _PER_DEGREE)
+
+
+def _value_and_error(value: float, error: float | None) -> list[str]:
+    # In two columns of a table: the same two texts that stand beside each other elsewhere.
+    shown = plus_minus(value, math.nan if error is None else error, spec=".5g").split(" ± ")
+    return shown if len(shown) == 2 else [*shown, "-"]
 
 
 def _line(fit: CurveFit, rotation: str | None) -> list[str]:
     shown = [
-        f"({p.value:.4g})" if p.standard_error is None else f"{p.value:.4g} ± {p.standard_error:.2g}"
+        f"({p.value:.4g})" if p.standard_error is None else plus_minus(p.value, p.standard_error)
         for p in fit.parameters
     ]
     return [

@@ -30,6 +30,7 @@ from toolkit.cli.console import (
 )
 from toolkit.cli.console import reader as choose_reader
 from toolkit.cli.delivery import draft_keys, mark_words
+from toolkit.estimate import plus_minus
 
 if TYPE_CHECKING:
     from toolkit.cli.resolve import Resolved
@@ -263,5 +264,5 @@ def _pull_table(resolved: Resolved, style: Style) -> str:
 def _shown(estimate: Estimate | None, factor: float, digits: int) -> str:
     if estimate is None:
         return "-"
-    U, _ = estimate.expanded()
-    return f"{estimate.value * factor:.{digits}f} ± {U * factor:.{digits}f}"
+    shown = estimate.scaled(factor, "")
+    return plus_minus(shown.value, shown.expanded()[0], spec=f".{digits}f")

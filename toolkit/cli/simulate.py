@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from toolkit.cli.console import Calibrations, Home, Json, Quiet, answer
+from toolkit.cli.console import Calibrations, Home, Json, Quiet, answer, exit_code, finding_lines
 
 if TYPE_CHECKING:
     from toolkit.calibration.registry.registry import Registry
@@ -94,8 +94,10 @@ def command(
         payload, text = _table(told, out)
     else:
         payload, text = _test(told, out, _registry(calibrations, home), csv, case)
-    answer(payload, text, as_json=json, quiet=quiet)
-    return 0
+    findings = () if told.tire_file is None else told.tire_file.tir.findings()
+    payload["findings"] = [one.as_dict() for one in findings]
+    answer(payload, "\n".join([text, *finding_lines(findings)]), as_json=json, quiet=quiet)
+    return exit_code(findings)
 
 
 def _refuse_options(given: dict[str, object]) -> None:
@@ -213,7 +215,6 @@ def _common(plan: Plan, out: Path, files: tuple[Path, ...]) -> dict[str, Any]:
         "seed": plan.seed,
         "effects": [one.as_dict() for one in plan.effects],
         "files": [path.name for path in files],
-        "findings": [],
     }
 
 

@@ -27,7 +27,7 @@ from toolkit.tires.fit import fit_curves, why_not
 from toolkit.tires.model import Curve
 from toolkit.tires.possible import demand_possible
 from toolkit.tires.table import TireTable, read_table
-from toolkit.tires.table_fit import axes_findings, fit_findings, table_curves
+from toolkit.tires.table_fit import axes_findings, fit_findings, repeat_findings, table_curves
 from toolkit.units import from_si
 
 if TYPE_CHECKING:
@@ -85,6 +85,7 @@ def maker_rows(
     findings += [
         replace(one, where=f"{path.name}, {one.where}") for one in (*told, *axes_findings(sae, fits))
     ]
+    findings += repeat_findings(table)
     return tuple(rows), tuple(findings)
 
 

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from toolkit.errors import ConfigError
+from toolkit.estimate import plus_minus
 from toolkit.files import check_keys, is_number
 from toolkit.units import unit
 
@@ -67,7 +68,7 @@ class Correction:
         """Return it in one line for people: what, how large, from which answer, why."""
         doubt = f" (or {', '.join(self.equivalent_to)})" if self.equivalent_to else ""
         return (
-            f"{self.label}{doubt}: {self.value:.4g} ± {self.u:.2g} {self.unit} (standard uncertainty), from "
+            f"{self.label}{doubt}: {plus_minus(self.value, self.u)} {self.unit} (standard uncertainty), from "
             f"answer {self.answer_sha256[:16]}, {self.date}, {self.by}: {self.reason}"
         )
 

@@ -8,6 +8,12 @@ A program that prints into a field of fixed width has one place less beside a mi
 and -182.415 in Figure 4.4 of the source document are all of eight characters). So where a decade holds both
 signs, and six or more values of one of them never show the finest place, those have the place that they show:
 by chance that happens to one in a million columns whose values were all printed alike.
+
+A program that measures in single precision writes numbers of that lattice, in as many digits as it likes:
+1.2345678806304932, 1.23456788 and 1.2345679 are one single float. Where every value of a column lies as near
+to a single float as its own digits can tell, and numbers that lie anywhere would do so once in 10^9 columns,
+the column's rounding is that of the single floats and of their digits together. Values of seven digits do
+not tell: as printed digits they are rounded as far.
 """
 
 from __future__ import annotations
@@ -32,11 +38,15 @@ _SMALL = -8  # below this decade the powers of ten that are needed are no longer
 _TEN = 10.0 ** np.arange(23)
 _LEAST = 307
 _POWER = 10.0 ** np.arange(-_LEAST, 309)
+_SMALLEST_SINGLE, _LARGEST_SINGLE = 1e-37, 3e38  # normal ones
+_BY_CHANCE = -9.0  # log10 of the share of columns of any other numbers that look like single floats
 _HALF = np.array([0.5 * float(f"1e{-places}") for places in range(_FULL)] + [0.0])  # by decimals
 
 
 def half_last_place(values: ArrayLike) -> NDArray[np.float64]:
     """Return half a unit of the last printed place of every value, 0 where it is a full double.
+
+    Of a column of single floats it is half their step, with what printing moved them.
 
     Parameters
     ----------
@@ -52,6 +62,8 @@ def half_last_place(values: ArrayLike) -> NDArray[np.float64]:
     [5e-06, 5e-06, 0.005]
     >>> half_last_place([1 / 3, 0.5]).tolist()
     [0.0, 0.0]
+    >>> half_last_place([1.2345678806304932, 0.1234567984938621]).tolist()
+    [5.960464477539063e-08, 3.725290353973065e-09]
     """
     given = np.asarray(values, dtype=np.float64)
     table = given.reshape(len(given), math.prod(given.shape[1:]))
@@ -97,11 +109,44 @@ def _halves(columns: NDArray[np.float64]) -> NDArray[np.float64]:
     # A sign of which there are enough, beside the other one, has the place that it shows.
     own = (count >= _FEW) & (count < count.sum(axis=1)[:, None]) & (both != _FULL)[:, None]
     half: NDArray[np.float64] = _HALF[np.where(own, sides, both[:, None]).ravel()[side]]
+    single = _single_floats(columns, size, decade, places, zero)
     if any_zero:
         there = (count.sum(axis=1) > 0).reshape(n, decades)
         smallest = np.where(there, _HALF[both].reshape(n, decades), np.inf).min(axis=1)
         half = np.where(zero, np.where(np.isinf(smallest), 0.0, smallest)[:, None], half)
+    for column in np.flatnonzero(single):
+        nearest = columns[column].astype(np.float32)
+        step = np.abs(np.spacing(nearest)).astype(np.float64)
+        off = np.abs(columns[column] - nearest)
+        # Digits that are whole leave nothing out, however few they are: 101234.5 is a single float.
+        printed = np.maximum(half[column], off) if off.any() else off
+        half[column] = np.where(zero[column], 0.0, printed + step / 2)
     return half
+
+
+def _single_floats(
+    columns: NDArray[np.float64],
+    size: NDArray[np.float64],
+    decade: NDArray[np.int64],
+    places: NDArray[np.int64],
+    zero: NDArray[np.bool_],
+) -> NDArray[np.bool_]:
+    """Return which columns (columns,) hold single floats, by the digits that their values show."""
+    found = np.zeros(len(columns), dtype=np.bool_)
+    # Seven digits and less name a single float, whatever was measured: only longer values can tell.
+    may = (((places + decade >= FULL_DIGITS // 2) | (places == _FULL)) & ~zero).any(axis=1)
+    may &= ((size < _LARGEST_SINGLE) & ((size > _SMALLEST_SINGLE) | zero)).all(axis=1)
+    for column in np.flatnonzero(may):
+        values = size[column][~zero[column]]
+        own = np.where(places[column] == _FULL, FULL_DIGITS - 1 - decade[column], places[column])[
+            ~zero[column]
+        ]
+        shown = 0.5 * 10.0 ** -own.astype(np.float64)
+        nearest = values.astype(np.float32)
+        if (np.abs(values - nearest) <= shown + np.spacing(values)).all():
+            chance = np.minimum(2 * shown / np.spacing(nearest), 1.0)
+            found[column] = np.log10(chance).sum() <= _BY_CHANCE
+    return found
 
 
 def _decades(size: NDArray[np.float64]) -> NDArray[np.int64]:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from toolkit import __version__
 from toolkit.calibration.records.use import DRAFT, UNVERIFIED
+from toolkit.estimate import has_interval, plus_minus
 from toolkit.files import sha256_bytes
 from toolkit.recording.details import ReportDetails
 from toolkit.report.columns import UNITS
@@ -202,7 +203,6 @@ def _values(
         "test.conditions": len(used),
         "test.findings": len(findings),
         "summary.load": summary_load,
-        **{f"summary.{name}": one.value if one else None for name, one in summary.items()},
     }
     made = {path: Value(kind="text", value=text) for path, text in texts.items()}
     made |= {
@@ -213,6 +213,8 @@ def _values(
     for path, number in numbers.items():
         made[path] = _number(number, path, entries[path].unit, entries[path].spec, style)
     for name, estimate in summary.items():
+        path = f"summary.{name}"
+        made[path] = _number(None, path, entries[path].unit, entries[path].spec, style, estimate=estimate)
         text = _with_U(estimate, made[f"summary.{name}"], style) if summary_load else None
         made[f"summary.{name}.with_U"] = Value(kind="text", value=text)
     if record is not None:
@@ -223,12 +225,25 @@ def _values(
     return made
 
 
-def _number(value: float | None, path: str, unit: str | None, spec: str, style: Style) -> Value:
+def _number(
+    value: float | None,
+    path: str,
+    unit: str | None,
+    spec: str,
+    style: Style,
+    estimate: Estimate | None = None,
+) -> Value:
     shown, factor = style.unit(unit)
     digits = style.digits(path, shown)
     if digits is not None and spec.endswith("f"):
         spec = f".{digits}f"
-    return Value(kind="number", value=None if value is None else value * factor, unit=shown, spec=spec)
+    if estimate is None:
+        return Value(kind="number", value=None if value is None else value * factor, unit=shown, spec=spec)
+    scaled = estimate.scaled(factor, "")
+    # Decimals that the style file gives this very tag rule; those of its unit are for numbers without U.
+    U = scaled.expanded()[0] if style.digits(path) is None else math.nan
+    own = U if has_interval(scaled.value, U) else None
+    return Value(kind="number", value=scaled.value, unit=shown, spec=spec, U=own)
 
 
 def _pressure(psi: float, pascal: float, style: Style) -> str:
@@ -276,14 +291,12 @@ _SUMMARY_NAMES = ("cornering_stiffness", "aligning_stiffness", "conicity", "plys
 
 
 def _with_U(estimate: Estimate | None, number: Value, style: Style) -> str:
-    """Return ``45.0 ± 0.6``, both with the digits of the value, in the organisation's unit."""
+    """Return ``45.0 ± 6.1`` in the organisation's unit."""
     if estimate is None or number.value is None or number.missing:
         return "n/a"
-    U, _ = estimate.expanded()
-    factor = float(number.value) / estimate.value if estimate.value else 1.0
-    if not math.isfinite(U):
+    if number.U is None:
         return number.text(None, style)
-    return f"{number.text(None, style)} ± {replace(number, value=U * abs(factor)).text(None, style)}"
+    return plus_minus(float(number.value), number.U, decimal_comma=style.decimal_comma)
 
 
 def _conditions(

@@ -13,6 +13,8 @@ class Column:
     """A column of a report table; ``unit`` is the SI-side default, shown in the heading.
 
     ``of_the_run`` says that its cells differ from run to run: the hash of the content leaves them out.
+    ``U`` names the column of the uncertainty to whose last place its cells are printed; an uncertainty's own
+    column names itself.
     """
 
     name: str
@@ -22,6 +24,7 @@ class Column:
     spec: str = "g"
     quantity: str | None = None
     of_the_run: bool = False
+    U: str | None = None
 
 
 def _text(name: str, description: str) -> Column:
@@ -29,7 +32,13 @@ def _text(name: str, description: str) -> Column:
 
 
 def _number(
-    name: str, description: str, spec: str, *, unit: str | None = None, quantity: str | None = None
+    name: str,
+    description: str,
+    spec: str,
+    *,
+    unit: str | None = None,
+    quantity: str | None = None,
+    U: str | None = None,
 ) -> Column:
     return Column(
         name=name,
@@ -38,13 +47,16 @@ def _number(
         spec=spec,
         quantity=quantity,
         unit=UNITS[quantity] if quantity else unit,
+        U=U,
     )
 
 
 def _with_u(name: str, description: str, spec: str, quantity: str) -> list[Column]:
     return [
-        _number(name, description, spec, quantity=quantity),
-        _number(f"U_{name}", f"expanded uncertainty (95 %) of {name}", spec, quantity=quantity),
+        _number(name, description, spec, quantity=quantity, U=f"U_{name}"),
+        _number(
+            f"U_{name}", f"expanded uncertainty (95 %) of {name}", spec, quantity=quantity, U=f"U_{name}"
+        ),
     ]
 
 
@@ -77,8 +89,9 @@ def _fit_columns() -> list[Column]:
     columns = []
     for name, unit, spec in shown:
         note = " in the channel's unit" if unit is None else ""
-        columns.append(_number(name, f"Magic Formula {name}{note}", spec, unit=unit))
-        columns.append(_number(f"u_{name}", f"standard error of {name}{note}", spec, unit=unit))
+        own = f"u_{name}"
+        columns.append(_number(name, f"Magic Formula {name}{note}", spec, unit=unit, U=own))
+        columns.append(_number(own, f"standard error of {name}{note}", spec, unit=unit, U=own))
     return columns
 
 
@@ -89,10 +102,14 @@ TABLES: dict[str, tuple[str, tuple[Column, ...]]] = {
             _text("rotation", "direction of rotation"),
             _number("SA", "measured slip angle", ".2f", unit="deg"),
             _number("FZ", "measured load", ".0f", quantity="force"),
-            _number("FY", "lateral force", ".1f", quantity="force"),
-            _number("U_FY", "expanded uncertainty of FY, every source, k = 2", ".1f", quantity="force"),
-            _number("MZ", "aligning moment", ".2f", quantity="moment"),
-            _number("U_MZ", "expanded uncertainty of MZ, every source, k = 2", ".2f", quantity="moment"),
+            _number("FY", "lateral force", ".1f", quantity="force", U="U_FY"),
+            _number(
+                "U_FY", "expanded uncertainty of FY, every source, k = 2", ".1f", quantity="force", U="U_FY"
+            ),
+            _number("MZ", "aligning moment", ".2f", quantity="moment", U="U_MZ"),
+            _number(
+                "U_MZ", "expanded uncertainty of MZ, every source, k = 2", ".2f", quantity="moment", U="U_MZ"
+            ),
             _text("file", "recording"),
         ),
     ),
@@ -178,8 +195,8 @@ TABLES: dict[str, tuple[str, tuple[Column, ...]]] = {
             _text("quantity", "name of the characteristic"),
             _text("rotation", "direction of rotation, or both"),
             _number("load", "load", ".0f", quantity="force"),
-            _number("value", "value in the row's unit", ".2f"),
-            _number("U", "expanded uncertainty (95 %) in the row's unit", ".2f"),
+            _number("value", "value in the row's unit", ".2f", U="U"),
+            _number("U", "expanded uncertainty (95 %) in the row's unit", ".2f", U="U"),
             _number("k", "coverage factor", ".2f", unit="1"),
             _text("unit", "unit of the row"),
         ),

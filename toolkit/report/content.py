@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from toolkit.calibration.records.use import CalibrationUse, mark_of
+from toolkit.estimate import round_to_uncertainty
 from toolkit.report.columns import Column
 from toolkit.report.style import Style
 from toolkit.report.tags import format_number
@@ -20,12 +21,16 @@ IMPOSSIBLE = "IMPOSSIBLE VALUES"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Value:
-    """One value: text as it is, a number with unit and default format, or an ISO date."""
+    """One value: text as it is, a number with unit and default format, or an ISO date.
+
+    A number with an expanded uncertainty ``U`` has the last place of its two digits in place of the format.
+    """
 
     kind: Literal["text", "number", "date"]
     value: Cell
     unit: str | None = None
     spec: str = "g"
+    U: float | None = None
 
     @property
     def missing(self) -> bool:
@@ -39,6 +44,9 @@ class Value:
         if isinstance(self.value, str):
             return style.date(self.value) if self.kind == "date" else self.value
         assert self.value is not None  # noqa: S101  missing values are refused before
+        if spec is None and self.U is not None:
+            text = round_to_uncertainty(self.value, self.U)
+            return text.replace(".", ",") if style.decimal_comma else text
         return format_number(self.value, spec or self.spec, decimal_comma=style.decimal_comma)
 
 

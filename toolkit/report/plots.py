@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
+from toolkit.estimate import plus_minus
 from toolkit.report.content import Curve, Plot
 from toolkit.report.style import Style
 from toolkit.report.tags import format_number
@@ -271,7 +272,7 @@ class _Plots:
             curves.append(_curve(label, x, y, index, "both", error=u, open_="reverse" in label))
             spec = ".1f" if quantity == "FY" else ".2f"
             listed = ", ".join(
-                f"{self._number(b, spec)} ± {self._number(c, spec)} at {self._number(a)}"
+                f"{plus_minus(b, c, spec=spec, decimal_comma=self.style.decimal_comma)} at {self._number(a)}"
                 for a, b, c in zip(x, y, u, strict=True)
             )
             said.append(f"{label}: {listed} {load_unit}")

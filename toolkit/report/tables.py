@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
+from toolkit.estimate import round_to_uncertainty
 from toolkit.report.columns import TABLES, Column
 from toolkit.report.content import Cell, Table
 from toolkit.report.models import model_rows
@@ -60,7 +61,9 @@ def _table(name: str, rows: list[Row], style: Style) -> Table:
         unit, factor = style.unit(column.unit)
         digits = style.digits(f"{name}.{column.name}", column.name, unit)
         spec = f".{digits}f" if digits is not None and column.spec.endswith("f") else column.spec
-        columns.append(replace(column, unit=unit, spec=spec))
+        # Decimals by the column's full name rule; those by unit are for numbers without an uncertainty.
+        own = column.U if style.digits(f"{name}.{column.name}") is None else None
+        columns.append(replace(column, unit=unit, spec=spec, U=own))
         factors.append(factor)
     cells = tuple(
         tuple(_scaled(row.get(c.name), c, f) for c, f in zip(columns, factors, strict=True)) for row in rows
@@ -204,8 +207,7 @@ def _to_place(value: float, total: float, style: Style) -> str:
     """Return a part of a budget to the place of the second digit of its total; a dash below it."""
     if not total > 0:
         return "-"
-    digits = max(0, 1 - math.floor(math.log10(total)))
-    text = f"{value:.{digits}f}"
+    text = round_to_uncertainty(value, total)
     if not float(text):
         return "-"
     return text.replace(".", ",") if style.decimal_comma else text

@@ -43,7 +43,7 @@ def with_numbers(tir: TirFile, numbers: dict[str, float]) -> TirFile:
     """Return a tire file with other values of coefficients; one that it leaves out is added.
 
     >>> from toolkit.tires.tir import parse_tir
-    >>> tir = parse_tir("[LATERAL_COEFFICIENTS]\\nPCY1 = 1.3\\n")
+    >>> tir = parse_tir("[MODEL]\\nFITTYP = 61\\n[LATERAL_COEFFICIENTS]\\nPCY1 = 1.3\\n")
     >>> with_numbers(tir, {"PCY1": 1.4, "LKY": 0.9}).coefficients()
     {'PCY1': 1.4, 'LKY': 0.9}
     """

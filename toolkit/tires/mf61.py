@@ -4,8 +4,9 @@ Axes ISO-W, SI. Equations: Pacejka, Tire and Vehicle Dynamics, 3rd ed. (2012), 4
 peak trail and trail stiffness as in Besselink, Schmeitz, Pacejka, Vehicle System Dynamics 48 (2010), A58
 and A60, and the equivalent slip angles as in A54 and A55: the book's 4.E40 names QBZ6, which no tire file
 has. Turn slip factors are one, alpha* = tan(alpha), gamma* = sin(gamma) unless raw angles are asked for,
-the curvature factors are limited to 1, A_mu is 1, and F_y in M_z is the one at zero camber (4.E74). A
-coefficient that is absent is zero, a scale factor one, PKY4 two. For these forces 6.2 is 6.1.
+the curvature factors are limited to 1, A_mu is 1, and F_y in M_z is the one at zero camber, with the weight
+G_yk at zero camber too (4.E74); other programs take G_yk with camber: docs/magic_formula.md. A coefficient
+that is absent is zero, a scale factor one, PKY4 two. For these forces 6.2 is 6.1.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """What MF 5.2 and MF 6.x share: longitudinal force, weights of combined slip, equivalent slip angles.
 
 Pacejka, Tire and Vehicle Dynamics, 3rd ed. (2012): FX 4.E9 to 4.E18, combined FX 4.E50 to 4.E57,
-combined FY 4.E58 to 4.E67, arm of FX 4.E76. MF 5.2 has no pressure and no REX, REY, RHY2, RBX3, RBY4
-beyond its file's entries: they are zero there. The curvature factors are limited to 1.
+combined FY 4.E58 to 4.E67, arm of FX 4.E76. MF 5.2 has no pressure, no RBX3 and no RBY4: `mf_versions`
+keeps them out. The curvature factors are limited to 1.
 """
 
 from __future__ import annotations

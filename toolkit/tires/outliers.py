@@ -16,6 +16,7 @@ from toolkit.findings import Finding
 from toolkit.tires.evaluate import value_at
 from toolkit.tires.fit import Curve, fit_curves
 from toolkit.tires.model import CHANNEL_UNIT, CurveFit
+from toolkit.tires.places import median, shares
 from toolkit.units import in_both
 
 if TYPE_CHECKING:
@@ -34,7 +35,7 @@ def gross_outliers(curves: Sequence[Curve], fits: Sequence[CurveFit]) -> tuple[F
         curve
         for curve, fit in zip(curves, fits, strict=True)
         if fit.loss == "linear"
-        and (fit.error_percent > _SUSPECT_PERCENT or _largest(_residual(fit, curve)) > _SUSPECT_SD)
+        and (fit.error_percent > _SUSPECT_PERCENT or _largest(_residual(fit, curve), curve) > _SUSPECT_SD)
     ]
     if not suspects:
         return ()
@@ -43,7 +44,7 @@ def gross_outliers(curves: Sequence[Curve], fits: Sequence[CurveFit]) -> tuple[F
         residual = _residual(fit, curve)
         size = np.abs(residual)
         away = size > np.maximum(
-            _SURE_SD * _SD_OF_MEDIAN * np.median(size), _SURE_SHARE * np.abs(curve.y - residual).max()
+            _SURE_SD * _SD_OF_MEDIAN * _typical(size, curve), _SURE_SHARE * np.abs(curve.y - residual).max()
         )
         if away.any():
             worst, unit = int(np.argmax(size)), CHANNEL_UNIT[curve.channel]
@@ -61,8 +62,14 @@ def _residual(fit: CurveFit, curve: Curve) -> NDArray[np.float64]:
     return np.asarray(curve.y - value_at(fit, curve.SA))
 
 
-def _largest(residual: NDArray[np.float64]) -> float:
+def _largest(residual: NDArray[np.float64], curve: Curve) -> float:
     # In robust standard deviations; an exact fit has none.
     size = np.abs(residual)
-    middle = float(np.median(size))
+    middle = _typical(size, curve)
     return float(size.max()) / (_SD_OF_MEDIAN * middle) if middle > 0 else 0.0
+
+
+def _typical(size: NDArray[np.float64], curve: Curve) -> float:
+    low, high = curve.SA.min(), curve.SA.max()
+    u = (2 * curve.SA - low - high) / (high - low)
+    return float(median(size[None], shares(u[None], np.ones((1, len(u)), dtype=np.bool_)))[0])

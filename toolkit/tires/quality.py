@@ -36,7 +36,8 @@ def scatter_floor_percent(
 
     Returns
     -------
-    percent, over the rows of bins that hold at least three; None where these are under half of the rows
+    percent, over the rows of bins that hold at least three; None where these are under half of the rows, or
+    all zero
     """
     place = np.rint(SA / _BIN).astype(np.intp)
     place -= place.min()
@@ -44,7 +45,7 @@ def scatter_floor_percent(
         place += (place.max() + 1) * np.asarray(load)
     rows = np.bincount(place)
     full = rows[place] >= _ROWS
-    if 2 * np.count_nonzero(full) < len(y):
+    if 2 * np.count_nonzero(full) < len(y) or not y[full].any():
         return None
     mean = np.bincount(place, y) / np.maximum(rows, 1)
     return error_percent((y - mean[place])[full], y[full])

@@ -2,12 +2,19 @@
 
 Pacejka, Tire and Vehicle Dynamics, 3rd ed. (2012), 4.E1 to 4.E8: alpha* = tan(alpha) sgn(Vx) and
 gamma* = sin(gamma); ``raw`` leaves both angles as they are, as MF-Tyre does.
+
+Backward rolling is forward rolling seen from behind: after a half turn about z the contact point moves
+forward again, the slip angle is the same (tan(alpha) = -Vy / Vx keeps both signs), camber and kappa change
+theirs, and so do FX and FY, but not MZ. Hence the trail and the residual moment turn with Vx: 4.E6 gives the
+trail the factor cos'(alpha) = Vx / V, 4.E47 gives the residual moment sgn(Vx). Here ``cosine`` is that
+signed one, taken once. What is built into a tire (conicity, plysteer) and the difference between braking and
+driving keep the sign that the file gives them: the equations do not say how they turn.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal, get_args
 
 import numpy as np
@@ -41,8 +48,9 @@ def readers(p: Mapping[str, float]) -> tuple[Reader, Reader]:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class State:
-    """alpha* with the slip angle's cosine, gamma*, kappa [1], load [N] and its change from the nominal.
+    """alpha*, the signed cosine of alpha, gamma*, kappa [1], load [N] and its change from the nominal.
 
+    ``cosine`` is Vx / V (4.E6), negative for a tire that rolls backward.
     ``dp`` is (P - NOMPRES) / NOMPRES; ``mu_x``, ``mu_y`` the friction scale factors at the slip speed.
     """
 
@@ -59,18 +67,7 @@ class State:
 
     def upright(self) -> State:
         """Return the same state at zero camber."""
-        return State(
-            a=self.a,
-            cosine=self.cosine,
-            g=np.zeros_like(self.g),
-            kappa=self.kappa,
-            FZ=self.FZ,
-            F0=self.F0,
-            df=self.df,
-            dp=self.dp,
-            mu_x=self.mu_x,
-            mu_y=self.mu_y,
-        )
+        return replace(self, g=np.zeros_like(self.g))
 
 
 def state(
@@ -91,7 +88,7 @@ def state(
     Parameters
     ----------
     p : scale factors by their names in a tire file
-    V : its sign turns alpha*; zero counts as forward
+    V : its sign turns alpha*, trail and residual moment; zero counts as forward
     V0 : the file's LONGVL [m/s]; with it and LMUV (4.E7) friction falls with the slip speed
     """
     s = Reader(p, 1.0)
@@ -103,10 +100,11 @@ def state(
     decay = p.get("LMUV", 0.0)
     fade: Array = np.asarray(1.0)
     if decay and V0:
-        fade = 1 / (1 + decay * np.abs(speed) * np.hypot(kappa, np.tan(angle)) / V0)
+        fade = 1 / (1 + decay * np.abs(speed) * np.hypot(kappa, np.tan(angle)) / abs(V0))
+    way = np.where(speed < 0, -1.0, 1.0)
     return State(
-        a=np.where(speed < 0, -a, a),
-        cosine=np.cos(angle),
+        a=way * a,
+        cosine=way * np.cos(angle),
         g=np.sin(camber) if angles == "star" else camber,
         kappa=kappa,
         FZ=load,

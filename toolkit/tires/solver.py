@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from toolkit.tires.kernel import Problems, State, assess, at_limit, sine, theta_of
+from toolkit.tires.places import median, shares
 from toolkit.tires.starts import pick
 
 if TYPE_CHECKING:
@@ -235,6 +236,8 @@ def _step(state: State, problems: Problems, damping: Array, radius: Array) -> tu
     gradient = gradient * free
     curvature = state.curvature() * (free[:, :, None] * free[:, None, :])
     diagonal = np.einsum("pii->pi", curvature).copy()
+    # What the elimination of D and Sv leaves of a direction that the rows do not see may round below zero.
+    diagonal = np.maximum(diagonal, 0.0)
     scale = diagonal + 1e-10 * diagonal.max(axis=1)[:, None] + 1e-300
     lifted = diagonal + damping[:, None] * scale + 1e-14 * scale
     # Scaled to a unit diagonal before it is solved: the unknowns differ by orders of magnitude.
@@ -317,15 +320,16 @@ def solve_robust(problems: Problems) -> tuple[Solution, Problems, Array]:
     owner = np.repeat(np.arange(curves), many_starts)
     many = cut.take(owner)
     state = descend(pick(cut, many_starts).reshape(-1, 4), many, steps=6, tolerance=1e-3)
+    once = shares(problems.u, problems.sw > 0)
     for _ in range(8):
         residual = np.abs(_residual(state, many))
-        width = 0.1 * _mad(residual, many.sw) + 1e-12
+        width = 0.1 * median(residual * many.sw, once[owner]) + 1e-12
         part = many.weighted(many.sw / np.sqrt(np.sqrt(residual**2 + width[:, None] ** 2)))
         state = descend(state.p, part, steps=4, tolerance=1e-4)
     size = np.sum(np.abs(_residual(state, many)) * many.sw, axis=1).reshape(curves, many_starts)
     agreeing = np.sum(size <= size.min(axis=1)[:, None] * 1.02 + 1e-12, axis=1)
     state = state.take(size.argmin(axis=1) + many_starts * np.arange(curves))
-    scale = _mad(np.abs(_residual(state, problems)), problems.sw) / 0.6745 + 1e-12
+    scale = median(np.abs(_residual(state, problems)) * problems.sw, once) / 0.6745 + 1e-12
     part, share = problems, np.zeros_like(problems.sw)
     for _ in range(25):
         share = _residual(state, problems) * problems.sw / (_BIWEIGHT * scale[:, None])
@@ -351,9 +355,9 @@ def _cut(problems: Problems) -> Problems:
     # Ordinates that lie far beyond most of their curve, brought nearer. It serves the starts alone: a narrow
     # peak that is cut with them is found again on the rows.
     used = problems.sw > 0
-    y = np.where(used, problems.y, np.nan)
-    middle = np.nanmedian(y, axis=1)[:, None]
-    room = _ROOM * np.nanquantile(np.abs(y - middle), _MOST, axis=1)[:, None]
+    once = shares(problems.u, used)
+    middle = median(problems.y, once)[:, None]
+    room = _ROOM * median(np.abs(problems.y - middle), once, _MOST)[:, None]
     cut = np.where(used, np.clip(problems.y, middle - room, middle + room), 0.0)
     return Problems(u=problems.u, y=cut, sw=problems.sw, low=problems.low, high=problems.high)
 
@@ -365,9 +369,3 @@ _BIWEIGHT = 4.685  # 95 % efficiency on normal noise
 def _residual(state: State, problems: Problems) -> Array:
     model = state.linear[:, :1] * sine(state.p, problems.u) + state.linear[:, 1:]
     return np.asarray(problems.y - model)
-
-
-def _mad(residual: Array, sw: Array) -> Array:
-    # The median of the weighted absolute residuals of each row that counts.
-    size = np.where(sw > 0, residual * sw, np.nan)
-    return np.asarray(np.nanmedian(size, axis=1))

@@ -35,6 +35,7 @@ _SLOPE_SIGN: dict[Axes, dict[str, int]] = {
 }
 _NO_LOAD = 1.0  # N: a block below stands in the air, or its load was not recorded
 _OUTLIERS = 0.02  # of a table's rows
+_COPIES = 0.1  # of the rows
 _SURE = 4.0  # standard errors by which a slope must differ from zero before its sign counts
 
 
@@ -160,6 +161,23 @@ def row_findings(table: TireTable) -> tuple[Finding, ...]:
     )  # fmt: skip
     cause = "is a column in another unit than its header says?"
     return tuple(one.finding("warning", cause=cause) for one in departures(readings, share=_OUTLIERS))
+
+
+def repeat_findings(table: TireTable) -> list[Finding]:
+    """Return a finding where over a tenth of the rows are copies of others in all columns but the time."""
+    rows = np.column_stack([values for symbol, values in table.columns if symbol != "t"])
+    _, count = np.unique(rows, axis=0, return_counts=True)
+    copies = int((count - 1).sum())
+    if copies <= _COPIES * len(rows):
+        return []
+    return [
+        Finding(
+            rule="duplicates",
+            where=table.path.name,
+            message=f"{copies} of {len(rows)} rows are copies of others, one of them stands {count.max()} "
+            "times: they count as measurements of their own, and standard errors come out too small",
+        )
+    ]
 
 
 def axes_findings(table: TireTable, fits: Sequence[CurveFit]) -> list[Finding]:

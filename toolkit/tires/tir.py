@@ -12,6 +12,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from toolkit.errors import CellError, ConfigError, UnreadableError
+from toolkit.findings import Finding
+from toolkit.tires.mf_versions import FOREIGN, ignored
 
 # What other programs write: 5, 6, 21 and 52 are MF 5.2, 60 to 62 are MF 6.x.
 _MF52, _MF6 = (5, 6, 21, 52), (60, 61, 62)
@@ -112,7 +114,37 @@ class TirFile:
         return "no FITTYP" + (f", and PROPERTY_FILE_FORMAT = {told}" if told is not None else "")
 
     def coefficients(self) -> dict[str, float]:
-        """Return every number of the coefficient and scaling sections by its name; LFZ0 is LFZO."""
+        """Return the numbers of the coefficient and scaling sections by their names; LFZ0 is LFZO.
+
+        Names that only the other Magic Formula has stay out (`mf_versions`).
+
+        Raises
+        ------
+        ConfigError
+            as `version`
+        """
+        foreign = FOREIGN[self.version]
+        return {name: value for name, value in self._written().items() if name not in foreign}
+
+    def findings(self) -> tuple[Finding, ...]:
+        """Return what of the file is not evaluated although its number would change a force.
+
+        Raises
+        ------
+        ConfigError
+            as `version`
+        """
+        names = ignored(self.version, self._written())
+        if not names:
+            return ()
+        other = {"5.2": "6.x", "6.x": "5.2"}[self.version]
+        text = (
+            f"the file is of MF {self.version} ({self._kind_as_written(self.get('FITTYP'))}): "
+            f"{', '.join(names)} of MF {other} {'is' if len(names) == 1 else 'are'} not evaluated"
+        )
+        return (Finding(rule="tir-foreign-names", where=self.where, message=text),)
+
+    def _written(self) -> dict[str, float]:
         return {
             _ALIASES.get(line.key, line.key): line.value
             for line in self.lines

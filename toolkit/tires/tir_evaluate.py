@@ -86,7 +86,7 @@ def evaluate_tir(
     result = Forces(FX=FX, FY=FY, MZ=MZ)
     _refuse_infinite(tir, result)
     given = {"SA": SA, "FZ": FZ, "IA": IA, "KAPPA": KAPPA} | ({} if P is None else {"P": P})
-    findings += [*_lacking(tir, p), *_beyond(tir, given)]
+    findings += [*tir.findings(), *_lacking(tir, p), *_beyond(tir, given)]
     return result, tuple(findings)
 
 

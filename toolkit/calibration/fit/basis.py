@@ -9,7 +9,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import TYPE_CHECKING
 
@@ -47,6 +47,33 @@ class Basis:
             columns = {n: (x - self.centre[n]) / self.half[n] for n, x in columns.items()}
         return (term_matrix(self.terms, columns) - self.middle) / self.length
 
+    def moved_back(self, zero: Mapping[str, float]) -> Basis:
+        """Return the basis of indications less ``zero`` with its map to the raw indications (`free_zero`)."""
+        if not any(zero.values()):
+            return self
+        parsed = [parse_term(name) for name in self.terms]
+        expand = _expansion(parsed, zero, dict.fromkeys(zero, 1.0))
+        exact = tuple(
+            tuple(sum((a * self.back_exact[m][j] for m, a in enumerate(row) if a), Fraction(0))
+                  for j in range(len(self.terms)))
+            for row in expand
+        )  # fmt: skip
+        back = np.array([[float(value) for value in row] for row in exact])
+        return replace(self, back=back, back_exact=exact)
+
+
+def free_zero(
+    terms: Sequence[str], columns: Mapping[str, NDArray[np.float64]]
+) -> tuple[dict[str, float], dict[str, NDArray[np.float64]]]:
+    """Return a zero of every indication, and the indications less it (rows,), without rounding.
+
+    Where the terms are the same model about any zero, that is one near the mean, so that what is added to an
+    indication is not lost beside a large one; else 0.
+    """
+    hierarchical = _hierarchical([parse_term(name) for name in terms])
+    zero = {name: _anchor(x) if hierarchical else 0.0 for name, x in columns.items()}
+    return zero, {name: x - zero[name] for name, x in columns.items()}
+
 
 def build_basis(terms: Sequence[str], columns: Mapping[str, NDArray[np.float64]]) -> Basis:
     """Return the solving basis of a list of terms (the intercept, where there is one, last).
@@ -56,7 +83,7 @@ def build_basis(terms: Sequence[str], columns: Mapping[str, NDArray[np.float64]]
     """
     parsed = [parse_term(name) for name in terms]
     centre, half = None, None
-    if _closed(parsed):
+    if not _linear(parsed) and _hierarchical(parsed):
         centre = {name: _anchor(x) for name, x in columns.items()}
         half = {name: _power_of_two(np.max(np.abs(x - centre[name]))) for name, x in columns.items()}
         raw = term_matrix(terms, {name: (x - centre[name]) / half[name] for name, x in columns.items()})
@@ -111,11 +138,14 @@ def _power_of_two(value: float) -> float:
     return math.ldexp(1.0, math.frexp(value)[1]) if value > 0 else 1.0
 
 
-def _closed(terms: Sequence[Term]) -> bool:
+def _linear(terms: Sequence[Term]) -> bool:
+    # The columns themselves are centred: nothing is gained by a centred variable.
+    return not any(sum(power for _, power in term.powers) > 1 for term in terms)
+
+
+def _hierarchical(terms: Sequence[Term]) -> bool:
     # (x - m)^2 spills into x and 1: centring keeps the model only where the lower terms are in it.
-    if any(term.absolutes for term in terms) or all(
-        len(term.powers) == 1 and term.powers[0][1] == 1 for term in terms
-    ):
+    if any(term.absolutes for term in terms):
         return False
     present = {_key(dict(term.powers)) for term in terms}
     for term in terms:

@@ -2,9 +2,11 @@
 
 Minimised: sum over rows of (load - f(x + delta))^2 / u_load^2 + sum of delta_j^2 / u_j^2. odrpack stops
 where the sum of squares does not move any more; a few Gauss-Newton steps then settle the last digits of the
-coefficients. The covariance follows from the stated uncertainties alone, as for `regression` with weights and
-in ISO/TS 28037 clause 7: at the solution it is odrpack's ``cov_beta``, which is unscaled, to more digits.
-``sd_beta``, rescaled by the residuals, is not used.
+coefficients. Indications are taken from a zero near their mean, as the other fits take them: beside an
+indication of 50 with a span of 1 an adjustment of its last digits would be rounded away. The covariance
+follows from the stated uncertainties alone, as for `regression` with weights and in ISO/TS 28037 clause 7: at
+the solution it is odrpack's ``cov_beta``, which is unscaled, to more digits. ``sd_beta``, rescaled by the
+residuals, is not used.
 
 Reference: Boggs, Byrd, Schnabel, SIAM J. Sci. Stat. Comput. 8 (1987) 1052; ODRPACK95, ACM TOMS algorithm 869.
 """
@@ -16,7 +18,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolkit.calibration.fit.basis import build_basis
+from toolkit.calibration.fit.basis import build_basis, free_zero
 from toolkit.calibration.fit.regression import Factor, TermFit, covariance_of, fit_terms, raw_coefficients
 from toolkit.calibration.terms import term_slopes
 
@@ -49,6 +51,7 @@ def fit_odr(
     """
     from odrpack import odr_fit
 
+    zero, columns = free_zero(terms, columns)
     basis = build_basis(terms, columns)
     names = list(columns)
     x = np.array([columns[name] for name in names])
@@ -82,6 +85,7 @@ def fit_odr(
     # prove: they end only where the objective is stationary.
     if found.info % 10 not in (1, 2, 3) or not np.isfinite(beta).all():
         raise ValueError(f"odrpack found no solution: {found.stopreason}")
+    best, still = np.inf, 0
     for _ in range(_STEPS):
         slope = slopes(x + delta, beta)
         spread = np.sqrt(u**2 + (slope**2 * u_cells[:, None] ** 2).sum(axis=0))
@@ -95,7 +99,11 @@ def fit_odr(
         adjusted = slope * u_cells[:, None] ** 2 * rest / spread**2
         moved = max(moved, np.abs((slope * (adjusted - delta)).sum(axis=0)).max())
         delta = adjusted
-        if moved <= _SETTLED * np.abs(load).max():
+        # Steps stop shrinking where they round at the size of what the indications make of the load.
+        still = 0 if moved < best else still + 1
+        best = min(best, moved)
+        rounds = _SETTLED * np.abs(slope * (x + delta)).sum(axis=0).max()
+        if moved <= _SETTLED * np.abs(load).max() or (still > 20 and moved <= 10 * rounds):
             break
     else:
         raise ValueError("the solution does not settle")
@@ -103,10 +111,11 @@ def fit_odr(
     residuals = np.asarray(load - fitted, dtype=np.float64)
     dof = len(load) - len(terms)
     scaled = rest / spread
+    raw = basis.moved_back(zero)
     return TermFit(
         terms=tuple(terms),
-        coefficients=raw_coefficients(basis, solution),
-        covariance=covariance_of(basis, factor.inverse),
+        coefficients=raw_coefficients(raw, solution),
+        covariance=covariance_of(raw, factor.inverse),
         residual_sd=float(np.sqrt(residuals @ residuals / dof)),
         dof=dof,
         residuals=residuals,

@@ -1,4 +1,4 @@
-"""Golden vectors of fits with shared errors, or errors in both variables: normal equations in 60 digits.
+"""Golden vectors of fits with shared errors, or errors in both variables: 60 digits or more.
 
 Decimal arithmetic on the raw terms, nothing centred, scaled or whitened, and nothing shared with the fit.
 Shared errors are solved as further unknowns with a prior of unit spread (Henderson's mixed-model equations),
@@ -9,6 +9,7 @@ References: Henderson, Biometrics 31 (1975) 423; Britt and Luecke, Technometrics
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from decimal import Decimal, localcontext
 from fractions import Fraction
@@ -39,7 +40,7 @@ def solve_gls_precisely(
         the terms are dependent
     """
     with localcontext() as context:
-        context.prec = _DIGITS
+        context.prec = _digits(terms, columns)
         x, y = _rows(terms, columns), [Decimal(value) for value in load]
         one = Decimal(1)
         ordinary = _least_squares(x, y, [one] * len(y))
@@ -85,7 +86,7 @@ def solve_odr_precisely(
         the terms are dependent, or the iteration does not settle
     """
     with localcontext() as context:
-        context.prec = _DIGITS
+        context.prec = _digits(terms, columns)
         names = list(columns)
         y = [Decimal(value) for value in load]
         observed = [[Decimal(value) for value in row] for row in zip(*columns.values(), strict=True)]
@@ -120,6 +121,15 @@ def solve_odr_precisely(
             if moved <= _SETTLED * largest:
                 return tuple(Fraction(value) for value in coefficients)
         raise ArithmeticError("the iteration does not settle")
+
+
+def _digits(terms: Sequence[str], columns: Mapping[str, Sequence[float]]) -> int:
+    # Nothing is centred here: a large zero costs the normal equations its digits twice, by every power.
+    ratio = max(
+        (max(map(abs, x)) / ((max(x) - min(x)) or 1.0) for x in columns.values() if any(x)), default=1.0
+    )
+    degree = max(sum(p for _, p in term.powers) + len(term.absolutes) for term in map(parse_term, terms))
+    return _DIGITS + 4 * degree * max(0, math.ceil(math.log10(max(ratio, 1.0))))
 
 
 def _terms(parsed: Sequence[Term], at: Mapping[str, Decimal]) -> list[Decimal]:

@@ -10,14 +10,18 @@ degrees, X5 at 240), each with its decreasing forces (X4', X6'). Errors in % at 
 
 and of the instrument: f0 = (i_f - i_0) / X_N (zero, the largest of all runs), c = |i_300 - i_30| / X_N
 (creep), X_N the mean deflection at the largest force. A class also asks for an applied force of small
-uncertainty and for forces that are large against the resolution. What the procedure lacks costs the class,
-not the figures that can still be had.
+uncertainty and for forces that are large against the resolution r: 4000, 2000, 1000 and 500 r for classes
+00, 0.5, 1 and 2. No class holds below 2 % of the transducer's largest force, whatever the resolution: both
+conditions stand side by side in the standard's clause on the minimum force, the second one for every class.
+The largest force of the calibration stands in for the transducer's, which a session does not state and which
+is not smaller. What the procedure lacks costs the class, not the figures that can still be had.
 
 Not judged: temperature and time between the readings, the regularity of the steps, the age of the
 calibration.
 
-Reference: ISO 376:2011, clauses on procedure and on classification with its table; EURAMET cg-4 on force
-measurements names the same components. The limits are in % of the value that the error is relative to.
+Reference: ISO 376:2011, clauses on minimum force (as in EN 10002-3:1994), on procedure and on classification
+with its table; EURAMET cg-4 on force measurements names the same components. The limits are in % of the
+value that the error is relative to.
 """
 
 from __future__ import annotations
@@ -41,6 +45,8 @@ __all__ = ["LIMITS", "Iso376Force", "Iso376Limits", "Iso376Result", "Iso376Run",
 _SLACK = 1 + 1e-9
 MIN_FORCES = 8
 MIN_PRELOADS = 3
+LEAST_SHARE = 0.02
+"""The least force over the largest one, for every class."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -182,7 +188,8 @@ def evaluate_iso376(
             "b": _at(b, i), "b'": _at(b_same, i), "fc": float(fc[i]), "f0": f0, "v": _at(v, i), "c": c,
             "U": _at(uncertainty, i),
         }  # fmt: skip
-        name, reasons = _classify(errors, None if in_force is None else value / in_force)
+        resolutions = None if in_force is None else value / in_force
+        name, reasons = _classify(errors, resolutions, value / float(forces[-1]))
         rows.append(
             Iso376Force(
                 force=value,
@@ -244,9 +251,13 @@ def _at(values: NDArray[np.float64] | None, i: int) -> float | None:
 
 
 def _classify(
-    errors: dict[str, float | None], resolutions: float | None
+    errors: dict[str, float | None], resolutions: float | None, share: float
 ) -> tuple[str | None, tuple[str, ...]]:
     """Return the best class at one force, and what the next better class is refused for."""
+    if share * _SLACK < LEAST_SHARE:
+        return None, (
+            f"the force is {100 * share:.3g} % of the largest, a class needs {100 * LEAST_SHARE:g} %",
+        )
     reasons: tuple[str, ...] = ()
     for limits in LIMITS:
         allowed = {

@@ -23,9 +23,9 @@ import numpy as np
 from toolkit.calibration.session.statements import statements_of
 from toolkit.calibration.terms import term_matrix
 from toolkit.calibration.uncertainty.readings import indication_errors
-from toolkit.calibration.uncertainty.rounding import last_place
 from toolkit.calibration.uncertainty.scatter import scatter_of
 from toolkit.errors import SessionError
+from toolkit.estimate import last_place
 
 if TYPE_CHECKING:
     from collections.abc import Callable

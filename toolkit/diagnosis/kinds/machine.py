@@ -48,6 +48,7 @@ class MachineModel:
 
         self.case = case
         self._tire = TirTire(tir)
+        self.findings = tir.findings()
         self._speed = speed_m_s
         self._load = self.nominal_load_N = self._tire.FNOMIN
         self.cells = None if record is None else Cells(case, record)

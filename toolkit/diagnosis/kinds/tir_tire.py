@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from toolkit.tires import mf52, mf61
+from toolkit.tires.mf_versions import FOREIGN
 from toolkit.tires.slip import state
 from toolkit.tires.tir import TirFile
 from toolkit.tires.tir_units import si_number
@@ -32,7 +33,7 @@ class TirTire:
         self._speed = si_number(tir, "LONGVL", 0.0) or None
         self._nominal = si_number(tir, "NOMPRES", 0.0)
         self._inflation = si_number(tir, "INFLPRES", self._nominal)
-        self.names = frozenset((*self._p, *_SCALES, *mf61.LATERAL, *mf61.ALIGNING))
+        self.names = frozenset((*self._p, *_SCALES, *mf61.LATERAL, *mf61.ALIGNING)) - FOREIGN[self._version]
         self.has_pressure = self._version != "5.2" and self._nominal > 0 and any(
             self._p.get(name) for name in ("PPY1", "PPY2", "PPY3", "PPY4", "PPZ1", "PPZ2")
         )  # fmt: skip

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from toolkit.estimate import plus_minus, round_uncertainty
+
 if TYPE_CHECKING:
     from toolkit.calibration.fit.balance_report import BalanceReport
     from toolkit.calibration.fit.report import FitReport
@@ -119,8 +121,8 @@ def report_text(report: FitReport) -> str:
         _table(
             ["term", "coefficient", "std error", "t", "sign sure", fs],
             [
-                [c.term, f"{c.value:.8g}", f"{c.standard_error:.2g}", f"{c.t:.1f}", _sure(c.sign_confidence),
-                 f"{c.percent_fs:.3g}"]
+                [c.term, f"{c.value:.8g}", round_uncertainty(c.standard_error), f"{c.t:.1f}",
+                 _sure(c.sign_confidence), f"{c.percent_fs:.3g}"]
                 for c in report.coefficients
             ],
         ),
@@ -187,7 +189,7 @@ def balance_text(report: BalanceReport) -> str:
             _table(
                 ["run", *(f"{one.load} [{one.unit}]" for one in report.loads)],
                 [
-                    [str(run), *(f"{v:+.4g} ± {u:.1g}" for v, u in zip(row, errors, strict=True))]
+                    [str(run), *(plus_minus(v, u) for v, u in zip(row, errors, strict=True))]
                     for run, row, errors in zip(
                         tares.runs, tares.values.tolist(), tares.standard_errors.tolist(), strict=True
                     )

@@ -8,7 +8,7 @@ from collections.abc import Iterable
 from dataclasses import replace
 
 from toolkit import __version__
-from toolkit.calibration.uncertainty.rounding import round_to_uncertainty, round_uncertainty
+from toolkit.estimate import round_to_uncertainty, round_uncertainty
 from toolkit.report.certificate.decision import RULES
 from toolkit.report.certificate.model import VERDICTS, Certificate, LoadResult
 from toolkit.report.certificate.plots import build_plots
@@ -156,7 +156,9 @@ def traceability(c: Certificate, style: Style | None = None) -> str:
         f"{c.reference_certificate or GAP}."
     )
     for load, U, k, unit in c.reference_uncertainties:
-        told, factor = _signed(round_uncertainty(U), style), _signed(f"{k:g}", style)
+        # As the standard's own certificate states it, where that takes fewer digits.
+        stated = min(round_uncertainty(U), f"{U:g}", key=len)
+        told, factor = _signed(stated, style), _signed(f"{k:g}", style)
         text += f" Its uncertainty for {load}: U = {told} {shown(unit)}, k = {factor}."
     return text
 
@@ -217,7 +219,14 @@ def _tables(c: Certificate, style: Style) -> dict[str, Table]:
             for cell, resolution in zip(c.cells, c.resolutions, strict=True)
         ],
         "coefficients": [
-            [one.load, t.term, repr(t.full), repr(t.issued), f"{t.standard_error:.2g}", shown(t.unit)]
+            [
+                one.load,
+                t.term,
+                repr(t.full),
+                repr(t.issued),
+                round_uncertainty(t.standard_error),
+                shown(t.unit),
+            ]
             for one in c.loads
             for t in one.terms
         ],
@@ -254,8 +263,8 @@ def _budget(one: LoadResult) -> Iterable[list[str]]:
             continue  # the statement about U names what it does not hold
         dof = f"{part.dof:.0f}" if math.isfinite(part.dof) and part.dof < 1e4 else "∞"
         yield [
-            one.load, part.name, part.evaluation, part.distribution, f"{part.u:.2g}", shown(one.unit), dof,
-            f"{100 * part.share:.1f}", part.source,
+            one.load, part.name, part.evaluation, part.distribution, round_uncertainty(part.u),
+            shown(one.unit), dof, f"{100 * part.share:.1f}", part.source,
         ]  # fmt: skip
 
 

@@ -10,8 +10,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from toolkit import __version__
-from toolkit.calibration.uncertainty.rounding import round_to_uncertainty, round_uncertainty
 from toolkit.errors import ConfigError
+from toolkit.estimate import round_to_uncertainty, round_uncertainty
 from toolkit.recording.marks import OWN_OUTPUT
 from toolkit.report.certificate import content as words
 from toolkit.report.certificate.dcc_units import dsi, dsi_of_term

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from toolkit.estimate import round_uncertainty
 from toolkit.report.certificate.model import Certificate, LoadResult
 from toolkit.report.certificate.vocabulary import FIGURES
 from toolkit.report.content import Curve, Plot
@@ -58,6 +59,7 @@ def _plot(name: str, one: LoadResult, mark: str | None) -> Plot:
         f"with the tolerance and the expanded uncertainty U.",
         alt=f"Deviation of {one.load} over {one.load} from {one.minimum:g} to {one.maximum:g} {unit}: "
         f"{one.n} fitted loads, largest residual {largest:+.3g} {unit}{checks}; tolerance "
-        f"{one.tolerance:.3g} {unit}, expanded uncertainty at full scale {one.full_scale.U:.3g} {unit}",
+        f"{one.tolerance:.3g} {unit}, expanded uncertainty at full scale "
+        f"{round_uncertainty(one.full_scale.U)} {unit}",
         watermark=mark,
     )

@@ -6,6 +6,7 @@ import math
 from typing import TYPE_CHECKING
 
 from toolkit.comparison.quantities import QUANTITIES
+from toolkit.estimate import plus_minus
 
 if TYPE_CHECKING:
     from toolkit.comparison.model import Comparison, Difference, FactorSpread, Part
@@ -25,12 +26,8 @@ def shown_unit(name: str, style: Style) -> tuple[str, float]:
 
 def with_U(one: Estimate, factor: float, style: Style) -> str:
     """Return ``45.0 ± 0.6``: two digits of U, and the value to the same place."""
-    value, U = one.value * factor, one.expanded()[0] * factor
-    if not math.isfinite(U) or U <= 0:
-        return comma(f"{value:.4g}", style)
-    digits = max(0, 1 - math.floor(math.log10(U)))
-    near = round(value, digits) + 0.0  # a value that rounds to nothing has no sign
-    return comma(f"{near:.{digits}f} ± {U:.{digits}f}", style)
+    shown = one.scaled(factor, "")
+    return plus_minus(shown.value, shown.expanded()[0], decimal_comma=style.decimal_comma)
 
 
 def p_text(p: float | None, style: Style) -> str:

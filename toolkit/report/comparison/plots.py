@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from toolkit.estimate import plus_minus
 from toolkit.report.content import Curve, Plot
 from toolkit.report.style import Style
 from toolkit.report.tags import format_number
@@ -83,7 +84,7 @@ def _plot(comparison: Comparison, wanted: _Wanted, style: Style) -> Plot | None:
             )
         )  # fmt: skip
         listed = ", ".join(
-            f"{_number(b, style)} ± {_number(c, style)} at {_number(a, style, '.0f')}"
+            f"{plus_minus(b, c, decimal_comma=style.decimal_comma)} at {_number(a, style)}"
             for a, b, c in zip(x, y, U, strict=True)
         )
         said.append(f"{entry.label}: {listed} {load_unit}")
@@ -125,6 +126,5 @@ def _series(entry: Entry, name: str) -> tuple[list[float], list[float], list[flo
     )
 
 
-def _number(value: float, style: Style, spec: str | None = None) -> str:
-    own = ".1f" if abs(value) >= 10 else ".2f"
-    return format_number(value, spec or own, decimal_comma=style.decimal_comma)
+def _number(value: float, style: Style) -> str:
+    return format_number(value, ".0f", decimal_comma=style.decimal_comma)

@@ -38,14 +38,14 @@ moment = "N*m"
 heading = "Heading 1"
 caption = "Caption"
 
-[decimals]                            # by unit, by tag or by table.column
+# By unit, by tag or by table.column. A value with an uncertainty ends at the last place of two digits of the
+# uncertainty: only its tag or table.column changes that, its unit does not.
+[decimals]
 N = 1
 "N*m" = 2
 "N/deg" = 1
 "N*m/deg" = 2
 deg = 2
-Sh = 3
-u_Sh = 3
 FZ = 0
 load = 0
 "summary.load" = 0

@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Iterator
 from copy import deepcopy
 
+from toolkit.estimate import has_interval, round_to_uncertainty
 from toolkit.report.content import Cell, Table
 from toolkit.report.style import Style
 from toolkit.report.tags import Tag, format_number, parse_tag
@@ -18,12 +19,18 @@ from toolkit.report.template.xml import W_P, W_SDT, W_TC, W_TR, Element, ancesto
 Said = Callable[[str, str], None]
 
 
-def cell_text(value: Cell, spec: str, style: Style) -> str:
-    """Return a cell's text; what is absent or not finite is the style's visible mark."""
+def cell_text(value: Cell, spec: str, style: Style, U: Cell = None) -> str:
+    """Return a cell's text; what is absent or not finite is the style's visible mark.
+
+    With an uncertainty ``U`` the value has the last place of its two significant digits.
+    """
     if isinstance(value, str):
         return value
     if value is None or not math.isfinite(value):
         return style.missing
+    if isinstance(U, float) and has_interval(value, U):
+        text = round_to_uncertainty(value, U)
+        return text.replace(".", ",") if style.decimal_comma else text
     return format_number(value, spec, decimal_comma=style.decimal_comma)
 
 
@@ -61,7 +68,8 @@ def fill_table(
             if tag.family != "row":
                 return resolve(tag)
             column = table.columns[index[tag.name]]
-            shown = cell_text(values[index[tag.name]], tag.spec or column.spec, style)
+            U = None if tag.spec or column.U not in index else values[index[column.U]]
+            shown = cell_text(values[index[tag.name]], tag.spec or column.spec, style, U)
             said(tag.name, shown)
             return printed(shown)
 
