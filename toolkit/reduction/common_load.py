@@ -65,9 +65,10 @@ def slopes(FZ: NDArray[np.float64], y: NDArray[np.float64]) -> tuple[Slope | Non
     Returns
     -------
     one entry a block; None where the file has one load only. Inside: the slope of the parabola through
-    the block and both neighbours; at an end the same parabola's slope there. The uncertainty is what a cubic
-    through one block more would change, the error of an interpolation by its next order; with three blocks
-    that of a rectangle between the two secants (GUM 4.3.7); with two, half the secant itself.
+    the block and both neighbours; at an end the same parabola's slope there; with five blocks or more that of
+    the cubic through one block more. The uncertainty is what the polynomial of the next order would change;
+    with three blocks that of a rectangle between the two secants (GUM 4.3.7); with two, half the secant
+    itself.
 
     Examples
     --------
@@ -86,27 +87,30 @@ def slopes(FZ: NDArray[np.float64], y: NDArray[np.float64]) -> tuple[Slope | Non
         return (one, one)
     for place, block in enumerate(order):
         middle = min(max(place, 1), n - 2)
-        left, right = secants[middle - 1], secants[middle]
-        bend = (right - left) / (x[middle + 1] - x[middle - 1])
-        # Newton's form of the parabola through the three, differentiated at the block itself.
-        value = left + bend * ((x[place] - x[middle - 1]) + (x[place] - x[middle]))
-        u = abs(right - left) / (2 * np.sqrt(3)) if n == 3 else _next_order(x, secants, middle, place)
-        found[block] = Slope(value=float(value), u=float(u))
+        terms = _terms(x, values, _nodes(x, place, middle))
+        # The parabola ends with the second term, the cubic with the third.
+        last = 3 if n >= 5 else 2
+        u = abs(terms[last]) if n > 3 else abs(secants[middle] - secants[middle - 1]) / (2 * np.sqrt(3))
+        found[block] = Slope(value=float(sum(terms[:last])), u=float(u))
     return tuple(found)
 
 
-def _next_order(x: NDArray[np.float64], secants: NDArray[np.float64], middle: int, place: int) -> float:
-    """Return how far a cubic through the nearest fourth block moves the parabola's slope at a block."""
-    nodes = x[middle - 1 : middle + 2]
-    # The fourth block is the nearer of the two beyond the three.
-    beyond = [i for i in (middle - 2, middle + 2) if 0 <= i < len(x)]
-    fourth = min(beyond, key=lambda i: abs(x[i] - x[place]))
-    first = min(fourth, middle - 1)
-    bends = np.diff(secants[first : first + 3]) / (x[first + 2 : first + 4] - x[first : first + 2])
-    third = (bends[1] - bends[0]) / (x[first + 3] - x[first])
-    # The cubic adds third * (x - x1)(x - x2)(x - x3), whose slope at a node is the product of two gaps.
-    gaps = [x[place] - node for node in nodes if node != x[place]]
-    return float(abs(third * gaps[0] * gaps[1]))
+def _nodes(x: NDArray[np.float64], place: int, middle: int) -> list[int]:
+    """Return up to five blocks in the order in which a polynomial at one of them takes them up."""
+    nodes = [place, *(i for i in (middle - 1, middle, middle + 1) if i != place)]
+    rest = sorted(set(range(len(x))) - set(nodes), key=lambda i: abs(x[i] - x[place]))
+    return nodes + rest[:2]
+
+
+def _terms(x: NDArray[np.float64], y: NDArray[np.float64], nodes: Sequence[int]) -> list[float]:
+    """Return what each order of Newton's polynomial adds to the slope at its first node."""
+    at, table = x[nodes], y[nodes]
+    terms, product = [], 1.0
+    for order in range(1, len(nodes)):
+        table = np.diff(table) / (at[order:] - at[:-order])
+        terms.append(float(table[0]) * product)
+        product *= float(at[0] - at[order])
+    return terms
 
 
 def carry(value: float, u: float, *, slope: Slope | None, delta_FZ: float) -> tuple[float, float]:
