@@ -145,9 +145,7 @@ def _sensitivities(directions: Sequence[Direction]) -> dict[tuple[float, str], S
     return found
 
 
-def _scale(
-    directions: Sequence[Direction], sensitivities: Mapping[tuple[float, str], Sensitivity]
-) -> Array:
+def _scale(directions: Sequence[Direction], sensitivities: Mapping[tuple[float, str], Sensitivity]) -> Array:
     # What each source is measured in, so that all are of one size: max|y| of the channels, and what of load
     # and slip angle moves FY by as much.
     size = [
@@ -199,9 +197,7 @@ class _Residuals:
             columns = np.vstack([np.diag(one[k]) for one in moved])
             through = K @ columns
             parts.append(through @ through.T)
-        return cls(
-            z=K @ np.concatenate(rest), rows=(K * np.concatenate(known)) @ K.T, parts=np.array(parts)
-        )
+        return cls(z=K @ np.concatenate(rest), rows=(K * np.concatenate(known)) @ K.T, parts=np.array(parts))
 
 
 def _restricted(curves: Sequence[_Residuals], free: NDArray[np.bool_]) -> tuple[Array, Array]:
@@ -232,9 +228,7 @@ def _restricted(curves: Sequence[_Residuals], free: NDArray[np.bool_]) -> tuple[
     return variances, covariance
 
 
-def _score(
-    curves: Sequence[_Residuals], variances: Array, chosen: NDArray[np.intp]
-) -> tuple[Array, Array]:
+def _score(curves: Sequence[_Residuals], variances: Array, chosen: NDArray[np.intp]) -> tuple[Array, Array]:
     # The information on the variances, and the right side whose solution is the next step of scoring.
     information, right = np.zeros((len(chosen), len(chosen))), np.zeros(len(chosen))
     for one in curves:

@@ -113,9 +113,7 @@ def revolutions(
     return None
 
 
-def means(
-    values: NDArray[np.float64], *, explained: NDArray[np.float64] | None = None
-) -> tuple[Mean, ...]:
+def means(values: NDArray[np.float64], *, explained: NDArray[np.float64] | None = None) -> tuple[Mean, ...]:
     """Return the mean of consecutive rows and its uncertainty, for each channel.
 
     Parameters
