@@ -87,7 +87,8 @@ class Scatter:
 def weights_of(direction: Direction, channel: Channel) -> Array:
     """Return d parameter / d condition (6, conditions) of a direction's curve: J^+ of its free parameters."""
     fit = direction.curve(channel)
-    assert fit is not None
+    if fit is None:
+        raise ValueError(f"there is no curve of {channel} to weigh conditions by")
     jacobian = model(fit.model).jacobian(fit.values, direction.group.SA)
     free = np.array([p.name not in fit.at_bound for p in fit.parameters])
     size = np.linalg.norm(jacobian, axis=1) * free
@@ -130,10 +131,10 @@ def _sensitivities(directions: Sequence[Direction]) -> dict[tuple[float, str], S
             for (one, place), load, value, slope in zip(pairs, FZ, y, slopes(FZ, y), strict=True):
                 steep = value / load if slope is None else slope.value
                 by_load[channel][id(one), place] = float(steep)
-    found = {}
+    found: dict[tuple[float, str], Sensitivity] = {}
     for one in directions:
         SA = one.group.SA
-        rows = {}
+        rows: dict[Channel, Array] = {}
         for index, channel in enumerate(_CHANNELS):
             fit = one.curve(channel)
             made = np.zeros((4, len(SA)))
@@ -178,7 +179,7 @@ class _Residuals:
             if fit is None:
                 continue
             jacobian = model(fit.model).jacobian(fit.values, SA)
-            hat = jacobian.T @ weights_of(one, channel).T.T
+            hat = jacobian.T @ weights_of(one, channel)
             values, vectors = np.linalg.eigh((hat + hat.T) / 2)
             left.append(vectors[:, values < 0.5].T)
             y = one.group.values(channel)

@@ -160,7 +160,7 @@ def turning(rows: int, revolutions: float | None) -> NDArray[np.float64]:
 def _unexplained(
     rest: NDArray[np.float64], explained: NDArray[np.float64] | None
 ) -> tuple[NDArray[np.float64], int]:
-    """Return what signals leave of rows without their mean (channels, rows), and how many freedoms it took."""
+    """Return what signals leave of rows about their mean (channels, rows), and the freedoms that it took."""
     count = 0 if explained is None else len(explained)
     if explained is None or not count or rest.shape[1] < _ROWS_EACH * (count + 1):
         return rest, 0
