@@ -141,8 +141,7 @@ def test_another_minimum_that_the_noise_cannot_tell_apart_lies_within_the_interv
     noise = noise_of(np.zeros_like(problems.y), columns, rows, solution.state.cost, np.array([np.nan]))
 
     def determined(solution):
-        found = spread(solution, problems, zero=-scale.middle / scale.half, noise=noise)
-        return found
+        return spread(solution, problems, zero=-scale.middle / scale.half, noise=noise)
 
     found = determined(solution)
     assert found.determined.all()

@@ -66,9 +66,9 @@ def slopes(FZ: NDArray[np.float64], y: NDArray[np.float64]) -> tuple[Slope | Non
     -------
     one entry a block; None where the file has one load only. Inside: the slope of the parabola through
     the block and both neighbours; at an end the same parabola's slope there; with five blocks or more that of
-    the cubic through one block more. The uncertainty is what the polynomial of the next order would change;
-    with three blocks that of a rectangle between the two secants (GUM 4.3.7); with two, half the secant
-    itself.
+    the cubic through one block more. The uncertainty is that of a rectangle (GUM 4.3.7) as wide to either
+    side as what the polynomial of the next order would change, with three blocks one between the two
+    secants; with two blocks it is half the secant itself.
 
     Examples
     --------
@@ -90,8 +90,8 @@ def slopes(FZ: NDArray[np.float64], y: NDArray[np.float64]) -> tuple[Slope | Non
         terms = _terms(x, values, _nodes(x, place, middle))
         # The parabola ends with the second term, the cubic with the third.
         last = 3 if n >= 5 else 2
-        u = abs(terms[last]) if n > 3 else abs(secants[middle] - secants[middle - 1]) / (2 * np.sqrt(3))
-        found[block] = Slope(value=float(sum(terms[:last])), u=float(u))
+        u = abs(terms[last]) if n > 3 else abs(secants[middle] - secants[middle - 1]) / 2
+        found[block] = Slope(value=float(sum(terms[:last])), u=float(u) / np.sqrt(3))
     return tuple(found)
 
 
