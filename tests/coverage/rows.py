@@ -81,10 +81,14 @@ def as_table(rows: Sequence[CoverageRow]) -> str:
     head = ("what", "drawn", "n", "covers %", "95 % of it", "rms error / u", "median U / needed")
     lines = ["| " + " | ".join(head) + " |", "|" + "---|" * len(head)]
     for one in rows:
-        width = "" if one.median_width_ratio is None else f"{one.median_width_ratio:.2f}"
-        cells = (
-            one.name, one.condition, str(one.n), f"{100 * one.share:.1f}" if one.n else "",
-            f"{100 * one.low:.1f} to {100 * one.high:.1f}" if one.n else "", "" if math.isnan(one.rms_ratio) else f"{one.rms_ratio:.2f}", width,
-        )  # fmt: skip
+        share = limits = ratio = width = ""
+        if one.n:
+            share = f"{100 * one.share:.1f}"
+            limits = f"{100 * one.low:.1f} to {100 * one.high:.1f}"
+        if not math.isnan(one.rms_ratio):
+            ratio = f"{one.rms_ratio:.2f}"
+        if one.median_width_ratio is not None:
+            width = f"{one.median_width_ratio:.2f}"
+        cells = (one.name, one.condition, str(one.n), share, limits, ratio, width)
         lines.append("| " + " | ".join(cells) + " |")
     return "\n".join(lines)
