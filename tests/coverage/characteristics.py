@@ -32,7 +32,7 @@ from toolkit.machine import Machine, load_machine
 from toolkit.recording.model import Recording, Series, TestInfo
 from toolkit.reduction.model import ReducedTest, Tare
 from toolkit.reduction.reduce import reduce_test
-from toolkit.simulation.plan import Plan, read_plan
+from toolkit.simulation.plan import Plan, read_plan, with_effects
 from toolkit.simulation.run import VirtualTest, simulate
 from toolkit.simulation.session import simulate_session
 from toolkit.simulation.steady import settled
@@ -50,16 +50,20 @@ LOADS = {0: "250 lbf", 2: "833 lbf", 4: "1372 lbf"}
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Cell:
-    """What is drawn: ``stated`` the machine's type B terms, ``record`` a new session each time."""
+    """What is drawn beside record and noise: ``stated`` the machine's type B terms.
+
+    ``effects`` are switched on as in ``toolkit simulate --effect``; they move no mean of a whole turn.
+    """
 
     name: str
     stated: bool = True
-    record: bool = True
+    effects: tuple[str, ...] = ()
 
 
 CELLS = (
     Cell(name="every stated error, the record, noise"),
     Cell(name="the record and noise", stated=False),
+    Cell(name="the record, noise, an uneven tire", stated=False, effects=("nonuniformity.FY=40N",)),
 )
 
 
@@ -78,11 +82,12 @@ class Reading:
 def readings(cell: Cell, seed: int) -> tuple[Reading, ...]:
     """Return every characteristic of one repetition."""
     rng = np.random.default_rng([1987, seed])
-    plan = dataclasses.replace(_plan(), seed=int(rng.integers(2**31)))
+    bare = dataclasses.replace(_plan(), seed=int(rng.integers(2**31)))
+    plan = with_effects(bare, list(cell.effects))
     machine = MACHINE if cell.stated else dataclasses.replace(MACHINE, type_b=())
-    reduced, record = _reduced(plan, _record(int(rng.integers(2**31)) if cell.record else 1), machine, rng)
+    reduced, record = _reduced(plan, _record(int(rng.integers(2**31))), machine, rng)
     found = characterise(reduced, machine=machine, record=record)
-    tire = settled(plan, {})
+    tire = settled(bare, {})
     made: list[Reading] = []
 
     def hold(name: str, load: int, rotation: str, estimate: Estimate | None, true: float) -> None:
