@@ -8,10 +8,11 @@ normal equations, solved in the tangent plane). Whatever moves a condition moves
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from toolkit.characteristics.direction import CHANNELS, Channel, Direction
 from toolkit.characteristics.scatter import Scatter, weights_of
 from toolkit.characteristics.shared import Shared
 from toolkit.characteristics.uncertain import Part, Uncertain, merged
@@ -22,25 +23,8 @@ from toolkit.tires.evaluate import estimate_at, slope_at, slope_estimate_at, val
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from toolkit.characteristics.groups import Group
-    from toolkit.characteristics.model import DirectionFit
-    from toolkit.tires.model import CurveFit
 
-Channel = Literal["FY", "MZ"]
-CHANNELS: tuple[Channel, Channel] = ("FY", "MZ")
 UNIT = {"FY": "N", "MZ": "N*m"}
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Direction:
-    """One direction's conditions and curves at one load; a curve is None where it could not be fitted."""
-
-    group: Group
-    fit: DirectionFit
-
-    def curve(self, channel: Channel) -> CurveFit | None:
-        """Return the fitted curve of a channel."""
-        return self.fit.FY if channel == "FY" else self.fit.MZ
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from toolkit.characteristics.direction import CHANNELS, Channel, Direction
 from toolkit.characteristics.groups import group
 from toolkit.characteristics.pull import pull
-from toolkit.characteristics.reading import CHANNELS, Channel, Direction, Reader
+from toolkit.characteristics.reading import Reader
 from toolkit.characteristics.scatter import Scatter, scatter_of
 from toolkit.characteristics.shared import Shared
 from toolkit.characteristics.stiffness import stiffness

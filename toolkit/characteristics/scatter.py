@@ -23,6 +23,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from toolkit.characteristics.direction import CHANNELS, Channel, Direction
 from toolkit.reduction.common_load import at_one_angle, slopes
 from toolkit.tires.catalog import model
 from toolkit.tires.evaluate import slope_at, value_at
@@ -30,11 +31,8 @@ from toolkit.tires.evaluate import slope_at, value_at
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from toolkit.characteristics.reading import Channel, Direction
-
     Array = NDArray[np.float64]
 
-_CHANNELS: tuple[Channel, Channel] = ("FY", "MZ")
 _ENOUGH = 24  # residual freedoms from which on the variances of load and slip angle are told apart
 _STEPS, _SETTLED = 60, 1e-6
 _FLOOR = 1e-24  # of max|y|^2: rounding of conditions without noise
@@ -122,11 +120,11 @@ def scatter_of(directions: Sequence[Direction]) -> Scatter:
 def _sensitivities(directions: Sequence[Direction]) -> dict[tuple[float, str], Sensitivity]:
     every = [(one, place) for one in directions for place in range(len(one.group.conditions))]
     groups = at_one_angle([one.group.conditions[place] for one, place in every])
-    by_load: dict[Channel, dict[tuple[int, int], float]] = {channel: {} for channel in _CHANNELS}
+    by_load: dict[Channel, dict[tuple[int, int], float]] = {channel: {} for channel in CHANNELS}
     for members in groups:
         pairs = [every[index] for index in members]
         FZ = np.array([one.group.conditions[place].FZ for one, place in pairs])
-        for channel in _CHANNELS:
+        for channel in CHANNELS:
             y = np.array([one.group.values(channel)[place] for one, place in pairs])
             for (one, place), load, value, slope in zip(pairs, FZ, y, slopes(FZ, y), strict=True):
                 steep = value / load if slope is None else slope.value
@@ -135,7 +133,7 @@ def _sensitivities(directions: Sequence[Direction]) -> dict[tuple[float, str], S
     for one in directions:
         SA = one.group.SA
         rows: dict[Channel, Array] = {}
-        for index, channel in enumerate(_CHANNELS):
+        for index, channel in enumerate(CHANNELS):
             fit = one.curve(channel)
             made = np.zeros((4, len(SA)))
             made[index] = 1.0
@@ -151,7 +149,7 @@ def _scale(directions: Sequence[Direction], sensitivities: Mapping[tuple[float, 
     # and slip angle moves FY by as much.
     size = [
         max((float(np.max(np.abs(one.group.values(c)))) for one in directions), default=1.0) or 1.0
-        for c in _CHANNELS
+        for c in CHANNELS
     ]
     steep = [
         max((float(np.max(np.abs(one.by_channel["FY"][k]))) for one in sensitivities.values()), default=0.0)
@@ -174,7 +172,7 @@ class _Residuals:
         SA = one.group.SA
         n = len(SA)
         left, rest, known, moved = [], [], [], []
-        for index, channel in enumerate(_CHANNELS):
+        for index, channel in enumerate(CHANNELS):
             fit = one.curve(channel)
             if fit is None:
                 continue
