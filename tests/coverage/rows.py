@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.stats import beta
@@ -29,6 +30,10 @@ class CoverageRow:
     rms_ratio: float
     median_width_ratio: float | None = None
 
+    def without_widths(self) -> CoverageRow:
+        """Return the row with the share alone: of intervals that have no standard uncertainty."""
+        return replace(self, rms_ratio=math.nan, median_width_ratio=None)
+
     @property
     def share(self) -> float:
         """The share of the intervals that held the truth, not a number where there was none."""
@@ -51,10 +56,14 @@ def row_of(
     name: str, condition: str, *, errors: Sequence[float], u: Sequence[float], U: Sequence[float]
 ) -> CoverageRow:
     """Return the row of estimates with their errors, standard uncertainties and half widths (n,) each."""
+    if not len(errors):
+        return CoverageRow(
+            name=name, condition=condition, n=0, covered=0, low=0.0, high=1.0, rms_ratio=math.nan
+        )
     e, s, half = (np.asarray(one, dtype=float) for one in (errors, u, U))
     covered = int(np.sum(np.abs(e) <= half))
     low, high = exact_interval(covered, len(e))
-    needed = float(np.quantile(np.abs(e), 0.95)) if len(e) else float("nan")
+    needed = float(np.quantile(np.abs(e), 0.95))
     return CoverageRow(
         name=name,
         condition=condition,
@@ -62,7 +71,7 @@ def row_of(
         covered=covered,
         low=low,
         high=high,
-        rms_ratio=float(np.sqrt(np.mean((e / s) ** 2))) if len(e) else float("nan"),
+        rms_ratio=float(np.sqrt(np.mean((e / s) ** 2))),
         median_width_ratio=float(np.median(half)) / needed if needed > 0 else None,
     )
 
@@ -72,10 +81,14 @@ def as_table(rows: Sequence[CoverageRow]) -> str:
     head = ("what", "drawn", "n", "covers %", "95 % of it", "rms error / u", "median U / needed")
     lines = ["| " + " | ".join(head) + " |", "|" + "---|" * len(head)]
     for one in rows:
-        width = "" if one.median_width_ratio is None else f"{one.median_width_ratio:.2f}"
-        cells = (
-            one.name, one.condition, str(one.n), f"{100 * one.share:.1f}",
-            f"{100 * one.low:.1f} to {100 * one.high:.1f}", f"{one.rms_ratio:.2f}", width,
-        )  # fmt: skip
+        share = limits = ratio = width = ""
+        if one.n:
+            share = f"{100 * one.share:.1f}"
+            limits = f"{100 * one.low:.1f} to {100 * one.high:.1f}"
+        if not math.isnan(one.rms_ratio):
+            ratio = f"{one.rms_ratio:.2f}"
+        if one.median_width_ratio is not None:
+            width = f"{one.median_width_ratio:.2f}"
+        cells = (one.name, one.condition, str(one.n), share, limits, ratio, width)
         lines.append("| " + " | ".join(cells) + " |")
     return "\n".join(lines)

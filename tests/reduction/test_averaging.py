@@ -10,7 +10,7 @@ import pytest
 
 from toolkit.machine import load_machine
 from toolkit.recording.model import Recording, Series
-from toolkit.reduction.averaging import free_radius_m, means, window
+from toolkit.reduction.averaging import free_radius_m, means, turning, window
 from toolkit.reduction.blocks import Block
 
 M15 = load_machine("m15")
@@ -123,3 +123,25 @@ def test_one_row_and_constant_rows() -> None:
     assert (single.value, single.sd, single.u) == (3.0, 0.0, 0.0)
     (constant,) = means(np.full((1, 50), 3.0))
     assert (constant.value, constant.u) == (3.0, 0.0)
+
+
+def test_what_the_rows_follow_is_no_error_of_their_mean() -> None:
+    """A swing of the load and of the tire's own turn, over one turn, on rows of noise 2."""
+    rng = np.random.default_rng(6)
+    phase = 2 * np.pi * np.arange(100) / 100
+    load = 4000.0 + 30.0 * np.cos(phase / 4 + 0.3)
+    swing = 1.5 * (load - load.mean()) + 40.0 * np.cos(phase + 1.0) + 10.0 * np.sin(2 * phase)
+    rows = rng.normal(5.0, 2.0, (400, 100)) + swing
+    explained = np.vstack([load, turning(100, 1.0)])
+    found, bare = means(rows, explained=explained), means(rows)
+    assert [one.value for one in found] == [one.value for one in bare]
+    assert [one.sd for one in found] == [one.sd for one in bare]
+    stated = np.sqrt(np.mean([one.u**2 for one in found]))
+    assert stated == pytest.approx(0.2, rel=0.12)  # 2 / sqrt(100)
+    assert np.mean([one.u for one in bare]) > 20 * stated
+
+
+def test_a_turn_that_is_not_whole_explains_nothing() -> None:
+    assert turning(100, None).shape == turning(100, 0.6).shape == turning(100, 1.1).shape == (0, 100)
+    assert turning(100, 2.0).shape == (4, 100)
+    np.testing.assert_allclose(turning(100, 2.0).mean(axis=1), 0.0, atol=1e-15)

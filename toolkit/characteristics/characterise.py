@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Literal, cast
 import numpy as np
 
 from toolkit.channels import Rotation
+from toolkit.characteristics.direction import Direction
 from toolkit.characteristics.groups import Group, group
 from toolkit.characteristics.model import (
     AtAngle,
@@ -19,7 +20,6 @@ from toolkit.characteristics.model import (
     Stiffness,
 )
 from toolkit.characteristics.pull import NAMES as PULL
-from toolkit.characteristics.reading import Direction
 from toolkit.characteristics.rows import BOTH, Row, directions_of, point_u, rows_of
 from toolkit.characteristics.shared import shared_of
 from toolkit.characteristics.stiffness import NAMES as STIFFNESS

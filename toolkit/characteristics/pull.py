@@ -21,7 +21,8 @@ plysteer, and cancel in conicity.
 
 from __future__ import annotations
 
-from toolkit.characteristics.reading import CHANNELS, Reader
+from toolkit.characteristics.direction import CHANNELS
+from toolkit.characteristics.reading import Reader
 from toolkit.characteristics.uncertain import Uncertain, weighted
 
 NAMES = (

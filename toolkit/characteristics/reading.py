@@ -7,13 +7,15 @@ normal equations, solved in the tangent plane). Whatever moves a condition moves
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from toolkit.characteristics.direction import CHANNELS, Channel, Direction
+from toolkit.characteristics.scatter import Scatter, weights_of
 from toolkit.characteristics.shared import Shared
-from toolkit.characteristics.uncertain import Part, Uncertain, merged, weighted
+from toolkit.characteristics.uncertain import Part, Uncertain, merged
 from toolkit.estimate import Estimate
 from toolkit.tires.catalog import model
 from toolkit.tires.evaluate import estimate_at, slope_at, slope_estimate_at, value_at, zero_crossing
@@ -21,34 +23,29 @@ from toolkit.tires.evaluate import estimate_at, slope_at, slope_estimate_at, val
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from toolkit.characteristics.groups import Group
-    from toolkit.characteristics.model import DirectionFit
-    from toolkit.tires.model import CurveFit
 
-Channel = Literal["FY", "MZ"]
-CHANNELS: tuple[Channel, Channel] = ("FY", "MZ")
 UNIT = {"FY": "N", "MZ": "N*m"}
-# Singular values of the scaled derivatives below this part of the largest are directions without data.
-_NO_DATA = 1e-8
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Direction:
-    """One direction's conditions and curves at one load; a curve is None where it could not be fitted."""
-
-    group: Group
-    fit: DirectionFit
-
-    def curve(self, channel: Channel) -> CurveFit | None:
-        """Return the fitted curve of a channel."""
-        return self.fit.FY if channel == "FY" else self.fit.MZ
+class _Reading:
+    # One channel's reading: its value with the u of the curve's own covariance, d reading / d condition, and
+    # what the slip angle's zero and scale do to it.
+    channel: Channel
+    estimate: Estimate
+    weights: NDArray[np.float64]
+    angle: tuple[Part, ...]
 
 
 class Reader:
-    """Reads one direction; what its conditions share is computed once."""
+    """Reads one direction; what its conditions share is computed once.
 
-    def __init__(self, direction: Direction, *, shared: Shared) -> None:
-        self.direction, self.shared = direction, shared
+    ``scatter`` is that of the conditions about all curves of the test; without it each curve's own
+    covariance stands for it, as for a table whose rows follow one another.
+    """
+
+    def __init__(self, direction: Direction, *, shared: Shared, scatter: Scatter | None = None) -> None:
+        self.direction, self.shared, self.scatter = direction, shared, scatter
         self.group = direction.group
         conditions = self.group.conditions
         self._calibration = {c: shared.calibration_rows(c, conditions) for c in CHANNELS}
@@ -70,17 +67,20 @@ class Reader:
 
     def value(self, channel: Channel, SA: float) -> Uncertain | None:
         """Return the curve's value at a slip angle [rad]; None without a curve."""
+        reading = self._value(channel, SA)
+        return None if reading is None else self._read(reading, f"value at {SA:.9g}")
+
+    def _value(self, channel: Channel, SA: float) -> _Reading | None:
         fit = self.direction.curve(channel)
         if fit is None:
             return None
         slope = float(slope_at(fit, SA))
         gradient = model(fit.model).jacobian(fit.values, SA)
-        return self._read(
-            channel,
-            estimate_at(fit, SA),
-            self._weights(channel, fit, gradient),
-            f"value at {SA:.9g}",
-            self.shared.angle_parts(slope, slope * SA),
+        return _Reading(
+            channel=channel,
+            estimate=estimate_at(fit, SA),
+            weights=self._weights(channel, gradient),
+            angle=tuple(self.shared.angle_parts(slope, slope * SA)),
         )
 
     def slope(self, channel: Channel) -> Uncertain | None:
@@ -93,13 +93,9 @@ class Reader:
         # A zero of the slip angle moves along the curve to where its slope is another one.
         step = 1e-4
         bend = (float(slope_at(fit, step)) - float(slope_at(fit, -step))) / (2 * step)
-        return self._read(
-            channel,
-            one,
-            self._weights(channel, fit, gradient),
-            "slope at 0",
-            self.shared.angle_parts(bend, one.value),
-        )
+        angle = tuple(self.shared.angle_parts(bend, one.value))
+        weights = self._weights(channel, gradient)
+        return self._read(_Reading(channel=channel, estimate=one, weights=weights, angle=angle), "slope at 0")
 
     def secant(self, channel: Channel) -> Uncertain | None:
         """Return (y(1 deg) - y(-1 deg)) / 2 deg [per rad] from the measured steps.
@@ -127,15 +123,17 @@ class Reader:
         slope = float(weights @ y) / span
         # What an error of the angle does to the two ends, by the slopes there; by the chord without a curve.
         ends = (slope, slope) if fit is None else slope_at(fit, np.array([one, -one])).tolist()
-        # The zero of the slip angle cancels in the span; what is left of the angle is its scatter.
-        scatter = np.array([c.sd_SA for c in self.group.conditions])
-        parts = [
-            *self.shared.angle_parts((ends[0] - ends[1]) / span, (ends[0] + ends[1]) / 2),
-            self._own(channel, "slip angle scatter", "secant", slope * _norm(weights * scatter) / span),
-        ]
+        parts = list(self.shared.angle_parts((ends[0] - ends[1]) / span, (ends[0] + ends[1]) / 2))
+        if fit is None or self.scatter is None:
+            # The zero of the slip angle cancels in the span; what is left of the angle is its scatter, which
+            # the scatter about the curves has in it.
+            scatter = np.array([c.sd_SA for c in self.group.conditions])
+            u = slope * _norm(weights * scatter) / span
+            parts.append(self._own(channel, "slip angle scatter", "secant", u))
         u = _norm(weights * self.group.own_u(channel)) / span
         estimate = Estimate(value=slope, u=u, unit=f"{UNIT[channel]}/rad")
-        return self._read(channel, estimate, weights / span, "secant", parts)
+        reading = _Reading(channel=channel, estimate=estimate, weights=weights / span, angle=tuple(parts))
+        return self._read(reading, "secant")
 
     def chord(self, channel: Channel) -> Uncertain | None:
         """Return the +-1 deg secant [per rad] off the curve alone, for data without steps of a protocol."""
@@ -152,20 +150,21 @@ class Reader:
         u = float(np.sqrt(max(float(gradient @ np.asarray(fit.covariance) @ gradient), 0.0)))
         dof = estimate_at(fit, 0.0).dof
         estimate = Estimate(value=slope, u=u, unit=f"{UNIT[channel]}/rad", dof=dof)
-        parts = self.shared.angle_parts((right - left) / (2 * one), (right + left) / 2)
-        return self._read(channel, estimate, self._weights(channel, fit, gradient), "chord", parts)
+        angle = tuple(self.shared.angle_parts((right - left) / (2 * one), (right + left) / 2))
+        weights = self._weights(channel, gradient)
+        return self._read(_Reading(channel=channel, estimate=estimate, weights=weights, angle=angle), "chord")
 
     def moment_without_force(self) -> Uncertain | None:
         """Return MZ where the direction's own FY is zero: the residual aligning torque.
 
         An error of FY moves the angle at which it is read, by dMZ/dFY along the curves; a zero of the slip
-        angle moves both curves alike and cancels.
+        angle moves both curves alike and cancels, as does the slip angle of a single block.
         """
         FY = self.direction.curve("FY")
         crossing = None if FY is None or not self.covers_zero() else zero_crossing(FY)
         if FY is None or crossing is None:
             return None
-        moment, force = self.value("MZ", crossing.value), self.value("FY", crossing.value)
+        moment, force = self._value("MZ", crossing.value), self._value("FY", crossing.value)
         fit = self.direction.curve("MZ")
         if moment is None or force is None or fit is None:
             return None
@@ -173,46 +172,41 @@ class Reader:
         if not stiffness:
             return None
         ratio = float(slope_at(fit, crossing.value)) / stiffness
-        # Their sum has the value of MZ alone: FY is zero there but for rounding.
-        moved = Uncertain(value=0.0, unit=moment.unit, parts=force.parts)
-        return weighted([(1.0, moment), (-ratio, moved)])
+        return self._read(moment, "MZ without FY", (-ratio, force))
 
-    def _weights(self, channel: Channel, fit: CurveFit, gradient: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _weights(self, channel: Channel, gradient: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return d reading / d condition (conditions,)."""
         if channel not in self._pseudo:
-            jacobian = model(fit.model).jacobian(fit.values, self.group.SA)
-            free = np.array([p.name not in fit.at_bound for p in fit.parameters])
-            size = np.linalg.norm(jacobian, axis=1) * free
-            scale = np.where(size > 0, 1 / np.where(size > 0, size, 1.0), 0.0)
-            pseudo = np.linalg.pinv((jacobian * scale[:, None]).T, rcond=_NO_DATA)
-            self._pseudo[channel] = scale[:, None] * pseudo
+            self._pseudo[channel] = weights_of(self.direction, channel)
         return np.asarray(gradient @ self._pseudo[channel])
 
-    def _read(
-        self,
-        channel: Channel,
-        estimate: Estimate,
-        weights: NDArray[np.float64],
-        what: str,
-        more: list[Part],
-    ) -> Uncertain:
-        shared = self.shared
-        rows = _norm(weights * self.group.own_u(channel))
-        # The fit's residuals hold the scatter of the rows already; where a curve follows its points more
-        # closely than their own scatter allows, the scatter stands. Never both.
-        rest = float(np.sqrt(max(estimate.u**2 - rows**2, 0.0)))
-        return Uncertain(
-            value=estimate.value,
-            unit=estimate.unit,
-            parts=merged([
-                *shared.calibration_parts(channel, self._calibration[channel] @ weights),
-                *shared.zero_parts(self._zero[channel] @ weights),
-                self._own(channel, "tare", what, _norm(weights * self._tares[channel])),
-                *more,
-                self._own(channel, "repeatability", what, rows),
-                self._own(channel, "fit", what, rest, estimate.dof),
-            ]),
-        )  # fmt: skip
+    def _read(self, first: _Reading, what: str, *more: tuple[float, _Reading]) -> Uncertain:
+        """Return the value of the first reading with all parts of a weighted sum of readings.
+
+        What further readings share with the first, and what one block's errors do to both channels, is
+        added with its sign; their values are zero.
+        """
+        terms = ((1.0, first), *more)
+        channel, shared = first.channel, self.shared
+        weights = {one.channel: factor * one.weights for factor, one in terms}
+        rows = _norm(np.concatenate([w * self.group.own_u(c) for c, w in weights.items()]))
+        tares = _norm(np.concatenate([w * self._tares[c] for c, w in weights.items()]))
+        if self.scatter is not None and all(self.direction.curve(c) is not None for c in weights):
+            rest, dof = self.scatter.of(self.direction, weights)
+        else:
+            # The fit's residuals hold the scatter of the rows already; where a curve follows its points more
+            # closely than their own scatter allows, the scatter stands. Never both.
+            u = _norm(np.array([factor * one.estimate.u for factor, one in terms]))
+            rest, dof = float(np.sqrt(max(u**2 - rows**2, 0.0))), first.estimate.dof
+        parts: list[Part] = []
+        for c, w in weights.items():
+            parts += shared.calibration_parts(c, self._calibration[c] @ w)
+            parts += shared.zero_parts(self._zero[c] @ w)
+        parts.append(self._own(channel, "tare", what, tares))
+        parts += [replace(part, u=factor * part.u) for factor, one in terms for part in one.angle]
+        parts.append(self._own(channel, "repeatability", what, rows))
+        parts.append(self._own(channel, "fit", what, rest, dof))
+        return Uncertain(value=first.estimate.value, unit=first.estimate.unit, parts=merged(parts))
 
     def _own(self, channel: str, source: str, what: str, u: float, dof: float = np.inf) -> Part:
         where = f"{self.shared.test}/{self.group.load_N:.6g}/{self.group.rotation}/{channel}/{what}"

@@ -9,9 +9,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from toolkit.characteristics.direction import CHANNELS, Channel, Direction
 from toolkit.characteristics.groups import group
 from toolkit.characteristics.pull import pull
-from toolkit.characteristics.reading import CHANNELS, Channel, Direction, Reader
+from toolkit.characteristics.reading import Reader
+from toolkit.characteristics.scatter import Scatter, scatter_of
 from toolkit.characteristics.shared import Shared
 from toolkit.characteristics.stiffness import stiffness
 from toolkit.characteristics.uncertain import Part, Uncertain
@@ -54,7 +56,8 @@ def directions_of(reduced: ReducedTest, fits: Sequence[DirectionFit]) -> tuple[D
 def rows_of(directions: Sequence[Direction], *, shared: Shared) -> tuple[Row, ...]:
     """Return every characteristic of a test: pull, stiffness, and FY and MZ at its slip angle steps."""
     steps = {c.step_SA for one in directions for c in one.group.conditions if c.step_SA is not None}
-    readers = [Reader(one, shared=shared) for one in directions]
+    scatter = scatter_of(directions)
+    readers = [Reader(one, shared=shared, scatter=scatter) for one in directions]
     found: list[Row] = []
     for load in sorted({one.group.load_N for one in directions}):
         there = {r.group.rotation: r for r in readers if r.group.load_N == load}
@@ -117,14 +120,15 @@ def _with_load_and_pressure(rows: Sequence[Row], shared: Shared) -> list[Row]:
 def point_u(directions: Sequence[Direction], *, shared: Shared) -> Mapping[tuple[str, int], dict[str, float]]:
     """Return the whole standard uncertainty of every condition as measured: (file, first row) -> channel.
 
-    Sources: the record, the cells' zeros or tares, the scatter of the rows, and through the curve's slopes
-    the slip angle (zero and scale), the load and the pressure.
+    Sources: the record, the cells' zeros or tares, the scatter of the rows and about the curves, and through
+    the curve's slopes the slip angle (zero and scale), the load and the pressure.
     """
     every = [(one, place) for one in directions for place in range(len(one.group.conditions))]
     groups = at_one_angle([one.group.conditions[place] for one, place in every])
+    scatter = scatter_of(directions)
     found: dict[tuple[str, int], dict[str, float]] = {}
     for channel in CHANNELS:
-        squares = _squares(directions, channel, shared)
+        squares = _squares(directions, channel, shared, scatter)
         for members in groups:
             pairs = [every[index] for index in members]
             conditions = [one.group.conditions[place] for one, place in pairs]
@@ -139,7 +143,9 @@ def point_u(directions: Sequence[Direction], *, shared: Shared) -> Mapping[tuple
     return found
 
 
-def _squares(directions: Sequence[Direction], channel: Channel, shared: Shared) -> dict[int, np.ndarray]:
+def _squares(
+    directions: Sequence[Direction], channel: Channel, shared: Shared, scatter: Scatter
+) -> dict[int, np.ndarray]:
     """Return the variance of each condition of each direction but for load and pressure."""
     from toolkit.tires.evaluate import slope_at
 
@@ -158,6 +164,7 @@ def _squares(directions: Sequence[Direction], channel: Channel, shared: Shared) 
         if fit is not None:
             SA = one.group.SA
             slope = slope_at(fit, SA)
+            total = total + scatter.each(one, channel)
             total = total + (slope * shared.SA.u) ** 2 + (slope * SA * shared.SA_scale.relative) ** 2
         found[id(one)] = total
     return found

@@ -7,7 +7,8 @@ passenger tire) because the curve bends.
 
 from __future__ import annotations
 
-from toolkit.characteristics.reading import CHANNELS, Reader
+from toolkit.characteristics.direction import CHANNELS
+from toolkit.characteristics.reading import Reader
 from toolkit.characteristics.uncertain import Uncertain
 
 NAMES = ("secant_cornering", "secant_aligning", "slope_cornering", "slope_aligning")

@@ -83,6 +83,7 @@ def _common(fit: CurveFit | GlobalFit, rotation: str | None) -> dict[str, Any]:
         "dof": fit.dof,
         "parameters": {p.name: p.value for p in fit.parameters},
         "standard_errors": {p.name: p.standard_error for p in fit.parameters},
+        "intervals95": {p.name: p.interval95 for p in fit.parameters},
         "not_determined": list(fit.not_determined),
         "at_bound": list(fit.at_bound),
         "error_percent": fit.error_percent,

@@ -14,9 +14,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from toolkit.channels import signs
+from toolkit.characteristics.direction import CHANNELS, Direction
 from toolkit.characteristics.groups import Group
 from toolkit.characteristics.model import DirectionFit
-from toolkit.characteristics.reading import CHANNELS, Direction, Reader
+from toolkit.characteristics.reading import Reader
 from toolkit.characteristics.rows import Row
 from toolkit.characteristics.shared import Shared
 from toolkit.errors import FitError

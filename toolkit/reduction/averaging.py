@@ -113,12 +113,14 @@ def revolutions(
     return None
 
 
-def means(values: NDArray[np.float64]) -> tuple[Mean, ...]:
+def means(values: NDArray[np.float64], *, explained: NDArray[np.float64] | None = None) -> tuple[Mean, ...]:
     """Return the mean of consecutive rows and its uncertainty, for each channel.
 
     Parameters
     ----------
     values : (channels, rows)
+    explained : (signals, rows) what the rows follow without its being an error of their mean, as the load
+        at which that mean is stated does; what is left about it counts. Few rows are taken as they are.
 
     Notes
     -----
@@ -130,12 +132,44 @@ def means(values: NDArray[np.float64]) -> tuple[Mean, ...]:
     average = values.mean(axis=1)
     if n < 2:
         return tuple(Mean(value=value, sd=0.0, u=0.0) for value in average.tolist())
-    rest = values - average[:, None]
+    whole = values - average[:, None]
+    sd = np.sqrt(np.einsum("ij,ij->i", whole, whole) / (n - 1))
+    rest, used = _unexplained(whole, explained)
     squares = np.einsum("ij,ij->i", rest, rest)
     products = np.einsum("ij,ij->i", rest[:, 1:], rest[:, :-1])
-    sd = np.sqrt(squares / (n - 1))
+    noise = np.minimum(np.sqrt(squares / (n - 1 - used)), sd)
     rho = np.clip(products / np.where(squares > 0, squares, 1.0), 0.0, 0.999)
-    u = np.minimum(sd * np.sqrt((1 + rho) / (1 - rho) / n), sd)
+    u = np.minimum(noise * np.sqrt((1 + rho) / (1 - rho) / n), noise)
     return tuple(
         Mean(value=v, sd=s, u=w) for v, s, w in zip(*np.stack([average, sd, u]).tolist(), strict=True)
     )
+
+
+def turning(rows: int, revolutions: float | None) -> NDArray[np.float64]:
+    """Return the first two harmonics of the tire's revolution (4, rows), none where its turns are not whole.
+
+    Over whole revolutions a non-uniformity of the tire has no mean: its swing is no error.
+    """
+    turns = round(revolutions or 0.0)
+    if revolutions is None or turns < 1 or abs(revolutions - turns) > _WHOLE:
+        return np.zeros((0, rows))
+    phase = 2 * np.pi * turns * np.arange(rows) / rows
+    return np.stack([wave(order * phase) for order in (1, 2) for wave in (np.cos, np.sin)])
+
+
+def _unexplained(
+    rest: NDArray[np.float64], explained: NDArray[np.float64] | None
+) -> tuple[NDArray[np.float64], int]:
+    """Return what signals leave of rows about their mean (channels, rows), and the freedoms that it took."""
+    count = 0 if explained is None else len(explained)
+    if explained is None or not count or rest.shape[1] < _ROWS_EACH * (count + 1):
+        return rest, 0
+    centred = explained - explained.mean(axis=1, keepdims=True)
+    basis, size, _ = np.linalg.svd(centred.T, full_matrices=False)
+    basis = basis[:, size > _NO_SIGNAL * max(float(size[0]), 1e-300)]
+    return rest - (rest @ basis) @ basis.T, basis.shape[1]
+
+
+_WHOLE = 0.02  # of a turn
+_ROWS_EACH = 8  # rows that each signal takes at least
+_NO_SIGNAL = 1e-9

@@ -65,8 +65,10 @@ def slopes(FZ: NDArray[np.float64], y: NDArray[np.float64]) -> tuple[Slope | Non
     Returns
     -------
     one entry a block; None where the file has one load only. Inside: the slope of the parabola through
-    the block and both neighbours; at an end the same parabola's slope there. The uncertainty is that of a
-    rectangle between the two secants (GUM 4.3.7); with two blocks, half the secant itself.
+    the block and both neighbours; at an end the same parabola's slope there; with five blocks or more that of
+    the cubic through one block more. The uncertainty is that of a rectangle (GUM 4.3.7) as wide to either
+    side as what the polynomial of the next order would change, with three blocks one between the two
+    secants; with two blocks it is half the secant itself.
 
     Examples
     --------
@@ -85,12 +87,30 @@ def slopes(FZ: NDArray[np.float64], y: NDArray[np.float64]) -> tuple[Slope | Non
         return (one, one)
     for place, block in enumerate(order):
         middle = min(max(place, 1), n - 2)
-        left, right = secants[middle - 1], secants[middle]
-        bend = (right - left) / (x[middle + 1] - x[middle - 1])
-        # Newton's form of the parabola through the three, differentiated at the block itself.
-        value = left + bend * ((x[place] - x[middle - 1]) + (x[place] - x[middle]))
-        found[block] = Slope(value=float(value), u=float(abs(right - left)) / (2 * np.sqrt(3)))
+        terms = _terms(x, values, _nodes(x, place, middle))
+        # The parabola ends with the second term, the cubic with the third.
+        last = 3 if n >= 5 else 2
+        u = abs(terms[last]) if n > 3 else abs(secants[middle] - secants[middle - 1]) / 2
+        found[block] = Slope(value=float(sum(terms[:last])), u=float(u) / np.sqrt(3))
     return tuple(found)
+
+
+def _nodes(x: NDArray[np.float64], place: int, middle: int) -> list[int]:
+    """Return up to five blocks in the order in which a polynomial at one of them takes them up."""
+    nodes = [place, *(i for i in (middle - 1, middle, middle + 1) if i != place)]
+    rest = sorted(set(range(len(x))) - set(nodes), key=lambda i: abs(x[i] - x[place]))
+    return nodes + rest[:2]
+
+
+def _terms(x: NDArray[np.float64], y: NDArray[np.float64], nodes: Sequence[int]) -> list[float]:
+    """Return what each order of Newton's polynomial adds to the slope at its first node."""
+    at, table = x[nodes], y[nodes]
+    terms, product = [], 1.0
+    for order in range(1, len(nodes)):
+        table = np.diff(table) / (at[order:] - at[:-order])
+        terms.append(float(table[0]) * product)
+        product *= float(at[0] - at[order])
+    return terms
 
 
 def carry(value: float, u: float, *, slope: Slope | None, delta_FZ: float) -> tuple[float, float]:

@@ -13,7 +13,7 @@ from toolkit.calibration.records.use import not_asked
 from toolkit.channels import Reversal, Rotation, seen_by_cells, signs
 from toolkit.reduction import protocol as plan
 from toolkit.reduction import remarks
-from toolkit.reduction.averaging import Window, means
+from toolkit.reduction.averaging import Window, means, turning
 from toolkit.reduction.cells import physics_findings
 from toolkit.reduction.common_load import at_one_angle, carry, slopes
 from toolkit.reduction.corrections import correction_findings
@@ -159,7 +159,12 @@ def _condition(
 ) -> Condition:
     recording, rows = file.recording, chosen.rows
     sign = signs(machine.axes, "SAE", seen_by_cells(file.rotation, reversal))
-    SA, FZ, FY, MZ = means(file.channels[:, rows])
+    load = file.channels[1, rows]
+    SA, FZ = means(file.channels[:2, rows])
+    # FY and MZ follow the load at which their means are stated, and the tire's own turn has no mean.
+    turns = _revolutions(chosen, machine)
+    explained = np.vstack([load / max(abs(FZ.value), 1e-300), turning(len(load), turns)])
+    FY, MZ = means(file.channels[2:, rows], explained=explained)
     zero = {"FY": 0.0, "MZ": 0.0}
     cells = file.indications[:, rows].mean(axis=1)
     if file.tare.u:
@@ -194,6 +199,16 @@ def _condition(
         used=True,
         calibration_sha256=record.sha256,
     )
+
+
+def _revolutions(chosen: Window, machine: Machine) -> float | None:
+    """Return the tire's revolutions that a window spans; None where they are not known to be the tire's."""
+    protocol = machine.protocol
+    if protocol.revolutions_of != "tire" or chosen.short:
+        return None
+    if chosen.revolutions is None:
+        return protocol.average_revolutions if protocol.acquisition == "after_settling" else None
+    return chosen.revolutions
 
 
 def _acquired(recording: Recording, symbol: str, rows: slice, sign: int) -> float | None:

@@ -207,6 +207,12 @@ def _estimate(value: Any, u: Any, dof: Any, unit: Any) -> Estimate | None:
     return Estimate(value=number(value), u=number(u), dof=number(dof), unit=str(unit))
 
 
+def _interval(row: Row) -> tuple[float | None, float | None] | None:
+    # Files of earlier versions have no such columns.
+    low, high = optional(row.get("low_95")), optional(row.get("high_95"))
+    return None if low is None and high is None else (low, high)
+
+
 def _fit(row: Row, parameters: list[Row], covariances: dict[tuple[str, str], float]) -> CurveFit:
     hints = get_type_hints(CurveFit)
     given: Row = {}
@@ -226,6 +232,7 @@ def _fit(row: Row, parameters: list[Row], covariances: dict[tuple[str, str], flo
                 unit=str(one["unit"]),
                 standard_error=optional(one["standard_error"]),
                 dof=optional(one["dof"]),
+                interval95=_interval(one),
             )
             for one in parameters
         ),

@@ -190,10 +190,11 @@ def _parts(estimate: Estimate | None) -> list[Any]:
 
 
 def _parameters(result: TestResult) -> Rows:
-    yield ("fit", "parameter", "value", "standard_error", "dof", "unit")
+    yield ("fit", "parameter", "value", "standard_error", "dof", "low_95", "high_95", "unit")
     for index, (_, _, fit) in enumerate(_all_fits(result)):
         for one in fit.parameters:
-            yield (index, one.name, one.value, one.standard_error, one.dof, one.unit)
+            low, high = one.interval95 or (None, None)
+            yield (index, one.name, one.value, one.standard_error, one.dof, low, high, one.unit)
 
 
 def _covariances(result: TestResult) -> Rows:

@@ -242,7 +242,9 @@ def _result(
     values = found.theta[i] * factor
     values[4] -= middle
     covariance = found.covariance[i] * np.outer(factor, factor)
-    errors = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    errors = found.error[i] * np.abs(factor)
+    ends = found.ends[i] * factor[:, None]
+    ends[4] -= middle
     names = [spec.name for spec in MODEL.parameters]
     determined, bound = found.determined[i], found.at_bound[i]
     unit = CHANNEL_UNIT[curve.channel]
@@ -271,9 +273,10 @@ def _result(
                 unit=spec.unit_of(curve.channel),
                 standard_error=float(error) if ok else None,
                 dof=own if ok else None,
+                interval95=_interval(low, high),
             )
-            for spec, value, error, ok, own in zip(
-                MODEL.parameters, values, errors, determined, dof[:6], strict=True
+            for spec, value, error, ok, own, (low, high) in zip(
+                MODEL.parameters, values, errors, determined, dof[:6], ends.tolist(), strict=True
             )
         ),
         covariance=tuple(tuple(row) for row in covariance.tolist()),
@@ -287,6 +290,12 @@ def _result(
         converged=converged,
         message=_message(curve, values, converged, not_determined, at_bound, time),
     )
+
+
+def _interval(low: float, high: float) -> tuple[float | None, float | None] | None:
+    # Open where a bound alone ends it.
+    ends = tuple(end if np.isfinite(end) else None for end in (low, high))
+    return None if ends == (None, None) else (ends[0], ends[1])
 
 
 def _message(

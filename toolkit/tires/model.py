@@ -52,7 +52,9 @@ class Parameter:
     """A fitted parameter. ``standard_error`` is None where the data do not determine it.
 
     ``dof`` are the degrees of freedom of the error, infinite where the noise was known: an interval of 95 %
-    is Student's t for them times the error. None where there is no error.
+    is Student's t for them times the error. None where there is no error. ``interval95`` is the interval of
+    95 % itself, with or without an error, not always symmetric; an end is None where only the parameter's
+    bound ends it, and the whole is None where both are or the fit gives no such interval.
     """
 
     name: str
@@ -60,6 +62,7 @@ class Parameter:
     unit: str
     standard_error: float | None
     dof: float | None = None
+    interval95: tuple[float | None, float | None] | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -1,13 +1,19 @@
-"""Which parameters the data determine, and how well: linear propagation, held against the model itself.
+"""How well the data determine each parameter: an interval that holds, and whether it is worth showing.
 
-All is asked of the 95 % interval that a standard error stands for. A parameter is determined where
+Intervals of 95 % start from linear propagation and are held against the model itself: with a parameter held
+at either end and all else fitted again, the curve must have moved as far as the parabola of the cost says;
+where it has moved less, that end moves out. Another minimum that the noise cannot tell from the lowest lies
+within the interval. A standard error is the half width of the interval over its coverage factor: the linear
+one where model and noise are straight enough, a larger one else.
 
-- it is not at a bound, and its interval lies within the bounds,
-- the interval's half width is at most half of what is natural for it: B, C and D themselves, 1.25 - E, half
-  the range of slip angle for Sh, max|y| for Sv,
-- the model is straight enough over it: with the parameter held at either end and all else fitted again,
-  the curve has moved as far as the linear propagation says,
-- no other minimum that the noise cannot tell from the lowest lies outside it.
+A parameter is determined where
+
+- it is not at a bound,
+- rows like these would determine it on a curve of the usual shape (`usual_shape`): the half width of its
+  interval there lies within the bounds and is at most half of what is natural for it: B, C and D themselves,
+  1.25 - E, half the range of slip angle for Sh, max|y| for Sv. Asked at the estimate instead, the answer
+  would depend on the error: what is shown would be what happens to look sharp, and cover 70 to 85 %,
+- its own interval's half width is not beyond what is natural for it.
 
 Only the model, the places of the rows and the size of the noise are asked, never the residuals: less noise
 determines more. Rows of a 100 Hz sweep repeat themselves: `colour` says what information that leaves.
@@ -36,6 +42,7 @@ from toolkit.tires.kernel import (
 )
 from toolkit.tires.models.magic_formula import jacobian, slope, slope_jacobian, value
 from toolkit.tires.solver import compress
+from toolkit.tires.usual_shape import at_usual_shape
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -44,18 +51,21 @@ if TYPE_CHECKING:
     from toolkit.tires.kernel import Array
     from toolkit.tires.solver import Solution
 
-_PARABOLA = (0.5, 3.0)  # of the expected rise of the cost: below, an interval would be too narrow to be true
+_PARABOLA = 0.7  # of the expected rise of the cost: below, an interval would be too narrow to be true
+_STRAIGHT = (0.25, 6.0)  # the same at the usual shape, where a parameter may be determined
+_LEAST_RISE = 1e-2  # of it: an end goes no further out at once
 _INSIDE = 0.98  # normalised: SA = 0 must lie between the rows
 _REFITS = 2  # steps by which all else is fitted again where one parameter is held
 _WIDE = 0.5  # half width of an interval, of what is natural: beyond, the data say next to nothing
-_SAME = 1e-6  # normalised parameters that differ by less are one
+_IDLE = 1.0  # the same at the estimate: beyond, an interval says nothing
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Spread:
     """Per curve, in normalised parameters (B, C, D, E, h, Sv): what the data say about each.
 
-    ``theta`` (curves, 6); ``covariance`` (curves, 6, 6); ``determined`` ``at_bound`` (curves, 6);
+    ``theta`` (curves, 6); ``covariance`` (curves, 6, 6); ``determined`` ``at_bound`` (curves, 6); ``ends``
+    (curves, 6, 2) of the intervals of 95 %, NaN where the bounds alone end one; ``error`` (curves, 6);
     ``slope`` ``value`` at SA = 0 with their standard errors, NaN where not determined (curves,); ``dof``
     (curves, 8) degrees of freedom of the errors of the six, of slope and of value.
     """
@@ -64,6 +74,8 @@ class Spread:
     covariance: Array
     determined: NDArray[np.bool_]
     at_bound: NDArray[np.bool_]
+    ends: Array
+    error: Array
     slope: Array
     slope_se: Array
     value: Array
@@ -106,17 +118,37 @@ def spread(solution: Solution, problems: Problems, *, zero: Array, noise: Noise)
         )
         dof[noise.coloured] = noise.dof_of(asked[noise.coloured])
         factor[noise.coloured] = np.vectorize(coverage_factor)(dof[noise.coloured])
-    half = factor[:, :6] * np.sqrt(np.maximum(np.einsum("pii->pi", covariance), 0.0))
-    inside = (theta - half >= low) & (theta + half <= high)
-    natural = np.ones_like(theta)
-    natural[:, :3], natural[:, 3] = np.abs(theta[:, :3]), E_TOP - theta[:, 3]
+    linear = np.sqrt(np.maximum(np.einsum("pii->pi", covariance), 0.0))
+    half = factor[:, :6] * linear
+    coarse = compress(problems)
+    alone = plain / noise.variance[:, None, None]
+    rise = _rise(theta, alone, half, coarse, low, high)
     rival = (solution.excess <= (common * common * largest)[:, None])[..., None]
-    outside = np.abs(solution.rivals - theta[:, None, :]) > half[:, None, :] + _SAME
-    determined = ~at_bound & inside & (half <= _WIDE * natural) & ~(rival & outside).any(axis=1)
-    determined &= _straight(theta, plain / noise.variance[:, None, None], half, compress(problems), low, high)
+    sides = _sides(half, rise, np.where(rival, solution.rivals - theta[:, None, :], 0.0))
+    ends = np.stack([theta - sides[0], theta + sides[1]], axis=-1)
+    closed = np.stack([ends[..., 0] > low + margin, ends[..., 1] < high - margin], axis=-1)
+    wide = 0.5 * (np.minimum(sides[0], theta - low) + np.minimum(sides[1], high - theta))
+    # Student's t of one degree of freedom has no spread that an error could be.
+    determined = ~at_bound & (wide <= _IDLE * _natural(theta)) & (dof[:, :6] > 1)
+    # Autocorrelation widens an interval at the usual shape by as much as at the estimate.
+    colour = linear / np.sqrt(np.maximum(np.einsum("pii->pi", plain), 1e-300))
+    usual = at_usual_shape(theta, coarse, low, high)
+    there = _columns(usual, coarse)
+    width = _box(usual, problems)[2]
+    asked = _inverse(
+        there @ there.transpose(0, 2, 1) / noise.variance[:, None, None]
+        + np.eye(6) / (width * width)[:, :, None]
+    )
+    reach = factor[:, :6] * colour * np.sqrt(np.maximum(np.einsum("pii->pi", asked), 0.0))
+    determined &= (usual - reach >= low) & (usual + reach <= high) & (reach <= _WIDE * _natural(usual))
+    bent = _rise(usual, asked / noise.variance[:, None, None], reach, coarse, low, high)
+    # B, C and E move together along a ridge that bends; D and the shifts do not.
+    straight = ((bent >= _STRAIGHT[0]) & (bent <= _STRAIGHT[1])).all(axis=0)
+    determined &= straight | np.array([False, False, True, False, True, True])
     # Rows of one sign leave the shifts to the model, and all else moves with them: of the few intervals that
     # would pass three quarters cover.
     determined &= (np.abs(zero) <= _INSIDE)[:, None]
+    closed &= (np.abs(zero) <= _INSIDE)[:, None, None]
     # Beyond the data a curve is an extrapolation of the model, whatever its covariance says.
     # Slope and value need rows on both sides: at their end the linear interval covers 85 % and not 95 %.
     slope_ok = (np.abs(zero) <= 0.95) & (factor[:, 6] * slope_se <= _WIDE * np.abs(at_zero))
@@ -126,6 +158,8 @@ def spread(solution: Solution, problems: Problems, *, zero: Array, noise: Noise)
         covariance=covariance,
         determined=determined,
         at_bound=at_bound,
+        ends=np.where(closed, ends, np.nan),
+        error=np.maximum(wide / factor[:, :6], 0.0),
         slope=at_zero,
         slope_se=np.where(slope_ok, slope_se, np.nan),
         value=level,
@@ -155,18 +189,32 @@ def _box(theta: Array, problems: Problems) -> tuple[Array, Array, Array]:
     return low, high, width
 
 
-def _straight(
-    theta: Array, inverse: Array, half: Array, problems: Problems, low: Array, high: Array
-) -> NDArray[np.bool_]:
-    # Has the curve moved as far as the linear propagation says, at both ends of every parameter's interval,
-    # all else fitted again? (curves, 6). Bin means serve for long curves: their rows' places count, not
-    # their values, for the curve is held against itself.
+def _natural(theta: Array) -> Array:
+    # What is natural for each parameter (curves, 6).
+    natural = np.ones_like(theta)
+    natural[:, :3], natural[:, 3] = np.abs(theta[:, :3]), E_TOP - theta[:, 3]
+    return natural
+
+
+def _sides(half: Array, rise: Array, away: Array) -> tuple[Array, Array]:
+    # How far intervals reach below and above (curves, 6): as far as the cost rises as it should, and to every
+    # other minimum ``away`` (curves, rivals, 6) that the noise cannot tell from the lowest.
+    further = np.sqrt(np.maximum(_PARABOLA / np.maximum(rise, _LEAST_RISE), 1.0))
+    below = np.maximum(half * further[1], -away.min(axis=1))
+    above = np.maximum(half * further[0], away.max(axis=1))
+    return below, above
+
+
+def _rise(theta: Array, inverse: Array, half: Array, problems: Problems, low: Array, high: Array) -> Array:
+    # How far the curve has moved, of what the linear propagation says, at both ends of every parameter's
+    # interval, all else fitted again: (above and below, curves, 6). Bin means serve for long curves: their
+    # rows' places count, not their values, for the curve is held against itself.
     curves = len(theta)
     own = np.maximum(np.einsum("pii->pi", inverse), 1e-300)
     # Along its own row of the inverse normal matrix a parameter moves with all else where the parabola wants
     # it, and the cost rises by the square of its move over its own entry.
     step = inverse * (half / own)[:, :, None]
-    # Where rounding leaves no interval the cost cannot rise as it should: not determined.
+    # Where rounding leaves no interval the cost cannot rise as it should.
     expected = np.where(half > 0, half * half / own, np.inf)
     moved = np.stack([theta[:, None] + step, theta[:, None] - step])  # (ends, curves, held, 6)
     moved = np.clip(moved, low[:, None], high[:, None]).reshape(-1, 6)
@@ -192,9 +240,8 @@ def _straight(
         new_cost = np.vecdot(new, new)
         better = new_cost < cost
         moved[better], residual[better], cost[better] = trial[better], new[better], new_cost[better]
-    rise = cost.reshape(2, curves, 6) / expected
-    fair: NDArray[np.bool_] = ((rise >= _PARABOLA[0]) & (rise <= _PARABOLA[1])).all(axis=0)
-    return fair
+    rise: Array = cost.reshape(2, curves, 6) / expected
+    return rise
 
 
 def _columns(theta: Array, problems: Problems) -> Array:

@@ -1,0 +1,241 @@
+"""How conditions scatter about the curves of a test: three variances, by restricted likelihood.
+
+The rows of a block say how sure their own mean is, and no more: a drum's run-out that the filter delays, a
+load that creeps, a steering that comes to rest elsewhere are the same in every row of the block. They differ
+from block to block, and that is seen about the curves. The error of a condition i beyond that of its rows is
+
+    channel:  a          load of the block:  dy/dFZ_i b          slip angle of the block:  dy/dSA_i c
+
+with a for FY and for MZ, and b and c that move both channels of a block together. Their variances are those
+of the largest restricted likelihood (Patterson and Thompson, Biometrika 58 (1971) 545) of the residuals of
+all curves at once, by scoring with non-negative variances; a single curve has seven degrees of freedom and
+its own variance says little. At zero slip FY hardly follows the load, and an error of the load is not taken
+for one of conicity. Degrees of freedom are Satterthwaite's, from the information on the variances.
+
+What a curve's form misses stands among the residuals too and widens ``a``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from toolkit.characteristics.direction import CHANNELS, Channel, Direction
+from toolkit.reduction.common_load import at_one_angle, slopes
+from toolkit.tires.catalog import model
+from toolkit.tires.evaluate import slope_at, value_at
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    Array = NDArray[np.float64]
+
+_ENOUGH = 24  # residual freedoms from which on the variances of load and slip angle are told apart
+_STEPS, _SETTLED = 60, 1e-6
+_FLOOR = 1e-24  # of max|y|^2: rounding of conditions without noise
+# Singular values of the scaled derivatives below this part of the largest are directions without data.
+_NO_DATA = 1e-8
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Sensitivity:
+    """What one direction's conditions are moved by: (sources, conditions) for each channel.
+
+    Sources: FY, MZ [1], the load of a block [N/N, N·m/N], its slip angle [N/rad, N·m/rad].
+    """
+
+    by_channel: Mapping[Channel, Array]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Scatter:
+    """Variances (4,) of the sources of `Sensitivity` [N², N²m², N², rad²] and their covariance (4, 4).
+
+    ``directions`` has the sensitivities of each direction by its load and rotation.
+    """
+
+    variances: Array
+    covariance: Array
+    directions: Mapping[tuple[float, str], Sensitivity]
+
+    def of(self, direction: Direction, weights: Mapping[Channel, Array]) -> tuple[float, float]:
+        """Return u and degrees of freedom of a weighted sum of a direction's conditions."""
+        squares = self._squares(direction, weights)
+        variance = float(squares @ self.variances)
+        if variance <= 0:
+            return 0.0, np.inf
+        own = float(squares @ self.covariance @ squares)
+        return float(np.sqrt(variance)), max(2 * variance**2 / own, 1.0) if own > 0 else np.inf
+
+    def each(self, direction: Direction, channel: Channel) -> Array:
+        """Return the variance of each condition of a direction (conditions,)."""
+        sensitivity = self.directions[direction.group.load_N, direction.group.rotation]
+        return np.asarray(self.variances @ sensitivity.by_channel[channel] ** 2)
+
+    def _squares(self, direction: Direction, weights: Mapping[Channel, Array]) -> Array:
+        # One error of a block moves both channels: their weighted sensitivities add before they are squared.
+        sensitivity = self.directions[direction.group.load_N, direction.group.rotation]
+        moved = sum(sensitivity.by_channel[channel] * w for channel, w in weights.items())
+        return np.asarray(np.sum(np.square(moved), axis=1))
+
+
+def weights_of(direction: Direction, channel: Channel) -> Array:
+    """Return d parameter / d condition (6, conditions) of a direction's curve: J^+ of its free parameters."""
+    fit = direction.curve(channel)
+    if fit is None:
+        raise ValueError(f"there is no curve of {channel} to weigh conditions by")
+    jacobian = model(fit.model).jacobian(fit.values, direction.group.SA)
+    free = np.array([p.name not in fit.at_bound for p in fit.parameters])
+    size = np.linalg.norm(jacobian, axis=1) * free
+    scale = np.where(size > 0, 1 / np.where(size > 0, size, 1.0), 0.0)
+    pseudo = np.linalg.pinv((jacobian * scale[:, None]).T, rcond=_NO_DATA)
+    return np.asarray(scale[:, None] * pseudo)
+
+
+def scatter_of(directions: Sequence[Direction]) -> Scatter:
+    """Return the scatter of the conditions of a test about all its curves."""
+    sensitivities = _sensitivities(directions)
+    scale = _scale(directions, sensitivities)
+    curves = [
+        _Residuals.of(one, sensitivities[one.group.load_N, one.group.rotation], scale)
+        for one in directions
+        if one.fit.FY is not None or one.fit.MZ is not None
+    ]
+    freedoms = sum(len(one.z) for one in curves)
+    free = np.array([True, True, freedoms >= _ENOUGH, freedoms >= _ENOUGH])
+    free &= np.array([
+        any(float(np.trace(one.parts[k])) > _SETTLED * len(one.z) for one in curves) for k in range(4)
+    ]) if curves else False  # fmt: skip
+    variances, covariance = _restricted(curves, free)
+    return Scatter(
+        variances=variances * scale**2,
+        covariance=covariance * np.outer(scale**2, scale**2),
+        directions=sensitivities,
+    )
+
+
+def _sensitivities(directions: Sequence[Direction]) -> dict[tuple[float, str], Sensitivity]:
+    every = [(one, place) for one in directions for place in range(len(one.group.conditions))]
+    groups = at_one_angle([one.group.conditions[place] for one, place in every])
+    by_load: dict[Channel, dict[tuple[int, int], float]] = {channel: {} for channel in CHANNELS}
+    for members in groups:
+        pairs = [every[index] for index in members]
+        FZ = np.array([one.group.conditions[place].FZ for one, place in pairs])
+        for channel in CHANNELS:
+            y = np.array([one.group.values(channel)[place] for one, place in pairs])
+            for (one, place), load, value, slope in zip(pairs, FZ, y, slopes(FZ, y), strict=True):
+                steep = value / load if slope is None else slope.value
+                by_load[channel][id(one), place] = float(steep)
+    found: dict[tuple[float, str], Sensitivity] = {}
+    for one in directions:
+        SA = one.group.SA
+        rows: dict[Channel, Array] = {}
+        for index, channel in enumerate(CHANNELS):
+            fit = one.curve(channel)
+            made = np.zeros((4, len(SA)))
+            made[index] = 1.0
+            made[2] = [by_load[channel][id(one), place] for place in range(len(SA))]
+            made[3] = 0.0 if fit is None else slope_at(fit, SA)
+            rows[channel] = made
+        found[one.group.load_N, one.group.rotation] = Sensitivity(by_channel=rows)
+    return found
+
+
+def _scale(directions: Sequence[Direction], sensitivities: Mapping[tuple[float, str], Sensitivity]) -> Array:
+    # What each source is measured in, so that all are of one size: max|y| of the channels, and what of load
+    # and slip angle moves FY by as much.
+    size = [
+        max((float(np.max(np.abs(one.group.values(c)))) for one in directions), default=1.0) or 1.0
+        for c in CHANNELS
+    ]
+    steep = [
+        max((float(np.max(np.abs(one.by_channel["FY"][k]))) for one in sensitivities.values()), default=0.0)
+        for k in (2, 3)
+    ]
+    return np.array([*size, *(size[0] / one if one else 1.0 for one in steep)])
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Residuals:
+    # Of one direction, in the space that its curves leave: residuals z (f,), what its rows and the way to the
+    # common load explain (f, f), and what each source would (4, f, f); values in parts of max|y|.
+    z: Array
+    rows: Array
+    parts: Array
+
+    @classmethod
+    def of(cls, one: Direction, sensitivity: Sensitivity, scale: Array) -> _Residuals:
+        """Project the residuals of both channels out of their curves' tangent planes."""
+        SA = one.group.SA
+        n = len(SA)
+        left, rest, known, moved = [], [], [], []
+        for index, channel in enumerate(CHANNELS):
+            fit = one.curve(channel)
+            if fit is None:
+                continue
+            jacobian = model(fit.model).jacobian(fit.values, SA)
+            hat = jacobian.T @ weights_of(one, channel)
+            values, vectors = np.linalg.eigh((hat + hat.T) / 2)
+            left.append(vectors[:, values < 0.5].T)
+            y = one.group.values(channel)
+            rest.append((y - value_at(fit, SA)) / scale[index])
+            known.append((one.group.own_u(channel) / scale[index]) ** 2 + _FLOOR)
+            moved.append(sensitivity.by_channel[channel] * scale[:, None] / scale[index])
+        count = len(left)
+        K = np.zeros((sum(len(part) for part in left), count * n))
+        row = 0
+        for place, part in enumerate(left):
+            K[row : row + len(part), place * n : (place + 1) * n] = part
+            row += len(part)
+        # Each source is one variable a condition: FY and MZ of a block share it.
+        parts = []
+        for k in range(4):
+            columns = np.vstack([np.diag(one[k]) for one in moved])
+            through = K @ columns
+            parts.append(through @ through.T)
+        return cls(z=K @ np.concatenate(rest), rows=(K * np.concatenate(known)) @ K.T, parts=np.array(parts))
+
+
+def _restricted(curves: Sequence[_Residuals], free: NDArray[np.bool_]) -> tuple[Array, Array]:
+    """Return the variances of the largest restricted likelihood (4,) and their covariance (4, 4)."""
+    from scipy.optimize import nnls
+
+    variances, covariance = np.zeros(4), np.zeros((4, 4))
+    chosen = np.flatnonzero(free)
+    if not len(curves) or not len(chosen):
+        return variances, covariance
+    total = sum(float(one.z @ one.z) for one in curves) / sum(len(one.z) for one in curves)
+    variances[chosen] = total / len(chosen)
+    for _ in range(_STEPS):
+        information, right = _score(curves, variances, chosen)
+        size = 1 / np.sqrt(np.maximum(np.diag(information), 1e-300))
+        lower = np.linalg.cholesky(information * np.outer(size, size) + 1e-10 * np.eye(len(chosen)))
+        found = nnls(lower.T, np.linalg.solve(lower, right * size))[0] * size
+        change = np.abs(found - variances[chosen]).max()
+        variances[chosen] = found
+        if change <= _SETTLED * found.max():
+            break
+    active = np.flatnonzero(variances > 0)
+    if len(active):
+        information, _ = _score(curves, variances, active)
+        size = 1 / np.sqrt(np.diag(information))
+        unit = information * np.outer(size, size)
+        covariance[np.ix_(active, active)] = np.linalg.pinv(unit, hermitian=True) * np.outer(size, size)
+    return variances, covariance
+
+
+def _score(curves: Sequence[_Residuals], variances: Array, chosen: NDArray[np.intp]) -> tuple[Array, Array]:
+    # The information on the variances, and the right side whose solution is the next step of scoring.
+    information, right = np.zeros((len(chosen), len(chosen))), np.zeros(len(chosen))
+    for one in curves:
+        V = one.rows + np.einsum("k,kij->ij", variances, one.parts)
+        inverse = np.linalg.inv(V)
+        through = inverse @ one.parts[chosen]
+        weighted = inverse @ one.z
+        information += 0.5 * np.einsum("kij,lji->kl", through, through)
+        right += 0.5 * np.einsum("i,kij,j->k", weighted, one.parts[chosen], weighted)
+        right -= 0.5 * np.einsum("kij,ji->k", through, inverse @ one.rows)
+    return information, right
