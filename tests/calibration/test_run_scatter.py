@@ -213,6 +213,29 @@ def test_check_loads_without_their_zero_are_refused(
     assert not list(tmp_path.glob("cal/*/*.json"))
 
 
+def test_what_one_run_cannot_tell_may_be_stated(make_session: Callable[..., Path], tmp_path: Path) -> None:
+    """C = s^2 (X'X)^-1 + zero^2 C_z + gain^2 C_g: one run's zero moves the intercept, its gain the slopes."""
+    tail = "[between_runs.FY]\nzero = 2.0\ngain = 3.0\nunit = 'N'\n"
+    paths = [make_session(name="plain"), make_session(name="stated", tail=tail)]
+    for path in paths:
+        rows = (path.parent / "loads.csv").read_text()
+        (path.parent / "loads.csv").write_text(re.sub(r"(?m),\d+,(up|down)$", r",1,\1", rows))
+    registry = Registry(tmp_path / "cal")
+    plain, stated = (registry.load(calibrate(path, registry).record.id) for path in paths)
+    before, after = plain.loads[0], stated.loads[0]
+    zero, gain = 2.0 / 4.4482216152605, 3.0 / 4.4482216152605
+    added = np.asarray(after.covariance) - np.asarray(before.covariance)
+    c = np.asarray(before.coefficients) / before.largest
+    wanted = gain**2 * np.outer(c, c)
+    wanted[3, 3] += zero**2
+    assert added == pytest.approx(wanted, rel=1e-6, abs=1e-9 * wanted.max())
+    loads = stored_loads(registry.folder, stated)
+    assert loads is not None
+    part = calibration_budget(stated, loads, None, "FY").component("reproducibility")
+    assert (part.type, part.u) == ("B", pytest.approx(np.hypot(zero, gain), rel=1e-9))
+    assert stated.loads[1].scatter is None
+
+
 def test_one_run_keeps_the_covariance_of_independent_rows(
     make_session: Callable[..., Path], tmp_path: Path
 ) -> None:

@@ -106,10 +106,11 @@ def _data_findings(session: Session) -> list[Finding]:
     rows = table.matrix(names)
     found += _repeated(rows, where)
     factor, group = groups_of(table)
-    if session.method == "ols" and not group.any():
+    if session.method == "ols" and not group.any() and not session_statements(session).between_runs:
         message = (
             f"one {factor}: how {factor}s differ in zero and gain is unknown, and no uncertainty holds it; "
-            f"a second {factor} of the same loads would tell, a third and more tell it better"
+            f"a second {factor} of the same loads would tell, a third and more tell it better; what is known "
+            "from elsewhere goes into [between_runs]"
         )
         found.append(Finding(rule="one-run", where=where, message=message, level="note"))
     if session.check is None:

@@ -25,6 +25,7 @@ from toolkit.calibration.records.scatter import RunScatter
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from toolkit.calibration.session.statements import BetweenRuns
     from toolkit.calibration.session.table import Table
 
 # Rows over which the mean may bend and rows may be correlated: with fewer, both take what is scatter.
@@ -164,6 +165,23 @@ def estimate(rows: SessionRows) -> RunScatter | None:
         factor=rows.factor, groups=groups, within=within, zero=within * zero, gain=within * gain,
         correlation=correlation ** (1 / rows.stride), dof=left,
     )  # fmt: skip
+
+
+def stated_scatter(
+    factor: str, stated: BetweenRuns | None, *, residual_sd: float, dof: int
+) -> RunScatter | None:
+    """Return the scatter of one run and what its session states of the next; None where it states nothing."""
+    if stated is None:
+        return None
+    return RunScatter(
+        factor=factor,
+        groups=1,
+        within=residual_sd,
+        zero=stated.zero,
+        gain=stated.gain,
+        correlation=0.0,
+        dof=dof,
+    )
 
 
 def is_lowest(rows: SessionRows, scatter: RunScatter) -> bool:

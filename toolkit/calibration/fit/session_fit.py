@@ -14,7 +14,7 @@ from toolkit.calibration.fit.diagnostics import Diagnostics, diagnose, replicate
 from toolkit.calibration.fit.gls import fit_gls
 from toolkit.calibration.fit.odr import fit_odr
 from toolkit.calibration.fit.regression import TermFit, fit_loads, fit_terms
-from toolkit.calibration.fit.run_scatter import SessionRows, estimate, groups_of
+from toolkit.calibration.fit.run_scatter import SessionRows, estimate, groups_of, stated_scatter
 from toolkit.calibration.records.scatter import RunScatter, rows_of
 from toolkit.calibration.session.known_errors import KnownErrors, known_errors, row_uncertainty
 from toolkit.calibration.session.settings import wrong
@@ -135,9 +135,14 @@ def _result(
     if session.method == "ols":
         # Other methods are given by the session what every row's uncertainty is, and what rows share.
         design = term_matrix(session.terms, table.columns(session.indications))
-        scatter = estimate(SessionRows.of(design, load, table, session.zero))
+        factor, group = groups_of(table)
+        if group.any():
+            scatter = estimate(SessionRows.of(design, load, table, session.zero))
+        else:
+            stated = session_statements(session).between(setting.name)
+            scatter = stated_scatter(factor, stated, residual_sd=fit.residual_sd, dof=fit.dof)
         if scatter is not None:
-            covariance = rows_of(design, load, groups_of(table)[1]).covariance(scatter)
+            covariance = rows_of(design, load, group).covariance(scatter)
             fit = dataclasses.replace(fit, covariance=covariance)
     residuals, percent = None, None
     if session.check is not None:

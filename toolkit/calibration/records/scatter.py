@@ -35,7 +35,8 @@ class RunScatter:
 
     ``factor`` is what tells the groups of rows apart, run or mounting; ``groups`` their number; ``within``,
     ``zero``, ``gain`` and ``correlation`` as above; ``dof`` the degrees of freedom that are left for
-    ``within`` by the mean and the runs. ``zero`` is 0 by definition where each run has its own zero.
+    ``within`` by the mean and the runs. ``zero`` is 0 by definition where each run has its own zero. Of one
+    group alone ``zero`` and ``gain`` are what the session stated.
     """
 
     factor: str
@@ -82,6 +83,8 @@ class Rows:
         freedom only. The within part counts rows that correlation leaves independent,
         (1 - phi^2) / (1 + phi^2) of them (Bayley and Hammersley, J. R. Stat. Soc. Suppl. 8 (1946) 184).
         """
+        if scatter.groups < 2:  # as for independent rows; what was stated is known
+            return np.asarray(np.einsum("k,kij->ij", scatter.variances, self.parts(0.0)))
         phi2 = scatter.correlation**2
         within = max(scatter.dof * (1 - phi2) / (1 + phi2), 1.0)
         between = float(max(scatter.groups - 1, 1))

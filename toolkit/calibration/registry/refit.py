@@ -18,10 +18,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolkit.calibration.fit.run_scatter import SessionRows, groups_of, is_lowest
+from toolkit.calibration.fit.run_scatter import SessionRows, groups_of, is_lowest, stated_scatter
 from toolkit.calibration.records.issue import issued_value, term_reach
 from toolkit.calibration.records.scatter import rows_of
 from toolkit.calibration.registry.whitening import Whitener, errors_of, linearise, whitener
+from toolkit.calibration.session.statements import statements_of
 from toolkit.calibration.session.table import Table
 from toolkit.calibration.terms import INTERCEPT, term_matrix
 from toolkit.errors import RecordError
@@ -197,9 +198,18 @@ def scatter_covariance(
     """
     design = term_matrix(one.terms, table.columns(record.indications))
     load = table.column(one.load)
-    if one.scatter is None or not is_lowest(SessionRows.of(design, load, table, record.zero), one.scatter):
+    factor, group = groups_of(table)
+    if group.any():
+        sound = one.scatter is not None and is_lowest(
+            SessionRows.of(design, load, table, record.zero), one.scatter
+        )
+    else:
+        stated = statements_of(record).between(one.load)
+        wanted = stated_scatter(factor, stated, residual_sd=one.residual_sd or 0.0, dof=one.dof or 0)
+        sound = one.scatter == wanted
+    if one.scatter is None or not sound:
         return None
-    return rows_of(design, load, groups_of(table)[1], operator).covariance(one.scatter)
+    return rows_of(design, load, group, operator).covariance(one.scatter)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

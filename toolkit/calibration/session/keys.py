@@ -74,6 +74,11 @@ _UNCERTAINTY = Table(
          lambda value: isinstance(value, str), required=True, rule="no-unit",
      )},
 )  # fmt: skip
+_BETWEEN = Table(
+    {"zero": Value("a standard deviation, zero or more", required=True),
+     "gain": Value("a standard deviation at the largest load, zero or more", required=True),
+     "unit": Value("a unit of the load such as 'N'", is_text, required=True)},
+)  # fmt: skip
 _CELL = Table(
     dict.fromkeys(
         "serial resolution scale excitation shunt_expected shunt_measured shunt_tolerance u "
@@ -116,6 +121,7 @@ SESSION = Table(
                 "uncertainty": Table(_UNCERTAINTY, keyed="loads"),
             }
         ),
+        "between_runs": Table(_BETWEEN, keyed="loads"),
         "cells": Table(_CELL, keyed="indications"),
         "zero": Table(
             {"fit": _ANY, "readings": _READING}, otherwise=Table(_READING.entries, rows=True, otherwise=_ANY)

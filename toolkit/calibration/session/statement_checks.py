@@ -117,6 +117,7 @@ def check_statements(raw: Mapping[str, Any], table: Table, loads: tuple[str, ...
             raise wrong(where, f"cells.{name}.replacement", replacement, "a text: why the cell was replaced")
         shunt_entry(name, cell, scope)
     _check_reference(raw.get("reference", {}), table, where)
+    _check_between(raw.get("between_runs", {}), table, where)
     zero_entries(zero_readings(raw), scope)
     creep_entries(raw.get("creep", []), scope)
     polarity_readings(raw.get("polarity", []), scope)
@@ -172,6 +173,20 @@ def stated(entry: object, text: str, place: str, where: object) -> float:
     if not is_number(value):
         raise wrong(where, place, entry, f"a number in {text}, or {{ value, unit }}")
     return float(value)
+
+
+def _check_between(entries: Mapping[str, Any], table: Table, where: object) -> None:
+    for name, entry in entries.items():
+        place = f"between_runs.{name}"
+        for key in ("zero", "gain"):
+            if not is_number(entry[key]) or entry[key] < 0:
+                raise wrong(where, f"{place}.{key}", entry[key], "a standard deviation, zero or more")
+        found, dimension = (
+            unit(entry["unit"], where=f"{where}: {place}.unit"),
+            unit(table.unit(name)).dimension,
+        )
+        if found.dimension != dimension:
+            raise _other_unit(f"{where}: {place}.unit", found, dimension, repr(table.unit(name)))
 
 
 def _check_reference(reference: Mapping[str, Any], table: Table, where: object) -> None:

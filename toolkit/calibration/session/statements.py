@@ -54,6 +54,18 @@ class ReferenceUncertainty:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class BetweenRuns:
+    """What one run cannot tell: standard deviations of the runs' ``zero`` and ``gain`` (at the largest load).
+
+    Both in the load's unit, known from other sessions of the instrument, from its maker, or judged.
+    """
+
+    load: str
+    zero: float
+    gain: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Reference:
     """The reference standard. ``shared_group`` as written: which loads share its error (see `gls`)."""
 
@@ -118,6 +130,11 @@ class Statements:
     creep: tuple[Mapping[str, Any], ...]
     certificate: Mapping[str, Any]
     preloads: int | None = None
+    between_runs: tuple[BetweenRuns, ...] = ()
+
+    def between(self, load: str) -> BetweenRuns | None:
+        """Return what is stated of a load's differences between runs; None where nothing is."""
+        return next((one for one in self.between_runs if one.load == load), None)
 
     def cell(self, name: str) -> CellStatement:
         """Return one indication's statement."""
@@ -194,7 +211,15 @@ def parse_statements(
         creep=tuple(creep) if isinstance(creep, list) else (),
         certificate=settings.get("certificate", {}),
         preloads=preloads_of(settings, where),
+        between_runs=tuple(
+            _between(name, one, loads[name]) for name, one in settings.get("between_runs", {}).items()
+        ),
     )
+
+
+def _between(load: str, entry: Mapping[str, Any], text: str) -> BetweenRuns:
+    factor = unit(str(entry["unit"])).factor / unit(text).factor
+    return BetweenRuns(load=load, zero=float(entry["zero"]) * factor, gain=float(entry["gain"]) * factor)
 
 
 def _reference(load: str, entry: Mapping[str, Any], text: str, largest: float) -> ReferenceUncertainty:

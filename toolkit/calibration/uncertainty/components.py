@@ -51,7 +51,8 @@ def components_of(
     share = abs(value) / one.largest
     curve = _curve(record, one, scatter, point)
     new = _new_run(scatter, share)
-    total = (curve.variance if one.method == "ols" else 0.0) + scatter.runs.within**2 + new.variance
+    total = (curve.variance if one.method == "ols" else 0.0) + scatter.runs.within**2
+    total += new.variance if scatter.runs.groups > 1 else 0.0
     dof = scatter.dof(curve.gradient + _READING + new.gradient, total)
     return (
         _reference(statements, one, value),
@@ -83,7 +84,7 @@ def _curve(record: CalibrationRecord, one: LoadFit, s: Scatter, point: NDArray[n
     stored = max(float(J @ np.asarray(one.covariance) @ J), 0.0)
     if one.method != "ols":  # it follows from stated uncertainties alone
         return _Variance(variance=stored, gradient=np.zeros(4), dof=math.inf)
-    if s.runs.groups < 2:
+    if one.scatter is None and s.runs.groups < 2:
         share = stored / (one.residual_sd or 1.0) ** 2
         dof = math.inf if one.dof is None else float(one.dof)
         return _Variance(variance=stored, gradient=np.array([share, 0.0, 0.0, 0.0]), dof=dof)
@@ -134,13 +135,16 @@ def _repeatability(s: Scatter) -> Component:
 
 def _reproducibility(s: Scatter, new: _Variance) -> Component:
     runs = s.runs
+    u = math.sqrt(new.variance)
     if runs.groups < 2:
-        return _absent("reproducibility", f"one {runs.factor} tells nothing of the next", "data")
+        if not u:
+            return _absent("reproducibility", f"one {runs.factor} tells nothing of the next", "data")
+        text = f"stated of another {runs.factor}: zero {runs.zero:.3g}, gain {runs.gain:.3g} at full scale"
+        return _part("reproducibility", text, "B", "normal", u, math.inf, "session")
     text = (
         f"between {runs.groups} {runs.factor}s, free of the scatter within: zero {runs.zero:.3g}, "
         f"gain {runs.gain:.3g} at full scale"
     )
-    u = math.sqrt(new.variance)
     return _part("reproducibility", text, "A", "student", u, new.dof, "data", joint=True)
 
 

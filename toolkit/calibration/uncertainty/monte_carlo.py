@@ -192,7 +192,7 @@ def _refits(record: CalibrationRecord, loads: Table, budget: Budget) -> Refit:
     scatter = scatter_of(record, loads, one)
     spread = scatter.rows.parts(scatter.runs.correlation)
     own = np.einsum("k,kij->ij", scatter.runs.variances, spread)
-    root = _root(own if part.joint and scatter.runs.groups > 1 else np.asarray(one.covariance))
+    root = _root(own if part.joint and one.scatter is not None else np.asarray(one.covariance))
 
     def refit(generator: np.random.Generator, size: int, scale: NDArray[np.float64]) -> NDArray[np.float64]:
         moved = generator.standard_normal((size, len(coefficients))) @ root.T
