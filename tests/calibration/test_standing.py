@@ -28,7 +28,9 @@ def two(registry: Registry, make_session: Sessions) -> Registry:
     """hub-r1 in force from 2026-02-01, hub-r2 from 2026-04-01, each decided on its day."""
     calibrate(make_session(hub_data(60, 3), name="later"), registry)
     for record_id, day in (("hub-r1", date(2026, 2, 1)), ("hub-r2", date(2026, 4, 1))):
-        assert approve(registry, record_id, in_force_from=day, checked_by="B", known_on=day).done
+        assert approve(
+            registry, record_id, in_force_from=day, checked_by="B", known_on=day, reason="paper of that day"
+        ).done
     return registry
 
 

@@ -62,7 +62,9 @@ def home(tmp_path_factory: pytest.TempPathFactory) -> Path:
     registry = Registry(folder / "calibrations")
     assert calibrate(session / "SESSION.toml", registry).record.id == REFUSED
     day = dt.date(2026, 3, 3)
-    assert not approve(registry, REFUSED, in_force_from=day, checked_by="B", known_on=day).done
+    assert not approve(
+        registry, REFUSED, in_force_from=day, checked_by="B", known_on=day, reason="paper of that day"
+    ).done
     return folder
 
 

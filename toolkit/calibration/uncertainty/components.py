@@ -106,11 +106,13 @@ def _reference(statements: Statements, one: LoadFit, value: float) -> Component:
     if one.method == "gls" and statements.reference.shared_group is not None:
         text = "held by the fit's covariance: its rows share the reference's error (gls)"
         return _part("reference", text, "B", "normal", 0.0, math.inf, "session")
-    u = float(stated.u_at(np.array(value)))
-    where = "at every load" if stated.relative is None else "of the load"
-    size = f"{stated.U:.4g} {one.unit}" if stated.relative is None else f"{100 * stated.relative:.4g} %"
-    text = f"certificate: U = {size} with k = {stated.k:g}, u = U/k {where}"
-    return _part("reference", text, "B", "normal", u, math.inf, "session")
+    # The error of a standard is one scale, as in all that the record computes (`propagation`).
+    if stated.relative is None:
+        size = f"{stated.U:.4g} {one.unit} at the largest load, in proportion to the load"
+    else:
+        size = f"{100 * stated.relative:.4g} % of the load"
+    text = f"certificate: U = {size}, with k = {stated.k:g}"
+    return _part("reference", text, "B", "normal", stated.u * abs(value) / one.largest, math.inf, "session")
 
 
 def _fit(record: CalibrationRecord, one: LoadFit, point: NDArray[np.float64], curve: _Variance) -> Component:

@@ -7,14 +7,12 @@ differences where they must. Beside the scatter of the fit, which V_fit holds, f
 - *scale*: had the reference applied (1 + e) times the load it states, least squares, linear in the loads,
   would have returned (1 + e) c: every coefficient, the intercept too. So V_scale = u(e)^2 c c^T, and the
   error of a load is e f(x): it grows with the load, is zero at zero load, and stays in every sum that is
-  not zero. u(e) is u(reference) over the largest calibrated load; creep, a part of the load as well, is
-  added to it. A reference stated as a share of the load (``unit = "%"``) has no other error.
-- *offset*: a reference stated as an amount has it at every load, as the budget reads it too: of its error
-  u (a l + b sqrt(1 - l^2)) at a share l of the largest load the first part is the scale, and the second,
-  2/3 u^2 in the mean over the range, an offset. A stated uncertainty of an indication, and the drift of its
-  zero over the session, are taken as one shift common to all rows of a test. V_offset has them on the
-  intercept: they cancel in slopes and in differences, and with a tare where the record's intercept does
-  (``zero = "included"``).
+  not zero. u(e) is u(reference) over the largest calibrated load, where the stated U is meant, whether it
+  was stated as an amount or as a share of the load; the budget reads it so too. Creep, a part of the load as
+  well, is added to it.
+- *offset*: a stated uncertainty of an indication, and the drift of its zero over the session, are taken as
+  one shift common to all rows of a test: V_offset has them on the intercept. It cancels in slopes and in
+  differences, and with a tare where the record's intercept does (``zero = "included"``).
 
 Loads are taken one at a time. A shared reference (``shared_group``) makes the scale errors of two loads the
 same, and a cell's shift moves both; that matters to a sum of forces with moments only. The fits' scatter is
@@ -45,10 +43,6 @@ if TYPE_CHECKING:
     from toolkit.calibration.session.statements import Statements
 
 
-# Mean of 1 - l^2 over the shares l of the largest load, from 0 to 1.
-_MEAN_SQUARE_OFF_SCALE = 2 / 3
-
-
 def record_covariance(record: CalibrationRecord) -> dict[str, NDArray[np.float64]]:
     """Return load -> covariance of its coefficients (terms, terms), with what the session stated.
 
@@ -69,22 +63,15 @@ def scale_u(record: CalibrationRecord, one: LoadFit, statements: Statements) -> 
 
 
 def offset_u(record: CalibrationRecord, one: LoadFit, statements: Statements) -> float:
-    """Return the standard uncertainty of a shift of all rows [the unit of the load].
-
-    It is made by the reference standard's amount, the cells and their zeros.
-    """
-    reference = statements.reference.of(one.load)
-    counted = one.method == "gls" and statements.reference.shared_group is not None
-    amount = 0.0 if reference is None or counted or reference.relative is not None else reference.u
-    amount *= math.sqrt(_MEAN_SQUARE_OFF_SCALE)
+    """Return the standard uncertainty of a shift of all rows [the unit of the load]: cells, zeros."""
     stated = [cell.u or 0.0 for cell in statements.cells]
     drift = zero_drift(record)
     if not any(stated) and isinstance(drift, str):
-        return amount
+        return 0.0
     middle = [((c.minimum or 0.0) + (c.maximum or 0.0)) / 2 for c in record.cells]
     slope = sensitivities(record, one, middle)
     moved = 0.0 if isinstance(drift, str) else float(slope @ np.asarray(drift)) / math.sqrt(3.0)
-    return math.hypot(amount, float(np.linalg.norm(slope * np.asarray(stated))), moved)
+    return math.hypot(float(np.linalg.norm(slope * np.asarray(stated))), moved)
 
 
 def _covariance(record: CalibrationRecord, one: LoadFit, statements: Statements) -> NDArray[np.float64]:
