@@ -34,13 +34,14 @@ HIGHEST_POWER = 4
 MOST_GROUPS = 60
 MOST_ROWS = 2000
 _DENSE = 800
-_LARGEST_RATIO = 1e3
+# Beyond it products of zeros leave nothing of the scatter within runs in double precision.
+_LARGEST_RATIO = 1e4
 _LARGEST_CORRELATION = 0.97
 # None begins at 0: the deviance is even in a ratio, hence level there whatever lies beyond.
-_GRID = (0.03, 0.3, 0.6, 0.9)
+_GRID = (0.03, 0.4, 1.5, 6.0, 40.0, 1000.0)
 _CORRELATIONS = (0.1, 0.4, 0.8)
 _DEPENDENT = 1e-9
-_STEP = 1e-7
+_STEP = 1e-5
 # Scatter below this share of the largest load is rounding, which has no runs.
 ROUNDING = 1e-13
 # Fall of the deviance from which rows count as correlated: chi-square, one-sided 5 %.
@@ -49,7 +50,8 @@ CORRELATED = 2.71
 # tenth of a standard error makes.
 _NEIGHBOUR = 0.01
 _GAIN = 0.01
-_SAME = 1e-6
+_SAME = 1e-4
+_MOST_STEPS = 1000
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -196,10 +198,9 @@ def is_lowest(rows: SessionRows, scatter: RunScatter) -> bool:
     correlation = scatter.correlation**rows.stride
     ratios = np.array([scatter.zero / scatter.within, scatter.gain / scatter.within, correlation])
     low, high = np.array(rows.bounds).T
-    if (ratios < low).any() or (ratios > high).any():
+    if (ratios < low).any() or (ratios > high * (1 + _SAME)).any():
         return False
-    steps = _NEIGHBOUR * np.maximum(ratios, 1.0) * np.vstack([np.zeros((1, 3)), np.eye(3), -np.eye(3)])
-    deviance, variance = problem.deviance(np.clip(ratios + steps, low, high))
+    deviance, variance = problem.deviance(_neighbours(ratios, rows.bounds))
     allowed = np.array([_GAIN, _GAIN, _GAIN if correlation else CORRELATED])
     return bool(
         abs(scatter.within / (size * math.sqrt(float(variance[0]))) - 1) <= _SAME
@@ -319,7 +320,7 @@ def _lowest(problem: _Problem, bounds: list[tuple[float, float]]) -> tuple[float
     alone, without = _search(problem, [*bounds[:2], (0.0, 0.0)], [_GRID, _GRID, (0.0,)])
     if not bounds[2][1]:
         return alone
-    near = [(max(ratio / (1 + ratio), _GRID[0]),) for ratio in alone[:2]]
+    near = [(max(ratio, _GRID[0]),) for ratio in alone[:2]]
     together, lowest = _search(problem, bounds, [*near, _CORRELATIONS])
     return together if lowest < without - CORRELATED else alone
 
@@ -329,17 +330,17 @@ def _search(
 ) -> tuple[tuple[float, float, float], float]:
     """Return the ratios of lowest deviance and that deviance, from the best point of a grid of ``starts``.
 
-    A ratio of standard deviations r is searched as r / (1 + r): half of the way is where runs differ by as
-    much as the rows of a run do.
+    A ratio of standard deviations r is searched as ln(1 + r): zeros of untared bridges differ by thousands
+    of times the noise.
     """
     from scipy.optimize import Bounds, minimize
 
     low, high = np.array(bounds).T
-    top = np.array([high[0] / (1 + high[0]), high[1] / (1 + high[1]), high[2]])
+    top = np.append(np.log1p(high[:2]), high[2])
 
     def ratios(values: NDArray[np.float64]) -> NDArray[np.float64]:
         clipped = np.clip(values, low, top)
-        return np.column_stack([clipped[:, :2] / (1 - clipped[:, :2]), clipped[:, 2]])
+        return np.column_stack([np.expm1(clipped[:, :2]), clipped[:, 2]])
 
     def slope(values: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]:
         # Inwards at an upper end: beyond it nothing is computed.
@@ -347,18 +348,37 @@ def _search(
         near = problem.deviance(ratios(values + np.vstack([np.zeros((1, 3)), np.diag(step)])))[0]
         return float(near[0]), (near[1:] - near[0]) / step
 
-    axes = [np.unique(np.minimum(start, end)) for start, end in zip(starts, top, strict=True)]
+    scales = [np.log1p(starts[0]), np.log1p(starts[1]), np.asarray(starts[2])]
+    axes = [np.unique(np.minimum(start, end)) for start, end in zip(scales, top, strict=True)]
     grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
     start = grid[int(np.argmin(problem.deviance(ratios(grid))[0]))]
-    found = minimize(slope, start, jac=True, bounds=Bounds(low, top), method="L-BFGS-B").x
+    found = minimize(
+        slope, start, jac=True, bounds=Bounds(low, top), method="L-BFGS-B", options={"ftol": 1e-13}
+    ).x
     # A ratio that is not told apart from none is none.
     candidates = np.vstack(
         [np.where(found < _GRID[0], 0.0, found), *np.where(np.eye(3, dtype=bool), 0.0, found), found, start]
     )
-    deviance = problem.deviance(ratios(candidates))[0]
-    best = int(np.argmin(deviance))
-    zero, gain, correlation = ratios(candidates)[best].tolist()
-    return (zero, gain, correlation), float(deviance[best])
+    points = ratios(candidates)
+    best = points[int(np.argmin(problem.deviance(points)[0]))]
+    lowest = float(problem.deviance(best[None])[0][0])
+    # Rounding may end a search early: what a stored optimum is held to is reached by steps of that size.
+    for _ in range(_MOST_STEPS):
+        near = _neighbours(best, bounds)
+        deviance = problem.deviance(near)[0]
+        at = int(np.argmin(deviance))
+        if deviance[at] > lowest - _GAIN / 2:
+            break
+        best, lowest = near[at], float(deviance[at])
+    zero, gain, correlation = best.tolist()
+    return (zero, gain, correlation), lowest
+
+
+def _neighbours(ratios: NDArray[np.float64], bounds: list[tuple[float, float]]) -> NDArray[np.float64]:
+    """Return a point and those a hundredth beside it within the bounds (7, 3)."""
+    low, high = np.array(bounds).T
+    steps = _NEIGHBOUR * np.maximum(ratios, 1.0) * np.vstack([np.zeros((1, 3)), np.eye(3), -np.eye(3)])
+    return np.clip(ratios + steps, low, high)
 
 
 def _sample(group: NDArray[np.int64]) -> tuple[NDArray[np.int64], int]:

@@ -43,12 +43,13 @@ class Scatter:
     misfit_dof: int
 
     def dof(self, gradient: NDArray[np.float64], variance: float) -> float:
-        """Return Satterthwaite's degrees of freedom of a variance, 2 u^4 / Var(u^2).
+        """Return Satterthwaite's degrees of freedom of a variance, 2 u^4 / Var(u^2), one at least.
 
-        ``gradient`` (4,) is d u^2 by within^2, zero^2, gain^2 and the correlation.
+        ``gradient`` (4,) is d u^2 by within^2, zero^2, gain^2 and the correlation. Two runs differ in one
+        number; less than that the formula gives where it takes a variance for about none.
         """
         uncertain = float(gradient @ self.spread @ gradient)
-        return 2 * variance**2 / uncertain if uncertain > 0 else float("inf")
+        return max(2 * variance**2 / uncertain, 1.0) if uncertain > 0 else float("inf")
 
 
 def scatter_of(record: CalibrationRecord, loads: Table, one: LoadFit) -> Scatter:
