@@ -13,7 +13,8 @@ from calibration_factory import hub_data
 from numpy.typing import NDArray
 from uncertainty_factory import record_of_table, table_of
 
-from toolkit.calibration.fit.run_scatter import Mean, SessionRows, estimate, is_lowest, spread
+from toolkit.calibration.fit.run_scatter import estimate, is_lowest, spread
+from toolkit.calibration.fit.session_rows import Mean, SessionRows
 from toolkit.calibration.records.scatter import RunScatter, rows_of
 from toolkit.calibration.registry.candidate import calibrate
 from toolkit.calibration.registry.refit import check_reproduces

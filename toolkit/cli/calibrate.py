@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -106,13 +107,16 @@ def _payload(made: Candidate, status: str) -> dict[str, Any]:
 
     loads = {}
     for one in made.fit.loads:
-        fit, more = one.fit, one.diagnostics
+        # Of a session that is recorded already the record's own figures hold, whatever a fit gives today.
+        fit, more, kept = one.fit, one.diagnostics, record.load(one.setting.name)
         loads[one.setting.name] = {
             "unit": one.setting.unit,
             "indication_units": dict(zip(record.indications, record.indication_units, strict=True)),
             "coefficients": dict(zip(fit.terms, fit.coefficients, strict=True)),
-            "issued": dict(zip(fit.terms, record.load(one.setting.name).issued, strict=True)),
-            "standard_errors": dict(zip(fit.terms, fit.standard_errors.tolist(), strict=True)),
+            "issued": dict(zip(fit.terms, kept.issued, strict=True)),
+            "standard_errors": dict(zip(fit.terms, kept.standard_errors, strict=True)),
+            "covariance_model": kept.covariance_model,
+            "scatter": None if kept.scatter is None else asdict(kept.scatter),
             "residual_sd": fit.residual_sd,
             "dof": fit.dof,
             "condition_number": made.fit.condition_number,
@@ -147,12 +151,12 @@ def _text(made: Candidate, status: str) -> str:
         f"file   {made.path}" + ("  (not written: a dry run)" if status == NOT_ENTERED else ""),
     ]
     for one in made.fit.loads:
-        issued = record.load(one.setting.name).issued
+        kept = record.load(one.setting.name)
         units = dict(zip(record.indications, record.indication_units, strict=True))
         rows = [
             [term, f"{c:.10g}", f"{i:.8g}", round_uncertainty(u), _per(term, one.setting.unit, units)]
             for term, c, i, u in zip(
-                one.fit.terms, one.fit.coefficients, issued, one.fit.standard_errors, strict=True
+                one.fit.terms, one.fit.coefficients, kept.issued, kept.standard_errors, strict=True
             )
         ]
         check = "no check loads" if one.check_max_percent_fs is None else (
@@ -164,6 +168,7 @@ def _text(made: Candidate, status: str) -> str:
             table(["term", "coefficient", "issued", "std error", "unit"], rows, align="<>>><"),
             f"residual sd {one.fit.residual_sd:.3g} {one.setting.unit}, {one.fit.dof} degrees of freedom, "
             f"lower limit factor {one.llf:.3g} {one.setting.unit}; {check}",
+            *([kept.scatter_words] if kept.scatter_words else []),
         ]
     lines += ["", f"condition number of the indications {made.fit.condition_number:.3g}"]
     if made.findings:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 from toolkit.cli.console import table
@@ -32,6 +33,8 @@ def described(record: CalibrationRecord, registry: Path) -> tuple[dict[str, Any]
             "coefficients": dict(zip(one.terms, one.coefficients, strict=True)),
             "issued": dict(zip(one.terms, one.issued, strict=True)),
             "standard_errors": dict(zip(one.terms, errors, strict=True)) if one.covariance else None,
+            "covariance_model": one.covariance_model,
+            "scatter": None if one.scatter is None else asdict(one.scatter),
             "residual_sd": one.residual_sd,
             "dof": one.dof,
             "n": one.n,
@@ -70,6 +73,9 @@ def _figures(one: LoadFit, miss: float | None) -> list[str]:
         f"{one.method}, {one.n} rows, {one.dof} degrees of freedom, "
         f"range {_range(one.minimum, one.maximum, one.unit)}, residual sd {one.residual_sd:.4g} {one.unit}"
     ]
+    lines.append(f"standard errors by: {one.covariance_model}")
+    if one.scatter_words is not None:
+        lines.append(one.scatter_words)
     if one.tolerance is not None:
         told = "no check loads" if miss is None else f"check loads off by at most {miss:.4g} {one.unit}"
         lines.append(f"{told}, tolerance {one.tolerance:.4g} {one.unit}")

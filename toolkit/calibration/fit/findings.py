@@ -15,8 +15,8 @@ from toolkit.calibration.fit.diagnostics import replicate_groups
 from toolkit.calibration.fit.levels import lack_of_fit, load_levels
 from toolkit.calibration.fit.recommend import NEGLIGIBLE_PERCENT, recommend_drop, recommend_wider
 from toolkit.calibration.fit.robust import hidden_outliers, robust_weights
-from toolkit.calibration.fit.run_scatter import groups_of
 from toolkit.calibration.fit.session_fit import session_statements
+from toolkit.calibration.fit.session_rows import groups_of
 from toolkit.calibration.session.known_errors import undeclared_standard
 from toolkit.calibration.session.settings import DEFAULT_TOLERANCE
 from toolkit.findings import Finding

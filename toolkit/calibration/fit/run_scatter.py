@@ -1,9 +1,6 @@
 """Restricted likelihood of a session's scatter: within runs, between their zeros and between their gains.
 
-The model is that of `records.scatter`. Its mean holds, beside the terms of the equation, what a curve may
-miss smoothly (powers 2 to 4 of the load) and what loading and unloading may do apart (a parabola over the
-load), so that neither passes for scatter: no levels of load are looked for, and reference loads need not
-repeat. Variances are estimated together at the lowest restricted deviance
+The model is that of `records.scatter`, its mean that of `session_rows`. Variances are estimated together at the lowest restricted deviance
 
     (n - p) ln s^2 + ln |V / s^2| + ln |X^T V^-1 X s^2|
 
@@ -16,7 +13,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -25,22 +22,13 @@ from toolkit.calibration.records.scatter import RunScatter
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from toolkit.calibration.fit.session_rows import SessionRows
     from toolkit.calibration.session.statements import BetweenRuns
-    from toolkit.calibration.session.table import Table
 
-# Rows over which the mean may bend and rows may be correlated: with fewer, both take what is scatter.
-ENOUGH_DOF = 20
-HIGHEST_POWER = 4
-MOST_GROUPS = 60
-MOST_ROWS = 2000
 _DENSE = 800
-# Beyond it products of zeros leave nothing of the scatter within runs in double precision.
-_LARGEST_RATIO = 1e4
-_LARGEST_CORRELATION = 0.97
 # None begins at 0: the deviance is even in a ratio, hence level there whatever lies beyond.
 _GRID = (0.03, 0.4, 1.5, 6.0, 40.0, 1000.0)
 _CORRELATIONS = (0.1, 0.4, 0.8)
-_DEPENDENT = 1e-9
 _STEP = 1e-5
 # Scatter below this share of the largest load is rounding, which has no runs.
 ROUNDING = 1e-13
@@ -52,103 +40,6 @@ _NEIGHBOUR = 0.01
 _GAIN = 0.01
 _SAME = 1e-4
 _MOST_STEPS = 1000
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Mean:
-    """Orthonormal columns of the mean (rows, columns): the terms', then ``misfit``, then ``direction``."""
-
-    columns: NDArray[np.float64]
-    misfit: slice
-    direction: slice
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class SessionRows:
-    """The rows of one load: its reference loads (rows,), their mean, and the runs.
-
-    ``relative`` (rows,) is the load that the equation gives, by the largest: an effect in proportion to the
-    reference loads themselves could take them up whole. ``group`` numbers from 0 what tells the rows apart
-    (``factor``: run or mounting); ``own_zeros``: the mean holds a zero of every run, so that differences of
-    zeros are no scatter. Of long sessions a sample stands for all: `MOST_GROUPS` runs, and of each every
-    ``stride``-th row, so that rows are `MOST_ROWS` at most; more would narrow estimates that are narrow.
-    """
-
-    load: NDArray[np.float64]
-    relative: NDArray[np.float64]
-    mean: Mean
-    factor: str
-    group: NDArray[np.int64]
-    own_zeros: bool
-    stride: int = 1
-
-    @classmethod
-    def of(
-        cls, design: NDArray[np.float64], load: NDArray[np.float64], table: Table, zero: str
-    ) -> SessionRows:
-        """Return the rows of a load (rows,) with the terms of its equation (rows, terms)."""
-        factor, group = groups_of(table)
-        sample, stride = _sample(group)
-        group = _numbered(group[sample])
-        design, load = design[sample], load[sample]
-        up = None if table.up is None else table.up[sample]
-        zeros = np.empty((len(load), 0))
-        if zero == "run" and table.run is not None:
-            run = _numbered(table.run[sample])
-            zeros = (run[:, None] == np.arange(int(run.max()) + 1)).astype(np.float64)
-        terms = _basis([design])[0]
-        relative = terms @ (terms.T @ load) / (float(np.abs(load).max()) or 1.0)
-        mean = mean_of(np.column_stack([design, zeros]), relative, up)
-        return cls(
-            load=load, relative=relative, mean=mean, factor=factor, group=group,
-            own_zeros=bool(zeros.size), stride=stride,
-        )  # fmt: skip
-
-    @property
-    def groups(self) -> int:
-        """Number of runs or mountings."""
-        return int(self.group.max()) + 1
-
-    @property
-    def largest(self) -> float:
-        """Largest absolute load."""
-        return float(np.abs(self.load).max())
-
-    @property
-    def bounds(self) -> list[tuple[float, float]]:
-        """Lowest and highest zero and gain by within, and correlation."""
-        n, p = self.mean.columns.shape
-        return [
-            (0.0, 0.0 if self.own_zeros else _LARGEST_RATIO),
-            (0.0, _LARGEST_RATIO),
-            (0.0, _LARGEST_CORRELATION if n - p >= ENOUGH_DOF else 0.0),
-        ]
-
-
-def groups_of(table: Table) -> tuple[str, NDArray[np.int64]]:
-    """Return what tells a session's rows apart, and each row's group from 0 (rows,).
-
-    Mountings take the place of runs where the session has more than one rotation: ISO 376 takes
-    reproducibility between rotated mountings, repeatability within one.
-    """
-    if table.rotation is not None and len(np.unique(table.rotation)) > 1:
-        return "mounting", _numbered(table.rotation)
-    run = np.zeros(table.rows) if table.run is None else table.run
-    return "run", _numbered(run)
-
-
-def mean_of(design: NDArray[np.float64], relative: NDArray[np.float64], up: NDArray[np.bool_] | None) -> Mean:
-    """Return the columns of the mean for a design (rows, terms) and relative loads (rows,)."""
-    n = len(relative)
-    misfit, direction = np.empty((n, 0)), np.empty((n, 0))
-    if n - design.shape[1] >= ENOUGH_DOF:
-        misfit = np.stack([relative**k for k in range(2, HIGHEST_POWER + 1)], axis=1)
-        if up is not None and 0 < int(np.count_nonzero(up)) < n:
-            side = np.where(up, 1.0, -1.0)
-            direction = np.stack([side, side * relative, side * relative**2], axis=1)
-    columns, sizes = _basis([design, misfit, direction])
-    ends = np.cumsum(sizes).tolist()
-    return Mean(columns=columns, misfit=slice(ends[0], ends[1]), direction=slice(ends[1], ends[2]))
 
 
 def estimate(rows: SessionRows) -> RunScatter | None:
@@ -379,40 +270,3 @@ def _neighbours(ratios: NDArray[np.float64], bounds: list[tuple[float, float]]) 
     low, high = np.array(bounds).T
     steps = _NEIGHBOUR * np.maximum(ratios, 1.0) * np.vstack([np.zeros((1, 3)), np.eye(3), -np.eye(3)])
     return np.clip(ratios + steps, low, high)
-
-
-def _sample(group: NDArray[np.int64]) -> tuple[NDArray[np.int64], int]:
-    """Return which rows stand for all (rows,), and how many rows of a run each of them stands for."""
-    groups = int(group.max()) + 1
-    every = np.arange(len(group))
-    if groups <= MOST_GROUPS and len(group) <= MOST_ROWS:
-        return every, 1
-    picked = np.unique(np.linspace(0, groups - 1, min(groups, MOST_GROUPS)).round().astype(np.int64))
-    rows = every[np.isin(group, picked)]
-    stride = max(math.ceil(len(rows) / MOST_ROWS), 1)
-    order = rows[np.argsort(group[rows], kind="stable")]
-    sorted_group = group[order]
-    place = np.arange(len(order)) - np.searchsorted(sorted_group, sorted_group)
-    return np.sort(order[place % stride == 0]), stride
-
-
-def _basis(blocks: list[NDArray[np.float64]]) -> tuple[NDArray[np.float64], list[int]]:
-    """Return an orthonormal basis of columns in their order (rows, columns), and how many each block gave.
-
-    A column that those before it make up gives none.
-    """
-    columns = np.column_stack(blocks)
-    owner = np.repeat(np.arange(len(blocks)), [block.shape[1] for block in blocks])
-    while True:
-        length = np.sqrt(np.einsum("ij,ij->j", columns, columns))
-        q, r = np.linalg.qr(columns / np.where(length > 0, length, 1.0))
-        spare = np.abs(np.diag(r)) <= _DEPENDENT
-        if not spare.any():
-            return q, np.bincount(owner, minlength=len(blocks)).tolist()
-        # One at a time: those behind it were judged against a direction that is none.
-        keep = np.arange(columns.shape[1]) != int(np.argmax(spare))
-        columns, owner = columns[:, keep], owner[keep]
-
-
-def _numbered(values: NDArray[Any]) -> NDArray[np.int64]:
-    return np.asarray(np.unique(values, return_inverse=True)[1].ravel(), dtype=np.int64)

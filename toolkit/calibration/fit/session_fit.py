@@ -14,7 +14,8 @@ from toolkit.calibration.fit.diagnostics import Diagnostics, diagnose, replicate
 from toolkit.calibration.fit.gls import fit_gls
 from toolkit.calibration.fit.odr import fit_odr
 from toolkit.calibration.fit.regression import TermFit, fit_loads, fit_terms
-from toolkit.calibration.fit.run_scatter import SessionRows, estimate, groups_of, stated_scatter
+from toolkit.calibration.fit.run_scatter import estimate, stated_scatter
+from toolkit.calibration.fit.session_rows import SessionRows, groups_of
 from toolkit.calibration.records.scatter import RunScatter, rows_of
 from toolkit.calibration.session.known_errors import KnownErrors, known_errors, row_uncertainty
 from toolkit.calibration.session.settings import wrong

@@ -87,6 +87,26 @@ class LoadFit:
         """Standard errors of the coefficients; empty for a legacy import."""
         return tuple(row[i] ** 0.5 for i, row in enumerate(self.covariance))
 
+    @property
+    def covariance_model(self) -> str:
+        """By what the covariance was made: the scatter's model, independent rows, stated uncertainties."""
+        if self.scatter is not None:
+            return self.scatter.model
+        if not self.covariance:
+            return "none"
+        return "independent rows" if self.method == "ols" else "stated uncertainties"
+
+    @property
+    def scatter_words(self) -> str | None:
+        """The scatter in a line; None where nothing tells it."""
+        s = self.scatter
+        if s is None:
+            return None
+        between = f"between {s.groups} {s.factor}s" if s.groups > 1 else f"of another {s.factor}, as stated:"
+        text = f"scatter within a {s.factor} {s.within:.3g}, {between} zero {s.zero:.3g}, gain {s.gain:.3g}"
+        correlated = f", correlated by {s.correlation:.2f} from row to row" if s.correlation else ""
+        return f"{text} {self.unit} at full scale{correlated}"
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Golden:

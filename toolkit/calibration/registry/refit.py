@@ -18,7 +18,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolkit.calibration.fit.run_scatter import SessionRows, groups_of, is_lowest, stated_scatter
+from toolkit.calibration.fit.run_scatter import is_lowest, stated_scatter
+from toolkit.calibration.fit.session_rows import SessionRows, groups_of
 from toolkit.calibration.records.issue import issued_value, term_reach
 from toolkit.calibration.records.scatter import rows_of
 from toolkit.calibration.registry.whitening import Whitener, errors_of, linearise, whitener

@@ -2,7 +2,7 @@
 
 The scatter is that of the record (`records.scatter`); of records made before it was kept there, and of other
 methods than ordinary least squares, it is estimated from their rows here. Misfit and reversal are the parts
-of the mean beside the equation's terms (`fit.run_scatter`): what the columns explain, less what the scatter
+of the mean beside the equation's terms (`fit.session_rows`): what the columns explain, less what the scatter
 alone would give them.
 """
 
@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolkit.calibration.fit.run_scatter import SessionRows, estimate, groups_of, spread
+from toolkit.calibration.fit.run_scatter import estimate, spread
+from toolkit.calibration.fit.session_rows import SessionRows, groups_of
 from toolkit.calibration.records.scatter import Rows, RunScatter, rows_of
 from toolkit.calibration.terms import term_matrix
 
