@@ -1,6 +1,7 @@
 """Restricted likelihood of a session's scatter: within runs, between their zeros and between their gains.
 
-The model is that of `records.scatter`, its mean that of `session_rows`. Variances are estimated together at the lowest restricted deviance
+The model is that of `records.scatter`, its mean that of `session_rows`. Variances are estimated together at
+the lowest restricted deviance
 
     (n - p) ln s^2 + ln |V / s^2| + ln |X^T V^-1 X s^2|
 
