@@ -11,16 +11,15 @@ degrees, X5 at 240), each with its decreasing forces (X4', X6'). Errors in % at 
 and of the instrument: f0 = (i_f - i_0) / X_N (zero, the largest of all runs), c = |i_300 - i_30| / X_N
 (creep), X_N the mean deflection at the largest force. A class also asks for an applied force of small
 uncertainty and for forces that are large against the resolution r: 4000, 2000, 1000 and 500 r for classes
-00, 0.5, 1 and 2. No class holds below 2 % of the transducer's largest force, whatever the resolution: both
-conditions stand side by side in the standard's clause on the minimum force, the second one for every class.
+00, 0.5, 1 and 2. No class holds below 2 % of the transducer's largest force, whatever the resolution: the
+second condition on the minimum force, taken for every class (the standard's own text was not at hand).
 The largest force of the calibration stands in for the transducer's, which a session does not state and which
 is not smaller. What the procedure lacks costs the class, not the figures that can still be had.
 
 Not judged: temperature and time between the readings, the regularity of the steps, the age of the
 calibration.
 
-Reference: ISO 376:2011, clauses on minimum force (as in EN 10002-3:1994), on procedure and on classification
-with its table; EURAMET cg-4 on force measurements names the same components. The limits are in % of the
+Reference: ISO 376:2011, clauses on minimum force, on procedure and on classification with its table; EURAMET cg-4 on force measurements names the same components. The limits are in % of the
 value that the error is relative to.
 """
 
