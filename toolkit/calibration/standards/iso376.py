@@ -19,8 +19,9 @@ is not smaller. What the procedure lacks costs the class, not the figures that c
 Not judged: temperature and time between the readings, the regularity of the steps, the age of the
 calibration.
 
-Reference: ISO 376:2011, clauses on minimum force, on procedure and on classification with its table; EURAMET cg-4 on force measurements names the same components. The limits are in % of the
-value that the error is relative to.
+Reference: ISO 376:2011, clauses on minimum force, on procedure and on classification with its table; EURAMET
+cg-4 on force measurements names the same components. The limits are in % of the value that the error is
+relative to.
 """
 
 from __future__ import annotations
