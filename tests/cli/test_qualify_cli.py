@@ -43,6 +43,9 @@ def test_the_record_as_text(capsys: pytest.CaptureFixture[str]) -> None:
     ):
         assert part in text
     assert text.rstrip().endswith("all passed")
+    (row,) = [line for line in text.splitlines() if "E5 negated, against the history" in line]
+    assert row.split()[-3:] == ["approval", "sign", "sign"]
+    assert "asked for less" not in text
 
 
 def test_the_record_as_json_is_also_the_file(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
@@ -54,6 +57,10 @@ def test_the_record_as_json_is_also_the_file(capsys: pytest.CaptureFixture[str],
     assert found["software"] == __version__
     assert found["packages"].keys() == {"numpy", "scipy", "statsmodels", "odrpack"}
     assert found["checks"][0].keys() >= {"group", "name", "quantity", "required", "reached", "passed"}
+    rows = {one["name"]: one for one in found["checks"] if one["group"] == "gates"}
+    sign = rows["E5 negated, against the history"]
+    assert (sign["quantity"], sign["required"], sign["reached"]) == ("approval", "sign", "sign")
+    assert "the sign changed" in sign["note"]
     assert json.loads(out.read_text()) == found
     assert [path.name for path in out.parent.iterdir()] == ["record.json"]
 

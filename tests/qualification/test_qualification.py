@@ -66,7 +66,7 @@ def test_everything_passes_as_packaged(record: QualificationRecord) -> None:
     assert record.failed == ()
     assert record.passed
     assert {check.group for check in record.checks} == {
-        "packaged numbers", "NIST StRD linear", "ISO/TS 28037", "ASTM E74", "golden vectors",
+        "packaged numbers", "NIST StRD linear", "ISO/TS 28037", "ASTM E74", "golden vectors", "gates",
     }  # fmt: skip
     assert record.date == DAY
     assert [name for name, _ in record.packages] == ["numpy", "scipy", "statsmodels", "odrpack"]

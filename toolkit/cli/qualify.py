@@ -25,7 +25,7 @@ def command(
     json: Json = False,
     quiet: Quiet = False,
 ) -> int:
-    """Qualify this installation against certified sets, published examples and golden vectors.
+    """Qualify this installation: certified sets, published examples, golden vectors, and every refusal once.
 
     Example: toolkit qualify --out qualification.json
     """
@@ -69,17 +69,25 @@ def _text(record: QualificationRecord) -> str:
         "",
     ]
     rows = [
-        ["pass" if one.passed else "FAIL", one.group, one.name, one.quantity, one.measure, _required(one),
-         _digits(one.reached)]
+        [_verdict(one), one.group, one.name, one.quantity, one.measure, _required(one), _digits(one.reached)]
         for one in record.checks
-    ]  # fmt: skip
+        if one.measure != "rules"
+    ]
+    head = ["", "group", "name", "quantity", "measure", "required", "reached"]
+    lines += [table(head, rows, align="<<<<<>>"), ""]
+    rows = [
+        [_verdict(one), one.name, one.quantity, _required(one), _digits(one.reached)]
+        for one in record.checks
+        if one.measure == "rules"
+    ]
     lines.append(
-        table(["", "group", "name", "quantity", "measure", "required", "reached"], rows, align="<<<<<>>")
+        table(["", "refusal shown", "at", "must be refused by", "was refused by"], rows, align="<" * 5)
     )
     for title, told in (
         ("failed", [_reason(one) for one in record.failed]),
         ("asked for less than public QR solvers reach",
-         [f"{one.name}, {one.quantity}: {one.note}" for one in record.checks if "more than" in one.note]),
+         [f"{one.name}, {one.quantity}: {one.note}" for one in record.checks
+          if one.measure == "correct digits" and "more than" in one.note]),
         ("not covered", [f"{one.name}: {one.reason}" for one in record.not_covered]),
     ):  # fmt: skip
         if told:
@@ -89,6 +97,10 @@ def _text(record: QualificationRecord) -> str:
     return "\n".join(lines)
 
 
+def _verdict(one: Check) -> str:
+    return "pass" if one.passed else "FAIL"
+
+
 def _reason(one: Check) -> str:
     what = ", ".join(part for part in (one.group, one.name, one.quantity) if part)
     numbers = f"required {_required(one)}, reached {_digits(one.reached)}"
@@ -96,7 +108,7 @@ def _reason(one: Check) -> str:
 
 
 def _required(one: Check) -> str:
-    sign = {"correct digits": ">= ", "text": ""}.get(one.measure, "<= ")
+    sign = {"correct digits": ">= ", "text": "", "rules": ""}.get(one.measure, "<= ")
     return sign + _digits(one.required)
 
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from datetime import date
 from typing import Literal
 
-Measure = Literal["correct digits", "units of the last digit", "share of the largest load", "text"]
+Measure = Literal["correct digits", "units of the last digit", "share of the largest load", "text", "rules"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -17,8 +17,9 @@ class Check:
     """One check. ``measure`` says what ``required`` and ``reached`` count.
 
     *correct digits*: at least ``required``. *units of the last digit*: difference from a printed number, at
-    most 0.5. *share of the largest load*: at most ``required``. *text*: equal. ``note`` tells what else
-    there is to know, and the reason where it failed without a number.
+    most 0.5. *share of the largest load*: at most ``required``. *text*: equal. *rules*: the ids of the
+    rules that refused, all of them and no other; *passes* where nothing may. ``note`` tells what else there
+    is to know, the refusal's own words, and the reason where it failed without a number.
     """
 
     group: str

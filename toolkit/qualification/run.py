@@ -11,6 +11,7 @@ from toolkit import __version__
 from toolkit.qualification import numbers
 from toolkit.qualification.certified import check_certified
 from toolkit.qualification.examples import check_e74, check_lines
+from toolkit.qualification.gates.run import check_gates
 from toolkit.qualification.golden import check_golden
 from toolkit.qualification.model import QualificationRecord
 
@@ -41,6 +42,7 @@ def qualify(*, calibrations: Path, on: date, folder: Path | None = None) -> Qual
             *check_lines(folder),
             *check_e74(folder),
             *golden,
+            *check_gates(folder),
         ),
         not_covered=tuple(not_covered),
     )

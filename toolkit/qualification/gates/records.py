@@ -1,0 +1,122 @@
+"""Altered records: what was changed behind the registry's back is refused when the record is read.
+
+The first changes are careless; those of `forgery` come with every hash computed anew, and only what a record
+is made of can tell.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+from pathlib import Path
+
+from toolkit.calibration.records.record import CalibrationRecord, LoadFit
+from toolkit.calibration.registry.ledger import LEDGER
+from toolkit.calibration.registry.refit import polarity
+from toolkit.calibration.registry.registry import Registry
+from toolkit.files import sha256_bytes
+from toolkit.qualification.gates.bench import Act, Bench, Demonstration, Refusals
+from toolkit.qualification.gates.forgery import forge
+from toolkit.qualification.gates.virtual_hub import RIG
+
+_RECORD = f"{RIG}-r1"
+_FILE, _DATA = f"{_RECORD}.json", f"{_RECORD}.loads.csv"
+Change = Callable[[CalibrationRecord], CalibrationRecord]
+
+
+def _load(registry: Registry) -> Act:
+    def act() -> Refusals:
+        registry.load(_RECORD)
+        return ()
+
+    return act
+
+
+def _careless(name: str, rules: str, change: Callable[[Path], object]) -> Demonstration:
+    def prepare(bench: Bench) -> Act:
+        change(bench.registry.folder / RIG)
+        return _load(bench.registry)
+
+    return Demonstration(name=name, stage="record read", rules=tuple(rules.split()), prepare=prepare)
+
+
+def _forged(name: str, rule: str, change: Change) -> Demonstration:
+    def alter(folder: Path) -> None:
+        forge(folder, change(Registry(folder.parent).load(_RECORD)))
+
+    return _careless(f"{name}, every hash computed anew", rule, alter)
+
+
+def _replaced(file: str, old: bytes, new: bytes) -> Callable[[Path], object]:
+    def change(folder: Path) -> None:
+        path = folder / file
+        data = path.read_bytes()
+        if old not in data:
+            raise ValueError(f"{file} does not hold {old!r}")
+        path.write_bytes(data.replace(old, new, 1))
+
+    return change
+
+
+def _first_load(change: Callable[[LoadFit], LoadFit]) -> Change:
+    def alter(record: CalibrationRecord) -> CalibrationRecord:
+        first, *rest = record.loads
+        return dataclasses.replace(record, loads=(change(first), *rest))
+
+    return alter
+
+
+def _negated(one: LoadFit) -> LoadFit:
+    coefficients = (-one.coefficients[0], *one.coefficients[1:])
+    return dataclasses.replace(one, coefficients=coefficients, polarity=polarity(coefficients))
+
+
+def _smaller(one: LoadFit) -> LoadFit:
+    covariance = tuple(tuple(value / 4 for value in row) for row in one.covariance)
+    return dataclasses.replace(one, covariance=covariance)
+
+
+def _less_scatter(one: LoadFit) -> LoadFit:
+    if one.scatter is None:
+        raise ValueError("the record has no scatter components")
+    return dataclasses.replace(one, scatter=dataclasses.replace(one.scatter, within=one.scatter.within / 2))
+
+
+def _shifted_golden(record: CalibrationRecord) -> CalibrationRecord:
+    golden = record.golden
+    outputs = tuple(tuple(1.001 * value for value in row) for row in golden.outputs)
+    return dataclasses.replace(record, golden=dataclasses.replace(golden, outputs=outputs))
+
+
+def _exchange_loads(folder: Path) -> None:
+    record = Registry(folder.parent).load(_RECORD)
+    path = folder / _DATA
+    data = path.read_bytes().replace(b",3000.0,", b",3100.0,")
+    path.write_bytes(data)
+    files = tuple(
+        dataclasses.replace(one, sha256=sha256_bytes(data)) if one.role == "loads" else one
+        for one in record.data
+    )
+    forge(folder, dataclasses.replace(record, data=files))
+
+
+def _cut_off(folder: Path) -> None:
+    lines = (folder / LEDGER).read_bytes().splitlines(keepends=True)
+    (folder / LEDGER).write_bytes(b"".join(lines[:-1]))
+
+
+DEMONSTRATIONS: tuple[Demonstration, ...] = (
+    _careless("record as it was entered", "", Path.exists),
+    _careless("file of the record removed", "missing", lambda folder: (folder / _FILE).unlink()),
+    _careless("file of the record cut off", "unreadable", lambda folder: (folder / _FILE).write_bytes(b"{")),
+    _careless("digit of the record's file changed", "hash", _replaced(_FILE, b"6000.0", b"6001.0")),
+    _careless("reference loads changed", "data", _replaced(_DATA, b"6000.0", b"6001.0")),
+    _careless("ledger line changed", "ledger", _replaced(LEDGER, b"virtual checker", b"virtual approver")),
+    _careless("last ledger line cut off", "ledger", _cut_off),
+    _forged("coefficient negated", "refit", _first_load(_negated)),
+    _forged("covariance divided by four", "refit", _first_load(_smaller)),
+    _forged("scatter within a run halved", "refit", _first_load(_less_scatter)),
+    _forged("golden vectors changed", "golden", _shifted_golden),
+    _forged("date changed", "data", lambda record: dataclasses.replace(record, date="2020-03-03")),
+    _careless("reference loads exchanged, every hash computed anew", "refit", _exchange_loads),
+)
