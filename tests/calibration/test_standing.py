@@ -15,6 +15,7 @@ from control_factory import enter, put_in_force
 from toolkit.calibration.records.use import CalibrationUse, mark_of
 from toolkit.calibration.registry.approval import approve, withdraw
 from toolkit.calibration.registry.candidate import calibrate
+from toolkit.calibration.registry.discard import discard
 from toolkit.calibration.registry.registry import Registry
 from toolkit.calibration.registry.standing import standing
 from toolkit.errors import RecordError
@@ -84,6 +85,23 @@ def test_every_day_has_its_own_reason(two: Registry) -> None:
     assert reasons(two, "hub-r1", MAY) == ["superseded by hub-r2, in force from 2026-04-01"]
     assert reasons(two, "hub-r2", None) == ["the test has no date: which record was in force cannot be told"]
     assert len(reasons(two, "hub-r1", date(2026, 1, 31))) == 1
+
+
+def test_a_test_of_tomorrow_has_no_record_yet(two: Registry) -> None:
+    (told,) = reasons(two, "hub-r2", dt.date.today() + dt.timedelta(days=40))  # noqa: DTZ011
+    assert "in the future" in told
+
+
+def test_a_discarded_record_makes_no_draft(two: Registry, make_session: Sessions) -> None:
+    calibrate(make_session(hub_data(60, 9), name="sound"), two)
+    discard(two, "hub-r3", reason="wrong cell mounted")
+    held = standing(two, "hub", on=MAY, named="hub-r3")
+    (reason,) = held.reasons
+    assert reason.text.startswith("discarded on ")
+    assert reason.text.endswith(": wrong cell mounted")
+    with pytest.raises(RecordError) as caught:
+        held.use(draft=True)
+    assert "--draft" not in str(caught.value)
 
 
 def test_an_approval_of_later_does_not_count_where_an_earlier_one_was_known(two: Registry) -> None:

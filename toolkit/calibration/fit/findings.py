@@ -15,7 +15,7 @@ from toolkit.calibration.fit.diagnostics import replicate_groups
 from toolkit.calibration.fit.levels import lack_of_fit, load_levels
 from toolkit.calibration.fit.recommend import NEGLIGIBLE_PERCENT, recommend_drop, recommend_wider
 from toolkit.calibration.fit.robust import hidden_outliers, robust_weights
-from toolkit.calibration.fit.session_fit import session_statements
+from toolkit.calibration.fit.session_fit import session_statements, within_runs
 from toolkit.calibration.fit.session_rows import groups_of
 from toolkit.calibration.session.known_errors import undeclared_standard
 from toolkit.calibration.session.settings import DEFAULT_TOLERANCE
@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 
 FEW_POINTS = 30
 REPEATED = 0.1
+COARSE_REFERENCE = 0.05
 MOST_NAMED = 10
 _RISK = 0.01
 
@@ -128,6 +129,15 @@ def _data_findings(session: Session) -> list[Finding]:
     if session.reference_due is not None and session.reference_due < session.date:
         message = f"the reference standard was due on {session.reference_due.isoformat()}"
         found.append(Finding(rule="reference-due", where=where, message=message))
+    stated = session_statements(session).reference
+    for load in session.loads:
+        largest = float(np.abs(table.column(load.name)).max())
+        if (u := stated.u(load.name)) is not None and u > COARSE_REFERENCE * largest:
+            message = (
+                f"the reference's standard uncertainty is {100 * u / largest:.3g} % of the largest load: "
+                "with such a standard nothing is calibrated; is its unit right?"
+            )
+            found.append(Finding(rule="coarse-reference", where=load.name, message=message))
     if session.method == "gls":
         name = undeclared_standard(session_statements(session).reference, table)
         if name is not None:
@@ -219,9 +229,10 @@ def _robust_findings(fit: SessionFit) -> list[Finding]:
     columns = fit.session.table.columns(fit.session.indications)
     found = []
     for one in fit.loads:
-        load = fit.session.table.column(one.setting.name)
-        weights = robust_weights(one.fit, columns=columns, load=load)
-        hidden = hidden_outliers(one.fit, weights, columns=columns)
+        load = fit.session.table.column(one.setting.name) - one.of_runs
+        within = within_runs(one.fit, one.of_runs)
+        weights = robust_weights(within, columns=columns, load=load)
+        hidden = hidden_outliers(within, weights, columns=columns)
         rows = [row for row in hidden if row not in one.diagnostics.outliers]
         if rows:
             message = (

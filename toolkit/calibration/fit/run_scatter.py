@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from toolkit.calibration.session.statements import BetweenRuns
 
 _DENSE = 800
+FEWEST_DOF = 3
 # None begins at 0: the deviance is even in a ratio, hence level there whatever lies beyond.
 _GRID = (0.03, 0.4, 1.5, 6.0, 40.0, 1000.0)
 _CORRELATIONS = (0.1, 0.4, 0.8)
@@ -47,8 +48,8 @@ def estimate(rows: SessionRows) -> RunScatter | None:
     """Return the scatter of a load; None where one run cannot tell how runs differ, or nothing scatters."""
     n, p = rows.mean.columns.shape
     groups = rows.groups
-    left = n - p - (groups - 1) * (1 if rows.own_zeros else 2)
-    if groups < 2 or left < 1:
+    left = rows.dof
+    if groups < 2 or n - p < FEWEST_DOF:
         return None
     problem, size = _problem(rows)
     if size <= ROUNDING * rows.largest:
@@ -80,9 +81,7 @@ def stated_scatter(
 
 def is_lowest(rows: SessionRows, scatter: RunScatter) -> bool:
     """Tell whether a stored scatter is the one that these rows have: no neighbour of it is likelier."""
-    n, p = rows.mean.columns.shape
-    left = n - p - (rows.groups - 1) * (1 if rows.own_zeros else 2)
-    if (scatter.factor, scatter.groups, scatter.dof) != (rows.factor, rows.groups, left):
+    if (scatter.factor, scatter.groups, scatter.dof) != (rows.factor, rows.groups, rows.dof):
         return False
     if not scatter.within > 0:
         return False

@@ -34,6 +34,8 @@ LLF_FACTOR = 2.4
 class LoadResult:
     """One load. ``fit.covariance`` is that of `records.scatter` where the session's runs tell ``scatter``.
 
+    ``of_runs`` (rows,) is what of the residuals the runs' zeros and gains make; rows are judged without it.
+
     ``llf`` and ``check_residuals`` (fitted - reference, check rows,) in the load's unit.
 
     ``check_max_percent_fs`` is None where the session has no check loads.
@@ -42,6 +44,7 @@ class LoadResult:
     setting: LoadSetting
     fit: TermFit
     scatter: RunScatter | None
+    of_runs: NDArray[np.float64]
     diagnostics: Diagnostics
     llf: float
     check_residuals: NDArray[np.float64] | None
@@ -133,6 +136,7 @@ def _result(
     table = session.table
     load = table.column(setting.name)
     scatter = None
+    of_runs = np.zeros_like(load)
     if session.method == "ols":
         # Other methods are given by the session what every row's uncertainty is, and what rows share.
         design = term_matrix(session.terms, table.columns(session.indications))
@@ -143,8 +147,9 @@ def _result(
             stated = session_statements(session).between(setting.name)
             scatter = stated_scatter(factor, stated, residual_sd=fit.residual_sd, dof=fit.dof)
         if scatter is not None:
-            covariance = rows_of(design, load, group).covariance(scatter)
-            fit = dataclasses.replace(fit, covariance=covariance)
+            rows = rows_of(design, load, group)
+            of_runs = rows.of_runs(scatter, fit.residuals)
+            fit = dataclasses.replace(fit, covariance=rows.covariance(scatter))
     residuals, percent = None, None
     if session.check is not None:
         check = session.check
@@ -155,11 +160,37 @@ def _result(
         setting=setting,
         fit=fit,
         scatter=scatter,
-        diagnostics=diagnose(fit, cells=cells, load=load, up=table.up, replicates=groups),
+        of_runs=of_runs,
+        diagnostics=_diagnosed(fit, of_runs, cells=cells, load=load, up=table.up, groups=groups),
         llf=max(LLF_FACTOR * fit.residual_sd, _resolution(session, fit)),
         check_residuals=residuals,
         check_max_percent_fs=percent,
     )
+
+
+def within_runs(fit: TermFit, of_runs: NDArray[np.float64]) -> TermFit:
+    """Return a fit with the residuals that it has within its runs."""
+    if not of_runs.any():
+        return fit
+    residuals = fit.residuals - of_runs
+    sd = float(np.sqrt(np.sum(residuals**2) / fit.dof))
+    return dataclasses.replace(fit, residuals=residuals, scaled=residuals, residual_sd=sd)
+
+
+def _diagnosed(
+    fit: TermFit,
+    of_runs: NDArray[np.float64],
+    *,
+    cells: NDArray[np.float64],
+    load: NDArray[np.float64],
+    up: NDArray[np.bool_] | None,
+    groups: NDArray[np.intp],
+) -> Diagnostics:
+    found = diagnose(fit, cells=cells, load=load, up=up, replicates=groups)
+    if not of_runs.any():
+        return found
+    within = diagnose(within_runs(fit, of_runs), cells=cells, load=load, up=up, replicates=groups)
+    return dataclasses.replace(found, outliers=within.outliers, heteroscedasticity=within.heteroscedasticity)
 
 
 def load_uncertainty(session: Session, setting: LoadSetting) -> NDArray[np.float64] | None:

@@ -85,6 +85,16 @@ class SessionRows:
         return int(self.group.max()) + 1
 
     @property
+    def dof(self) -> int:
+        """Degrees of freedom that the mean and the runs leave for the scatter within them, one at least.
+
+        Runs of two rows share theirs between scatter and gain: half of them are taken for either.
+        """
+        n, p = self.mean.columns.shape
+        effects = 1 if self.own_zeros else 2
+        return max(int(n - p - (self.groups - 1) * effects), int(n - p) // (1 + effects), 1)
+
+    @property
     def largest(self) -> float:
         """Largest absolute load."""
         return float(np.abs(self.load).max())

@@ -57,6 +57,8 @@ class LoadFit:
     ``tolerance`` is that of the check loads, ``minimum`` and ``maximum`` the range of the fitted loads.
     ``scatter`` is what the covariance was made of where the session's runs tell it (`records.scatter`); None:
     the covariance takes every row for independent, as that of one run alone and of records made before.
+    ``reference_u`` is the largest standard uncertainty that the session states row by row of the reference
+    load where the fit does not weigh by it; None where it states none.
     """
 
     load: str
@@ -74,6 +76,7 @@ class LoadFit:
     maximum: float | None = None
     tolerance: float | None = None
     scatter: RunScatter | None = None
+    reference_u: float | None = None
 
     @property
     def largest(self) -> float:
@@ -227,7 +230,11 @@ def _cell_content(one: Indication) -> dict[str, Any]:
 def _load_content(one: LoadFit) -> dict[str, Any]:
     content = {key: getattr(one, key) for key in _LOAD_KEYS}
     # As with cells: records made without it keep their hash.
-    return content if one.scatter is None else content | {"scatter": asdict(one.scatter)}
+    if one.scatter is not None:
+        content["scatter"] = asdict(one.scatter)
+    if one.reference_u is not None:
+        content["reference_u"] = one.reference_u
+    return content
 
 
 def _scatter(entry: Any) -> RunScatter | None:
@@ -348,6 +355,7 @@ def _from_content(
                 "dof": _optional(entry["dof"], int),
                 "residual_sd": _optional(entry["residual_sd"], float),
                 "scatter": _scatter(entry.get("scatter")),
+                "reference_u": _optional(entry.get("reference_u"), float),
             }
         )
         if not len(one.terms) == len(one.coefficients) == len(one.issued) == len(one.polarity):

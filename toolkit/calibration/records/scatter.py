@@ -93,6 +93,24 @@ class Rows:
         total = np.einsum("k,kij->ij", widened, self.parts(scatter.correlation))
         return np.asarray((total + total.T) / 2)
 
+    def of_runs(self, scatter: RunScatter, residuals: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return what of the residuals (rows,) the zeros and gains of the runs make, as best predicted.
+
+        Henderson's predictor G Z^T V^-1 e of rows taken for uncorrelated: a run that lies off does not make
+        outliers of its rows.
+        """
+        root = np.array([scatter.zero, scatter.gain])
+        if scatter.groups < 2 or not root.any() or not scatter.within:
+            return np.zeros_like(residuals)
+        ones, relative = np.ones_like(residuals), self.relative
+        products = [ones, relative, relative * relative, residuals, residuals * relative]
+        one, first, second, zero, gain = (np.bincount(self.group, weights=values) for values in products)
+        inner = np.array([[one, first], [first, second]]).transpose(2, 0, 1) * np.outer(root, root)
+        inner = inner + scatter.within**2 * np.eye(2)
+        told = np.linalg.solve(inner, (np.stack([zero, gain], axis=1) * root)[:, :, None])[:, :, 0] * root
+        effects = told[self.group]
+        return np.asarray(effects[:, 0] + effects[:, 1] * relative)
+
     def variance(self, scatter: RunScatter, J: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]:
         """Return J C J^T, unexpanded, of one vector J (terms,), and its gradient (4,).
 

@@ -37,7 +37,7 @@ from toolkit.calibration.registry.clock import check_begun, now
 from toolkit.calibration.registry.history import history_of
 from toolkit.calibration.registry.judgement import judge, machine_of
 from toolkit.calibration.registry.ledger import Ledger
-from toolkit.calibration.registry.refit import check_reproduces, polarity
+from toolkit.calibration.registry.refit import check_reproduces, polarity, reference_u
 from toolkit.calibration.registry.registry import ID, Registry, load_checked
 from toolkit.calibration.registry.status import discarded_before, is_discarded
 from toolkit.calibration.registry.store import Change, commit
@@ -263,6 +263,7 @@ def _load_fit(session: Session, one: LoadResult) -> LoadFit:
         maximum=float(values.max()),
         tolerance=one.setting.tolerance,
         scatter=one.scatter,
+        reference_u=reference_u(session.table, one.setting.name, one.setting.unit, session.method),
     )
 
 

@@ -113,6 +113,14 @@ def polarity(coefficients: tuple[float, ...]) -> tuple[int, ...]:
     return tuple(0 if c == 0 else 1 if c > 0 else -1 for c in coefficients)
 
 
+def reference_u(table: Table, load: str, load_unit: str, method: str) -> float | None:
+    """Return the largest standard uncertainty that the rows of a plain fit state of a load, in its unit."""
+    name = f"u_{load}"
+    if method != "ols" or not table.has(name):
+        return None
+    return float(table.column(name).max()) * (unit(table.unit(name)).factor / unit(load_unit).factor)
+
+
 def _weights(one: LoadFit, table: Table) -> NDArray[np.float64] | None:
     if one.method != "wls":
         return None
@@ -138,6 +146,9 @@ def _check_load(record: CalibrationRecord, at: int, one: LoadFit, solver: _Solve
     n = len(loads)
     _demand_equal(record, where, "number of rows and dof", (one.n, one.dof), (n, n - len(coefficients)))
     _demand_equal(record, where, "range", (one.minimum, one.maximum), (low, high))
+    if one.reference_u is not None:  # records made before have none
+        stated = reference_u(table, where, one.unit, one.method)
+        _demand_equal(record, where, "reference_u", one.reference_u, stated)
     _demand_equal(record, where, "polarity", one.polarity, polarity(one.coefficients))
     issued = tuple(issued_value(c, e, largest) for c, e in zip(one.coefficients, solver.extent, strict=True))
     _demand_equal(record, where, "issued coefficients", one.issued, issued)

@@ -20,6 +20,7 @@ from toolkit.calibration.registry.refit import (
     GOLDEN_REFIT,
     RESIDUAL,
     SPREAD,
+    reference_u,
     scatter_covariance,
 )
 from toolkit.calibration.terms import INTERCEPT, evaluate, parse_term
@@ -69,6 +70,9 @@ def _shape(record: CalibrationRecord, table: Table) -> Hashable | None:
         len(names) != len(record.cells) + len(loads)
         or any(units.get(name) != text for name, text in told.items())
         or any((one.n, one.dof) != (table.rows, table.rows - p) for one in loads)
+        or any(
+            one.reference_u not in (None, reference_u(table, one.load, one.unit, one.method)) for one in loads
+        )
         or len(inputs) <= len(record.cells)
         or table.rows <= p
     ):

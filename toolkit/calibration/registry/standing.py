@@ -156,9 +156,6 @@ def unapproved(registry: Registry, record: CalibrationRecord, status: RecordStat
         failed = failed_gates(registry, record)
     except ToolkitError as error:
         return (Reason(text=f"{state}; its gates cannot be run: {error.what}", next_step=_VERIFY),)
-    if status.state == "discarded":
-        why = f"discarded: {status.reason or 'no reason stated'}"
-        return (Reason(text=why, next_step="name another record, or calibrate the instrument again"),)
     if not failed:
         step = f"approve it: 'toolkit calibration approve {record.id} --in-force-from DATE'"
         return (Reason(text=f"{state}; no gate fails", next_step=step),)
@@ -200,6 +197,11 @@ def _reasons(
     if on is None:
         text = "the test has no date: which record was in force cannot be told"
         found.append(Reason(text=text, next_step="write 'date = YYYY-MM-DD' into test.toml"))
+    elif on > today():
+        text = (
+            f"the test is dated {on.isoformat()}, in the future: what will be in force then cannot be known"
+        )
+        found.append(Reason(text=text, next_step="correct the date in test.toml"))
     elif not void and status.in_force_from is not None:
         found += _by_day(registry, record, status, on, known)
     return tuple(found)

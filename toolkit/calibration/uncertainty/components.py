@@ -14,6 +14,7 @@ from toolkit.calibration.uncertainty.model import Component, Distribution, Evalu
 from toolkit.calibration.uncertainty.readings import (
     creep,
     indication_errors,
+    left_at_zero,
     sensitivities,
     zero_drift,
 )
@@ -63,7 +64,7 @@ def components_of(
         _reversibility(scatter),
         _resolution(record, statements, slope),
         _cells(record, statements, slope),
-        _zero(record, slope),
+        _zero(record, one, slope),
         _creep(record, one, value),
         _temperature(statements, temperature, slope, point, value),
     ), dof
@@ -101,6 +102,11 @@ def _new_run(s: Scatter, share: float) -> _Variance:
 
 def _reference(statements: Statements, one: LoadFit, value: float) -> Component:
     stated = statements.reference.of(one.load)
+    if stated is None and one.reference_u is not None:
+        size = f"{one.reference_u:.4g} {one.unit}"
+        text = f"u_{one.load} of the rows, at most {size}: u at the largest load, in proportion to the load"
+        u = one.reference_u * abs(value) / one.largest
+        return _part("reference", text, "B", "normal", u, math.inf, "session")
     if stated is None:
         return _absent("reference", "no uncertainty of the reference standard is stated", "session")
     if one.method == "gls" and statements.reference.shared_group is not None:
@@ -140,7 +146,8 @@ def _reproducibility(s: Scatter, new: _Variance) -> Component:
     u = math.sqrt(new.variance)
     if runs.groups < 2:
         if not u:
-            return _absent("reproducibility", f"one {runs.factor} tells nothing of the next", "data")
+            why = f"so few rows, or one {runs.factor}, tell nothing of the next"
+            return _absent("reproducibility", why, "data")
         text = f"stated of another {runs.factor}: zero {runs.zero:.3g}, gain {runs.gain:.3g} at full scale"
         return _part("reproducibility", text, "B", "normal", u, math.inf, "session")
     text = (
@@ -196,13 +203,20 @@ def _cells(record: CalibrationRecord, statements: Statements, slope: NDArray[np.
     return _part("indication", text, "B", "normal", u, math.inf, "session")
 
 
-def _zero(record: CalibrationRecord, slope: NDArray[np.float64]) -> Component:
-    drift = zero_drift(record)
-    if isinstance(drift, str):
+def _zero(record: CalibrationRecord, one: LoadFit, slope: NDArray[np.float64]) -> Component:
+    drift, intercept = zero_drift(record), left_at_zero(record, one)
+    if isinstance(drift, str) and not intercept:
         return _absent("zero", drift, "session")
-    moved = abs(float(slope @ np.asarray(drift)))
-    text = f"zeros after the session minus before move the load by {moved:.3g}: rectangular half-width"
-    return _part("zero", text, "B", "rectangular", moved / ROOT3, math.inf, "session")
+    moved = 0.0 if isinstance(drift, str) else abs(float(slope @ np.asarray(drift)))
+    said = (
+        []
+        if isinstance(drift, str)
+        else [f"zeros after the session minus before move the load by {moved:.3g}"]
+    )
+    if intercept:
+        said.append(f"tared indications of zero mean {intercept:.3g}")
+    text = f"{'; '.join(said)}: rectangular half-width"
+    return _part("zero", text, "B", "rectangular", math.hypot(moved, intercept) / ROOT3, math.inf, "session")
 
 
 def _creep(record: CalibrationRecord, one: LoadFit, value: float) -> Component:

@@ -34,7 +34,7 @@ import numpy as np
 
 from toolkit.calibration.session.statements import statements_of
 from toolkit.calibration.terms import INTERCEPT
-from toolkit.calibration.uncertainty.readings import creep, sensitivities, zero_drift
+from toolkit.calibration.uncertainty.readings import creep, left_at_zero, sensitivities, zero_drift
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -56,7 +56,7 @@ def scale_u(record: CalibrationRecord, one: LoadFit, statements: Statements) -> 
     """Return the relative standard uncertainty of a load's scale: reference standard and creep."""
     # A generalised fit of one shared reference has its error in the covariance already.
     counted = one.method == "gls" and statements.reference.shared_group is not None
-    u = 0.0 if counted else statements.reference.u(one.load) or 0.0
+    u = 0.0 if counted else statements.reference.u(one.load) or one.reference_u or 0.0
     crept = creep(record, one)
     relative = 0.0 if isinstance(crept, str) else crept / math.sqrt(3.0)
     return math.hypot(u / one.largest if one.largest > 0 else 0.0, relative)
@@ -66,12 +66,13 @@ def offset_u(record: CalibrationRecord, one: LoadFit, statements: Statements) ->
     """Return the standard uncertainty of a shift of all rows [the unit of the load]: cells, zeros."""
     stated = [cell.u or 0.0 for cell in statements.cells]
     drift = zero_drift(record)
+    tared = left_at_zero(record, one) / math.sqrt(3.0)
     if not any(stated) and isinstance(drift, str):
-        return 0.0
+        return tared
     middle = [((c.minimum or 0.0) + (c.maximum or 0.0)) / 2 for c in record.cells]
     slope = sensitivities(record, one, middle)
     moved = 0.0 if isinstance(drift, str) else float(slope @ np.asarray(drift)) / math.sqrt(3.0)
-    return math.hypot(float(np.linalg.norm(slope * np.asarray(stated))), moved)
+    return math.hypot(tared, float(np.linalg.norm(slope * np.asarray(stated))), moved)
 
 
 def _covariance(record: CalibrationRecord, one: LoadFit, statements: Statements) -> NDArray[np.float64]:

@@ -12,7 +12,7 @@ import numpy as np
 from toolkit.calibration.session.reading_entries import creep_entries, zero_entries
 from toolkit.calibration.session.settings import zero_readings
 from toolkit.calibration.session.statements import scope_of
-from toolkit.calibration.terms import term_matrix
+from toolkit.calibration.terms import INTERCEPT, term_matrix
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -83,6 +83,19 @@ def zero_drift(record: CalibrationRecord) -> tuple[float, ...] | str:
     if missing:
         return f"the zero readings lack {', '.join(missing)}"
     return tuple(last[name] - first[name] for name in record.indications)
+
+
+def left_at_zero(record: CalibrationRecord, one: LoadFit) -> float:
+    """Return the load that tared indications of zero would mean [unit of the load]; 0 where it is none.
+
+    An intercept under ``zero = "tared"`` beyond twice its standard uncertainty is no scatter: a gate lets it
+    pass inside the check loads' tolerance, and every reading has it.
+    """
+    if record.zero != "tared" or INTERCEPT not in one.terms:
+        return 0.0
+    at = one.terms.index(INTERCEPT)
+    size = abs(one.coefficients[at])
+    return size if size > 2 * one.standard_errors[at] else 0.0
 
 
 def creep(record: CalibrationRecord, one: LoadFit) -> float | str:
