@@ -18,7 +18,7 @@ from toolkit.calibration.records.use import CalibrationUse
 from toolkit.calibration.registry.clock import today
 from toolkit.calibration.registry.gates import GateResult
 from toolkit.calibration.registry.interval import parse_interval
-from toolkit.calibration.registry.judgement import judge_stored
+from toolkit.calibration.registry.judgement import judge_stored, machine_of
 from toolkit.errors import RecordError, ToolkitError
 
 if TYPE_CHECKING:
@@ -175,7 +175,8 @@ def withdrawal(status: RecordStatus, on: date | None = None) -> tuple[Reason, ..
 
 def failed_gates(registry: Registry, record: CalibrationRecord) -> tuple[GateResult, ...]:
     """Return the gates of an approval that a record fails."""
-    return judge_stored(registry, record, registry.ledger(record.instrument)).failed
+    ledger, machine = registry.ledger(record.instrument), machine_of(record.instrument)
+    return judge_stored(registry, record, ledger, machine=machine).failed
 
 
 _VERIFY = "see 'toolkit calibration verify'"
