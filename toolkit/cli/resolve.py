@@ -165,12 +165,13 @@ def _from_file(
     result = replace(result, reduced=checked(result.reduced))
     used = result.reduced.calibration
     record = registry.load(used.id)
-    if record.sha256 != used.sha256 or calibration not in (None, used.id):
+    wanted = record if calibration in (None, used.id) else registry.load(calibration)
+    if wanted.sha256 != used.sha256:
         raise RecordError(
             "the reduced test was made with another calibration record",
             where=test,
             got=f"{used.id}, {used.sha256[:16]}...",
-            expected=f"{calibration or record.id}, {record.sha256[:16]}...",
+            expected=f"{wanted.id}, {wanted.sha256[:16]}...",
             next_step="process the recordings again with the record that is wanted",
             rule="record-differs",
         )
