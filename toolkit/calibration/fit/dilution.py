@@ -1,17 +1,18 @@
 """Which terms the loads tell, and which only the noise of the cells (regression dilution).
 
-An equation is solved for the load from indications that carry noise. At two or three load levels a cube is a
-straight line but for the noise of the indications; the fit then answers the noise, flattens the equation at the
-levels that were applied, and reads up to a fifth of full scale wrong between them while the residuals shrink.
+An equation is solved for the load from indications that carry noise. At two or three load levels a cube is
+a straight line but for the noise of the indications; the fit then answers the noise, flattens the equation at
+the levels that were applied, and reads up to a fifth of full scale wrong between them while the residuals
+shrink.
 
 The indications are therefore set against clean ones, what they would be by the reference loads alone:
 
     x_i = b_0 + sum over loads of (b_1 load + b_2 load^2 + b_3 load^3)
 
-so that cells with curves of their own are not taken for noisy ones. The part of a term that the other terms do
-not explain is one combination of all terms, T g; the same combination of the terms formed on the clean
-indications, T_clean g, is what the loads make of it. Of its squares the share (|T g - T_clean g| / |T g|)^2 is
-the attenuation of the coefficient: Fuller, Measurement Error Models (1987), 1.1.
+so that cells with curves of their own are not taken for noisy ones. The part of a term that the other terms
+do not explain is one combination of all terms, T g; the same combination of the terms formed on the clean
+indications, T_clean g, is what the loads make of it, and (|T g - T_clean g| / |T g|)^2 is the share of its
+squares by which the coefficient is attenuated: Fuller, Measurement Error Models (1987), 1.1.
 """
 
 from __future__ import annotations
@@ -27,8 +28,9 @@ from toolkit.calibration.terms import INTERCEPT
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-# Of the size of a term's own part. Cells with curves up to 3 % of full scale stay below 0.35 however they are
-# loaded, and below 0.01 where they are straight; terms that the loads do not tell lie at 1.
+# Of the size of a term's own part. Terms that the loads do not tell lie at 1. Straight cells at enough levels
+# stay below 0.01, cells of which one has a curve of 5 % below 0.1, and balances that bend by 3 % with
+# products of loads, which the clean indications have not, below 0.35.
 NOISE_SHARE = 0.5
 _CURVE = 3
 # Columns that agree to this, of unit size, are one: levels that differ by less are the same level.

@@ -81,7 +81,7 @@ def calibrate(
     Raises
     ------
     ConfigError, SessionError, UnitError
-        the session cannot be used; nothing is written
+        the session cannot be used, or does not tell terms of its model; nothing is written
     RegistryError
         the ledger is damaged, the session lies in the future, or ``discarded``; nothing is written
     """
