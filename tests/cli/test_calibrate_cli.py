@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import datetime as dt
 import json
 import os
 from pathlib import Path
@@ -12,6 +13,8 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
+from toolkit.calibration.registry.approval import approve
+from toolkit.calibration.registry.registry import Registry
 from toolkit.cli import calibrate, calibration_report
 from toolkit.errors import ToolkitError
 
@@ -28,6 +31,7 @@ loads = ["FY", "MZ"]
 data = "loads.csv"
 check = "check.csv"
 """
+DAY = dt.date(2026, 1, 5)
 HEADER = "A [mV/V],B [mV/V],FY [lbf],MZ [lbf*ft]"
 
 
@@ -280,3 +284,43 @@ def test_a_session_folder_that_is_not_writable_is_enough(session: Path, tmp_path
     finally:
         session.parent.chmod(0o700)
     assert sorted(p.name for p in session.parent.iterdir()) == ["SESSION.toml", "check.csv", "loads.csv"]
+
+
+def polarity(sign: float = 1.0) -> str:
+    """Return readings of 400 lbf and of 80 lbf*ft by the cells' true sensitivities, times a sign."""
+    loads = {"FY": (400.0, "lbf", 0.8, 0.04), "MZ": (80.0, "lbf*ft", -0.24, 0.8)}
+    return "".join(
+        f'[[polarity]]\nload = "{name}"\nvalue = {{ value = {value}, unit = "{unit}" }}\n'
+        f'indications = {{ A = {{ value = {sign * a}, unit = "mV/V" }}, '
+        f'B = {{ value = {sign * b}, unit = "mV/V" }} }}\n'
+        for name, (value, unit, a, b) in loads.items()
+    )
+
+
+def last_line(*arguments: object) -> str:
+    return run(*arguments)[1].strip().splitlines()[-1]
+
+
+def test_an_approval_is_named_next_only_where_it_can_be_had(session: Path, tmp_path: Path) -> None:
+    registry = Registry(tmp_path / "cal")
+
+    def entered(text: str) -> str:
+        session.write_text(TEXT + text)
+        return last_line(session, "--calibrations", registry.folder)
+
+    approval = "next: toolkit calibration approve cell2-r{} --in-force-from 2026-01-05 --checked-by NAME"
+    assert entered("") == approval.format(1) + " --polarity FILE"
+    serials = '[cells.A]\nserial = "{}"\n[cells.B]\nserial = "2"\n'
+    assert entered(serials.format("1") + polarity()) == approval.format(2)
+    wrong = entered(serials.format("1") + polarity(-1.0))
+    assert wrong.startswith("next: settle")
+    assert "polarity-reading" in wrong
+    assert "approve cell2" not in wrong
+    assert not approve(registry, "cell2-r3", in_force_from=DAY, checked_by="second person").done
+    assert approve(registry, "cell2-r2", in_force_from=DAY, checked_by="second person").done
+    assert entered(serials.format("9") + polarity()) == approval.format(4) + " --reason TEXT"
+    # A session that is recorded already is told the same.
+    assert last_line(session, "--calibrations", registry.folder) == approval.format(4) + " --reason TEXT"
+    assert not approve(registry, "cell2-r4", in_force_from=DAY, checked_by="second person").done
+    done = approve(registry, "cell2-r4", in_force_from=DAY, checked_by="second person", reason="A failed")
+    assert done.done

@@ -217,3 +217,11 @@ def test_a_reduced_test_of_a_record_in_force_is_converted_and_one_withdrawn_sinc
         assert "cell overloaded" in answer["error"]["got"]
     assert not table.exists()
     assert not (tmp_path / "out").exists()
+    # As it was known the day before the withdrawal: what became known since goes along.
+    before = today() - dt.timedelta(days=1)
+    code, _ = toolkit(capsys, own, "convert", whole, table, "--known-at", before)
+    assert code == 1
+    rows = list(csv.DictReader(table.read_text().splitlines()))
+    assert rows
+    assert all("KNOWN SINCE: m15-virtual-r1: " in one["calibration"] for one in rows)
+    assert all("cell overloaded" in one["calibration"] for one in rows)

@@ -222,3 +222,16 @@ def test_times_stand_apart_from_the_answer_and_errors_carry_their_degrees_of_fre
         stiffness = one["cornering_stiffness_N_per_rad"] or one["aligning_stiffness_Nm_per_rad"]
         if stiffness is not None:
             assert stiffness["dof"] == 5
+
+
+def test_a_fit_of_a_table_says_how_its_record_stands(tire):
+    plain = json.loads(run(tire, *models("brush"), "--json")[1])
+    lines = tire.read_text().splitlines()
+    marked = [lines[0] + ",calibration", *(f"{line},UNVERIFIED CALIBRATION: m15-r2" for line in lines[1:])]
+    tire.write_text("\n".join(marked) + "\n")
+    code, out = run(tire, *models("brush"), "--json")
+    told = json.loads(out)
+    assert code == 1
+    (finding,) = [one for one in told["findings"] if one["rule"] == "unverified"]
+    assert "m15-r2" in finding["message"]
+    assert told["fits"] == plain["fits"]

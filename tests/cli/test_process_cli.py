@@ -7,6 +7,7 @@ import shutil
 from pathlib import Path
 from typing import Any
 
+import pandas as pd
 import pytest
 
 from toolkit.cli.home import packaged_home
@@ -46,6 +47,29 @@ def test_a_real_file_is_corrected_by_the_record_in_force(
     assert first["FY_N"] / 4.4482216152605 == pytest.approx(-1.79, abs=0.01)
     assert first["FY_file_N"] / 4.4482216152605 == pytest.approx(371.353, abs=0.001)
     assert (tmp_path / "test.xlsx").is_file()
+
+
+def test_a_table_of_an_unverified_record_says_so_in_every_row(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    test = fig_test(tmp_path, 'machine = "m15"\ndate = 2019-05-31')
+    whole, table, tydex, back = (tmp_path / name for name in ("w.xlsx", "w.csv", "w.tdx", "back.csv"))
+    toolkit(capsys, "process", test, "--out", whole)
+    code, _ = toolkit(capsys, "convert", whole, table)
+    assert code == 1
+    lines = table.read_text().splitlines()
+    assert lines[0] == "SA [deg],FZ [N],FY [N],MZ [N*m],calibration"
+    assert len(lines) > 1
+    assert all(line.endswith(",UNVERIFIED CALIBRATION: m15-r2") for line in lines[1:])
+    read = pd.read_csv(table)
+    assert set(read["calibration"]) == {"UNVERIFIED CALIBRATION: m15-r2"}
+    assert read["FY [N]"].dtype == float
+    # Through TYDEX and back, and into what is made of it.
+    code, answer = toolkit(capsys, "convert", table, tydex)
+    assert (code, answer["findings"][0]["rule"]) == (1, "unverified")
+    assert "UNVERIFIED CALIBRATION: m15-r2" in tydex.read_text().splitlines()
+    toolkit(capsys, "convert", tydex, back)
+    assert pd.read_csv(back)["calibration"].tolist() == read["calibration"].tolist()
 
 
 def test_a_reduced_test_is_a_test(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -21,11 +21,13 @@ from toolkit.cli.console import (
 )
 from toolkit.cli.fit_report import Figures, Full, check_folder, tell
 from toolkit.cli.home import registry_to_write
-from toolkit.errors import ConfigError
+from toolkit.errors import ConfigError, ToolkitError
 from toolkit.estimate import round_uncertainty
 
 if TYPE_CHECKING:
+    from toolkit.calibration.records.record import CalibrationRecord
     from toolkit.calibration.registry.candidate import Candidate
+    from toolkit.calibration.registry.registry import Registry
 
 NAME = "calibrate"
 NOT_ENTERED = "not entered"
@@ -81,6 +83,8 @@ def command(
     made = (rehearse if dry_run else calibrate)(session, registry, machine=machine, again=again)
     status = NOT_ENTERED if dry_run and not made.existing else registry.status(made.record.id).state
     payload, text = _payload(made, status), _text(made, status)
+    if status == "candidate":
+        text += f"\n\nnext: {_next(registry, made.record, machine)}"
     payload["dry_run"] = dry_run
     if full or as_json or figures is not None:
         from toolkit.calibration.standards.evaluation import evaluations
@@ -173,12 +177,30 @@ def _text(made: Candidate, status: str) -> str:
     lines += ["", f"condition number of the indications {made.fit.condition_number:.3g}"]
     if made.findings:
         lines += ["findings:", *finding_lines(made.findings)]
-    if status == "candidate":
-        lines += [
-            "",
-            f"next: toolkit calibration approve {record.id} --in-force-from {record.date} --checked-by NAME",
-        ]
     return "\n".join(lines)
+
+
+def _next(registry: Registry, record: CalibrationRecord, machine: str | None) -> str:
+    """Return the approval, with what its gates ask for; where they block it, what comes before."""
+    from toolkit.calibration.registry.judgement import machine_of
+    from toolkit.calibration.registry.standing import failed_gates, gate_words
+
+    try:
+        failed = failed_gates(registry, record, machine=machine_of(record.instrument, machine))
+    except ToolkitError as error:
+        return f"what an approval would be refused for: {error.what} ({error.where}); {error.next_step}"
+    blocks = [one for one in failed if one.effect == "blocks"]
+    if blocks:
+        return (
+            f"settle what 'calibration approve' would refuse: {gate_words(blocks)} (toolkit explain RULE "
+            f"tells more); where the session is wrong, correct it, calibrate again and discard {record.id}"
+        )
+    words = f"toolkit calibration approve {record.id} --in-force-from {record.date} --checked-by NAME"
+    asked = {one.rule for one in failed}
+    words += f" --machine {machine}" if machine else ""
+    words += " --reason TEXT" if "replacement" in asked else ""
+    words += " --polarity FILE" if "polarity-reading" in asked else ""
+    return words
 
 
 def _per(term: str, load_unit: str, units: dict[str, str]) -> str:

@@ -23,6 +23,8 @@ from toolkit.cli.console import (
 from toolkit.cli.delivery import draft_keys
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     import numpy as np
     from numpy.typing import NDArray
 
@@ -54,8 +56,8 @@ def command(
 ) -> int:
     """Convert between the formats that are read and written; what the target cannot hold is named.
 
-    A reduced test is judged by the registry as in every other command. A table has no place for the mark of
-    a draft: a draft goes into no .csv.
+    A reduced test is judged by the registry as in every other command. Where its record is unverified, or
+    something became known of it since, a table says so in a column `calibration`; a draft goes into no .csv.
 
     Example: toolkit convert tire.tdx tire.csv --axes SAE
     """
@@ -82,9 +84,13 @@ def command(
             )
             use = resolved.result.reduced.calibration
         _refuse_draft(source, target, kinds, use)
-        columns, read_in, found = _of_test(source, resolved) if resolved else _read(source, kinds[0], axes)
-        comments = [use.mark] if use is not None and use.mark else []
-        text, more = _written(columns, read_in, kinds[1], axes, source, comments)
+        marks: tuple[str, ...]
+        if resolved:
+            columns, read_in, found = _of_test(source, resolved)
+            marks = (use.mark,) if use is not None and use.mark else ()
+        else:
+            columns, read_in, found, marks = _read(source, kinds[0], axes)
+        text, more = _written(columns, read_in, kinds[1], axes, source, marks)
         findings = (*found, *more)
     write_atomic(target, text)
     shown = f"{target} written"
@@ -148,8 +154,8 @@ def _tir(source: Path) -> tuple[str, tuple[Finding, ...]]:
     return file_text(converted), findings
 
 
-def _read(source: Path, kind: str, axes: str) -> tuple[Columns, Axes, tuple[Finding, ...]]:
-    # Columns in their own units, the axes that they are in, and what stays out.
+def _read(source: Path, kind: str, axes: str) -> tuple[Columns, Axes, tuple[Finding, ...], tuple[str, ...]]:
+    # Columns in their own units, the axes that they are in, what stays out, and the marks of records.
     from toolkit.findings import Finding
     from toolkit.units import from_si, unit
 
@@ -164,7 +170,7 @@ def _read(source: Path, kind: str, axes: str) -> tuple[Columns, Axes, tuple[Find
         note = Finding(
             rule="not-converted", where=str(source), message=f"a table has no place for {', '.join(out)}"
         )
-        return columns, "ISO-W", (*file.findings, *([note] if out else []))
+        return columns, "ISO-W", (*file.findings, *([note] if out else [])), _marks(source)
     from toolkit.tires.table import read_table
 
     table = read_table(source, axes=axes, required=("FZ",), measured=False)
@@ -173,7 +179,15 @@ def _read(source: Path, kind: str, axes: str) -> tuple[Columns, Axes, tuple[Find
         symbol: (name, from_si(values, name))
         for name, (symbol, values) in zip(units, table.columns, strict=True)
     }
-    return columns, table.axes, ()
+    return columns, table.axes, table.mark_findings, table.marks
+
+
+def _marks(tydex: Path) -> tuple[str, ...]:
+    """Return the marks of records among the comments of a TYDEX file."""
+    from toolkit.calibration.records.use import SINCE, UNVERIFIED
+
+    lines = tydex.read_bytes().decode("utf-8", errors="replace").splitlines()
+    return tuple(dict.fromkeys(line.strip() for line in lines if line.startswith((UNVERIFIED, SINCE))))
 
 
 def _of_test(source: Path, resolved: Resolved) -> tuple[Columns, Axes, tuple[Finding, ...]]:
@@ -204,24 +218,32 @@ def _of_test(source: Path, resolved: Resolved) -> tuple[Columns, Axes, tuple[Fin
 
 
 def _written(
-    columns: Columns, read_in: Axes, kind: str, axes: str, source: Path, comments: list[str]
+    columns: Columns, read_in: Axes, kind: str, axes: str, source: Path, marks: Sequence[str]
 ) -> tuple[str, tuple[Finding, ...]]:
+    import csv
+    import io
+
     from toolkit.channels import signs
     from toolkit.findings import Finding
+    from toolkit.tires.table import MARKS
     from toolkit.tires.tydex import NAMES, tydex_text
 
     turn = signs(read_in, "ISO-W" if kind == "tydex" else axes)  # type: ignore[arg-type]
     turned = {symbol: (name, turn.get(symbol, 1) * values) for symbol, (name, values) in columns.items()}
     if kind == "csv":
-        lines = [",".join(f"{symbol} [{name}]" for symbol, (name, _) in turned.items())]
-        lines += [
-            ",".join(repr(float(value) + 0.0) for value in row)  # -0 is 0
-            for row in zip(*(values for _, values in turned.values()), strict=True)
-        ]
-        return "\n".join(lines) + "\n", ()
+        # Every row says how its record stands: a row that is copied elsewhere says so too.
+        mark = [" - ".join(marks)] if marks else []
+        table = io.StringIO()
+        writer = csv.writer(table, lineterminator="\n")
+        writer.writerow(
+            [f"{symbol} [{name}]" for symbol, (name, _) in turned.items()] + [MARKS for _ in mark]
+        )
+        for row in zip(*(values for _, values in turned.values()), strict=True):
+            writer.writerow([repr(float(value) + 0.0) for value in row] + mark)  # -0 is 0
+        return table.getvalue(), ()
     out = [symbol for symbol in turned if symbol not in NAMES]
     text, findings = tydex_text(
-        {symbol: column for symbol, column in turned.items() if symbol in NAMES}, comments=comments
+        {symbol: column for symbol, column in turned.items() if symbol in NAMES}, comments=marks
     )
     if out:
         message = f"TYDEX has no channel for {', '.join(out)}"

@@ -68,7 +68,7 @@ def fit_table_models(
     data = of_table(measured, rated_load_N=rated_load_N, radius_m=radius_m or STAND_IN_RADIUS)
     single, every = _split(names)
     curves: tuple[CurveFit, ...] = ()
-    findings: tuple[Finding, ...] = (*repeat_findings(measured),)
+    findings: tuple[Finding, ...] = (*measured.mark_findings, *repeat_findings(measured))
     seconds: dict[str, float] = {}
     for one in single:
         started = time.perf_counter()

@@ -86,7 +86,7 @@ def maker_rows(
     findings += [
         replace(one, where=f"{path.name}, {one.where}") for one in (*told, *axes_findings(sae, fits))
     ]
-    findings += repeat_findings(table)
+    findings += (*repeat_findings(table), *table.mark_findings)
     return tuple(rows), tuple(findings)
 
 

@@ -2,7 +2,8 @@
 
     SA [deg],FZ [N],FY [N],MZ [N*m]        optional: IA [deg], P [kPa], V [km/h], FX [N], KAPPA [1], t [s]
 
-FZ may have either sign and is the load. The axis system is declared, never guessed.
+FZ may have either sign and is the load. The axis system is declared, never guessed. A column of text, named
+`calibration` and without a unit, may say how the record stands that the numbers rest on: `convert` writes it.
 """
 
 from __future__ import annotations
@@ -20,12 +21,14 @@ import numpy as np
 
 from toolkit.channels import AXES, CHANNELS, Axes
 from toolkit.errors import CellError, ColumnError, ConfigError, UnreadableError
+from toolkit.findings import Finding
 from toolkit.tires.possible import LARGEST
 from toolkit.units import unit
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+MARKS = "calibration"
 _HEADER = re.compile(r"\s*([A-Za-z_]+)\s*\[([^\]]*)\]\s*")
 _NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]{1,4})?")
 _AXES: dict[str, Axes] = {axes: axes for axes in get_args(Axes)}
@@ -37,7 +40,8 @@ _SHAPE = "a header such as 'SA [deg],FZ [N],FY [N],MZ [N*m]' and rows of numbers
 class TireTable:
     """A table in SI: ``columns`` by symbol (rows,), in the declared ``axes``; FZ is the positive load.
 
-    ``header`` and ``cells`` are the same as written, so that a grid comes back with its own digits.
+    ``header`` and ``cells`` are the same as written, so that a grid comes back with its own digits. ``marks``
+    are the texts of its column `calibration`, each once.
     """
 
     path: Path
@@ -45,6 +49,19 @@ class TireTable:
     columns: tuple[tuple[str, NDArray[np.float64]], ...]
     header: tuple[str, ...] = ()
     cells: tuple[tuple[str, ...], ...] = ()
+    marks: tuple[str, ...] = ()
+
+    @property
+    def mark_findings(self) -> tuple[Finding, ...]:
+        """What the table says of the record that its numbers rest on."""
+        return tuple(
+            Finding(
+                rule="known-since" if mark.startswith("KNOWN SINCE") else "unverified",
+                where=self.path.name,
+                message=mark,
+            )
+            for mark in self.marks
+        )
 
     def get(self, symbol: str) -> NDArray[np.float64] | None:
         """Return a column [SI], None where the table has none."""
@@ -84,7 +101,7 @@ def read_table(
             f"unknown axis system {axes!r}", where="--axes", got=axes, expected=", ".join(AXES),
             next_step="name one of those expected", rule="unknown-axes",
         )  # fmt: skip
-    lines = _cells(path)
+    lines, marks = _without_marks(_cells(path))
     row, header = lines[0]
     names = [_symbol(cell, path) for cell in header]
     symbols = [name for name, _, _ in names]
@@ -130,7 +147,21 @@ def read_table(
         columns=tuple(columns),
         header=tuple(cell.strip() for cell in header),
         cells=tuple(tuple(cell.strip() for cell in cells) for _, cells in lines[1:]),
+        marks=marks,
     )
+
+
+def _without_marks(
+    lines: list[tuple[int, list[str]]],
+) -> tuple[list[tuple[int, list[str]]], tuple[str, ...]]:
+    # The lines without the column of marks, and its texts.
+    header = lines[0][1]
+    at = [i for i, cell in enumerate(header) if cell.strip().lower() == MARKS]
+    if len(at) != 1:
+        return lines, ()
+    rest = [(row, cells[: at[0]] + cells[at[0] + 1 :]) for row, cells in lines]
+    told = [cells[at[0]].strip() for _, cells in lines[1:] if len(cells) > at[0]]
+    return rest, tuple(dict.fromkeys(mark for mark in told if mark))
 
 
 def _cells(path: Path) -> list[tuple[int, list[str]]]:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from toolkit.calibration.fit.dilution import NOISE_SHARE, noise_terms
 from toolkit.calibration.terms import INTERCEPT, term_matrix
 from toolkit.errors import ConfigError, SessionError
 
@@ -127,6 +128,34 @@ def check_adequate(session: Session) -> Adequacy:
         # Variance inflation factors: the diagonal of the inverse of the correlations.
         vif=tuple(np.diag(np.linalg.inv(correlation)).tolist()),
     )
+
+
+def check_levels(session: Session) -> None:
+    """Refuse a session whose model has terms that only the noise of the cells tells apart (`dilution`).
+
+    It is asked of a session that is to be entered; what was recorded before stays readable.
+
+    Raises
+    ------
+    SessionError
+        ``load-levels``
+    """
+    loads = session.table.matrix([load.name for load in session.loads])
+    untold = noise_terms(session.terms, session.table.columns(session.indications), loads)
+    if not untold:
+        return
+    named = [term for term in session.terms if term in untold]
+    worst = max(untold, key=untold.__getitem__)
+    drop = ", ".join(f'"{term}"' for term in named)
+    raise _refused(
+        session,
+        f"the loads do not tell {', '.join(named)}: only the noise of the cells would decide about "
+        f"{'it' if len(named) == 1 else 'them'}",
+        f"{min(untold[worst], 1.0):.0%} of what sets {worst} apart from the other terms is noise",
+        f"at most {NOISE_SHARE:.0%}", "load-levels",
+        "apply more load levels on each axis, and combined loads for products of cells, or leave the terms "
+        f"out: drop = [{drop}]",
+    )  # fmt: skip
 
 
 def _condition(matrix: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]:

@@ -20,6 +20,7 @@ import numpy as np
 
 from toolkit.calibration.fit.adequacy import RANK, terms_condition_number
 from toolkit.calibration.fit.basis import build_basis
+from toolkit.calibration.fit.dilution import NOISE_SHARE, noise_shares
 from toolkit.calibration.terms import INTERCEPT, model_terms, term_matrix
 
 if TYPE_CHECKING:
@@ -99,7 +100,8 @@ def recommend_wider(fit: SessionFit) -> Wider | None:
     session, columns = fit.session, fit.session.table.columns(fit.session.indications)
     loads = [one for one in fit.loads if not _exact(one)]
     own = _Model(name="session", lines="", terms=session.terms)
-    models = [m for m in _models(session) if _determined(m.terms, columns)]
+    applied = session.table.matrix([load.name for load in session.loads])
+    models = [m for m in _models(session) if _determined(m.terms, columns, applied)]
     if not models or not loads:
         return None
     solved = {(own.name, one.setting.name): _sum_of(one.fit) for one in loads}
@@ -294,7 +296,9 @@ def _exact(one: LoadResult) -> bool:
     return one.fit.residual_sd <= 1e-9 * one.setting.tolerance
 
 
-def _determined(terms: tuple[str, ...], columns: Mapping[str, NDArray[np.float64]]) -> bool:
+def _determined(
+    terms: tuple[str, ...], columns: Mapping[str, NDArray[np.float64]], loads: NDArray[np.float64]
+) -> bool:
     matrix = term_matrix(terms, columns)
     if len(matrix) - len(terms) < 3:
         return False
@@ -303,7 +307,10 @@ def _determined(terms: tuple[str, ...], columns: Mapping[str, NDArray[np.float64
     # A column that only rounding tells from zero is undetermined too.
     if (np.abs(matrix).max(axis=0) == 0).any():
         return False
-    return bool(terms_condition_number(matrix) < RANK**-0.5)
+    if terms_condition_number(matrix) >= RANK**-0.5:
+        return False
+    # Noise that tells a term gains as much by the F test as a curve of the cells would.
+    return max(noise_shares(terms, columns, loads).values(), default=0.0) <= NOISE_SHARE
 
 
 def _lines(model: str, drop: Sequence[str]) -> str:

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 DRAFT = "DRAFT"
 DRAFT_MARK = f"{DRAFT}, NOT APPROVED"
 UNVERIFIED = "UNVERIFIED CALIBRATION"
+SINCE = "KNOWN SINCE"
 _LONGEST = 130  # characters of a part of the mark that stands on every page
 
 
@@ -72,7 +73,7 @@ def mark_of(uses: Sequence[CalibrationUse]) -> str | None:
     for word, chosen, why in (
         (DRAFT_MARK, [one for one in uses if one.draft], "draft_reasons"),
         (UNVERIFIED, [one for one in uses if one.unverified], None),
-        ("KNOWN SINCE", [one for one in uses if one.since], "since"),
+        (SINCE, [one for one in uses if one.since], "since"),
     ):
         if chosen:
             text = f"{word}: {', '.join(dict.fromkeys(one.id for one in chosen))}"

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from toolkit.calibration.fit.adequacy import check_levels
 from toolkit.calibration.fit.findings import session_findings
 from toolkit.calibration.fit.readings import SessionReadings, readings_of
 from toolkit.calibration.fit.readings_findings import readings_findings
@@ -80,7 +81,7 @@ def calibrate(
     Raises
     ------
     ConfigError, SessionError, UnitError
-        the session cannot be used; nothing is written
+        the session cannot be used, or does not tell terms of its model; nothing is written
     RegistryError
         the ledger is damaged, the session lies in the future, or ``discarded``; nothing is written
     """
@@ -98,6 +99,7 @@ def calibrate(
         return Candidate(
             record=existing, path=path, existing=True, fit=fit, readings=readings, findings=findings
         )
+    check_levels(session)
     made: list[CalibrationRecord] = []
     unnumbered = _record(fit)
     # Before anything is written: what cannot be evaluated must not leave a record behind.

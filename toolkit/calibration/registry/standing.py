@@ -22,9 +22,12 @@ from toolkit.calibration.registry.judgement import judge_stored, machine_of
 from toolkit.errors import RecordError, ToolkitError
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from toolkit.calibration.records.record import CalibrationRecord
     from toolkit.calibration.registry.registry import Registry
     from toolkit.calibration.registry.status import RecordStatus
+    from toolkit.machine.definition import Machine
 
 _PLACES = 4  # of a failed gate that are named
 
@@ -160,7 +163,7 @@ def unapproved(registry: Registry, record: CalibrationRecord, status: RecordStat
         step = f"approve it: 'toolkit calibration approve {record.id} --in-force-from DATE'"
         return (Reason(text=f"{state}; no gate fails", next_step=step),)
     step = "correct the session and calibrate again: 'approve' refuses this record"
-    return (Reason(text=f"{state}; failed {_gates(failed)}", next_step=step),)
+    return (Reason(text=f"{state}; failed {gate_words(failed)}", next_step=step),)
 
 
 def withdrawal(status: RecordStatus, on: date | None = None) -> tuple[Reason, ...]:
@@ -173,10 +176,12 @@ def withdrawal(status: RecordStatus, on: date | None = None) -> tuple[Reason, ..
     return (Reason(text=text, next_step="see 'toolkit calibration list'"),)
 
 
-def failed_gates(registry: Registry, record: CalibrationRecord) -> tuple[GateResult, ...]:
-    """Return the gates of an approval that a record fails."""
-    ledger, machine = registry.ledger(record.instrument), machine_of(record.instrument)
-    return judge_stored(registry, record, ledger, machine=machine).failed
+def failed_gates(
+    registry: Registry, record: CalibrationRecord, *, machine: Machine | None = None
+) -> tuple[GateResult, ...]:
+    """Return the gates of an approval that a record fails; ``machine``: default that of its instrument."""
+    machine = machine or machine_of(record.instrument)
+    return judge_stored(registry, record, registry.ledger(record.instrument), machine=machine).failed
 
 
 _VERIFY = "see 'toolkit calibration verify'"
@@ -245,7 +250,8 @@ def _other(registry: Registry, instrument: str, on: date | None, known: date) ->
     return f"use {winner}, the record in force: leave --calibration away, or process the recordings again"
 
 
-def _gates(failed: tuple[GateResult, ...]) -> str:
+def gate_words(failed: Sequence[GateResult]) -> str:
+    """Return failed gates in words: each rule with the first of its places."""
     told = []
     for rule in dict.fromkeys(one.rule for one in failed):
         places = [one.where for one in failed if one.rule == rule]
