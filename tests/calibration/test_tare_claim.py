@@ -88,9 +88,15 @@ def test_without_zero_rows_and_intercept_nothing_shows_the_tare(empty: Registry,
     assert any("cannot be seen to hold" in text for text in decision.evidence)
 
 
-def test_an_offset_inside_the_tolerance_is_hysteresis(empty: Registry, tmp_path: Path) -> None:
-    # 1e-4 mV/V of 1.6 is 0.006 % of full scale; the check loads' tolerance is 0.1 %.
-    path = write_virtual(tmp_path / "s", shifted("D51", 1e-4))
+def test_an_intercept_beyond_its_own_uncertainty_blocks(empty: Registry, tmp_path: Path) -> None:
+    # 2e-4 mV/V of 1.6 is 0.012 % of full scale, inside the tolerance of 0.1 % and far outside the scatter.
+    _, decision = judged(empty, write_virtual(tmp_path / "s", shifted("D51", 2e-4)))
+    assert failed(decision) == {"tared"}
+
+
+def test_what_a_standard_may_show_of_nothing_is_no_offset(empty: Registry, tmp_path: Path) -> None:
+    # 5e-5 mV/V is 0.005 % of full scale, half of a tenth of the check loads' tolerance.
+    path = write_virtual(tmp_path / "s", shifted("D51", 5e-5))
     made = calibrate(path, empty)
     day = dt.date(2026, 11, 1)
     assert approve(empty, made.record.id, in_force_from=day, checked_by="Z").done

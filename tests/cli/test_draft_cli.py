@@ -110,7 +110,7 @@ def test_no_command_makes_a_number_from_it(
     assert code == 2
     error = answer["error"]
     assert error["rule"] in ("not-in-force", "certificate-candidate")
-    assert "failed gate sign (FY, E5; MZ, E5" in error["got"]
+    assert "sign (FY, E5; MZ, E5" in error["got"]
     assert all(error[part] for part in ("what", "where", "expected", "next_step"))
     assert list(tmp_path.iterdir()) == []
 
@@ -130,7 +130,7 @@ def test_a_draft_says_so_in_answer_and_file_and_stays_one(
         capsys, home, "fit", draft_file, "--draft", "--model", "mf61", "--tir", tire, "--figures", figures
     )
     assert (code, answer["draft"], answer["calibration"]["id"]) == (1, True, REFUSED)
-    assert "failed gate sign" in answer["draft_reasons"][0]
+    assert "failed gates sign" in answer["draft_reasons"][0]
     assert f"! DRAFT, NOT APPROVED: {REFUSED}" in tire.read_text()
     (tmp_path / "grid.csv").write_text("SA [deg],FZ [N]\n1,4000\n")
     with pytest.raises(SystemExit) as caught:
@@ -156,7 +156,7 @@ def test_every_page_of_a_draft_is_marked(
     assert (code, answer["draft"], answer["verified"]) == (1, True, True)
     pages = text_of(Path(answer["pdf"]))
     assert len(pages) == answer["pages"] > 5
-    assert all("DRAFT, NOT APPROVED" in one and "failed gate sign" in one for one in pages)
+    assert all("DRAFT, NOT APPROVED" in one and "failed gates sign" in one for one in pages)
     first = " ".join(pages[0].split())
     assert "not approved: a candidate" in first
     assert "DRAFT-TR-" in first
@@ -178,7 +178,7 @@ def test_a_draft_of_a_certificate_and_of_a_comparison(
     words = ("calibration", "certificate", REFUSED, "--draft", "--out", tmp_path / "certificate")
     code, answer = toolkit(capsys, home, *words)
     assert (code, answer["draft"]) == (1, True)
-    assert "failed gate sign" in answer["draft_reasons"][0]
+    assert "failed gates sign" in answer["draft_reasons"][0]
     assert all("DRAFT, NOT APPROVED" in one for one in text_of(Path(answer["pdf"])))
     other = tmp_path / "other"
     plan = tmp_path / "plan.toml"

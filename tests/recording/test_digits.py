@@ -6,7 +6,7 @@ from decimal import Decimal
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from toolkit.examples.fig4_4 import ROWS, SYMBOLS
@@ -14,7 +14,30 @@ from toolkit.recording.digits import half_last_place
 
 
 def by_text(values: list[float]) -> list[float]:
-    """The rule in its own words: the finest place among values of the same decade, from their texts."""
+    """The rule in its own words: the finest place among values of the same decade, from their texts.
+
+    Six values of one sign beside others of the other have the finest place of their own sign.
+    """
+    whole = _finest(values)
+    zero = min(whole.values(), default=0.0)
+    sides = [[v for v in values if v * sign > 0] for sign in (1, -1)]
+    own = [_finest(side) for side in sides]
+
+    def half(value: float) -> float:
+        decade = _decade(value)
+        at = int(value < 0)
+        count = [sum(_decade(v) == decade for v in side) for side in sides]
+        split = count[at] >= 6 and count[1 - at] > 0 and whole[decade] > 0
+        return own[at][decade] if split else whole[decade]
+
+    return [zero if v == 0 else half(v) for v in values]
+
+
+def _decade(value: float) -> int:
+    return Decimal(repr(value)).adjusted()
+
+
+def _finest(values: list[float]) -> dict[int, float]:
     places: dict[int, int] = {}
     full: set[int] = set()
     for value in values:
@@ -26,9 +49,7 @@ def by_text(values: list[float]) -> list[float]:
         places[decade] = max(places.get(decade, -10_000), -min(exponent, 0) if decade >= -8 else -exponent)
         if len(digits) >= 15 or (decade >= 14):
             full.add(decade)
-    half = {d: 0.0 if d in full else float(Decimal(5).scaleb(-p - 1)) for d, p in places.items()}
-    zero = min(half.values(), default=0.0)
-    return [zero if v == 0 else half[Decimal(repr(v)).adjusted()] for v in values]
+    return {d: 0.0 if d in full else float(Decimal(5).scaleb(-p - 1)) for d, p in places.items()}
 
 
 def test_figure_4_4():
@@ -57,6 +78,7 @@ def test_a_table_is_its_columns():
     )
 
 
+@example([1000.5, *[-1000.0] * 6])
 @given(
     st.lists(
         st.one_of(

@@ -7,6 +7,7 @@ intercept as a load that is not there.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
@@ -15,6 +16,7 @@ import numpy as np
 from toolkit.calibration.registry.gates import GateResult
 from toolkit.calibration.registry.response import response, tolerance
 from toolkit.calibration.terms import INTERCEPT, term_matrix
+from toolkit.calibration.uncertainty.scatter import scatter_of
 from toolkit.units import unit
 
 if TYPE_CHECKING:
@@ -40,11 +42,13 @@ def tare_claim(
 
     Notes
     -----
-    What the check loads' tolerance covers is no contradiction: a zero return of hysteresis stays inside it.
+    An intercept's own uncertainty is that of the fit, with half the difference of loading and unloading and
+    the misfit of the curve, which move it; a tenth of the check loads' tolerance is what a standard may show
+    of nothing. Single cells at zero load are held against the tolerance itself: zero returns stay inside it.
     """
     if record.zero != "tared" or record.kind != "fit" or not tables:
         return ()
-    failed = [one for load in record.loads for one in _intercept(load)]
+    failed = [one for load in record.loads for one in _intercept(record, load, tables[0])]
     noise = [_SIGMAS * (u or 0.0) for u in tuple(u_reference) or (None,) * len(record.loads)]
     rows = [_zero_rows(record, table, noise) for table in tables]
     zeros = np.vstack([table.matrix(record.indications)[at] for table, at in zip(tables, rows, strict=True)])
@@ -59,18 +63,18 @@ def tare_claim(
     return tuple(failed)
 
 
-def _intercept(one: LoadFit) -> list[GateResult]:
+def _intercept(record: CalibrationRecord, one: LoadFit, loads: Table) -> list[GateResult]:
     if INTERCEPT not in one.terms or not one.covariance:
         return []
     at = one.terms.index(INTERCEPT)
-    value, u = one.coefficients[at], one.standard_errors[at]
-    limit = _limit(one)
-    if abs(value) <= max(limit, _SIGMAS * u):
+    scatter = scatter_of(record, loads, one)
+    value, u = one.coefficients[at], math.hypot(one.standard_errors[at], scatter.reversal, scatter.misfit)
+    if abs(value) <= max(AT_ZERO * _limit(one), _SIGMAS * u):
         return []
     message = (
         f'zero = "tared" does not hold: the intercept is {value:+.4g} {one.unit}, its standard uncertainty '
-        f"{u:.2g} {one.unit} and the check loads' tolerance {limit:.4g} {one.unit}; a tared test would read "
-        "it as a load"
+        f"{u:.2g} {one.unit}; a tared test would read it as a load. Tare before each run, or say "
+        'zero = "included" or zero = "run"'
     )
     return [GateResult(rule="tared", where=f"{one.load}, {INTERCEPT}", message=message)]
 
