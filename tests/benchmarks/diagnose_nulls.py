@@ -51,7 +51,7 @@ def run(folder: Path, pairs: int) -> list[dict[str, object]]:
     """Return alarms and processor time of some thirty clean recordings a pair."""
     from scipy.stats import beta
 
-    from toolkit.diagnosis.case_read import read_case
+    from toolkit.diagnosis.case.reader import read_case
     from toolkit.diagnosis.diagnose import diagnose
 
     count, alarms = 29 * pairs, 0

@@ -73,7 +73,7 @@ def run(folder: Path, pairs: int) -> list[dict[str, object]]:
 
 
 def _one(folder: Path, rows: int, effects: tuple[str, ...], *, seed: int) -> tuple[float, int, Any]:
-    from toolkit.diagnosis.case_read import read_case
+    from toolkit.diagnosis.case.reader import read_case
     from toolkit.diagnosis.diagnose import diagnose
     from toolkit.simulation.case import write_case
     from toolkit.simulation.plan import read_plan

@@ -100,7 +100,7 @@ def test_a_named_registry_without_the_machine_is_a_stand_alone_run(run, short, t
 
 
 def test_a_case_and_csv_beside_a_test(run, tmp_path):
-    from toolkit.diagnosis.case_read import read_case
+    from toolkit.diagnosis.case.reader import read_case
 
     plan = (EXAMPLES / "continuous_plan.toml").read_text().partition("[[run]]")[0]
     plan = plan.replace("[2, -2, 5, -5, 9, -9, 0]", "[3]").replace("[2000, 4000, 6000]", "[4000]")

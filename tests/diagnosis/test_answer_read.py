@@ -7,12 +7,12 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from toolkit.diagnosis.answer.reader import read_answer
+from toolkit.diagnosis.answer.serial import as_json
 
 from tests.diagnosis.cases import HEAD, TWO, carriage, write_case
-from toolkit.diagnosis.answer_read import read_answer
-from toolkit.diagnosis.case_read import read_case
+from toolkit.diagnosis.case.reader import read_case
 from toolkit.diagnosis.diagnose import diagnose
-from toolkit.diagnosis.serial import as_json
 from toolkit.errors import ConfigError, ToolkitError
 
 

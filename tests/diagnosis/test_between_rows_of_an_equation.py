@@ -9,9 +9,9 @@ import pandas as pd
 import pytest
 
 from tests.diagnosis.cases import write_case
-from toolkit.diagnosis.case_read import read_case
-from toolkit.diagnosis.load import model_of
-from toolkit.diagnosis.model import Active
+from toolkit.diagnosis.case.reader import read_case
+from toolkit.diagnosis.simulators.build_simulator import model_of
+from toolkit.diagnosis.simulators.simulator import Active
 from toolkit.effects.catalogue import effects
 
 # An interval is at most 0.64 T long, so that straight lines over its quarters are off by 0.64^2 / 128, 0.3 %,

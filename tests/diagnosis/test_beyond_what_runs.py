@@ -6,12 +6,12 @@ import numpy as np
 import pandas as pd
 import pytest
 import typer
+from toolkit.diagnosis.search import forward_step, search
 from typer.testing import CliRunner
 
 from tests.diagnosis.cases import HEAD, TWO, carriage, write_case
 from toolkit.cli import diagnose as command
-from toolkit.diagnosis import search, step
-from toolkit.diagnosis.case_read import read_case
+from toolkit.diagnosis.case.reader import read_case
 from toolkit.diagnosis.diagnose import diagnose
 from toolkit.errors import FitError
 
@@ -101,7 +101,7 @@ def test_a_fold_that_cannot_run_takes_its_candidate_away_and_no_other(tmp_path, 
         asked.append([one.effect.name for one in active])
         return refused() if "coulomb_friction" in asked[-1] else whole(problem, folds, active, made)
 
-    for module in (search, step):
+    for module in (search, forward_step):
         monkeypatch.setattr(module, "hold_out", without_friction)
     found = names(tmp_path)
     assert ["coulomb_friction"] in asked
@@ -125,7 +125,7 @@ def test_an_effect_without_which_nothing_runs_is_kept(tmp_path, monkeypatch, can
         return made
 
     frames = {f"r{i}__csv": carriage(seed=i).assign(F=lambda df: df["F"] + 15) for i in range(2)}
-    for module in (search, step):
+    for module in (search, forward_step):
         monkeypatch.setattr(module, cannot, only_together)
     assert sorted(names(tmp_path, **frames)) == ["coulomb_friction", "zero_offset"]
     assert left

@@ -8,7 +8,7 @@ import pytest
 
 from tests.diagnosis.cases import HEAD, ONE, TWO, carriage, write_case
 from toolkit.cli.explain import RULES_FILE
-from toolkit.diagnosis.case_read import read_case
+from toolkit.diagnosis.case.reader import read_case
 from toolkit.errors import CellError, ColumnError, ConfigError, ToolkitError, UnreadableError
 
 

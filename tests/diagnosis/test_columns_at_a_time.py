@@ -5,7 +5,12 @@ import math
 import numpy as np
 import pytest
 
-from toolkit.diagnosis.kinds.together import NotTogetherError, columns_of, integrate_together, takes_columns
+from toolkit.diagnosis.simulators.batch_integration import (
+    NotTogetherError,
+    columns_of,
+    integrate_together,
+    takes_columns,
+)
 
 T = np.linspace(0.0, 10.0, 201)
 SETS = [{"k": 1.0}, {"k": 4.0}, {"k": 9.0}]

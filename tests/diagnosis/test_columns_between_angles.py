@@ -6,13 +6,13 @@ import pytest
 
 from tests.diagnosis.cases import ONE, write_case
 from tests.diagnosis.tire_case import toml
-from toolkit.diagnosis.case_read import read_case
+from toolkit.diagnosis.case.reader import read_case
 from toolkit.diagnosis.diagnose import diagnose
-from toolkit.diagnosis.kinds.columns import ColumnsModel
-from toolkit.diagnosis.kinds.surface import Surface, scatter
-from toolkit.diagnosis.kinds.tire import base_drive
-from toolkit.diagnosis.model import Active
-from toolkit.diagnosis.problem import problem_of
+from toolkit.diagnosis.fit.problem import problem_of
+from toolkit.diagnosis.simulators.columns import ColumnsModel
+from toolkit.diagnosis.simulators.simulator import Active
+from toolkit.diagnosis.simulators.surface import Surface, scatter
+from toolkit.diagnosis.simulators.tire import base_drive
 from toolkit.effects.catalogue import effects
 from toolkit.errors import ConfigError
 

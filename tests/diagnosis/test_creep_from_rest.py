@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 
 from tests.diagnosis.cases import CELL, TWO, cell_case, write_case
-from toolkit.diagnosis.case_read import read_case
+from toolkit.diagnosis.case.reader import read_case
 from toolkit.diagnosis.diagnose import diagnose
 
 FRACTION, TAU = 0.02, 15.0

@@ -4,12 +4,12 @@ import numpy as np
 import pandas as pd
 import pytest
 from scipy.optimize import curve_fit
+from toolkit.diagnosis.fit.fit import fit
 
 from tests.diagnosis.cases import write_case
-from toolkit.diagnosis.case_read import read_case
-from toolkit.diagnosis.fit import fit
-from toolkit.diagnosis.load import model_of
-from toolkit.diagnosis.problem import problem_of
+from toolkit.diagnosis.case.reader import read_case
+from toolkit.diagnosis.fit.problem import problem_of
+from toolkit.diagnosis.simulators.build_simulator import model_of
 
 CASE = """schema = 1
 [simulation]

@@ -10,10 +10,10 @@ import pytest
 from scipy.optimize import brentq
 
 from tests.diagnosis.cases import write_case
-from toolkit.diagnosis.case_read import read_case
+from toolkit.diagnosis.case.reader import read_case
 from toolkit.diagnosis.diagnose import diagnose
-from toolkit.diagnosis.load import model_of
-from toolkit.diagnosis.model import Active
+from toolkit.diagnosis.simulators.build_simulator import model_of
+from toolkit.diagnosis.simulators.simulator import Active
 from toolkit.effects.catalogue import effects
 
 COULOMB, REACH = 0.5, 1e-3  # N/kg, m

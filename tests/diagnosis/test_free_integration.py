@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from toolkit.diagnosis.kinds.integrate import IntegrationError, integrate
+from toolkit.diagnosis.simulators.integrate import IntegrationError, integrate
 
 TIGHT = 1e-9
 

@@ -2,8 +2,7 @@
 
 import numpy as np
 import pytest
-
-from toolkit.diagnosis.lattice import lattice_of
+from toolkit.diagnosis.search.lattice import lattice_of
 
 
 def printed(values, form):

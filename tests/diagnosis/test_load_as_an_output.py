@@ -7,9 +7,9 @@ import pandas as pd
 import pytest
 
 from tests.diagnosis.cases import write_case
-from toolkit.diagnosis.case_read import read_case
-from toolkit.diagnosis.load import model_of
-from toolkit.diagnosis.model import Active
+from toolkit.diagnosis.case.reader import read_case
+from toolkit.diagnosis.simulators.build_simulator import model_of
+from toolkit.diagnosis.simulators.simulator import Active
 from toolkit.effects.catalogue import effects
 
 SIMULATOR = """

@@ -6,7 +6,7 @@ import pandas as pd
 from tests.conftest import EXAMPLES
 from tests.diagnosis.cases import write_case
 from tests.diagnosis.tire_case import TIR, toml
-from toolkit.diagnosis.case_read import read_case
+from toolkit.diagnosis.case.reader import read_case
 from toolkit.diagnosis.diagnose import diagnose
 
 REGISTRY = EXAMPLES.parents[1] / "calibrations"

@@ -5,17 +5,17 @@ import hashlib
 import numpy as np
 import pandas as pd
 import pytest
+from toolkit.diagnosis.answer.answer import Recorded
+from toolkit.diagnosis.answer.case_findings import calibration_findings, case_findings
 
 from tests.conftest import EXAMPLES
 from tests.diagnosis.cases import write_case
 from tests.diagnosis.tire_case import TIR, sweep, toml
-from toolkit.diagnosis.answer import Recorded
-from toolkit.diagnosis.case_read import read_case
+from toolkit.diagnosis.case.reader import read_case
 from toolkit.diagnosis.diagnose import diagnose
-from toolkit.diagnosis.load import model_of
-from toolkit.diagnosis.model import Active
-from toolkit.diagnosis.notes import calibration_findings, case_findings
-from toolkit.diagnosis.problem import problem_of
+from toolkit.diagnosis.fit.problem import problem_of
+from toolkit.diagnosis.simulators.build_simulator import model_of
+from toolkit.diagnosis.simulators.simulator import Active
 from toolkit.effects.catalogue import effects
 from toolkit.errors import ConfigError
 

@@ -7,15 +7,15 @@ import shutil
 import numpy as np
 import pandas as pd
 import pytest
+from toolkit.diagnosis.answer.model_text import MODEL, model_text
 
 from tests.diagnosis.cases import HEAD, SIMULATOR, TWO, carriage, write_case
 from tests.diagnosis.tire_case import TIR, plain, python_tire, toml
-from toolkit.diagnosis.case_read import read_case
+from toolkit.diagnosis.case.reader import read_case
 from toolkit.diagnosis.diagnose import diagnose
 from toolkit.diagnosis.forward import simulate_model
-from toolkit.diagnosis.load import model_of
-from toolkit.diagnosis.model import Active
-from toolkit.diagnosis.model_text import MODEL, model_text
+from toolkit.diagnosis.simulators.build_simulator import model_of
+from toolkit.diagnosis.simulators.simulator import Active
 from toolkit.effects.catalogue import effects
 from toolkit.errors import ConfigError, ToolkitError
 from toolkit.simulation.model_file import read_model

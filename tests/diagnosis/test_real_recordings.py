@@ -7,7 +7,7 @@ import pytest
 
 from tests.concealed.real_cases import CASES
 from tests.conftest import EXAMPLES, SHARED_DATA
-from toolkit.diagnosis.case_read import read_case
+from toolkit.diagnosis.case.reader import read_case
 from toolkit.diagnosis.diagnose import diagnose
 
 REGISTRY = EXAMPLES.parents[1] / "calibrations"

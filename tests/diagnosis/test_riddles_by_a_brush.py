@@ -14,7 +14,7 @@ import pandas as pd
 import pytest
 
 from tests.diagnosis.cases import write_case
-from toolkit.diagnosis.case_read import read_case
+from toolkit.diagnosis.case.reader import read_case
 from toolkit.diagnosis.diagnose import diagnose
 
 DRUM, TIRE = 1.353, 0.316  # m: drum of 8.5 m around, and a common passenger tire

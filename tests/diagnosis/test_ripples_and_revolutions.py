@@ -6,10 +6,10 @@ import pytest
 
 from tests.diagnosis.cases import HEAD, TWO, carriage, write_case
 from tests.diagnosis.tire_case import SIGNS, SIMULATOR, sweep, toml
-from toolkit.diagnosis.case_read import read_case
+from toolkit.diagnosis.case.reader import read_case
 from toolkit.diagnosis.diagnose import diagnose
-from toolkit.diagnosis.load import model_of
-from toolkit.diagnosis.model import Active
+from toolkit.diagnosis.simulators.build_simulator import model_of
+from toolkit.diagnosis.simulators.simulator import Active
 from toolkit.effects.catalogue import effects
 
 POSITION = HEAD.replace('v = { unit = "m/s"', 'x = { unit = "m", role = "input" }\nv = { unit = "m/s"')

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from tests.effects.rig import setting
-from toolkit.diagnosis.kinds.channels import undone
-from toolkit.diagnosis.model import Active
+from toolkit.diagnosis.simulators.channels import undone
+from toolkit.diagnosis.simulators.simulator import Active
 from toolkit.effects.catalogue import effects
 from toolkit.errors import FitError
 

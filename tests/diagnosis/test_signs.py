@@ -3,10 +3,10 @@
 import pytest
 
 from tests.diagnosis.tire_case import SIGNS, python_tire
-from toolkit.diagnosis.case_read import read_case
+from toolkit.diagnosis.case.reader import read_case
 from toolkit.diagnosis.diagnose import diagnose
-from toolkit.diagnosis.model import Active
-from toolkit.diagnosis.sense import sense
+from toolkit.diagnosis.simulators.parameter_signs import sense
+from toolkit.diagnosis.simulators.simulator import Active
 from toolkit.effects.catalogue import effects
 
 

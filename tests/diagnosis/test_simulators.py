@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from tests.diagnosis.cases import HEAD, ONE, SIMULATOR, TWO, carriage, write_case
-from toolkit.diagnosis.case_read import read_case
+from toolkit.diagnosis.case.reader import read_case
 from toolkit.diagnosis.diagnose import diagnose
-from toolkit.diagnosis.kinds.ode import OdeModel
-from toolkit.diagnosis.kinds.python import PythonModel
-from toolkit.diagnosis.load import model_of
-from toolkit.diagnosis.problem import problem_of
+from toolkit.diagnosis.fit.problem import problem_of
+from toolkit.diagnosis.simulators.build_simulator import model_of
+from toolkit.diagnosis.simulators.ode import OdeModel
+from toolkit.diagnosis.simulators.python import PythonModel
 from toolkit.errors import ConfigError, FitError
 
 START = "import numpy as np\nimport pandas as pd\ndef simulate(inputs, p):\n    "
@@ -112,7 +112,7 @@ def test_a_simulator_that_asks_for_input_does_not_wait_for_it(tmp_path, asking):
     case = write_case(tmp_path, simulator=text)
     run = f"""
 import pathlib
-from toolkit.diagnosis.case_read import read_case
+from toolkit.diagnosis.case.reader import read_case
 from toolkit.diagnosis.diagnose import diagnose
 try:
     print(diagnose(read_case(pathlib.Path({str(case)!r})), None, budget_s=2.0).diagnosis.complete)

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from toolkit.diagnosis.kinds.integrate import integrate
-from toolkit.diagnosis.kinds.slides import Slide
-from toolkit.diagnosis.kinds.together import integrate_together
+from toolkit.diagnosis.simulators.batch_integration import integrate_together
+from toolkit.diagnosis.simulators.integrate import integrate
+from toolkit.diagnosis.simulators.sliding_friction import Slide
 
 COULOMB = 2.0
 T = np.linspace(0.0, 4.0, 81)

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from toolkit.diagnosis.kinds.states import dimensions, fitting
-from toolkit.diagnosis.model import Output
+from toolkit.diagnosis.simulators.simulator import Output
+from toolkit.diagnosis.simulators.states import dimensions, fitting
 
 FRICTION = ("coulomb_friction", "viscous_damping", "quadratic_drag")
 

@@ -6,9 +6,9 @@ import pytest
 from tests.diagnosis.cases import write_case
 from tests.diagnosis.test_machine_cases import CELLS, REGISTRY, machine, with_cells
 from tests.diagnosis.tire_case import SIGNS, SIMULATOR, TIR, plain, sweep, toml
-from toolkit.diagnosis.case_read import read_case
-from toolkit.diagnosis.load import model_of
-from toolkit.diagnosis.model import Active
+from toolkit.diagnosis.case.reader import read_case
+from toolkit.diagnosis.simulators.build_simulator import model_of
+from toolkit.diagnosis.simulators.simulator import Active
 from toolkit.effects.catalogue import effects
 
 SPEED = 7.66 / 3.6  # m/s, of the drum where none is recorded (thesis, 7.66 km/h)

@@ -11,7 +11,7 @@ import pytest
 
 from tests.diagnosis.cases import HEAD, TWO, carriage, write_case
 from toolkit.calibration.records.use import CalibrationUse
-from toolkit.diagnosis.case_read import read_case
+from toolkit.diagnosis.case.reader import read_case
 from toolkit.diagnosis.diagnose import diagnose
 from toolkit.report.diagnosis.content import build_diagnosis_content
 from toolkit.report.diagnosis.page import page

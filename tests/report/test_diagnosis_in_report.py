@@ -9,8 +9,15 @@ from pathlib import Path
 import pytest
 from report_factory import make_record, make_result
 from template_factory import opened, p, texts
+from toolkit.diagnosis.answer.answer import (
+    Diagnosis,
+    FoundEffect,
+    FoundParameter,
+    HeldOutFit,
+    Mismatch,
+    Place,
+)
 
-from toolkit.diagnosis.answer import Diagnosis, FoundEffect, FoundParameter, HeldOutFit, Mismatch, Place
 from toolkit.findings import Finding
 from toolkit.report.build import build_content
 from toolkit.report.content import ReportContent

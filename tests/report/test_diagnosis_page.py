@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 
 from tests.diagnosis.cases import carriage, write_case
-from toolkit.diagnosis.case_read import read_case
+from toolkit.diagnosis.case.reader import read_case
 from toolkit.diagnosis.diagnose import diagnose
 from toolkit.report.diagnosis import figures
 from toolkit.report.diagnosis.chance import chance

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import toolkit
-from toolkit.diagnosis.case_read import read_case
-from toolkit.diagnosis.load import model_of
+from toolkit.diagnosis.case.reader import read_case
+from toolkit.diagnosis.simulators.build_simulator import model_of
 from toolkit.errors import ConfigError
 from toolkit.simulation.case import write_case, write_runs
 from toolkit.simulation.case_plan import CasePlan, Free

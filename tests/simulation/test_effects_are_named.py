@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 import toolkit
-from toolkit.diagnosis.case_read import read_case
+from toolkit.diagnosis.case.reader import read_case
 from toolkit.diagnosis.diagnose import diagnose
 from toolkit.simulation.case import write_case
 from toolkit.simulation.case_plan import CasePlan

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from toolkit.diagnosis.case_read import read_case
+from toolkit.diagnosis.case.reader import read_case
 from toolkit.diagnosis.diagnose import diagnose
 from toolkit.simulation.case import write_case
 from toolkit.simulation.plan import read_plan

@@ -17,7 +17,7 @@ from toolkit.errors import RecordError, RegistryError
 from toolkit.findings import Finding
 from toolkit.recording.read import read_recording
 from toolkit.reduction.blocks import find_blocks, is_tare
-from toolkit.reduction.opened import split_blocks
+from toolkit.reduction.prepare_rows import split_blocks
 from toolkit.units import si_scale
 
 if TYPE_CHECKING:

@@ -31,7 +31,7 @@ from toolkit.recording.archive import MAX_FILE_BYTES
 from toolkit.recording.folder import nearest_test_toml
 from toolkit.recording.marks import machine_in, own_output
 from toolkit.recording.read import read_recording
-from toolkit.reduction.opened import split_blocks
+from toolkit.reduction.prepare_rows import split_blocks
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

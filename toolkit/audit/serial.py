@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, fields
 from typing import Any
 
-from toolkit.audit.across import noted
+from toolkit.audit.archive_findings import noted
 from toolkit.audit.conditions import Change
 from toolkit.audit.estimate import Coefficient, Equation, Estimate, Nearest
 from toolkit.audit.model import Identification, Repair, Segment, Skipped

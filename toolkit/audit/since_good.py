@@ -29,7 +29,7 @@ from toolkit.calibration.control.as_found import AsFound, as_found, as_found_his
 from toolkit.calibration.registry.registry import Registry, instrument_of
 from toolkit.errors import ConfigError, ToolkitError
 from toolkit.recording.read import read_recording
-from toolkit.reduction.opened import split_blocks
+from toolkit.reduction.prepare_rows import split_blocks
 
 if TYPE_CHECKING:
     from toolkit.audit.archive import ArchiveAudit

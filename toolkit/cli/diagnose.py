@@ -12,7 +12,7 @@ from toolkit.cli.console import Calibrations, Home, Json, Quiet, answer, finding
 from toolkit.cli.home import calibrations_folder
 
 if TYPE_CHECKING:
-    from toolkit.diagnosis.answer import Diagnosis
+    from toolkit.diagnosis.answer.answer import Diagnosis
     from toolkit.report.template.package import Template
 
 NAME = "diagnose"
@@ -65,11 +65,11 @@ def command(
     import json as json_module
 
     from toolkit.cli.delivery import draft_keys
-    from toolkit.diagnosis.case_read import read_case
+    from toolkit.diagnosis.answer.case_findings import calibration_use
+    from toolkit.diagnosis.answer.model_text import MODEL, model_text
+    from toolkit.diagnosis.answer.serial import as_json
+    from toolkit.diagnosis.case.reader import read_case
     from toolkit.diagnosis.diagnose import diagnose
-    from toolkit.diagnosis.model_text import MODEL, model_text
-    from toolkit.diagnosis.notes import calibration_use
-    from toolkit.diagnosis.serial import as_json
     from toolkit.files import write_atomic
     from toolkit.report.diagnosis.page import page
 
@@ -196,7 +196,7 @@ def _teller(*, show: bool) -> Any:
 
 
 def _text(made: Diagnosis, out: Path) -> str:
-    from toolkit.diagnosis.answer import cut_short
+    from toolkit.diagnosis.answer.answer import cut_short
     from toolkit.report.diagnosis.chance import chance
 
     cut = made.verdict == "unknown" and cut_short(made.skipped)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from toolkit.calibration.records.use import CalibrationUse
-    from toolkit.diagnosis.case import Case
+    from toolkit.diagnosis.case.case import Case
     from toolkit.diagnosis.diagnose import Result
     from toolkit.report.template.package import Template
 

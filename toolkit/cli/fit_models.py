@@ -60,7 +60,7 @@ def fit_table_models(
     """
     from toolkit.cli.fit_tir import STAND_IN_RADIUS
     from toolkit.tires.global_data import of_table
-    from toolkit.tires.possible import size_findings
+    from toolkit.tires.plausibility import size_findings
     from toolkit.tires.table import read_table
     from toolkit.tires.table_fit import axes_findings, fit_table, repeat_findings, row_findings
 

@@ -15,7 +15,7 @@ from toolkit.recording.marks import OWN_OUTPUT
 
 if TYPE_CHECKING:
     from toolkit.cli.resolve import Resolved
-    from toolkit.diagnosis.answer import Diagnosis
+    from toolkit.diagnosis.answer.answer import Diagnosis
     from toolkit.findings import Finding
     from toolkit.recording.details import ReportDetails
     from toolkit.report.diagnosis.in_report import Told
@@ -66,7 +66,7 @@ def diagnosis_of(given: Path | None, by: str | None, tests: Sequence[Path]) -> t
     """
     if given is None and by is None:
         return None
-    from toolkit.diagnosis.answer_read import read_answer
+    from toolkit.diagnosis.answer.reader import read_answer
     from toolkit.errors import ConfigError
     from toolkit.report.diagnosis.in_report import Told
 

@@ -70,7 +70,7 @@ def correct(
     """
     from datetime import date
 
-    from toolkit.diagnosis.correction import correction_of, machine_of
+    from toolkit.diagnosis.answer.correction import correction_of, machine_of
     from toolkit.files import write_atomic
     from toolkit.machine import load_machine
     from toolkit.machine.next_version import next_version

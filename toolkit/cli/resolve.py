@@ -137,8 +137,8 @@ def _from_file(
 ) -> Resolved:
     from toolkit.calibration.registry.standing import Reason, standing
     from toolkit.errors import RecordError
-    from toolkit.recording.gate import gate
     from toolkit.recording.marks import is_own_output
+    from toolkit.recording.safe_open import gate
     from toolkit.reduction.cells import checked
     from toolkit.testfile import read_test_file
 

@@ -20,7 +20,7 @@ from toolkit.characteristics.rows import BOTH, Row
 from toolkit.characteristics.uncertain import Part, Uncertain
 from toolkit.comparison.quantities import CHARACTERISTICS
 from toolkit.errors import CellError, ColumnError, UnreadableError
-from toolkit.tires.possible import demand_possible
+from toolkit.tires.plausibility import demand_possible
 from toolkit.units import unit
 
 _HEADER = re.compile(r"\s*([A-Za-z_]+)\s*\[([^\]]*)\]\s*")

@@ -26,7 +26,7 @@ from toolkit.machine import TypeB
 from toolkit.reduction.model import Condition
 from toolkit.tires.fit import fit_curves, why_not
 from toolkit.tires.model import Curve
-from toolkit.tires.possible import demand_possible
+from toolkit.tires.plausibility import demand_possible
 from toolkit.tires.table import TireTable, read_table
 from toolkit.tires.table_fit import axes_findings, fit_findings, repeat_findings, table_curves
 from toolkit.units import from_si

@@ -8,26 +8,26 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from toolkit.diagnosis.answer import Diagnosis
-from toolkit.diagnosis.assemble import answer_of, mostly_unknown
-from toolkit.diagnosis.built_in import built_in_findings
-from toolkit.diagnosis.case import Case
-from toolkit.diagnosis.kinds.guard import kept_apart
-from toolkit.diagnosis.load import model_of
-from toolkit.diagnosis.notes import calibration_findings, case_findings
-from toolkit.diagnosis.partial import STEPS, does_not_vary, without_search
-from toolkit.diagnosis.predict import prediction_csv, prediction_names
-from toolkit.diagnosis.problem import Problem, problem_of
-from toolkit.diagnosis.refused import Refused
-from toolkit.diagnosis.search import Budget, BudgetSpentError, Search, search
-from toolkit.diagnosis.watch import Watch
+from toolkit.diagnosis.answer.answer import Diagnosis
+from toolkit.diagnosis.answer.build_answer import answer_of, mostly_unknown
+from toolkit.diagnosis.answer.case_findings import calibration_findings, case_findings
+from toolkit.diagnosis.answer.failed_runs import Refused
+from toolkit.diagnosis.answer.truncated_answer import STEPS, does_not_vary, without_search
+from toolkit.diagnosis.case.case import Case
+from toolkit.diagnosis.fit.predict import prediction_csv, prediction_names
+from toolkit.diagnosis.fit.problem import Problem, problem_of
+from toolkit.diagnosis.search.search import Budget, BudgetSpentError, Search, search
+from toolkit.diagnosis.search.time_budget import Watch
+from toolkit.diagnosis.simulators.build_simulator import model_of
+from toolkit.diagnosis.simulators.built_in import built_in_findings
+from toolkit.diagnosis.simulators.guard import kept_apart
 from toolkit.findings import Finding
 
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from toolkit.diagnosis.fit import Fit
+    from toolkit.diagnosis.fit.fit import Fit
 
 _QUICK_S = 2.0  # of a simulation: a slower one is not run twice to see whether it repeats itself
 _GRACE = 0.25  # of the budget, for predictions after a search that has spent it

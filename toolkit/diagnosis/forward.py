@@ -9,19 +9,19 @@ from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
-from toolkit.diagnosis.built_in import built_in_findings
-from toolkit.diagnosis.case import Case, CaseChannel, Role
-from toolkit.diagnosis.case_entries import number_of, text_of, wrong
-from toolkit.diagnosis.from_model import corrections_of, parameters_of, simulation_of
-from toolkit.diagnosis.kinds.guard import kept_apart
-from toolkit.diagnosis.load import model_of
-from toolkit.diagnosis.predict import csv_of, prediction_names
-from toolkit.diagnosis.recordings import read_run
+from toolkit.diagnosis.case.case import Case, CaseChannel, Role
+from toolkit.diagnosis.case.entries import number_of, text_of, wrong
+from toolkit.diagnosis.case.model_file import corrections_of, parameters_of, simulation_of
+from toolkit.diagnosis.case.recordings import read_run
+from toolkit.diagnosis.fit.predict import csv_of, prediction_names
+from toolkit.diagnosis.simulators.build_simulator import model_of
+from toolkit.diagnosis.simulators.built_in import built_in_findings
+from toolkit.diagnosis.simulators.guard import kept_apart
 from toolkit.errors import ConfigError
 from toolkit.files import read_bytes
 
 if TYPE_CHECKING:
-    from toolkit.diagnosis.case import Run
+    from toolkit.diagnosis.case.case import Run
     from toolkit.findings import Finding
     from toolkit.simulation.model_file import ModelFile
 

@@ -9,7 +9,7 @@ from typing import Any
 from toolkit.errors import CellError, UnreadableError
 from toolkit.recording.archive import stored_archive
 from toolkit.recording.cells import reference
-from toolkit.recording.gate import Gated
+from toolkit.recording.safe_open import Gated
 from toolkit.recording.table import Table
 
 

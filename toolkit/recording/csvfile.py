@@ -11,7 +11,7 @@ from toolkit.errors import UnreadableError
 from toolkit.machine import Machine
 from toolkit.recording.columns import header_of
 from toolkit.recording.dialect import SEPARATORS, decimal_sign, decode, number_or_text, separator_of
-from toolkit.recording.gate import Gated
+from toolkit.recording.safe_open import Gated
 from toolkit.recording.table import Table
 
 

@@ -11,9 +11,9 @@ from toolkit.recording.columns import header_of
 from toolkit.recording.csvfile import read_csv
 from toolkit.recording.formats import READERS
 from toolkit.recording.formats.vectors import series_of
-from toolkit.recording.gate import gate
 from toolkit.recording.marks import OWN_OUTPUT, SIMULATED, keywords_of, machine_named, saved_on
 from toolkit.recording.model import Recording
+from toolkit.recording.safe_open import gate
 from toolkit.recording.table import read_table
 from toolkit.recording.xlsx import read_sheet
 
@@ -35,7 +35,7 @@ def read_recording(
     Raises
     ------
     UnreadableError
-        the content is no recording: see `toolkit.recording.gate` and the rules ``no-data own-output``
+        the content is no recording: see `toolkit.recording.safe_open` and the rules ``no-data own-output``
     ColumnError
         a column is missing, doubled, or has no known unit
     CellError

@@ -12,7 +12,7 @@ from xml.etree import ElementTree as ET
 from toolkit.errors import CellError, RecordingError, ToolkitError, UnreadableError
 from toolkit.recording.archive import stored_archive
 from toolkit.recording.cells import error_cells
-from toolkit.recording.gate import Gated
+from toolkit.recording.safe_open import Gated
 from toolkit.recording.table import Table
 
 _MAIN = "{http://schemas.openxmlformats.org/spreadsheetml/2006/main}"

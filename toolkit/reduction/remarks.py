@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from toolkit.machine import Machine
     from toolkit.recording.model import TestInfo
     from toolkit.reduction.model import Condition
-    from toolkit.reduction.opened import OpenedFile
+    from toolkit.reduction.prepare_rows import OpenedFile
 
 
 # A cell may leave the range of the reference loads by this part of it before it is said aloud.

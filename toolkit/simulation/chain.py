@@ -17,7 +17,7 @@ from toolkit.effects.filters import lag
 from toolkit.effects.signals import Drive, Setting, TireForces, drive
 from toolkit.effects.similarity import similar
 from toolkit.simulation import carriage, road
-from toolkit.simulation.disturb import driven, through
+from toolkit.simulation.apply_effects import driven, through
 from toolkit.simulation.plan import Plan
 from toolkit.simulation.steady import loaded_radius, steady_of
 from toolkit.simulation.steps import RunSteps, machine_speed

@@ -19,9 +19,9 @@ from toolkit.effects.signals import Setting
 from toolkit.errors import ConfigError
 from toolkit.simulation import acquisition, carriage, cells, timeline, tire
 from toolkit.simulation.acquisition import OwnProgram, true_program
+from toolkit.simulation.apply_effects import through
 from toolkit.simulation.cells import CELLS
 from toolkit.simulation.chain import Before, Walked, walk
-from toolkit.simulation.disturb import through
 from toolkit.simulation.plan import Plan
 from toolkit.simulation.steps import RunSteps
 from toolkit.simulation.switched import Switched, here
@@ -30,7 +30,7 @@ from toolkit.simulation.timeline import Block, Timeline
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from toolkit.simulation.disturb import Signals
+    from toolkit.simulation.apply_effects import Signals
 
 _TARE_FILE = 1_000_000  # the tare's place among the seeds, beyond any file's number
 _TARE_ROWS = 100  # of the lifted wheel's one revolution, however few a recording has

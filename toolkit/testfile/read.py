@@ -22,8 +22,8 @@ from toolkit.estimate import Estimate
 from toolkit.findings import Finding, Level
 from toolkit.machine import TypeB
 from toolkit.pipeline import TestResult
-from toolkit.recording.gate import check_workbook
 from toolkit.recording.model import TestInfo
+from toolkit.recording.safe_open import check_workbook
 from toolkit.reduction.model import CalibrationUse, Condition, ReducedTest, Tare
 from toolkit.testfile.layout import (
     CONDITION_FIELDS,

@@ -22,7 +22,7 @@ import numpy as np
 from toolkit.channels import AXES, CHANNELS, Axes
 from toolkit.errors import CellError, ColumnError, ConfigError, UnreadableError
 from toolkit.findings import Finding
-from toolkit.tires.possible import LARGEST
+from toolkit.tires.plausibility import LARGEST
 from toolkit.units import unit
 
 if TYPE_CHECKING:

@@ -19,7 +19,7 @@ from toolkit.tires.evaluate import slope_estimate_at
 from toolkit.tires.fit import Curve, why_not
 from toolkit.tires.model import CurveFit, Loss, TireModel
 from toolkit.tires.outliers import gross_outliers
-from toolkit.tires.possible import size_findings
+from toolkit.tires.plausibility import size_findings
 from toolkit.tires.table import TireTable
 from toolkit.units import in_both
 

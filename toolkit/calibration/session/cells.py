@@ -61,7 +61,7 @@ def read_cells(data: bytes, known: Callable[[str], bool], *, where: object) -> C
     plain = _plain(data, where)
     if plain is not None:
         return plain
-    from toolkit.recording.gate import gate
+    from toolkit.recording.safe_open import gate
 
     try:
         gated = gate(Path(str(where)), data)

@@ -18,7 +18,7 @@ from toolkit.recording.formats.vectors import Vectors
 
 if TYPE_CHECKING:
     from toolkit.machine import Machine
-    from toolkit.recording.gate import Gated
+    from toolkit.recording.safe_open import Gated
 
 READERS: dict[str, Callable[[Gated, Machine], Vectors]] = {
     "lvm": read_lvm,

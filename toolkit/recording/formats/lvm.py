@@ -20,11 +20,11 @@ from toolkit.errors import ColumnError, RecordingError, UnreadableError
 from toolkit.machine import Machine
 from toolkit.recording.dialect import number_or_text
 from toolkit.recording.formats.vectors import Vector, Vectors, one_table
+from toolkit.recording.integrity.refuse import damaged, truncated
 from toolkit.recording.table import judge, refuse_cell
-from toolkit.recording.walks.refuse import damaged, truncated
 
 if TYPE_CHECKING:
-    from toolkit.recording.gate import Gated
+    from toolkit.recording.safe_open import Gated
 
 _END = "***End_of_Header***"
 _SPECIAL, _SPECIAL_END = "***Start_Special***", "***End_Special***"

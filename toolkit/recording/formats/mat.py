@@ -19,12 +19,12 @@ import numpy as np
 from toolkit.errors import UnreadableError
 from toolkit.machine import Machine
 from toolkit.recording.formats.vectors import Vector, Vectors, one_table, quantum
-from toolkit.recording.walks.refuse import no_numbers
+from toolkit.recording.integrity.refuse import no_numbers
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from toolkit.recording.gate import Gated
+    from toolkit.recording.safe_open import Gated
 
 DATA, HEADERS, UNITS = "data", "headers", "units"
 

@@ -14,7 +14,7 @@ from toolkit.recording.extras import needed
 from toolkit.recording.formats.vectors import Vector, Vectors, one_table, quantum
 
 if TYPE_CHECKING:
-    from toolkit.recording.gate import Gated
+    from toolkit.recording.safe_open import Gated
 
 _MASTERS = (2, 3)  # kinds of channels, measured and virtual
 _TIME = 1

@@ -12,11 +12,11 @@ from toolkit.errors import UnreadableError
 from toolkit.machine import Machine
 from toolkit.recording.extras import needed
 from toolkit.recording.formats.vectors import Vector, Vectors, one_table, quantum
-from toolkit.recording.walks.refuse import damaged
-from toolkit.recording.walks.tdms import walk_tdms
+from toolkit.recording.integrity.refuse import damaged
+from toolkit.recording.integrity.tdms import walk_tdms
 
 if TYPE_CHECKING:
-    from toolkit.recording.gate import Gated
+    from toolkit.recording.safe_open import Gated
 
 
 def read_tdms(gated: Gated, machine: Machine) -> Vectors:

@@ -20,8 +20,8 @@ from toolkit.report.diagnosis.vocabulary import DIAGNOSIS, TABLES
 
 if TYPE_CHECKING:
     from toolkit.calibration.records.use import CalibrationUse
-    from toolkit.diagnosis.answer import Diagnosis, FoundEffect
-    from toolkit.diagnosis.case import Case
+    from toolkit.diagnosis.answer.answer import Diagnosis, FoundEffect
+    from toolkit.diagnosis.case.case import Case
     from toolkit.diagnosis.diagnose import Result
     from toolkit.report.style import Style
 

@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from toolkit.diagnosis.locate import time_unit
+from toolkit.diagnosis.answer.locate import time_unit
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
-    from toolkit.diagnosis.answer import Diagnosis, Place
-    from toolkit.diagnosis.search import Search
+    from toolkit.diagnosis.answer.answer import Diagnosis, Place
+    from toolkit.diagnosis.search.search import Search
 
 GREY, ORANGE, BLUE, GREEN = "#6b6b6b", "#d9822b", "#1565c0", "#2e7d32"
 _RC: Any = {

@@ -13,7 +13,7 @@ from toolkit.report.content import Plot, Table, Value
 from toolkit.report.diagnosis.entries import REPORT_FIGURES, REPORT_TABLES, REPORT_VALUES
 
 if TYPE_CHECKING:
-    from toolkit.diagnosis.answer import Diagnosis
+    from toolkit.diagnosis.answer.answer import Diagnosis
     from toolkit.report.style import Style
 
 

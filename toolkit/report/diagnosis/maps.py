@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolkit.diagnosis.locate import time_unit
+from toolkit.diagnosis.answer.locate import time_unit
 from toolkit.report.diagnosis.figures import BLUE, GREEN, ORANGE, binned, draw_svg
 from toolkit.units import unit
 
@@ -15,8 +15,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
-    from toolkit.diagnosis.answer import Diagnosis
-    from toolkit.diagnosis.search import Search
+    from toolkit.diagnosis.answer.answer import Diagnosis
+    from toolkit.diagnosis.search.search import Search
 
 _FIRST = ("SA", "SA_CMD", "FZ", "FZ_CMD")
 _TURNS = ("TIRE_ANGLE", "DRUM_ANGLE")

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from toolkit.calibration.records.use import CalibrationUse
-    from toolkit.diagnosis.answer import Diagnosis, FoundEffect, Mismatch
+    from toolkit.diagnosis.answer.answer import Diagnosis, FoundEffect, Mismatch
     from toolkit.diagnosis.diagnose import Result
 
 HEADLINES = {
@@ -51,7 +51,7 @@ code{display:inline-block;vertical-align:bottom}
 
 def headline(made: Diagnosis) -> str:
     """Return the verdict as a sentence; a search that was cut off has not tried every effect."""
-    from toolkit.diagnosis.answer import cut_short
+    from toolkit.diagnosis.answer.answer import cut_short
 
     if made.verdict == "unknown" and cut_short(made.skipped):
         return "Something is missing; the budget was spent before every known effect was tried."

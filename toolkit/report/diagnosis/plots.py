@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolkit.diagnosis.locate import time_unit
+from toolkit.diagnosis.answer.locate import time_unit
 from toolkit.report.content import Curve, Plot
 from toolkit.report.diagnosis.figures import binned, variable_of, worst_run
 from toolkit.report.diagnosis.numbers import few
@@ -16,9 +16,9 @@ from toolkit.report.diagnosis.vocabulary import WHERE
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from toolkit.diagnosis.answer import Diagnosis, Mismatch
+    from toolkit.diagnosis.answer.answer import Diagnosis, Mismatch
     from toolkit.diagnosis.diagnose import Result
-    from toolkit.diagnosis.search import Search
+    from toolkit.diagnosis.search.search import Search
     from toolkit.report.style import Style
 
 _STEPS = ("as declared", "refitted", "with the effects")

@@ -1,0 +1,1 @@
+"""The answer: what was found, what could not be told, and what to measure next."""

@@ -1,0 +1,156 @@
+"""The answer to a case: verdict, mismatch, effects, fits, and what could not have been seen."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal
+
+from toolkit.findings import Finding
+
+if TYPE_CHECKING:
+    from toolkit.diagnosis.case.case import Run
+
+Verdict = Literal["named", "equivalent", "unknown", "nothing", "untestable"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Place:
+    """Where a mismatch is: a range of a channel, of time, or the value of a condition.
+
+    ``whole`` says that the range is all that was recorded: the mismatch is everywhere.
+    """
+
+    variable: str
+    start: float | str | None
+    end: float | str | None
+    unit: str
+    runs: tuple[str, ...]
+    whole: bool = False
+
+    def ends(self, number: Callable[[float], str]) -> str:
+        """Return the ends of a range, each as ``number`` writes it; a condition's one value as it stands."""
+        if isinstance(self.start, float) and isinstance(self.end, float):
+            return f"{number(self.start)} to {number(self.end)}"
+        return str(self.start)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Mismatch:
+    """One output that the refitted simulation does not explain; share of the refitted residual's variance."""
+
+    channel: str
+    p_value: float
+    share_of_variance: float
+    where: tuple[Place, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FoundParameter:
+    """A fitted parameter with its 95 % interval; a text where the parameter is a name."""
+
+    name: str
+    value: float | str
+    unit: str
+    ci95: tuple[float, float] | None
+    runs: tuple[str, ...] | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FoundEffect:
+    """An effect that explains a mismatch, and the names that explain it as well."""
+
+    name: str
+    stage: str
+    channel: str | None
+    statement: str
+    equation: str
+    reference: str
+    parameters: tuple[FoundParameter, ...]
+    equivalent_to: tuple[str, ...]
+    rejected: tuple[tuple[str, float], ...]
+    held_out_log_score_gain: float
+    p_value: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class NominalParameter:
+    """A parameter of the simulation before and after the fit."""
+
+    name: str
+    before: float
+    after: float
+    unit: str
+    prior_sd: float | None
+
+    @property
+    def shift_in_sd(self) -> float | None:
+        """How far it moved, in its prior's standard deviation."""
+        return None if not self.prior_sd else (self.after - self.before) / self.prior_sd
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class HeldOutFit:
+    """Root mean square errors of an output on rows that no fit has seen, in its unit."""
+
+    channel: str
+    unit: str
+    nominal_rmse: float
+    refitted_rmse: float
+    augmented_rmse: float
+    noise_floor: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class NotFound:
+    """An effect that was not found: the smallest size that this recording would have shown, 80 % power."""
+
+    name: str
+    minimum_detectable: float | None
+    unit: str
+    observable: bool
+    why: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Recorded:
+    """A recording that the answer rests on: its file's name and SHA-256.
+
+    ``own`` tells a file as the machine's acquisition program wrote it from a table made for the case.
+    """
+
+    name: str
+    sha256: str
+    own: bool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Diagnosis:
+    """The whole answer; ``recordings`` is None in one of a version that did not write them down."""
+
+    title: str
+    case_sha256: str
+    verdict: Verdict
+    remaining: Literal["nothing", "unknown"]
+    mismatch: tuple[Mismatch, ...]
+    effects: tuple[FoundEffect, ...]
+    nominal_parameters: tuple[NominalParameter, ...]
+    held_out: tuple[HeldOutFit, ...]
+    held_out_by: str
+    depends_on: tuple[tuple[str, tuple[str, ...]], ...]
+    not_found: tuple[NotFound, ...]
+    next_measurements: tuple[str, ...]
+    findings: tuple[Finding, ...]
+    complete: bool
+    skipped: tuple[str, ...]
+    recordings: tuple[Recorded, ...] | None = None
+
+
+def cut_short(skipped: Sequence[str]) -> bool:
+    """Tell whether a search ended before every known effect was tried; what comes later leaves names."""
+    return any(one not in ("swaps", "predictions") for one in skipped)
+
+
+def recorded(runs: Iterable[Run]) -> tuple[Recorded, ...]:
+    """Return what an answer says of the recordings of a case."""
+    return tuple(Recorded(name=one.name, sha256=one.sha256, own=one.own) for one in runs)

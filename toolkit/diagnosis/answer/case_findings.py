@@ -1,0 +1,99 @@
+"""What a reader of an answer must know of the case itself: one run, filled samples, the record's state."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from toolkit.findings import Finding
+
+if TYPE_CHECKING:
+    from toolkit.calibration.records.use import CalibrationUse
+    from toolkit.diagnosis.case.case import Case
+    from toolkit.diagnosis.fit.problem import Problem
+
+
+def case_findings(problem: Problem) -> tuple[Finding, ...]:
+    """Return notes on the recordings, one run only or inputs interpolated, and what the model has to tell."""
+    case = problem.case
+    made: list[Finding] = list(getattr(problem.model, "findings", ()))
+    if len(problem.runs) == 1:
+        made.append(
+            Finding(
+                rule="case-one-run",
+                where=case.path.name,
+                level="note",
+                message="one run only: contiguous blocks of it are held out, not whole runs",
+            )
+        )
+    for run in (*case.runs, *case.predict):
+        if run.filled:
+            told = ", ".join(f"{count} of {name}" for name, count in run.filled)
+            made.append(
+                Finding(
+                    rule="case-filled",
+                    where=run.name,
+                    level="note",
+                    message=f"missing samples of inputs were interpolated between their neighbours: {told}",
+                )
+            )
+    for name in ("FZ", "FZ_CMD"):
+        loads = [run.columns[name] for run in case.runs if name in run.columns]
+        if loads and float(np.nanmedian(np.concatenate(loads))) < 0:
+            made.append(
+                Finding(
+                    rule="case-load-sign",
+                    where=f"{case.path.name}: {name}",
+                    level="note",
+                    message="most loads are negative: FZ is the load, positive; below zero there is no force",
+                )
+            )
+    return tuple(made)
+
+
+def calibration_use(case: Case, calibrations: Path | None) -> CalibrationUse | None:
+    """Return the calibration that a case names, and how it stands; None where it names none.
+
+    A case has no date of its own: a record counts as in force where it is approved and not void on every day.
+    A candidate is accepted, and what is made with it says that it is a draft.
+    """
+    from toolkit.calibration.records.use import CalibrationUse
+    from toolkit.calibration.registry.registry import Registry
+    from toolkit.calibration.registry.standing import unapproved, withdrawal
+    from toolkit.diagnosis.simulators.build_simulator import record_of
+    from toolkit.errors import RegistryError
+
+    named = case.simulation.calibration
+    if not named:
+        return None
+    record = record_of(case, calibrations)
+    reasons: tuple[str, ...] = ()
+    if (case.path.parent / named).is_file():
+        reasons = ("a file beside the case: no registry says whether it is approved",)
+    elif calibrations is not None:
+        registry = Registry(calibrations)
+        try:
+            status = registry.status(record.id)
+            found = withdrawal(status) or unapproved(registry, record, status)
+            reasons = tuple(one.text for one in found)
+        except RegistryError as error:
+            reasons = (f"not approved: {error.what}",)
+    return CalibrationUse(
+        id=record.id, sha256=record.sha256, unverified=not record.verified, draft_reasons=reasons
+    )
+
+
+def calibration_findings(case: Case, calibrations: Path | None) -> tuple[Finding, ...]:
+    """Return notes on the calibration of a case that is no approved record, or an unverified one."""
+    use = calibration_use(case, calibrations)
+    if use is None:
+        return ()
+    said = list(use.draft_reasons)
+    if use.unverified:
+        said.append("imported, not fitted here: unverified")
+    return tuple(
+        Finding(rule="case-calibration", where=use.id, level="note", message=f"the calibration is {one}")
+        for one in said
+    )

@@ -1,0 +1,75 @@
+"""Simulations that failed during a search: a refit that could not move is not one that need not."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+from toolkit.errors import FitError
+from toolkit.findings import Finding
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from toolkit.diagnosis.case.case import Case, Run
+    from toolkit.diagnosis.simulators.simulator import Active
+
+
+class Refused:
+    """A model's ``simulate`` that counts where the simulation gave nothing: by itself, and with an effect."""
+
+    def __init__(self, simulate: Callable[..., dict[str, NDArray[np.float64]]]) -> None:
+        self._simulate = simulate
+        self._tried: set[tuple[float, ...]] = set()
+        self._failed: set[tuple[float, ...]] = set()
+        self._first = ""
+        self._with: dict[str, list[int]] = {}  # effect -> simulations with it, and those that gave nothing
+
+    def __call__(
+        self, run: Run, p: Mapping[str, float], active: Sequence[Active]
+    ) -> dict[str, NDArray[np.float64]]:
+        """Return the outputs of a run."""
+        values = tuple(p.values())
+        counted = self._with.setdefault(_told(active[-1]), [0, 0]) if active else [0, 0]
+        counted[0] += 1
+        if not active:
+            self._tried.add(values)
+        try:
+            return self._simulate(run, p, active)
+        except FitError as error:
+            counted[1] += 1
+            if not active:
+                self._failed.add(values)
+                told = ", ".join(f"{name} = {value:.6g}" for name, value in p.items())
+                self._first = self._first or f"{run.name}, {told}: {error.got}"
+            raise
+
+    def findings(self, case: Case) -> tuple[Finding, ...]:
+        """Return what is to be told; nothing where every simulation gave numbers."""
+        never = sorted(name for name, (tried, failed) in self._with.items() if tried == failed)
+        made = [
+            Finding(
+                rule="effect-not-simulated",
+                where=f"{case.path.name}: simulation",
+                message=f"with {name} the simulation gave no usable output at any size that was tried",
+                level="note",
+            )
+            for name in never
+        ]
+        if self._failed:
+            made.append(
+                Finding(
+                    rule="simulator-refuses",
+                    where=f"{case.path.name}: simulation",
+                    message=f"with {len(self._failed)} of {len(self._tried)} sets of parameters the "
+                    f"simulation gave no usable output, first {self._first}",
+                )
+            )
+        return tuple(made)
+
+
+def _told(one: Active) -> str:
+    return one.effect.name if one.channel is None else f"{one.effect.name} on {one.channel}"

@@ -1,0 +1,142 @@
+"""Where a mismatch is: the range of a channel, of time, or the condition that holds most of it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from toolkit.diagnosis.answer.answer import Place
+from toolkit.units import unit
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from toolkit.diagnosis.case.case import Case
+    from toolkit.diagnosis.fit.problem import Problem
+
+_BINS = 10
+_HELD = 0.8  # of the mismatch's energy that a range must hold
+_NARROW = 0.7  # of the rows: a range that is wider says nothing
+_WHOLE = 0.95  # of the rows: no range is narrower
+
+
+def places(
+    problem: Problem,
+    name: str,
+    signal: NDArray[np.float64],
+    simulated: NDArray[np.float64],
+    depends_on: Sequence[str] = (),
+) -> tuple[Place, ...]:
+    """Return the ranges that hold most of a mismatch: of what it depends on first, then the narrowest.
+
+    Parameters
+    ----------
+    name : the output
+    signal : the part of its residual that is no noise, over all rows
+    simulated : the output itself as simulated, a variable like the others
+    depends_on : variables on which the mismatch was found to depend
+    """
+    energy = np.where(problem.kept[name], np.nan_to_num(signal) ** 2, 0.0)
+    whole = float(energy.sum())
+    if whole <= 0:
+        return ()
+    rows = problem.kept[name]
+    found: list[tuple[float, Place]] = []
+    unit_of = {one.name: one.unit for one in problem.model.outputs}
+    for variable, measure, x in [*_variables(problem), (name, unit_of[name], simulated)]:
+        made = _range(x, energy, rows)
+        if made is not None:
+            share, low, high = made
+            inside = (x >= low) & (x <= high)
+            found.append(
+                (
+                    share,
+                    Place(
+                        variable=variable,
+                        start=low,
+                        end=high,
+                        unit=measure,
+                        runs=_runs(problem, energy * inside),
+                        whole=share > _WHOLE,
+                    ),
+                )
+            )
+    found += _conditions(problem, energy, rows)
+    found.sort(key=lambda one: (one[1].variable not in depends_on, one[0]))
+    chosen = [place for share, place in found if share <= _NARROW][:3]
+    return tuple(chosen) if chosen else tuple(place for _, place in found[:1])
+
+
+def _variables(problem: Problem) -> list[tuple[str, str, NDArray[np.float64]]]:
+    made = []
+    for one in problem.case.drivers:
+        if all(one.name in run.columns for run in problem.runs):
+            x = np.concatenate([run.columns[one.name] for run in problem.runs])
+            if np.ptp(x) > 0:
+                made.append((one.name, one.unit, x))
+    if problem.case.has_time:
+        text, seconds = time_unit(problem.case)
+        made.append(("time", text, np.concatenate([run.t for run in problem.runs]) / seconds))
+    return made
+
+
+def time_unit(case: Case) -> tuple[str, float]:
+    """Return the unit in which a case's people count its time, and its seconds."""
+    text = next((one.unit for one in case.channels if one.role == "time"), "s")
+    return text, unit(text).factor
+
+
+def _range(
+    x: NDArray[np.float64], energy: NDArray[np.float64], rows: NDArray[np.bool_]
+) -> tuple[float, float, float] | None:
+    """Return the share of rows, and the ends, of the narrowest range of bins that holds most energy."""
+    values = x[rows]
+    edges = np.unique(np.quantile(values, np.linspace(0, 1, _BINS + 1)))
+    if len(edges) < 3:
+        return None
+    at = np.clip(np.searchsorted(edges, x, side="right") - 1, 0, len(edges) - 2)
+    per_bin = np.bincount(at, weights=energy, minlength=len(edges) - 1)
+    count = np.bincount(at, weights=rows.astype(float), minlength=len(edges) - 1)
+    whole, n = per_bin.sum(), count.sum()
+    best: tuple[float, float, float] | None = None
+    for i in range(len(per_bin)):
+        for j in range(i, len(per_bin)):
+            if per_bin[i : j + 1].sum() >= _HELD * whole:
+                share = float(count[i : j + 1].sum() / n)
+                if best is None or share < best[0]:
+                    best = (share, float(edges[i]), float(edges[j + 1]))
+                break
+    return best
+
+
+def _conditions(
+    problem: Problem, energy: NDArray[np.float64], rows: NDArray[np.bool_]
+) -> list[tuple[float, Place]]:
+    found = []
+    whole, n = float(energy.sum()), float(rows.sum())
+    keys = dict.fromkeys(key for run in problem.runs for key in run.conditions)
+    for key in keys:
+        levels: dict[str, list[int]] = {}
+        for i, run in enumerate(problem.runs):
+            if key in run.conditions:
+                levels.setdefault(run.conditions[key], []).append(i)
+        if len(levels) < 2 or len(levels) == len(problem.runs):
+            continue
+        for level, which in levels.items():
+            held = sum(float(energy[problem.slices[i]].sum()) for i in which)
+            if held >= _HELD * whole:
+                share = sum(float(rows[problem.slices[i]].sum()) for i in which) / n
+                runs = tuple(problem.runs[i].name for i in which)
+                found.append((share, Place(variable=key, start=level, end=level, unit="", runs=runs)))
+    return found
+
+
+def _runs(problem: Problem, energy: NDArray[np.float64]) -> tuple[str, ...]:
+    sums = np.array([float(energy[one].sum()) for one in problem.slices])
+    if sums.sum() <= 0:
+        return ()
+    return tuple(
+        run.name for run, held in zip(problem.runs, sums, strict=True) if held > 0.2 * sums.sum() / len(sums)
+    )

@@ -1,0 +1,94 @@
+"""The simulation of a case that is a model file: an earlier answer, taken up as it was left."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from toolkit.diagnosis.case.case import KINDS, CaseParameter, Simulation
+from toolkit.effects.catalogue import effect
+from toolkit.errors import ConfigError
+from toolkit.machine import load_machine
+from toolkit.simulation.model_file import ModelEffect, ModelFile, ModelParameter, read_model
+
+
+def simulation_of(model: ModelFile) -> Simulation:
+    """Return the simulation that a model file declares; its files by path."""
+    if model.kind not in KINDS:
+        raise ConfigError(
+            "a model file of an unknown kind of simulation", where=f"{model.path}: simulation.kind",
+            got=model.kind, expected=", ".join(KINDS),
+            next_step="name a file that toolkit diagnose has written", rule="model-file",
+        )  # fmt: skip
+    told: Mapping[str, Any] = model.simulation
+    # A file by path is a path, whatever folder the case lies in.
+    machine, calibration = (
+        str(file.absolute()) if (file := model.file(key)) is not None else str(told.get(key, ""))
+        for key in ("machine", "calibration")
+    )
+    return Simulation(
+        kind=model.kind,
+        machine=machine or "m15",
+        calibration=calibration,
+        tire=model.file("tire"),
+        path=model.file("path"),
+        function=str(told.get("function", "simulate")),
+        states=tuple(told.get("states", ())),
+        force_terms=tuple(dict(told.get("force_terms", {})).items()),
+        simulated=tuple(dict(told.get("simulated", {})).items()),
+    )
+
+
+def parameters_of(model: ModelFile, given: tuple[CaseParameter, ...] = ()) -> tuple[CaseParameter, ...]:
+    """Return the model's parameters, free within their standard errors; those ``given`` go before them."""
+    own = tuple(
+        CaseParameter(name=one.name, value=one.value, unit=one.unit, sd=one.standard_error, bounds=one.bounds)
+        for one in model.parameters
+        if one.name not in {each.name for each in given}
+    )
+    return (*given, *own)
+
+
+def tire_model(path: Path, where: str) -> ModelFile:
+    """Return the model file that stands in the place of a tire file: one of kind ``machine``.
+
+    Raises
+    ------
+    ConfigError
+        ``model-file``: it has no tire
+    """
+    model = read_model(path)
+    if model.kind != "machine" or model.file("tire") is None:
+        raise ConfigError(
+            "the model has no tire", where=where, got=f"a model of kind {model.kind}",
+            expected="a tire file (.tir), or a model file of kind machine",
+            next_step="name the model as [simulation] model", rule="model-file",
+        )  # fmt: skip
+    return model
+
+
+def corrections_of(simulation: Simulation) -> tuple[ModelEffect, ...]:
+    """Return the corrections of a case's machine as effects: the recordings still have them.
+
+    None where no tire is simulated: an acquisition program's arithmetic is not the machine's.
+    """
+    if simulation.kind != "machine" or simulation.tire is None:
+        return ()
+    machine = load_machine(simulation.machine)
+    return tuple(
+        ModelEffect(
+            effect=effect(one.effect, where=machine.name),
+            channel=one.channel,
+            source=one.source,
+            parameters=(
+                ModelParameter(
+                    name=one.parameter, value=one.value, unit=one.unit, standard_error=one.u or None
+                ),
+            ),
+            axes="machine",
+            of_machine=True,
+            origin=f"{machine.name}, version {machine.version}: answer {one.answer_sha256[:16]}",
+        )
+        for one in machine.corrections
+    )

@@ -1,0 +1,153 @@
+"""Read one run of a case: plain CSV, or the machine's own .xlsx; columns in the recording's units."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from toolkit.diagnosis.case.case import CaseChannel, Run
+from toolkit.diagnosis.case.plain_csv import header_of, missing_column, read_csv
+from toolkit.errors import CellError, ColumnError, UnreadableError
+from toolkit.files import sha256_bytes
+from toolkit.units import unit
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+
+def read_run(
+    path: Path,
+    data: bytes,
+    *,
+    name: str,
+    channels: tuple[CaseChannel, ...],
+    time: CaseChannel | None,
+    declared: Mapping[str, Any],
+    simulated: Mapping[str, str],
+    machine: str,
+    predict: bool,
+) -> Run:
+    """Read one file.
+
+    Parameters
+    ----------
+    data : the file's content
+    simulated : output -> column of the other program's output, for a case of kind ``columns``
+    machine : whose own workbooks the file may be one of; empty for plain CSV alone
+    predict : outputs may be absent
+
+    Raises
+    ------
+    ColumnError
+        a column is missing or doubled; CellError: a cell is no number; UnreadableError: no rows, no text
+    """
+    names = {one.name for one in channels} | set(simulated.values())
+    units = {one.name: one.unit for one in channels}
+    table, present, own = _read(path, data, machine=machine, units=units, wanted=names)
+    columns: dict[str, NDArray[np.float64]] = {}
+    for channel in channels:
+        if channel.name in table:
+            columns[channel.name] = table[channel.name]
+        elif channel.role != "output" or (not predict):
+            raise missing_column(path, channel.name, present)
+    others: dict[str, NDArray[np.float64]] = {}
+    for output, column in simulated.items():
+        if column not in table:
+            raise missing_column(path, column, present)
+        others[output] = table[column]
+    if not table:
+        raise missing_column(path, channels[0].name if channels else "", present)
+    rows = len(next(iter(table.values())))
+    if time is None:
+        t = np.arange(rows, dtype=np.float64)
+    else:
+        t = columns[time.name] * unit(time.unit).factor
+        _check_time(path, time.name, t)
+    filled = []
+    for channel in channels:
+        if channel.role in ("input", "covariate") and channel.name in columns:
+            missing = int(np.isnan(columns[channel.name]).sum())
+            filled += [(channel.name, missing)] if missing else []
+            columns[channel.name] = _filled(path, channel.name, t, columns[channel.name])
+    return Run(
+        name=name, t=t, columns=columns, conditions=conditions(declared), declared=declared, simulated=others,
+        filled=tuple(filled), sha256=sha256_bytes(data), own=own,
+    )  # fmt: skip
+
+
+def conditions(declared: Mapping[str, Any]) -> dict[str, str]:
+    """Return the conditions of a run's table as texts, a quantity as number and unit."""
+    made = {}
+    for key, value in declared.items():
+        if isinstance(value, dict) and set(value) == {"value", "unit"}:
+            made[key] = f"{value['value']} {value['unit']}"
+        elif key != "file":
+            made[key] = str(value)
+    return made
+
+
+def _read(
+    path: Path, data: bytes, *, machine: str, units: Mapping[str, str], wanted: set[str]
+) -> tuple[dict[str, NDArray[np.float64]], list[str], bool]:
+    """Return the wanted columns that a file has, the names of all, and whether it is the machine's own."""
+    is_book = data[:4] == b"PK\x03\x04"
+    header = [] if is_book else header_of(data)
+    if machine:
+        from toolkit.diagnosis.case.workbook import is_of_machine, read_workbook
+
+        # The acquisition program's own headers, in a workbook or as text.
+        if is_book or (not wanted & set(header) and is_of_machine(header, machine)):
+            made = read_workbook(path, data, machine, units)
+            return made, list(made), True
+    if not is_book:
+        return read_csv(data, wanted, where=path), header, False
+    raise UnreadableError(
+        "a run is a workbook",
+        where=path,
+        got="an .xlsx",
+        expected="a CSV (workbooks only for kind machine)",
+        next_step="save the run as CSV",
+        rule="case-run",
+    )
+
+
+def _check_time(path: Path, name: str, t: NDArray[np.float64]) -> None:
+    bad = np.flatnonzero(~np.isfinite(t))
+    if len(bad):
+        raise CellError(
+            "a row has no time",
+            where=f"{path}, row {bad[0] + 1}, column {name}",
+            got="nothing",
+            expected="a time in every row",
+            next_step="remove the row or give its time",
+            rule="case-run",
+        )
+    back = np.flatnonzero(np.diff(t) <= 0)
+    if len(back):
+        raise CellError(
+            "time does not rise",
+            where=f"{path}, row {back[0] + 2}, column {name}",
+            got=f"{t[back[0] + 1]:g} s after {t[back[0]]:g} s",
+            expected="a rising time",
+            next_step="sort the rows, or split the file into runs",
+            rule="case-run",
+        )
+
+
+def _filled(path: Path, name: str, t: NDArray[np.float64], x: NDArray[np.float64]) -> NDArray[np.float64]:
+    good = np.isfinite(x)
+    if good.all():
+        return x
+    if not good.any():
+        raise ColumnError(
+            "an input has no value at all",
+            where=f"{path}, column {name}",
+            got="no number",
+            expected="numbers",
+            next_step="remove the channel from the case, or give its values",
+            rule="case-run",
+        )
+    return np.interp(t, t[good], x[good])

@@ -1,0 +1,275 @@
+"""Joint fits by free simulation: nominal parameters within their priors, effects' parameters, noise."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, cast
+
+import numpy as np
+
+from toolkit.diagnosis.fit.covariance import covariance
+from toolkit.diagnosis.fit.descent import Derivatives, descend
+from toolkit.diagnosis.fit.noise import Layout, Noise, fit_noise, log_likelihood
+from toolkit.diagnosis.fit.space import Space
+from toolkit.diagnosis.simulators.simulator import Active
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from toolkit.diagnosis.fit.problem import Problem
+
+    Stacked = dict[str, NDArray[np.float64]]
+
+_OUTER = 4  # times that the noise is estimated anew
+_BETTER = 0.02  # of the log-likelihood: less is no step worth another round
+_APART = 2.0  # of its own standard deviation: a larger difference of two solutions is none of chance
+_SAME = 0.05  # by which the coloured fit's residual variance may exceed the plain one's
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Fit:
+    """One hypothesis fitted to some rows.
+
+    ``p`` are the free nominal parameters in their units; ``residual`` recorded less simulated, over all
+    rows; ``covariance`` of (p, effects' parameters) in their units; ``log_posterior`` has the priors in it.
+    """
+
+    p: tuple[float, ...]
+    active: tuple[Active, ...]
+    residual: Stacked
+    simulated: Stacked
+    noise: dict[str, Noise]
+    log_posterior: float
+    covariance: NDArray[np.float64]
+    rows: NDArray[np.bool_] | None
+    plain: bool = False
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Solved:
+    """One solution: the searched vector, its residual, the noise of that, and the log-posterior."""
+
+    x: NDArray[np.float64]
+    simulated: Stacked
+    residual: Stacked
+    noise: dict[str, Noise]
+    score: float
+
+
+def fit(
+    problem: Problem,
+    active: Sequence[Active] = (),
+    *,
+    start: Sequence[float] | None = None,
+    rows: NDArray[np.bool_] | None = None,
+    noise: dict[str, Noise] | None = None,
+    rounds: int = _OUTER,
+    plain: bool | None = None,
+) -> Fit:
+    """Fit a hypothesis.
+
+    Parameters
+    ----------
+    active : effects with the values from which the search starts
+    start : free parameters from which it starts; their declared values by default
+    rows : rows of all runs on which it is fitted; the simulation is free over whole runs in any case
+    noise : from which the whitening starts; None for white noise first
+    plain : ordinary least squares, or not; None lets a specification test decide
+    """
+    space = Space.of(problem, tuple(active))
+    known = Derivatives(space)
+    layouts = {name: problem.layout(name, rows) for name in problem.names}
+    x = space.begin([one.value for one in problem.free] if start is None else start)
+    made = _coloured(space, layouts, x, noise, 2 if plain else rounds, known)
+    other = None
+    if plain is None:
+        other = _plain(space, layouts, made, known)
+        plain = other is not None and _absorbs(made, other, layouts)
+        chosen = other if plain and other is not None else made
+    else:
+        chosen = _plain(space, layouts, made, known) or made if plain else made
+    p, found = space.split(chosen.x)
+    return Fit(
+        p=tuple(p),
+        active=found,
+        residual=chosen.residual,
+        simulated=chosen.simulated,
+        noise=chosen.noise,
+        log_posterior=chosen.score,
+        covariance=_covariance(space, chosen, None if plain else other, layouts, plain=plain),
+        rows=rows,
+        plain=plain,
+    )
+
+
+def _coloured(
+    space: Space,
+    layouts: dict[str, Layout],
+    x: NDArray[np.float64],
+    noise: dict[str, Noise] | None,
+    rounds: int,
+    derivatives: Derivatives,
+) -> _Solved:
+    """Return generalised least squares, the noise estimated anew in every round."""
+    best: _Solved | None = None
+    known = noise
+    for turn in range(max(rounds, 1)):
+        if known is None:
+            known = _white(space.problem, space.residual(space.simulated(x)), layouts)
+        here = _solve(space, layouts, x, known, derivatives)
+        if best is not None and here.score < best.score + _BETTER:
+            return here if here.score > best.score else best
+        best, x, known = here, here.x, here.noise
+        if not len(x) and turn:
+            break
+    return cast("_Solved", best)
+
+
+def _plain(space: Space, layouts: dict[str, Layout], from_: _Solved, known: Derivatives) -> _Solved | None:
+    """Return ordinary least squares, each output weighed by what its rows are worth; None for white noise."""
+    if not len(from_.x) or not any(one.reflection for one in from_.noise.values()):
+        return None
+    weights = {
+        name: Noise(reflection=(), sd=one.marginal_sd * math.sqrt(one.correlation_rows))
+        for name, one in from_.noise.items()
+    }
+    return _solve(space, layouts, from_.x, weights, known)
+
+
+def _absorbs(coloured: _Solved, plain: _Solved, layouts: dict[str, Layout]) -> bool:
+    """Tell whether the coloured fit leaves a larger residual than noise alone can explain.
+
+    Under the right model both estimate the same, and the plain one is smaller by what its parameters take.
+    Where the coloured one is much larger, its noise has absorbed physics (a specification test in the
+    manner of Hausman), and the plain one is to be trusted.
+    """
+    for name, where in layouts.items():
+        one = float(np.mean(coloured.residual[name][where.index] ** 2)) if where.n else 0.0
+        other = float(np.mean(plain.residual[name][where.index] ** 2)) if where.n else 0.0
+        worth = plain.noise[name].correlation_rows / max(where.n, 1)
+        if one > other * (1 + _SAME + 3 * len(plain.x) * worth):
+            return True
+    return False
+
+
+def _solve(
+    space: Space,
+    layouts: dict[str, Layout],
+    x: NDArray[np.float64],
+    weights: dict[str, Noise],
+    known: Derivatives,
+) -> _Solved:
+    x = descend(space, layouts, x, weights, known)
+    simulated = space.simulated(x)
+    residual = space.residual(simulated)
+    noise = noise_of(space.problem, residual, layouts, used=len(x))
+    return _Solved(x, simulated, residual, noise, _score(space, x, residual, layouts, noise))
+
+
+def replace_effects(problem: Problem, made: Fit, active: tuple[Active, ...]) -> Fit:
+    """Return a fit with other effects in it that nothing is fitted of: its covariance has them as known."""
+    simulated = problem.simulate(made.p, active)
+    before, after = _columns(problem, made.active), _columns(problem, active)
+    covariance = np.zeros((len(after), len(after)))
+    there = [i for i, one in enumerate(after) if one in before]
+    known = [before.index(after[i]) for i in there]
+    covariance[np.ix_(there, there)] = made.covariance[np.ix_(known, known)]
+    residual = {name: problem.observed[name] - one for name, one in simulated.items()}
+    return replace(made, active=active, simulated=simulated, residual=residual, covariance=covariance)
+
+
+def _columns(problem: Problem, active: Sequence[Active]) -> list[tuple[object, ...]]:
+    """Return what tells the parameters of a fit apart, in the order of its covariance."""
+    made: list[tuple[object, ...]] = [(one.name,) for one in problem.free]
+    for one in active:
+        at = (one.effect.name, one.channel, one.source, one.runs)
+        made += [(*at, each.name) for each in one.searched]
+    return made
+
+
+def noise_of(
+    problem: Problem, residual: Stacked, layouts: dict[str, Layout], *, used: int = 0
+) -> dict[str, Noise]:
+    """Return the noise of every output's residual."""
+    return {
+        name: fit_noise(
+            residual[name][layouts[name].index],
+            layouts[name],
+            floor=problem.floor[name],
+            sd=problem.sd_of(name),
+            used=used // len(layouts),
+        )
+        for name in problem.names
+    }
+
+
+def log_prior(problem: Problem, p: Sequence[float]) -> float:
+    """Return the logarithm of the priors' density, without its constant."""
+    return -0.5 * sum(
+        ((value - one.value) / (one.sd or 1.0)) ** 2 for value, one in zip(p, problem.free, strict=True)
+    )
+
+
+def held_out_score(problem: Problem, made: Fit, rows: NDArray[np.bool_]) -> float:
+    """Return the log-likelihood of rows that a fit has not seen, under the noise of its training rows."""
+    total = 0.0
+    for name in problem.names:
+        where = problem.layout(name, rows)
+        if where.n:
+            total += log_likelihood(made.residual[name][where.index], where, made.noise[name])
+    return total
+
+
+def jacobian(problem: Problem, made: Fit) -> tuple[dict[str, NDArray[np.float64]], NDArray[np.float64]]:
+    """Return d(simulated)/d(x) over all rows of each output, and the sizes of x; x = (p, effects) / sizes."""
+    space = Space.of(problem, made.active)
+    return space.around(space.at(made.p))[1], space.sizes
+
+
+def _white(problem: Problem, residual: Stacked, layouts: dict[str, Layout]) -> dict[str, Noise]:
+    made = {}
+    for name, where in layouts.items():
+        values = residual[name][where.index]
+        size = math.sqrt(float(np.mean(values**2))) if len(values) else 0.0
+        made[name] = Noise(reflection=(), sd=max(size, problem.floor[name]))
+    return made
+
+
+def _score(
+    space: Space,
+    x: NDArray[np.float64],
+    residual: Stacked,
+    layouts: dict[str, Layout],
+    noise: dict[str, Noise],
+) -> float:
+    p, _ = space.split(x)
+    total = log_prior(space.problem, p)
+    for name, where in layouts.items():
+        if where.n:
+            total += log_likelihood(residual[name][where.index], where, noise[name])
+    return total if math.isfinite(total) else -math.inf
+
+
+def _covariance(
+    space: Space, solved: _Solved, other: _Solved | None, layouts: dict[str, Layout], *, plain: bool
+) -> NDArray[np.float64]:
+    """Return the covariance of a solution, with what the plain ``other`` disagrees with it beside.
+
+    Under the right model the two differ as far as the plain one is the less sure. A parameter by which they
+    differ by more depends on what the noise was taken for, and its uncertainty has that difference in it.
+    """
+    if not len(solved.x):
+        return np.zeros((0, 0))
+    J = space.around(solved.x)[1]
+    prior = np.zeros((len(space.problem.free), len(solved.x)))
+    for i, one in enumerate(space.problem.free):
+        prior[i, i] = space.sizes[i] / (one.sd or 1.0)
+    made = covariance(J, prior, space.sizes, layouts, solved.noise, plain=plain)
+    if other is not None:
+        unsure = np.diag(covariance(J, prior, space.sizes, layouts, other.noise, plain=True))
+        apart = ((other.x - solved.x) * space.sizes) ** 2
+        expected = np.maximum(unsure - np.diag(made), 0.0)
+        made = made + np.diag(np.where(apart > _APART**2 * expected, apart, 0.0))
+    return made

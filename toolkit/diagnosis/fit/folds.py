@@ -1,0 +1,130 @@
+"""Held-out rows: whole runs; with one run contiguous blocks of it. Never random rows."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from toolkit.diagnosis.fit.fit import Fit, fit, held_out_score, jacobian
+from toolkit.diagnosis.simulators.simulator import Active
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from toolkit.diagnosis.fit.problem import Problem
+
+_FOLDS = 5
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Folds:
+    """Rows that each fold holds out, and whether they are whole runs."""
+
+    held: tuple[NDArray[np.bool_], ...]
+    by_run: bool
+
+    def told(self, runs: int) -> str:
+        """Return what is held out, in words."""
+        if self.by_run:
+            return "run"
+        return "contiguous blocks of one run" if runs == 1 else "contiguous blocks of the runs"
+
+
+def folds_of(problem: Problem, made: Fit) -> Folds:
+    """Return the folds of a problem, at most five, runs dealt out in turn.
+
+    Where a free parameter belongs to one run alone (its own initial state), a run that is held out whole
+    would leave it at its prior: then blocks of every run are held out in its place.
+    """
+    runs = [one for one in problem.slices if one.stop > one.start]
+    if len(runs) >= 2 and not _own_parameters(problem, made):
+        count = min(_FOLDS, len(runs))
+        held = []
+        for k in range(count):
+            mask = np.zeros(problem.rows, dtype=bool)
+            for one in runs[k::count]:
+                mask[one] = True
+            held.append(mask)
+        return Folds(held=tuple(held), by_run=True)
+    held = []
+    for k in range(_FOLDS):
+        mask = np.zeros(problem.rows, dtype=bool)
+        for one in runs:
+            mask[np.array_split(np.arange(one.start, one.stop), _FOLDS)[k]] = True
+        if mask.any():
+            held.append(mask)
+    return Folds(held=tuple(held), by_run=False)
+
+
+def _own_parameters(problem: Problem, made: Fit) -> bool:
+    columns, _ = jacobian(problem, made)
+    for i in range(len(problem.free)):
+        moved = [
+            any(float(np.abs(columns[name][one, i]).max()) > 0 for name in problem.names)
+            for one in problem.slices
+            if one.stop > one.start
+        ]
+        if sum(moved) == 1:
+            return True
+    return False
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class HeldOut:
+    """A hypothesis on rows that it has not seen: log score of each fold, and its simulation of those rows."""
+
+    scores: tuple[float, ...]
+    simulated: dict[str, NDArray[np.float64]]
+    fits: tuple[Fit, ...]
+
+    @property
+    def total(self) -> float:
+        """Log score over all folds."""
+        return sum(self.scores)
+
+
+def hold_out(problem: Problem, folds: Folds, active: Sequence[Active], start: Fit) -> HeldOut:
+    """Fit a hypothesis without each fold and score it there; the simulation is free over whole runs."""
+    scores, fits = [], []
+    simulated = {name: np.full(problem.rows, np.nan) for name in problem.names}
+    for held in folds.held:
+        made = fit(problem, active, start=start.p, rows=~held, noise=start.noise, rounds=2, plain=start.plain)
+        scores.append(held_out_score(problem, made, held))
+        fits.append(made)
+        for name in problem.names:
+            simulated[name][held] = made.simulated[name][held]
+    return HeldOut(scores=tuple(scores), simulated=simulated, fits=tuple(fits))
+
+
+def matters(problem: Problem, before: HeldOut, after: HeldOut, least: float) -> bool:
+    """Tell whether some output's held-out error falls by a share that a user would notice.
+
+    By its mean square or by its variance: where a drift starts is found in a later step.
+    """
+    for name, kept in problem.kept.items():
+        observed = problem.observed[name][kept]
+        one, other = (observed - each.simulated[name][kept] for each in (before, after))
+        if np.mean(other**2) < np.mean(one**2) * (1 - least) or np.var(other) < np.var(one) * (1 - least):
+            return True
+    return False
+
+
+def beyond_form(problem: Problem, refitted: HeldOut, before: HeldOut, after: HeldOut, form: float) -> bool:
+    """Tell whether some output's error falls by more than the form of what was found before may leave.
+
+    Parameters
+    ----------
+    refitted, before : without any effect, and with those that were found
+    form : how far an effect's form is off, as a share of what the effect is
+    """
+    for name, kept in problem.kept.items():
+        observed = problem.observed[name][kept]
+        none, one, other = (
+            float(np.mean((observed - each.simulated[name][kept]) ** 2)) for each in (refitted, before, after)
+        )
+        if one - other > form**2 * max(none - one, 0.0):
+            return True
+    return False

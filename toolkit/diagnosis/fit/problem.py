@@ -1,0 +1,172 @@
+"""The problem that a case poses: runs, outputs and rows that count, nominal parameters with their priors."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from toolkit.diagnosis.fit.noise import Layout, layout
+from toolkit.diagnosis.simulators.simulator import Active, Model, Moving
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from toolkit.diagnosis.case.case import Case, CaseParameter, Run
+    from toolkit.diagnosis.simulators.simulator import Pattern
+
+    Stacked = dict[str, NDArray[np.float64]]
+
+_ISOLATED = 8.0  # robust standard deviations from the neighbours' median: no physics does that in one row
+_SHARE = 0.03  # of the rows; more than that is no outlier but a pattern
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Problem:
+    """What is fitted and judged.
+
+    ``kept`` masks the rows that count, for each output over all runs in their order; ``slices`` are the
+    rows of each run; ``floor`` is the resolution of each output's numbers, or what the simulation itself is
+    unsure by, below which no noise is known.
+    """
+
+    case: Case
+    model: Model
+    runs: tuple[Run, ...]
+    free: tuple[CaseParameter, ...]
+    known: dict[str, float]
+    observed: Stacked
+    kept: dict[str, NDArray[np.bool_]]
+    floor: dict[str, float]
+    slices: tuple[slice, ...]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the outputs."""
+        return tuple(one.name for one in self.model.outputs)
+
+    @property
+    def rows(self) -> int:
+        """Rows of all runs."""
+        return int(self.slices[-1].stop)
+
+    def layout(self, name: str, rows: NDArray[np.bool_] | None = None) -> Layout:
+        """Return the layout of an output's kept values, confined to some rows."""
+        good = self.kept[name] if rows is None else self.kept[name] & rows
+        return layout([run.t for run in self.runs], [good[one] for one in self.slices])
+
+    def simulate(self, p: Sequence[float], active: Sequence[Active]) -> Stacked:
+        """Return every output over all runs in their order; ``p`` are the free parameters."""
+        values = dict(self.known)
+        values.update(zip((one.name for one in self.free), map(float, p), strict=True))
+        made = [self.model.simulate(run, values, active) for run in self.runs]
+        return {name: np.concatenate([one[name] for one in made]) for name in self.names}
+
+    def prepare(self, wanted: Sequence[tuple[Sequence[float], Sequence[Active]]]) -> None:
+        """Have several simulations made at once where the model can; `simulate` then finds them."""
+        prepare = getattr(self.model, "prepare", None)
+        if prepare is None:
+            return
+        names = [one.name for one in self.free]
+        sets = [(self.known | dict(zip(names, map(float, p), strict=True)), active) for p, active in wanted]
+        for run in self.runs:
+            prepare(run, sets)
+
+    def pushed(
+        self, p: Sequence[float], active: Sequence[Active], one: Active, pattern: Pattern, forces: int
+    ) -> Stacked:
+        """Return linear responses of every output over all runs to small forces, (rows, forces).
+
+        What acts on a channel already is taken row by row: a channel that is saturated shows nothing.
+
+        Parameters
+        ----------
+        one : where and in which runs they act
+        pattern : positions (n,) to forces (n, forces)
+        """
+        values = dict(self.known)
+        values.update(zip((each.name for each in self.free), map(float, p), strict=True))
+        parts: dict[str, list[NDArray[np.float64]]] = {name: [] for name in self.names}
+        moving = self.model if isinstance(self.model, Moving) else None
+        for run in self.runs:
+            made: Stacked = {}
+            if moving is not None and one.acts_in(run):
+                made = moving.pushed(run, values, active, one.channel, pattern)
+            for name, column in parts.items():
+                column.append(made.get(name, np.zeros((run.rows, forces))))
+        return {name: np.concatenate(column) for name, column in parts.items()}
+
+    def sd_of(self, name: str) -> float | None:
+        """Return the stated noise of an output."""
+        return next(one.sd for one in self.model.outputs if one.name == name)
+
+
+def problem_of(case: Case, model: Model) -> Problem:
+    """Return the problem of a case: runs of the phase ``tare`` are no part of it."""
+    runs = tuple(run for run in case.runs if run.conditions.get("phase") != "tare")
+    observed: dict[str, list[NDArray[np.float64]]] = {one.name: [] for one in model.outputs}
+    for run in runs:
+        made = model.observed(run)
+        for name, column in observed.items():
+            column.append(made.get(name, np.full(run.rows, np.nan)))
+    stacked = {name: np.concatenate(columns) for name, columns in observed.items()}
+    unsure: dict[str, float] = getattr(model, "unsure", {})
+    ends = np.cumsum([run.rows for run in runs])
+    slices = tuple(slice(int(end - run.rows), int(end)) for end, run in zip(ends, runs, strict=True))
+    return Problem(
+        case=case,
+        model=model,
+        runs=runs,
+        free=tuple(one for one in model.parameters if one.sd is not None),
+        known={one.name: one.value for one in model.parameters},
+        observed=stacked,
+        kept={name: np.isfinite(column) for name, column in stacked.items()},
+        floor={name: max(_resolution(column), unsure.get(name, 0.0)) for name, column in stacked.items()},
+        slices=slices,
+    )
+
+
+def without_outliers(problem: Problem, residual: Stacked) -> Problem:
+    """Return the problem without single rows that stand far off all their neighbours.
+
+    The rows are chosen once, on the residual of the refitted simulation, so that every hypothesis is
+    judged on the same rows.
+    """
+    from dataclasses import replace
+
+    kept = {}
+    for name, r in residual.items():
+        good = problem.kept[name].copy()
+        for one in problem.slices:
+            here = np.flatnonzero(good[one]) + one.start
+            if len(here) < 12:
+                continue
+            values = r[here]
+            away = values - _running_median(values)
+            scale = 1.4826 * float(np.median(np.abs(away))) or float(np.std(away))
+            steps = 1.4826 * float(np.median(np.abs(np.diff(values)))) / np.sqrt(2)
+            far = np.abs(away) > _ISOLATED * max(scale, steps, 1e-300)
+            if 0 < far.sum() <= max(1, _SHARE * len(here)):
+                good[here[far]] = False
+        kept[name] = good
+    return replace(problem, kept=kept)
+
+
+def _running_median(x: NDArray[np.float64]) -> NDArray[np.float64]:
+    padded = np.concatenate([x[2:0:-1], x, x[-2:-4:-1]])
+    return np.asarray(np.median(np.lib.stride_tricks.sliding_window_view(padded, 5), axis=1))
+
+
+def _resolution(column: NDArray[np.float64]) -> float:
+    """Return the standard deviation that printed digits leave: the smallest step over the root of twelve."""
+    values = np.unique(column[np.isfinite(column)])
+    size = float(np.abs(values).max()) if len(values) else 1.0
+    steps = np.diff(values)
+    steps = steps[steps > 1e-12 * max(size, 1e-300)]
+    least = float(steps.min()) if len(steps) else 1e-12 * max(size, 1e-300)
+    # Only a lattice is a resolution: full doubles have steps of every size.
+    if len(steps) and np.allclose(steps / least, np.round(steps / least), atol=1e-3) and size / least < 1e7:
+        return float(least / np.sqrt(12))
+    return max(1e-9 * size, 1e-300)

@@ -1,0 +1,141 @@
+"""The vector that a joint fit searches: free parameters, then the effects' values, each over its size."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from toolkit.diagnosis.simulators.simulator import Active
+from toolkit.errors import FitError
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from toolkit.diagnosis.fit.problem import Problem
+
+    Array = NDArray[np.float64]
+    Stacked = dict[str, Array]
+
+_STEP = 1e-4  # of a parameter's size, for differences
+_WITHIN = 4.0  # prior standard deviations; further off a parameter is not uncertain but imitates an effect
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Space:
+    """One hypothesis as a vector with bounds."""
+
+    problem: Problem
+    active: tuple[Active, ...]
+    sizes: Array
+    low: Array
+    high: Array
+
+    @staticmethod
+    def of(problem: Problem, active: tuple[Active, ...]) -> Space:
+        """Return the space of a problem's free parameters and of the values that effects search."""
+        sizes, low, high = [], [], []
+        for one in problem.free:
+            size = one.sd or abs(one.value) or 1.0
+            sizes.append(size)
+            bounds = one.bounds or (-math.inf, math.inf)
+            reach = _WITHIN * one.sd if one.sd else math.inf
+            low.append(max(bounds[0], one.value - reach) / size)
+            high.append(min(bounds[1], one.value + reach) / size)
+        for each in active:
+            for parameter in each.searched:
+                size = _size(each, parameter.name)
+                sizes.append(size)
+                low.append(parameter.bounds[0] / size)
+                high.append(parameter.bounds[1] / size)
+        return Space(problem, active, np.array(sizes), np.array(low), np.array(high))
+
+    def begin(self, p: Sequence[float]) -> Array:
+        """Return the vector of free parameters and of the effects' values as they are, within the bounds."""
+        begin = [*p, *(_clipped(one, each.name) for one in self.active for each in one.searched)]
+        return np.clip(np.asarray(begin, dtype=np.float64) / self.sizes, self.low, self.high)
+
+    def at(self, p: Sequence[float]) -> Array:
+        """Return the same with the values as they are."""
+        values = [*p, *(one.values[each.name] for one in self.active for each in one.searched)]
+        return np.asarray(values, dtype=np.float64) / self.sizes
+
+    def split(self, x: Array) -> tuple[list[float], tuple[Active, ...]]:
+        """Return free parameters and effects with their values."""
+        values = (x * self.sizes).tolist()
+        n = len(self.problem.free)
+        made, at = [], n
+        for one in self.active:
+            names = [each.name for each in one.searched]
+            made.append(replace(one, values={**one.values, **dict(zip(names, values[at:], strict=False))}))
+            at += len(names)
+        return values[:n], tuple(made)
+
+    def simulated(self, x: Array) -> Stacked:
+        """Return every output over all runs.
+
+        Raises
+        ------
+        FitError
+            the simulation gives no usable output there
+        """
+        p, active = self.split(x)
+        return self.problem.simulate(p, active)
+
+    def residual(self, simulated: Stacked) -> Stacked:
+        """Return recorded less simulated."""
+        return {name: self.problem.observed[name] - simulated[name] for name in simulated}
+
+    def around(self, x: Array) -> tuple[Stacked, Stacked]:
+        """Return what is simulated at a vector, and d(simulated)/dx by one-sided differences.
+
+        They are (rows,) and (rows, parameters) for each output.
+
+        Raises
+        ------
+        FitError
+            the simulation gives no usable output at the vector itself
+        """
+        points = self._moved(x)
+        # Together they have the same steps: what these leave is then no part of a difference.
+        self.problem.prepare([self.split(one) for one in (x, *points)])
+        here = self.simulated(x)
+        made = {name: np.empty((len(column), len(x))) for name, column in here.items()}
+        for i, moved in enumerate(points):
+            try:
+                simulated = self.simulated(moved)
+            except FitError:
+                simulated = here
+            for name, column in simulated.items():
+                made[name][:, i] = (column - here[name]) / (moved[i] - x[i])
+        return here, made
+
+    def _moved(self, x: Array) -> list[Array]:
+        points = []
+        for i in range(len(x)):
+            step = min(_STEP * max(abs(x[i]), 1.0), 0.1 * (self.high[i] - self.low[i]))
+            step = -step if x[i] + step > self.high[i] else step
+            moved = x.copy()
+            moved[i] += step
+            points.append(moved)
+        return points
+
+
+def _size(one: Active, name: str) -> float:
+    """Return the size on which a parameter is searched: its value, or its typical one where that is off."""
+    parameter = next(each for each in one.effect.parameters if each.name == name)
+    value = abs(one.values.get(name, 0.0))
+    scale = one.values.get(f"_size_{name}", 0.0)
+    if value and math.isfinite(value):
+        return max(value, 0.2 * scale)
+    return scale or abs(parameter.typical[0]) or 1.0
+
+
+def _clipped(one: Active, name: str) -> float:
+    parameter = next(each for each in one.effect.parameters if each.name == name)
+    low, high = parameter.bounds
+    inside = 1e-9 * max(abs(low) if math.isfinite(low) else 0.0, 1e-9)
+    return min(max(one.values[name], low + inside), high)

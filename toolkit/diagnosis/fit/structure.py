@@ -1,0 +1,120 @@
+"""Structure that no effect of the catalogue explains: smooth dependences of a residual, tested, never named.
+
+Each group is a set of columns for one output: splines over a channel, over time, over the output itself,
+products of two, offsets of runs, harmonics of a shaft's angle. They are tested like effects, against their
+own null; what is found is `unknown`, with the variables that it depends on.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from toolkit.diagnosis.fit.fit import Fit
+    from toolkit.diagnosis.fit.problem import Problem
+
+_KNOTS = 7
+_ANGLES = ("TIRE_ANGLE", "DRUM_ANGLE")
+_FEWEST = 4.0  # rows for each column
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Group:
+    """Columns of a smooth dependence: the output it is in, the variables it depends on."""
+
+    output: str
+    variables: tuple[str, ...]
+    columns: NDArray[np.float64]
+
+    def directions(self, problem: Problem) -> dict[str, NDArray[np.float64]]:
+        """Return the columns as responses of every output: nothing in the others."""
+        none = np.zeros_like(self.columns)
+        return {name: self.columns if name == self.output else none for name in problem.names}
+
+
+def groups(problem: Problem, base: Fit) -> list[Group]:
+    """Return the groups of a case."""
+    variables = _variables(problem)
+    made: list[Group] = []
+    for output in problem.names:
+        n = int(problem.kept[output].sum())
+        found: list[tuple[tuple[str, ...], NDArray[np.float64]]] = []
+        own = _spline(base.simulated[output])
+        for name, x in [*variables, (output, base.simulated[output])]:
+            columns = own if name == output else _spline(x)
+            if columns is not None:
+                found.append(((name,), columns))
+            if name in _ANGLES or name.lower() in ("tire_angle", "drum_angle"):
+                found.append(((name,), _harmonics(x)))
+        for i, (a, x) in enumerate(variables):
+            for b, y in variables[i + 1 :]:
+                product = _product(x, y)
+                if product is not None and "time" not in (a, b):
+                    found.append(((a, b), product))
+        if len(problem.runs) > 1:
+            found.append((("run",), _run_offsets(problem)))
+        for names, columns in found:
+            if columns.shape[1] * _FEWEST <= n:
+                made.append(Group(output=output, variables=names, columns=columns))
+    return made
+
+
+def _variables(problem: Problem) -> list[tuple[str, NDArray[np.float64]]]:
+    found = [
+        (one.name, np.concatenate([run.columns[one.name] for run in problem.runs]))
+        for one in problem.case.drivers
+        if all(one.name in run.columns for run in problem.runs)
+    ]
+    rates = []
+    if problem.case.has_time:
+        elapsed = np.concatenate([run.t - run.t[0] for run in problem.runs])
+        for name, x in found:
+            steps = []
+            for run, place in zip(problem.runs, problem.slices, strict=True):
+                column = x[place]
+                steps.append(np.gradient(column, run.t) if run.rows > 2 else np.zeros(run.rows))
+            rate = np.concatenate(steps)
+            if np.ptp(rate) > 0:
+                low, high = np.quantile(rate, (0.005, 0.995))
+                rates.append((f"d{name}/dt", np.clip(rate, low, high)))
+        found.append(("time", elapsed))
+    return [*found, *rates]
+
+
+def _spline(x: NDArray[np.float64]) -> NDArray[np.float64] | None:
+    """Return natural splines over quantiles, centred; powers where few values occur."""
+    values = np.unique(x[np.isfinite(x)])
+    if len(values) < 2 or np.ptp(values) <= 1e-9 * np.abs(values).max():
+        return None
+    scaled = (x - values[0]) / np.ptp(values)
+    if len(values) <= _KNOTS + 1:
+        columns = np.stack([scaled**k for k in range(1, min(len(values), 4))], axis=1)
+    else:
+        knots = np.unique(np.quantile(scaled, np.linspace(0, 1, _KNOTS)))
+        columns = np.stack([scaled, *[np.abs(scaled - knot) ** 3 for knot in knots[1:-1]]], axis=1)
+    return np.asarray(columns - columns.mean(axis=0))
+
+
+def _product(x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64] | None:
+    if np.ptp(x) == 0 or np.ptp(y) == 0:
+        return None
+    u = (x - x.mean()) / (np.abs(x - x.mean()).max())
+    v = (y - y.mean()) / (np.abs(y - y.mean()).max())
+    columns = np.stack([u * v, u * u * v, u * v * v, np.abs(u) * v, u * np.abs(v)], axis=1)
+    return np.asarray(columns - columns.mean(axis=0))
+
+
+def _harmonics(angle: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.stack([f(k * angle) for k in (1, 2, 3, 4) for f in (np.cos, np.sin)], axis=1)
+
+
+def _run_offsets(problem: Problem) -> NDArray[np.float64]:
+    columns = np.zeros((problem.rows, len(problem.slices)))
+    for i, one in enumerate(problem.slices):
+        columns[one, i] = 1.0
+    return columns[:, 1:] if len(problem.slices) > 1 else columns

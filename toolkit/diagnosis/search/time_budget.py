@@ -1,0 +1,74 @@
+"""A simulator's calls under a time limit: a budget ends also a call that would take ten minutes."""
+
+from __future__ import annotations
+
+import signal
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any, TypeVar
+
+from toolkit.diagnosis.search.search import BudgetSpentError
+
+T = TypeVar("T")
+
+
+class _AlarmError(BaseException):
+    """The time is over; no simulator's own ``except Exception`` holds it up."""
+
+
+class Watch:
+    """How long a search may take, what it is at, and how long the last simulation took [s]."""
+
+    def __init__(self, budget_s: float, tell: Callable[[str], None]) -> None:
+        self.until = time.monotonic() + budget_s
+        self.step = "the simulation as declared"
+        self.last_s = 0.0
+        self._tell = tell
+
+    def tell(self, step: str) -> None:
+        """Note the step that begins, and tell it on."""
+        self.step = step
+        self._tell(step)
+
+    def guarded(self, function: Callable[..., T]) -> Callable[..., T]:
+        """Return a function whose calls end with the budget.
+
+        A call in the main thread is interrupted where it stands, so that a simulator which waits or
+        computes in Python never outlives the budget; elsewhere the call that is running is the last.
+        """
+
+        def call(*arguments: Any, **named: Any) -> T:
+            started = time.monotonic()
+            left = self.until - started
+            if left <= 0:
+                raise BudgetSpentError(self.step)
+            try:
+                with _alarm(left):
+                    return function(*arguments, **named)
+            except _AlarmError:
+                raise BudgetSpentError(self.step) from None
+            finally:
+                self.last_s = time.monotonic() - started
+
+        return call
+
+
+@contextmanager
+def _alarm(seconds: float) -> Iterator[None]:
+    """Raise in this thread after a time; nothing where the system or the thread knows no alarm."""
+    if threading.current_thread() is not threading.main_thread() or not hasattr(signal, "setitimer"):
+        yield
+        return
+
+    def ring(*_: object) -> None:
+        raise _AlarmError
+
+    before = signal.signal(signal.SIGALRM, ring)
+    signal.setitimer(signal.ITIMER_REAL, seconds)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        signal.signal(signal.SIGALRM, before)

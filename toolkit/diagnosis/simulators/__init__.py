@@ -1,0 +1,1 @@
+"""Simulators: from a case to predictions with effects, one module for each kind of simulation."""

@@ -1,0 +1,136 @@
+"""Cells as inputs, FY and MZ as outputs: the acquisition program alone, by a calibration record."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from toolkit.calibration.apply import apply_record
+from toolkit.diagnosis.simulators.channels import through_channels
+from toolkit.diagnosis.simulators.setting import nominal_load, setting
+from toolkit.diagnosis.simulators.simulator import Active, Output
+from toolkit.effects.effect import Effect
+from toolkit.errors import ConfigError, RecordError
+from toolkit.units import unit
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from toolkit.calibration.records.record import CalibrationRecord
+    from toolkit.diagnosis.case.case import Case, Run
+
+_STAGES = ("acquisition", "load_cells")
+# What needs a reading over time, or another load, cannot be told from a program's arithmetic.
+_ON_CELLS = ("channel_sign", "channel_swap", "unit_error", "sensitivity_error", "zero_offset")
+_ON_LOADS = (
+    "channel_sign",
+    "unit_error",
+    "channel_swap",
+    "rectification",
+    "sensitivity_error",
+    "zero_offset",
+)
+
+
+class AcquisitionModel:
+    """The acquisition program's arithmetic: a record's coefficients on the recorded cells."""
+
+    def __init__(self, case: Case, record: CalibrationRecord, others: Sequence[CalibrationRecord]) -> None:
+        declared = {one.name: one for one in case.channels}
+        missing = [name for name in record.indications if name not in declared]
+        if missing or not all(declared[name].role == "input" for name in record.indications):
+            raise ConfigError(
+                "the calibration needs a cell that is no input",
+                where=f"{case.path}: recording.channels",
+                got=", ".join(missing) or "another role",
+                expected=f"{', '.join(record.indications)} as inputs",
+                next_step="declare the cells as inputs, or name a tire file",
+                rule="case",
+            )
+        if case.parameters:
+            raise ConfigError(
+                "an acquisition program has no free parameter",
+                where=f"{case.path}: simulation.parameters",
+                got=", ".join(one.name for one in case.parameters),
+                expected="none: a record's coefficients are known exactly",
+                next_step="remove them, or declare the cells as outputs and name the tire",
+                rule="case",
+            )
+        self.case, self.record = case, record
+        self._others = {one.id: one for one in others if one.id != record.id}
+        self.parameters = case.parameters
+        self.outputs = tuple(
+            Output(name=one.name, unit=one.unit, sd=one.sd)
+            for one in case.outputs
+            if one.name in ("FY", "MZ")
+        )
+        if len(self.outputs) != len(case.outputs):
+            raise ConfigError(
+                "an output is nothing that a calibration gives",
+                where=f"{case.path}: recording.channels",
+                got=", ".join(one.name for one in case.outputs),
+                expected="FY, MZ",
+                next_step="change its role",
+                rule="case",
+            )
+
+    def observed(self, run: Run) -> dict[str, NDArray[np.float64]]:
+        """Return FY and MZ as the program wrote them."""
+        return {one.name: run.columns[one.name] for one in self.outputs if one.name in run.columns}
+
+    def simulate(
+        self,
+        run: Run,
+        p: Mapping[str, float],
+        active: Sequence[Active],
+    ) -> dict[str, NDArray[np.float64]]:
+        """Return FY and MZ by the record on cells with effects in them, then effects on FY and MZ."""
+        del p  # a record's coefficients are known exactly
+        here = setting(self.case, run, nominal_load_N=nominal_load(self.case))
+        record = self.record
+        for one in active:
+            if one.effect.name == "wrong_calibration" and one.source is not None and one.acts_in(run):
+                record = self._others[one.source]
+        cells = through_channels(
+            {name: run.columns[name] for name in self.record.indications}, active, run, here, run.columns
+        )
+        units = dict(zip(record.indications, record.indication_units, strict=True))
+        scaled = {
+            name: cells[name] * unit(self.case.unit(name)).factor / unit(units[name]).factor
+            for name in record.indications
+        }
+        loads = apply_record(record, scaled, units=units, only=[one.name for one in self.outputs])
+        made = {one.name: loads[one.name] / unit(one.unit).factor for one in self.outputs}
+        return through_channels(made, active, run, here, run.columns)
+
+    def places(self, effect: Effect) -> list[tuple[str | None, str | None]]:
+        """Return the cells, the loads and the records on which an effect could act."""
+        if effect.stage not in _STAGES or effect.channel is None:
+            return []
+        if effect.name == "wrong_calibration":
+            return [(None, name) for name, record in self._others.items() if self._fits(record)]
+        cells = list(self.record.indications)
+        loads = [one.name for one in self.outputs]
+        if effect.name == "channel_swap":
+            return [(a, b) for group in (cells, loads) for i, a in enumerate(group) for b in group[i + 1 :]]
+        made: list[tuple[str | None, str | None]] = []
+        if effect.name in _ON_CELLS:
+            made += [(name, None) for name in cells]
+        if effect.name in _ON_LOADS:
+            made += [(name, None) for name in loads]
+        return made
+
+    def _fits(self, record: CalibrationRecord) -> bool:
+        if not set(record.indications) <= set(self.record.indications):
+            return False
+        if not {one.name for one in self.outputs} <= {one.load for one in record.loads}:
+            return False
+        try:
+            return all(
+                unit(self.case.unit(name)).dimension == unit(text).dimension
+                for name, text in zip(record.indications, record.indication_units, strict=True)
+            )
+        except RecordError:
+            return False

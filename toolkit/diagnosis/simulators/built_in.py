@@ -1,0 +1,195 @@
+"""Effects that a simulation has from the start: those of a model file, and of a corrected machine.
+
+Their parameters are parameters of the simulation like any other: free within their standard errors, refitted
+with the rest, and told before and after. What a search finds comes on top of them.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from toolkit.diagnosis.case.case import CaseParameter
+from toolkit.diagnosis.simulators.channel_units import unit_of
+from toolkit.diagnosis.simulators.simulator import Active, Model, Moving
+from toolkit.effects.sense import computed_in
+from toolkit.errors import ConfigError
+from toolkit.findings import Finding
+from toolkit.units import unit
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from toolkit.diagnosis.case.case import Case, Run
+    from toolkit.effects.effect import Effect
+    from toolkit.simulation.model_file import ModelEffect, ModelParameter
+
+    Arrays = dict[str, NDArray[np.float64]]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Told:
+    """One parameter of an effect: the simulation's name for it, and the factor to the hook's own value."""
+
+    name: str
+    parameter: str
+    factor: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _BuiltIn:
+    """One effect with the names under which its parameters stand among those of the simulation."""
+
+    active: Active
+    told: tuple[_Told, ...]
+
+    def at(self, p: Mapping[str, float]) -> Active:
+        """Return the effect with its values of these parameters."""
+        values = {one.parameter: p[one.name] * one.factor for one in self.told}
+        return dataclasses.replace(self.active, values={**self.active.values, **values})
+
+
+def build_in(case: Case, model: Model) -> None:
+    """Put the effects of a case's own simulation into its model, for good.
+
+    Raises
+    ------
+    ConfigError
+        ``model-place``: an effect acts on what this case does not have, or in another dimension
+    """
+    if not case.effects:
+        return
+    own = {one.name for one in model.parameters}
+    built: list[_BuiltIn] = []
+    free: list[CaseParameter] = []
+    for one, names in zip(case.effects, parameter_names(case.effects), strict=True):
+        made, parameters = _built(case, model, one, names)
+        built.append(made)
+        free += parameters
+    model.parameters = (*model.parameters, *free)
+    plain, places = model.simulate, model.places
+    repeats, prepare = getattr(model, "repeats", None), getattr(model, "prepare", None)
+
+    def only_own(p: Mapping[str, float]) -> dict[str, float]:
+        return {name: value for name, value in p.items() if name in own}
+
+    def with_them(p: Mapping[str, float], active: Sequence[Active]) -> tuple[Active, ...]:
+        return (*(one.at(p) for one in built), *active)
+
+    def simulate(run: Run, p: Mapping[str, float], active: Sequence[Active]) -> Arrays:
+        return plain(run, only_own(p), with_them(p, active))
+
+    def not_yet(effect: Effect) -> list[tuple[str | None, str | None]]:
+        # Steps on steps of the same size are no second effect, and the recording would name them again.
+        taken = {
+            one.active.channel for one in built if one.active.effect.name == effect.name == "quantisation"
+        }
+        return [place for place in places(effect) if place[0] not in taken]
+
+    model.simulate = simulate  # type: ignore[method-assign]
+    model.places = not_yet  # type: ignore[method-assign]
+    if repeats is not None:
+        model.repeats = lambda run, p: repeats(run, only_own(p))  # type: ignore[attr-defined]
+    if prepare is not None:
+        model.prepare = lambda run, sets: prepare(  # type: ignore[attr-defined]
+            run, [(only_own(p), with_them(p, active)) for p, active in sets]
+        )
+    if isinstance(model, Moving):
+        pushed = model.pushed
+        model.pushed = lambda run, p, active, *more: pushed(  # type: ignore[method-assign]
+            run, only_own(p), with_them(p, active), *more
+        )
+
+
+def parameter_names(effects: Sequence[ModelEffect]) -> tuple[tuple[str, ...], ...]:
+    """Return the names of each effect's parameters among those of the simulation, all different.
+
+    >>> from toolkit.effects.catalogue import effects
+    >>> from toolkit.simulation.model_file import ModelEffect
+    >>> parameter_names([ModelEffect(effect=effects()["zero_offset"], channel="D51")] * 2)
+    (('zero_offset.D51.offset',), ('zero_offset.D51#2.offset',))
+    """
+    seen: dict[str, int] = {}
+    made = []
+    for one in effects:
+        label = ".".join(part for part in (one.effect.name, one.source, one.channel) if part)
+        seen[label] = seen.get(label, 0) + 1
+        label += f"#{seen[label]}" if seen[label] > 1 else ""
+        made.append(tuple(f"{label}.{name}" for name in one.effect.names))
+    return tuple(made)
+
+
+def _built(
+    case: Case, model: Model, one: ModelEffect, names: Sequence[str]
+) -> tuple[_BuiltIn, list[CaseParameter]]:
+    effect = one.effect
+    if (one.channel, one.source) not in [tuple(place) for place in model.places(effect)]:
+        raise ConfigError(
+            "the simulation has no place for an effect of its model", where=case.path, got=one.label,
+            expected="a case with the channels on which the model's effects act",
+            next_step="use the model with recordings of the same channels and roles", rule="model-place",
+        )  # fmt: skip
+    runs = {run.name for run in (*case.runs, *case.predict)}
+    acting = frozenset(
+        run.name for run in (*case.runs, *case.predict) if one.acts_in(run.name, run.conditions)
+    )
+    active = Active(
+        effect=effect,
+        channel=one.channel,
+        source=one.source,
+        runs=None if acting == runs else acting,
+        values=dict(one.numerics),
+    )
+    told, free = [], []
+    for name, parameter, own in zip(names, one.parameters, effect.parameters, strict=True):
+        sense = computed_in(effect.name, parameter.name, one.axes or case.axes)
+        low, high = (sense * bound for bound in own.bounds)
+        scale = _scale(case, model, active, parameter)
+        sd = parameter.standard_error if active.searched and effect.name != "quantisation" else None
+        free.append(
+            CaseParameter(
+                name=name,
+                value=parameter.value,
+                unit=parameter.unit,
+                sd=sd,
+                bounds=(min(low, high) / scale, max(low, high) / scale),
+            )
+        )
+        told.append(_Told(name=name, parameter=parameter.name, factor=sense * scale))
+    return _BuiltIn(active=active, told=tuple(told)), free
+
+
+def _scale(case: Case, model: Model, active: Active, parameter: ModelParameter) -> float:
+    """Return the factor from a parameter's unit to that of the same parameter in this case."""
+    here = unit_of(case, model, active, parameter.name)
+    if here == parameter.unit:
+        return 1.0
+    given, own = unit(parameter.unit), unit(here)
+    if given.dimension != own.dimension:
+        raise ConfigError(
+            "a parameter of the model does not fit the case's units",
+            where=f"{case.path}: {active.effect.name}.{parameter.name}", got=parameter.unit, expected=here,
+            next_step="give the channel the dimension that it had when the model was fitted",
+            rule="model-place",
+        )  # fmt: skip
+    return given.factor / own.factor
+
+
+def built_in_findings(case: Case) -> tuple[Finding, ...]:
+    """Return notes on the effects that the simulation has from the start."""
+    made = []
+    for one in case.effects:
+        runs = [run.name for run in case.runs if one.acts_in(run.name, run.conditions)]
+        where = "all runs" if len(runs) == len(case.runs) else ", ".join(runs) or "none of the case's runs"
+        made.append(
+            Finding(
+                rule="case-model",
+                where=one.origin or case.path.name,
+                level="note",
+                message=f"the simulation has an effect of an earlier answer in it: {one.label}, in {where}",
+            )
+        )
+    return tuple(made)

@@ -1,0 +1,207 @@
+"""The hub's load cells in a case: FY and MZ from them by a record, and effects on single cells."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from toolkit.calibration.apply import apply_record
+from toolkit.diagnosis.simulators.channels import channel_places, undone
+from toolkit.diagnosis.simulators.simulator import Active, Output
+from toolkit.effects.effect import Effect
+from toolkit.effects.signals import Setting
+from toolkit.errors import ConfigError
+from toolkit.units import unit
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from toolkit.calibration.records.record import CalibrationRecord
+    from toolkit.diagnosis.case.case import Case, Run
+
+
+_BY_VALUE = (
+    "sensitivity_error",
+    "hysteresis",
+    "nonlinearity",
+    "creep",
+    "dead_band",
+    "filter_lag",
+    "channel_delay",
+)
+_LEAST_ROWS = 20  # of a run, to tell what its cells carried from its loads
+_ON_TARE = ("channel_sign", "sensitivity_error", "unit_error")
+
+
+class Cells:
+    """Recorded cells and the record that turns them into loads, with the tare of the case's tare runs."""
+
+    def __init__(self, case: Case, record: CalibrationRecord) -> None:
+        declared = {one.name: one for one in case.channels}
+        missing = [name for name in record.indications if name not in declared]
+        if missing:
+            raise ConfigError(
+                "the calibration needs a cell that the recording has not",
+                where=f"{case.path}: recording.channels",
+                got=", ".join(missing),
+                expected=", ".join(record.indications),
+                next_step="add the channels, or judge FY and MZ directly",
+                rule="case",
+            )
+        self.case, self.record = case, record
+        self.names = record.indications
+        self.loads = tuple(one.load for one in record.loads if one.load in ("FY", "MZ"))
+        self._units = {name: declared[name].unit for name in self.names}
+        self._noise = {name: declared[name].sd for name in self.names}
+        self._recorded_unit = dict(zip(record.indications, record.indication_units, strict=True))
+        tares = [run for run in case.runs if run.conditions.get("phase") == "tare"]
+        self._tare = (
+            None
+            if not tares
+            else {
+                name: float(np.nanmean(np.concatenate([self._cell(run, name) for run in tares])))
+                for name in self.names
+            }
+        )
+
+    def _cell(self, run: Run, name: str) -> NDArray[np.float64]:
+        here, there = unit(self._units[name]), unit(self._recorded_unit[name])
+        if here.dimension != there.dimension:
+            raise ConfigError(
+                "a cell's unit is not the calibration's",
+                where=f"{self.case.path}: {name}",
+                got=here.text,
+                expected=there.text,
+                next_step="correct the unit, or name the right calibration",
+                rule="case",
+            )
+        return run.columns[name] * (here.factor / there.factor)
+
+    def load(self, run: Run, name: str) -> NDArray[np.float64]:
+        """Return FY [N] or MZ [N·m] from the recorded cells, (n,)."""
+        return self.loads_of({cell: self._cell(run, cell) for cell in self.names})[name]
+
+    def loads_of(self, cells: dict[str, NDArray[np.float64]]) -> dict[str, NDArray[np.float64]]:
+        """Return FY and MZ [SI] of cells in the record's units."""
+        return self._loads(cells, self._tare)
+
+    def _loads(
+        self, cells: dict[str, NDArray[np.float64]], tare: dict[str, float] | None
+    ) -> dict[str, NDArray[np.float64]]:
+        return apply_record(self.record, cells, units=self._recorded_unit, tare=tare, only=self.loads)
+
+    def noise(self, load: str) -> float | None:
+        """Return a load's noise from the cells' stated noise, None where a cell has none."""
+        fit = self.record.load(load)
+        known = dict(zip(fit.terms, fit.coefficients, strict=True))
+        total = 0.0
+        for name in self.names:
+            sd = self._noise[name]
+            if sd is None or name not in known:
+                return None
+            factor = unit(self._units[name]).factor / unit(self._recorded_unit[name]).factor
+            total += (known[name] * sd * factor) ** 2
+        return float(np.sqrt(total)) * unit(fit.unit).factor
+
+    def _carried(
+        self,
+        run: Run,
+        shown: NDArray[np.float64],
+        values: dict[str, NDArray[np.float64]],
+        outputs: Sequence[Output],
+    ) -> NDArray[np.float64]:
+        """Return what a cell showed as far as simulated loads and recorded FZ account for it, noise-free.
+
+        The cell's noise is in FY and MZ as well: an effect in proportion to what was recorded would explain
+        that noise, and be found where nothing is wrong.
+        """
+        columns = [values[one.name] for one in outputs if one.name in self.loads]
+        columns += [run.columns[name] for name in ("FZ",) if np.isfinite(run.columns.get(name, np.nan)).all()]
+        there = np.column_stack([*columns, np.ones(len(shown))])
+        good = np.isfinite(there).all(axis=1) & np.isfinite(shown)
+        if int(good.sum()) < _LEAST_ROWS:
+            return shown
+        return np.asarray(there @ np.linalg.lstsq(there[good], shown[good], rcond=None)[0])
+
+    def _foretold(
+        self, values: dict[str, NDArray[np.float64]], outputs: Sequence[Output]
+    ) -> dict[str, NDArray[np.float64]]:
+        """Return cells of inputs that were not recorded: as they went with the loads in the recordings.
+
+        Three cells carry more than two loads say; least squares over the case's runs give what went with
+        FY and MZ there, a constant included.
+        """
+        known = [one for one in outputs if one.name in self.loads]
+        runs = [run for run in self.case.runs if all(name in run.columns for name in self.names)]
+        if not runs:
+            raise ConfigError(
+                "an effect acts on cells that the inputs do not have",
+                where=self.case.path,
+                got="no cells",
+                expected=", ".join(self.names),
+                next_step="add the cells' columns to the inputs",
+                rule="model-place",
+            )
+        shown = {name: np.concatenate([self._cell(run, name) for run in runs]) for name in self.names}
+        loads = self.loads_of(shown)
+        there = np.column_stack([loads[one.name] for one in known] + [np.ones(len(shown[self.names[0]]))])
+        good = np.isfinite(there).all(axis=1) & np.isfinite(np.stack(list(shown.values()))).all(axis=0)
+        here = np.column_stack(
+            [values[one.name] * unit(one.unit).factor for one in known]
+            + [np.ones(len(next(iter(values.values()))))]
+        )
+        return {
+            name: here @ np.linalg.lstsq(there[good], column[good], rcond=None)[0]
+            for name, column in shown.items()
+        }
+
+    def places(self, effect: Effect, drivers: set[str]) -> list[tuple[str | None, str | None]]:
+        """Return the cells on which an effect could act: a force at the tire or the drum reaches them all."""
+        if effect.stage not in ("load_cells", "acquisition") or effect.name in (
+            "crosstalk",
+            "channel_swap",
+            "unit_error",
+        ):
+            return []
+        return channel_places(effect, [(name, self._units[name]) for name in self.names], (), drivers)
+
+    def disturbed(
+        self,
+        values: dict[str, NDArray[np.float64]],
+        active: Sequence[Active],
+        run: Run,
+        setting: Setting,
+        outputs: Sequence[Output],
+    ) -> dict[str, NDArray[np.float64]]:
+        """Return the loads that the record makes of disturbed cells.
+
+        What the cells truly carried is the recording with the effect undone; the difference to what they
+        showed, by the record, is what the effect adds to the simulation.
+        """
+        here = [one for one in active if one.channel in self.names and one.acts_in(run)]
+        if not here:
+            return values
+        if all(name in run.columns for name in self.names):
+            recorded = {name: self._cell(run, name) for name in self.names}
+            for name in {str(one.channel) for one in here if one.effect.name in _BY_VALUE}:
+                recorded[name] = self._carried(run, recorded[name], values, outputs)
+        else:
+            recorded = self._foretold(values, outputs)
+        true = dict(recorded)
+        tare = None if self._tare is None else dict(self._tare)
+        for one in reversed(here):
+            name = str(one.channel)
+            true[name] = undone(true[name], one, setting, true)
+            if tare is not None and one.effect.name in _ON_TARE:
+                # The tare was read through the same fault; what came later (creep, drift) is not in it.
+                tare[name] = float(undone(np.array([tare[name]]), one, setting, true)[0])
+        shown, without = self.loads_of(recorded), self._loads(true, tare)
+        made = dict(values)
+        for output in outputs:
+            if output.name in self.loads:
+                made[output.name] = (
+                    made[output.name] + (shown[output.name] - without[output.name]) / unit(output.unit).factor
+                )
+        return made

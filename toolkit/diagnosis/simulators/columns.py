@@ -1,0 +1,189 @@
+"""Kind ``columns``: another program's output beside the recording; it cannot be run again.
+
+Effects on single channels act on the recorded output as it is. Effects on road, carriage and tire need the
+output at other slip angles and loads: a smooth surface through the simulated columns gives the difference.
+Where the columns have too few slip angles for that, nothing below the surface's own error is judged.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import difflib
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from toolkit.diagnosis.simulators.channels import channel_places, through_channels
+from toolkit.diagnosis.simulators.motion import AlongMotion, Motion, motion_of
+from toolkit.diagnosis.simulators.setting import NOMINAL_SPEED, nominal_load, setting
+from toolkit.diagnosis.simulators.simulator import Active, Output
+from toolkit.diagnosis.simulators.surface import Surface
+from toolkit.diagnosis.simulators.tire import (
+    base_drive,
+    late,
+    slip_work_before,
+    through_tire,
+    tire_places,
+    tire_signs,
+)
+from toolkit.effects.effect import Effect
+from toolkit.effects.signals import Drive, Setting, TireForces
+from toolkit.errors import ConfigError
+from toolkit.units import unit
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from toolkit.diagnosis.case.case import Case, Run
+
+
+class ColumnsModel(AlongMotion):
+    """Simulated columns; a parameter ``<output>_gain`` or ``<output>_offset`` scales or shifts one."""
+
+    def __init__(self, case: Case) -> None:
+        self.case = case
+        named = dict(case.simulation.simulated)
+        missing = [one.name for one in case.outputs if one.name not in named]
+        if missing:
+            raise ConfigError(
+                "an output has no simulated column",
+                where=f"{case.path}: simulation.simulated",
+                got=", ".join(missing),
+                expected="a column for every output",
+                next_step="name it, or drop the output",
+                rule="case",
+            )
+        extra = [name for name in named if name not in {one.name for one in case.outputs}]
+        if extra:
+            near = difflib.get_close_matches(extra[0], [one.name for one in case.outputs], n=1, cutoff=0.5)
+            raise ConfigError(
+                "a simulated column stands for no output",
+                where=f"{case.path}: simulation.simulated",
+                got=", ".join(extra),
+                expected=", ".join(one.name for one in case.outputs),
+                next_step=f"did you mean {near[0]!r}?" if near else "declare the channel with role = output",
+                rule="case",
+            )
+        allowed = {f"{name}_{what}" for name in named for what in ("gain", "offset")}
+        unknown = [one.name for one in case.parameters if one.name not in allowed]
+        if unknown:
+            raise ConfigError(
+                "a simulation that cannot be run again has no such parameter",
+                where=f"{case.path}: simulation.parameters",
+                got=", ".join(unknown),
+                expected=", ".join(sorted(allowed)),
+                next_step="remove it, or give the simulation as kind python",
+                rule="case",
+            )
+        self.parameters = case.parameters
+        self.outputs = tuple(Output(name=one.name, unit=one.unit, sd=one.sd) for one in case.outputs)
+        self._load = nominal_load(case)
+        self._settings: dict[Run, Setting] = {}
+        drivers = {one.name for one in case.drivers}
+        is_tire = bool(drivers & {"SA", "SA_CMD"}) and bool({"FY", "MZ"} & set(named))
+        self._surface = Surface(case) if is_tire else None
+        self.findings = () if self._surface is None else self._surface.too_coarse()
+        self.unsure = {} if self._surface is None else self._surface.unsure
+        self.motion: Motion | None = None if is_tire else motion_of(case)
+
+    def observed(self, run: Run) -> dict[str, NDArray[np.float64]]:
+        """Return what was recorded of every output, where the other program has a value too."""
+        return {
+            one.name: np.where(np.isfinite(run.simulated[one.name]), run.columns[one.name], np.nan)
+            for one in self.outputs
+            if one.name in run.columns
+        }
+
+    def simulate(
+        self, run: Run, p: Mapping[str, float], active: Sequence[Active]
+    ) -> dict[str, NDArray[np.float64]]:
+        """Return every output of a run with effects in it."""
+        here = self.setting(run)
+        made = {
+            one.name: _whole(run, one.name) * p.get(f"{one.name}_gain", 1.0)
+            + p.get(f"{one.name}_offset", 0.0)
+            for one in self.outputs
+        }
+        if self._surface is not None and any(
+            one.effect.drive is not None and one.acts_in(run) for one in active
+        ):
+            made = self._tire(run, made, active, here)
+        forces = [one for one in active if one.effect.stage == "dynamics" and one.acts_in(run)]
+        if forces and self.motion is not None:
+            made = self.motion.disturbed(made, forces, run)
+        return through_channels(made, active, run, here, run.columns)
+
+    def places(self, effect: Effect) -> list[tuple[str | None, str | None]]:
+        """Return where an effect could act."""
+        found: list[tuple[str | None, str | None]] = []
+        drivers = {one.name for one in self.case.drivers}
+        if self._surface is not None and self._surface.good:
+            found += tire_places(
+                effect,
+                has_IA=False,
+                has_P=False,
+                varies={"load_commanded": "FZ_CMD" in drivers and "FZ" not in drivers},
+            )
+        if self.motion is not None:
+            found += self.motion.places(effect)
+        others = [(one.name, one.unit) for one in self.case.drivers]
+        return found + channel_places(effect, [(one.name, one.unit) for one in self.outputs], others, drivers)
+
+    def setting(self, run: Run) -> Setting:
+        """Return a run's setting."""
+        if run not in self._settings:
+            self._settings[run] = setting(
+                self.case,
+                run,
+                nominal_load_N=self._load,
+                speed_m_s=NOMINAL_SPEED,
+                work_kJ=self._work_before(run),
+            )
+        return self._settings[run]
+
+    def _work_before(self, run: Run) -> float:
+        if self._surface is None or "FY" not in {one.name for one in self.outputs}:
+            return 0.0
+        factor = unit(self.case.unit("FY")).factor
+        return slip_work_before(self.case, run, lambda one, _: _whole(one, "FY") * factor, load_N=self._load)
+
+    def _tire(
+        self, run: Run, made: dict[str, NDArray[np.float64]], active: Sequence[Active], here: Setting
+    ) -> dict[str, NDArray[np.float64]]:
+        surface, case = self._surface, self.case
+        if surface is None:
+            return made
+        start = base_drive(case, run, load_N=self._load, outputs=False)
+        turn, back = tire_signs(case.axes, "machine", run), tire_signs("machine", case.axes, run)
+        units = {name: unit(case.unit(name)).factor for name in ("FY", "MZ") if name in made}
+        zero = np.zeros(run.rows)
+
+        def steady(SA: NDArray[np.float64], drive: Drive) -> TireForces:
+            # The surface gives the difference to the row's own slip angle and load.
+            got = {
+                name: turn[name]
+                * units[name]
+                * (made[name] + surface.difference(name, run, SA, drive.FZ, start))
+                for name in units
+            }
+            return TireForces(FY=got.get("FY", zero), MZ=got.get("MZ", zero))
+
+        forces = through_tire(start, steady, active, run, here)
+        result = dict(made)
+        for name, factor in units.items():
+            result[name] = getattr(forces, name) * back[name] / factor
+        if "FZ" in result:
+            loads = dataclasses.replace(start, FZ=made["FZ"])
+            loaded = late(loads, active, run, here, lambda one: steady(one.SA, one))
+            result["FZ"] = result["FZ"] if loaded is None else loaded.FZ
+        return result
+
+
+def _whole(run: Run, name: str) -> NDArray[np.float64]:
+    """Return a simulated column; rows that the other program left out, which none judges, are bridged."""
+    values = run.simulated[name]
+    good = np.isfinite(values)
+    if good.all():
+        return values
+    return np.interp(run.t, run.t[good], values[good]) if good.any() else np.zeros(run.rows)

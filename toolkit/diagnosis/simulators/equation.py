@@ -1,0 +1,154 @@
+"""The functions of an equation's file, called with care: what they raise or give is told with its run."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from toolkit.diagnosis.simulators.forces import Forces
+from toolkit.diagnosis.simulators.inputs import Inputs
+from toolkit.diagnosis.simulators.integrate import OFF
+from toolkit.diagnosis.simulators.python import silenced
+from toolkit.errors import FitError
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from toolkit.diagnosis.case.case import Case, Run
+
+
+class Equation:
+    """``rhs(t, x, u, p)``, ``outputs(x, u, p)`` and ``initial(p[, run])``, and the inputs u that they see."""
+
+    def __init__(
+        self, case: Case, rhs: Callable[..., Any], outputs: Callable[..., Any], initial: Callable[..., Any]
+    ) -> None:
+        self.case, self.rhs, self._outputs, self._initial = case, rhs, outputs, initial
+        self._drivers = tuple(one.name for one in case.drivers)
+        self._shown = tuple(one.name for one in case.outputs)
+
+    def inputs(self, run: Run) -> Inputs:
+        """Return a run's inputs between its rows."""
+        return Inputs(run, self._drivers)
+
+    def start(self, run: Run, p: Mapping[str, float]) -> NDArray[np.float64]:
+        """Return the states at a run's first row, (states,)."""
+        import inspect
+
+        try:
+            many = len(inspect.signature(self._initial).parameters) > 1
+            given = self._initial(dict(p), _as_dict(run)) if many else self._initial(dict(p))
+            return np.atleast_1d(np.asarray(given, dtype=np.float64)).astype(np.float64)
+        except (Exception, SystemExit) as error:
+            raise failed(self.case, run, f"initial: {type(error).__name__}: {error}") from error
+
+    def kinematics(self, p: Mapping[str, float]) -> dict[int, int]:
+        """Return velocity state -> position state where one state's rate is another state as it is."""
+        rng = np.random.default_rng(0)
+        run = self.case.runs[0]
+        u = {name: float(run.columns[name][0]) for name in self._drivers}
+        found: dict[int, int] = {}
+        start = self.start(run, p)
+        size = np.maximum(np.abs(start), 1.0)
+        rates, points = [], []
+        for _ in range(4):
+            x = start + size * rng.normal(size=len(start))
+            try:
+                rates.append(np.asarray(self.rhs(float(run.t[0]), x.copy(), u, dict(p)), dtype=np.float64))
+            except (Exception, SystemExit) as error:
+                raise failed(self.case, run, f"rhs: {type(error).__name__}: {error}") from error
+            points.append(x)
+        for i in range(len(start)):
+            for j in range(len(start)):
+                if i != j and all(
+                    abs(r[i] - x[j]) <= 1e-9 * (1 + abs(x[j])) for r, x in zip(rates, points, strict=True)
+                ):
+                    found[j] = i
+        return found
+
+    def rates(self, run: Run, p: dict[str, float], forces: Forces, own: int) -> Callable[..., Any]:
+        """Return (time, state) -> rate with forces in it; ``own`` states come before those of the forces."""
+        plain, u = self.rhs, self.inputs(run)
+        if not forces.listed:
+            return lambda t, x: np.asarray(plain(t, x, u(t), p), dtype=np.float64)
+
+        def rhs(t: float, x: NDArray[np.float64]) -> NDArray[np.float64]:
+            rate = np.zeros(len(x))
+            rate[:own] = plain(t, x[:own], u(t), p)
+            forces.add(x, rate, own)
+            return rate
+
+        return rhs
+
+    def rates_together(
+        self, run: Run, p: Mapping[str, Any], forces: Sequence[Forces], own: int
+    ) -> Callable[..., Any]:
+        """Return the same for several sets at once, a column each."""
+        plain, u = self.rhs, self.inputs(run)
+        there = [(k, one) for k, one in enumerate(forces) if one.listed]
+
+        def rhs(t: float, x: NDArray[np.float64]) -> NDArray[np.float64]:
+            rate = np.zeros_like(x)
+            rate[:own] = plain(t, x[:own], u(t), p)
+            for k, one in there:
+                one.add(x[:, k], rate[:, k], own)
+            return rate
+
+        return rhs
+
+    def shown(
+        self, run: Run, p: Mapping[str, float], x: NDArray[np.float64]
+    ) -> dict[str, NDArray[np.float64]]:
+        """Return the outputs of states, (states, rows)."""
+        values, inputs = dict(p), self.inputs(run)
+        rows: dict[str, list[float]] = {name: [] for name in self._shown}
+        with silenced():
+            for k in range(run.rows):
+                try:
+                    made = self._outputs(x[:, k].copy(), inputs.row(k), values)
+                except (Exception, SystemExit) as error:
+                    raise failed(self.case, run, f"outputs: {type(error).__name__}: {error}") from error
+                if not isinstance(made, Mapping):
+                    raise failed(self.case, run, f"outputs gives a {type(made).__name__}, not a dict")
+                for name, column in rows.items():
+                    if name not in made:
+                        raise failed(
+                            self.case, run, f"outputs gives no {name!r}; it gives {', '.join(map(str, made))}"
+                        )
+                    column.append(_number(made[name]))
+        result = {name: np.array(column) for name, column in rows.items()}
+        for name, values_of in result.items():
+            if not np.isfinite(values_of).all():
+                raise failed(self.case, run, f"no number in output {name!r}")
+        return result
+
+
+def _number(value: Any) -> float:
+    """Return a number of an outputs' dict; no number of a text, a complex one, or one too large to square."""
+    if isinstance(value, (str, bytes)):
+        return math.nan
+    try:
+        number = float(value)
+    except (TypeError, ValueError):
+        return math.nan
+    return number if abs(number) < OFF else math.nan
+
+
+def _as_dict(run: Run) -> dict[str, Any]:
+    first = {name: float(values[0]) for name, values in run.columns.items()}
+    return {**first, **run.declared}
+
+
+def failed(case: Case, run: Run, got: str) -> FitError:
+    """Return the error that a simulation cannot be integrated."""
+    return FitError(
+        "the simulation cannot be integrated",
+        where=f"{case.simulation.path}, {run.name}",
+        got=got,
+        expected="rhs, outputs and initial that give finite numbers over the whole run",
+        next_step="run the equation on that file by itself and mend it",
+        rule="simulator",
+    )

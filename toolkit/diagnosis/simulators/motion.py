@@ -1,0 +1,250 @@
+"""Equations of motion behind a simulator that cannot be opened: force-like terms on its outputs.
+
+Two shapes are told apart by units. An output that is a force or a moment, beside a recorded velocity, is
+the sum of the terms of the equation: a missing one is added to it. An output that is a position or a
+velocity moves by the simulator's own acceleration along its trajectory; a missing term changes that
+acceleration, and the motion is integrated anew (exact where the simulator's acceleration depends on time
+alone, as in a free fall).
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, cast
+
+import numpy as np
+
+from toolkit.diagnosis.simulators.channels import slopes
+from toolkit.diagnosis.simulators.linear_response import integrated
+from toolkit.diagnosis.simulators.setting import dimension
+from toolkit.diagnosis.simulators.simulator import Active
+from toolkit.effects.effect import Effect
+from toolkit.units import unit
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from toolkit.diagnosis.case.case import Case, Run
+    from toolkit.diagnosis.simulators.simulator import Pattern
+    from toolkit.effects.signals import Setting
+
+_LENGTHS, _SPEEDS = ("length", "angle"), ("speed", "rad/s", "angular_speed")
+_SUBSTEPS = 4
+
+
+@dataclasses.dataclass(frozen=True, slots=True, kw_only=True)
+class Motion:
+    """Which output a term enters, and which channels are its position and velocity."""
+
+    case: Case
+    kind: str
+    output: str
+    position: str | None
+    velocity: str | None
+
+    def places(self, effect: Effect) -> list[tuple[str | None, str | None]]:
+        """Return the output that a dynamic effect could enter."""
+        if effect.stage != "dynamics":
+            return []
+        if effect.name in ("cubic_stiffness", "periodic_ripple") and self.position is None:
+            return []
+        if effect.name == "overflow":
+            return []
+        needs_v = effect.name in ("coulomb_friction", "viscous_damping", "quadratic_drag")
+        if needs_v and self.velocity is None and self.kind == "force":
+            return []
+        return [(self.output, None)]
+
+    def scales(self) -> tuple[float, float, float]:
+        """Return sizes of acceleration, velocity and position of an output that moves."""
+        run = max(self.case.runs, key=lambda one: one.rows)
+        y = run.columns[self.output]
+        good = np.isfinite(y)
+        span = float(np.ptp(run.t)) or 1.0
+        size = float(np.ptp(y[good])) or 1.0
+        if self.kind == "position":
+            return size / span**2, size / span, size
+        return size / span, size, size * span
+
+    def way(self) -> tuple[float, float]:
+        """Return the longest way of a run [position's unit], and the usual way from row to row.
+
+        None is passed unseen where the force stands on the rows' own positions.
+        """
+        name = self.position or ""
+        columns = [run.columns[name] for run in self.case.runs if name in run.columns]
+        columns = [one[np.isfinite(one)] for one in columns]
+        spans = [float(np.ptp(one)) for one in columns if len(one)]
+        steps = [np.abs(np.diff(one)) for one in columns if len(one) > 1]
+        unseen = bool(steps) and self.kind != "force"
+        return max(spans, default=0.0), float(np.median(np.concatenate(steps))) if unseen else 0.0
+
+    def pushed(
+        self,
+        made: Mapping[str, NDArray[np.float64]],
+        run: Run,
+        pattern: Callable[[NDArray[np.float64]], NDArray[np.float64]],
+    ) -> dict[str, NDArray[np.float64]]:
+        """Return what small forces of a pattern over the position add to every output, (rows, forces)."""
+        x = made.get(str(self.position), run.columns.get(str(self.position)))
+        if x is None:
+            return {}
+        pushes = pattern(x)
+        if self.kind != "force":
+            pushes = integrated(run.t, pushes)
+            if self.kind == "position":
+                pushes = integrated(run.t, pushes)
+        none = np.zeros_like(pushes)
+        return {name: pushes if name == self.output else none for name in made}
+
+    def disturbed(
+        self, made: Mapping[str, NDArray[np.float64]], forces: Sequence[Active], run: Run
+    ) -> dict[str, NDArray[np.float64]]:
+        """Return the outputs with force-like terms in the equation of motion."""
+        result = dict(made)
+        if self.kind == "force":
+            zero = np.zeros(run.rows)
+            x = zero if self.position is None else run.columns[self.position]
+            v = zero if self.velocity is None else run.columns[self.velocity]
+            result[self.output] = made[self.output] + _resisting(forces, run.t, x, v)
+            return result
+        return self._moved(result, forces, run)
+
+    def _moved(
+        self, made: dict[str, NDArray[np.float64]], forces: Sequence[Active], run: Run
+    ) -> dict[str, NDArray[np.float64]]:
+        from scipy.interpolate import CubicSpline
+
+        if run.rows < 4:
+            return made
+        t = run.t
+        is_position = self.kind == "position"
+        if is_position:
+            spline = CubicSpline(t, made[self.output])
+            x0, v0 = float(spline(t[0])), float(spline(t[0], 1))
+            acceleration = spline.derivative(2)
+        else:
+            spline = CubicSpline(t, made[self.output])
+            x0, v0 = 0.0, float(spline(t[0]))
+            acceleration = spline.derivative(1)
+        x, v = np.empty(run.rows), np.empty(run.rows)
+        x[0], v[0] = x0, v0
+        for i in range(run.rows - 1):
+            h = (t[i + 1] - t[i]) / _SUBSTEPS
+            a, b, at = x[i], v[i], t[i]
+            for _ in range(_SUBSTEPS):
+                a, b = _step(acceleration, forces, at, h, a, b)
+                at += h
+            x[i + 1], v[i + 1] = a, b
+        result = dict(made)
+        result[self.output] = x if is_position else v
+        if is_position and self.velocity in result:
+            result[str(self.velocity)] = v
+        return result
+
+
+class AlongMotion(ABC):
+    """A simulation of which only inputs and outputs are known: what moves in it stands in its recordings."""
+
+    motion: Motion | None
+
+    @abstractmethod
+    def setting(self, run: Run) -> Setting:
+        """Return a run's setting."""
+
+    @abstractmethod
+    def simulate(
+        self, run: Run, p: Mapping[str, float], active: Sequence[Active]
+    ) -> dict[str, NDArray[np.float64]]:
+        """Return every output of a run with effects in it."""
+
+    def way(self, _channel: str | None) -> tuple[float, float]:
+        """Return the longest way of a run and the usual one between rows, nothing where nothing moves."""
+        return (0.0, 0.0) if self.motion is None else self.motion.way()
+
+    def pushed(
+        self,
+        run: Run,
+        p: Mapping[str, float],
+        active: Sequence[Active],
+        _channel: str | None,
+        pattern: Pattern,
+    ) -> dict[str, NDArray[np.float64]]:
+        """Return what small forces of a pattern over the position add to every output, (rows, forces)."""
+        if self.motion is None:
+            return {}
+        # The class's own: a model file's effects, which wrap that of the instance, are in `active` already.
+        made = type(self).simulate(self, run, p, [one for one in active if one.effect.channel is None])
+        shown = slopes(made, active, run, self.setting(run), run.columns)
+        return {
+            name: shown[name][:, None] * one for name, one in self.motion.pushed(made, run, pattern).items()
+        }
+
+
+def _step(
+    acceleration: Callable[[float], object], forces: Sequence[Active], t: float, h: float, x: float, v: float
+) -> tuple[float, float]:
+    """Return position and velocity after a step of Runge and Kutta's fourth order."""
+    terms = [(one.effect.force, one.values) for one in forces if one.effect.force is not None]
+
+    def rate(at: float, position: float, speed: float) -> tuple[float, float]:
+        pull = sum(force(position, speed, values) for force, values in terms)
+        return speed, float(cast("float", acceleration(at))) - pull
+
+    k1 = rate(t, x, v)
+    k2 = rate(t + h / 2, x + h / 2 * k1[0], v + h / 2 * k1[1])
+    k3 = rate(t + h / 2, x + h / 2 * k2[0], v + h / 2 * k2[1])
+    k4 = rate(t + h, x + h * k3[0], v + h * k3[1])
+    return (
+        x + h / 6 * (k1[0] + 2 * k2[0] + 2 * k3[0] + k4[0]),
+        v + h / 6 * (k1[1] + 2 * k2[1] + 2 * k3[1] + k4[1]),
+    )
+
+
+def _resisting(
+    forces: Sequence[Active], t: NDArray[np.float64], x: NDArray[np.float64], v: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    total = np.zeros(len(x))
+    for one in forces:
+        if one.effect.recorded is not None:
+            total += one.effect.recorded(t, v, one.values)
+            continue
+        force = one.effect.force
+        if force is None:
+            continue
+        # A constant is reported as the term that stands in the output's own equation.
+        sign = -1.0 if one.effect.name in ("constant_force", "periodic_ripple") else 1.0
+        values = one.values
+        total += sign * np.fromiter(
+            (force(a, b, values) for a, b in zip(x.tolist(), v.tolist(), strict=True)), np.float64, len(x)
+        )
+    return total
+
+
+def motion_of(case: Case) -> Motion | None:
+    """Return how dynamic terms could enter a case, None where its units show no motion."""
+    inputs = {one.name: dimension(one.unit) for one in case.drivers}
+    outputs = {one.name: dimension(one.unit) for one in case.outputs}
+    velocity = next((name for name, kind in inputs.items() if _is_speed(case, name, kind)), None)
+    position = next((name for name, kind in inputs.items() if kind in _LENGTHS), None)
+    force = next((name for name, kind in outputs.items() if kind in ("force", "moment")), None)
+    if force is not None and (velocity is not None or position is not None):
+        return Motion(case=case, kind="force", output=force, position=position, velocity=velocity)
+    if not case.has_time:
+        return None
+    moved = next((name for name, kind in outputs.items() if kind in _LENGTHS), None)
+    speed = next((name for name, kind in outputs.items() if _is_speed(case, name, kind)), None)
+    if moved is not None:
+        return Motion(case=case, kind="position", output=moved, position=moved, velocity=speed)
+    if speed is not None:
+        return Motion(case=case, kind="velocity", output=speed, position=None, velocity=speed)
+    return None
+
+
+def _is_speed(case: Case, name: str, kind: str) -> bool:
+    if kind in _SPEEDS:
+        return True
+    text = unit(case.unit(name))
+    return text.si in ("m/s", "rad/s", "1/s*rad")

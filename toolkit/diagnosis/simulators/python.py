@@ -1,0 +1,288 @@
+"""Kind ``python``: any simulator as a function of its inputs and parameters."""
+
+from __future__ import annotations
+
+import contextlib
+import difflib
+import io
+import warnings
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from numbers import Real
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, cast
+
+import numpy as np
+
+from toolkit.diagnosis.simulators.channels import channel_places, through_channels
+from toolkit.diagnosis.simulators.motion import AlongMotion, Motion, motion_of
+from toolkit.diagnosis.simulators.setting import NOMINAL_SPEED, nominal_load, setting
+from toolkit.diagnosis.simulators.simulator import Active, Output
+from toolkit.diagnosis.simulators.tire import (
+    base_drive,
+    late,
+    slip_work_before,
+    through_tire,
+    tire_places,
+    tire_signs,
+)
+from toolkit.effects.effect import Effect
+from toolkit.effects.signals import Drive, Setting, TireForces
+from toolkit.errors import ConfigError, FitError
+from toolkit.files import read_regular
+from toolkit.units import unit
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from toolkit.diagnosis.case.case import Case, Run
+
+_KEPT = 300  # simulations that are remembered
+_LARGEST = 1e100  # of an output in its unit: the squares of larger ones are no numbers any more
+# Drive's field -> the channel that a simulator takes it from.
+_FIELDS = (("SA", ("SA", "SA_CMD")), ("FZ", ("FZ", "FZ_CMD")), ("IA", ("IA",)), ("V", ("V",)))
+
+
+class PythonModel(AlongMotion):
+    """A simulator in Python: ``simulate(inputs, p)`` returns one row for each row of inputs."""
+
+    def __init__(self, case: Case, function: Callable[..., Any]) -> None:
+        self.case, self._function = case, function
+        self.parameters = case.parameters
+        self.outputs = tuple(Output(name=one.name, unit=one.unit, sd=one.sd) for one in case.outputs)
+        self._names = {one.name for one in case.channels}
+        self._load = nominal_load(case)
+        self._settings: dict[Run, Setting] = {}
+        self._kept: dict[tuple[Run, tuple[float, ...]], dict[str, NDArray[np.float64]]] = {}
+        drivers = {one.name for one in case.drivers}
+        self._is_tire = bool(drivers & {"SA", "SA_CMD"}) and bool(
+            {"FY", "MZ"} & {one.name for one in self.outputs}
+        )
+        self.motion: Motion | None = None if self._is_tire else motion_of(case)
+
+    def observed(self, run: Run) -> dict[str, NDArray[np.float64]]:
+        """Return what was recorded of every output."""
+        return {one.name: run.columns[one.name] for one in self.outputs if one.name in run.columns}
+
+    def simulate(
+        self, run: Run, p: Mapping[str, float], active: Sequence[Active]
+    ) -> dict[str, NDArray[np.float64]]:
+        """Return every output of a run with effects in it."""
+        here = self.setting(run)
+        if self._is_tire and any(one.effect.drive is not None and one.acts_in(run) for one in active):
+            made = self._tire(run, p, active, here)
+        else:
+            made = self.call(run, p, {})
+        forces = [one for one in active if one.effect.stage == "dynamics" and one.acts_in(run)]
+        if forces and self.motion is not None:
+            made = self.motion.disturbed(made, forces, run)
+        return through_channels(made, active, run, here, run.columns)
+
+    def call(
+        self, run: Run, p: Mapping[str, float], changed: Mapping[str, NDArray[np.float64]]
+    ) -> dict[str, NDArray[np.float64]]:
+        """Return the simulator's own outputs with some of its inputs changed, checked.
+
+        The same inputs and parameters give the same outputs: a slow simulator is not asked twice.
+        """
+        key = (run, tuple(p.values()))
+        if changed:
+            return self._called(run, p, changed)
+        if key not in self._kept:
+            if len(self._kept) >= _KEPT:
+                self._kept.pop(next(iter(self._kept)))
+            self._kept[key] = self._called(run, p, changed)
+        return self._kept[key]
+
+    def repeats(self, run: Run, p: Mapping[str, float]) -> None:
+        """Refuse a simulator that answers one question in two ways: its noise would pass for physics."""
+        first, again = self.call(run, p, {}), self._called(run, p, {})
+        for name, values in first.items():
+            if not np.allclose(values, again[name], rtol=1e-9, atol=1e-12 * float(np.abs(values).max())):
+                raise _failed(
+                    self.case, run, f"other values of {name!r} on a second call with the same inputs"
+                )
+
+    def _called(
+        self, run: Run, p: Mapping[str, float], changed: Mapping[str, NDArray[np.float64]]
+    ) -> dict[str, NDArray[np.float64]]:
+        import pandas as pd
+
+        columns: dict[str, NDArray[np.float64]] = {}
+        for channel in self.case.channels:
+            if channel.role != "output" and channel.name in run.columns:
+                columns[channel.name] = np.array(changed.get(channel.name, run.columns[channel.name]))
+        inputs = pd.DataFrame(columns)
+        try:
+            with silenced():
+                made = self._function(inputs, dict(p))
+        except (Exception, SystemExit) as error:
+            raise _failed(self.case, run, f"{type(error).__name__}: {error}") from error
+        if not isinstance(made, pd.DataFrame):
+            raise _failed(self.case, run, f"a {type(made).__name__}, not a pandas.DataFrame")
+        if len(made) != run.rows:
+            raise _failed(self.case, run, f"{len(made)} rows for {run.rows} rows of inputs")
+        result = {}
+        for one in self.outputs:
+            if one.name not in made.columns:
+                raise _failed(
+                    self.case, run, f"no column {one.name!r}; it has {', '.join(map(str, made.columns))}"
+                )
+            values = _numbers(made, one.name)
+            if values is None or values.ndim != 1:
+                got = "no numbers" if values is None else "several columns of one name"
+                raise _failed(self.case, run, f"{got} in column {one.name!r}")
+            if not np.isfinite(values).all():
+                raise _failed(self.case, run, f"no number in column {one.name!r}, row {_first_bad(values)}")
+            if np.abs(values).max(initial=0.0) > _LARGEST:
+                raise _failed(self.case, run, f"values beyond {_LARGEST:.0e} in column {one.name!r}")
+            result[one.name] = values
+        return result
+
+    def places(self, effect: Effect) -> list[tuple[str | None, str | None]]:
+        """Return where an effect could act."""
+        found: list[tuple[str | None, str | None]] = []
+        drivers = {one.name for one in self.case.drivers}
+        if self._is_tire:
+            found += tire_places(
+                effect, has_IA="IA" in drivers, has_P=bool({"P", "P_INFL"} & drivers),
+                varies={"load_commanded": "FZ_CMD" in drivers and "FZ" not in drivers},
+            )  # fmt: skip
+        if self.motion is not None:
+            found += self.motion.places(effect)
+        others = [(one.name, one.unit) for one in self.case.drivers]
+        return found + channel_places(effect, [(one.name, one.unit) for one in self.outputs], others, drivers)
+
+    def setting(self, run: Run) -> Setting:
+        """Return a run's setting."""
+        if run not in self._settings:
+            self._settings[run] = setting(
+                self.case,
+                run,
+                nominal_load_N=self._load,
+                speed_m_s=NOMINAL_SPEED,
+                work_kJ=self._work_before(run),
+            )
+        return self._settings[run]
+
+    def _work_before(self, run: Run) -> float:
+        if not self._is_tire or "FY" not in {one.name for one in self.outputs}:
+            return 0.0
+        values = {one.name: one.value for one in self.parameters}
+        factor = unit(self.case.unit("FY")).factor
+        return slip_work_before(
+            self.case, run, lambda one, _: self.call(one, values, {})["FY"] * factor, load_N=self._load
+        )
+
+    def _tire(
+        self, run: Run, p: Mapping[str, float], active: Sequence[Active], here: Setting
+    ) -> dict[str, NDArray[np.float64]]:
+        case = self.case
+        start = base_drive(case, run, load_N=self._load, outputs=False)
+        to_case, to_machine = tire_signs("SAE", case.axes, run), tire_signs(case.axes, "machine", run)
+        units = {name: unit(case.unit(name)).factor for name in ("FY", "MZ") if name in self._names}
+
+        def raw(SA: NDArray[np.float64], drive: Drive) -> dict[str, NDArray[np.float64]]:
+            changed = {}
+            for field, names in _FIELDS:
+                value = SA * to_case["SA"] if field == "SA" else getattr(drive, field)
+                for name in names:
+                    if name in self._names:
+                        changed[name] = value / unit(case.unit(name)).factor
+            for name in ("P_INFL", "P"):
+                if name in self._names:
+                    changed[name] = run.columns[name] + drive.pressure_error / unit(case.unit(name)).factor
+            return self.call(run, p, changed)
+
+        def steady(SA: NDArray[np.float64], drive: Drive) -> TireForces:
+            made = raw(SA, drive)
+            zero = np.zeros(run.rows)
+            return TireForces(
+                FY=made["FY"] * units["FY"] * to_machine["FY"] if "FY" in made else zero,
+                MZ=made["MZ"] * units["MZ"] * to_machine["MZ"] if "MZ" in made else zero,
+            )
+
+        forces = through_tire(start, steady, active, run, here)
+        back = tire_signs("machine", case.axes, run)
+        made = dict(self.call(run, p, {}))
+        for name in ("FY", "MZ"):
+            if name in made:
+                made[name] = getattr(forces, name) * back[name] / units[name]
+        if "FZ" in made:
+            loaded = late(start, active, run, here, lambda one: steady(one.SA, one))
+            made["FZ"] = made["FZ"] if loaded is None else raw(loaded.SA, loaded)["FZ"]
+        return made
+
+
+def load_functions(path: Path, *names: str) -> tuple[Callable[..., Any], ...]:
+    """Return functions of one Python file, which is run once and may import its neighbours.
+
+    Raises
+    ------
+    ConfigError
+        the file raises or ends the process, or has no such function
+    """
+    import sys
+    import types
+
+    space = types.ModuleType(f"simulator_{abs(hash(path.resolve()))}")
+    space.__file__ = str(path)
+    # Dataclasses and pickles look their module up by name.
+    sys.modules[space.__name__] = space
+    folder = str(path.resolve().parent)
+    if folder not in sys.path:
+        sys.path.append(folder)
+    try:
+        with silenced():
+            exec(compile(read_regular(path), str(path), "exec"), space.__dict__)  # noqa: S102
+    except (Exception, SystemExit) as error:
+        raise ConfigError(
+            "the simulator cannot be loaded", where=path, got=f"{type(error).__name__}: {error}",
+            expected=f"a Python file with {names[0]}(..)", next_step="run the file by itself and mend it",
+            rule="simulator",
+        ) from error  # fmt: skip
+    made = []
+    for name in names:
+        function = getattr(space, name, None)
+        if not callable(function):
+            own = [key for key, one in vars(space).items() if callable(one) and not key.startswith("_")]
+            near = difflib.get_close_matches(name, own, n=1, cutoff=0.5)
+            raise ConfigError(
+                f"the simulator has no function {name!r}", where=path, got=", ".join(own) or "no functions",
+                expected=f"def {name}(..)",
+                next_step=f"did you mean {near[0]!r}?" if near else "name the function in the case",
+                rule="simulator",
+            )  # fmt: skip
+        made.append(cast("Callable[..., Any]", function))
+    return tuple(made)
+
+
+@contextlib.contextmanager
+def silenced() -> Iterator[None]:
+    """Keep what a simulator prints and warns out of our own output."""
+    with contextlib.redirect_stdout(io.StringIO()), np.errstate(all="ignore"), warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        yield
+
+
+def _failed(case: Case, run: Run, got: str) -> FitError:
+    return FitError(
+        "the simulation gives no usable output", where=f"{case.simulation.path}, {run.name}", got=got,
+        expected="a pandas.DataFrame with every output, a finite number in each row, in the inputs' order",
+        next_step="run the simulator on that file by itself and mend it", rule="simulator",
+    )  # fmt: skip
+
+
+def _numbers(made: Any, name: str) -> NDArray[np.float64] | None:
+    """Return a column's numbers, None where it has texts or complex numbers."""
+    column = made[name]
+    kind = getattr(getattr(column, "dtype", None), "kind", "O")
+    if kind not in "iufb" and not all(isinstance(one, Real) for one in np.ravel(column)):
+        return None
+    try:
+        return np.asarray(column, dtype=np.float64)
+    except (TypeError, ValueError):
+        return None
+
+
+def _first_bad(values: NDArray[np.float64]) -> int:
+    return int(np.flatnonzero(~np.isfinite(values))[0]) + 1

@@ -1,0 +1,103 @@
+"""One run as effects see it: signals in SI, conditions, and what was there before the run."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from toolkit.effects.signals import Setting
+from toolkit.errors import UnitError
+from toolkit.units import unit
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from toolkit.diagnosis.case.case import Case, Run
+
+NOMINAL_SPEED = 7.66 / 3.6  # m/s, of the M-15's drum (the thesis, 2.2)
+# What tire models call the load to which their coefficients are counted, without case and underlines.
+_NOMINAL_LOADS = frozenset({"FZ0", "FZNOM", "FZNOMINAL", "FNOMIN", "FNOM", "NOMINALLOAD"})
+
+
+def si(case: Case, name: str, values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return a channel's values in SI."""
+    known = unit(case.unit(name))
+    return values * known.factor + known.offset
+
+
+def setting(
+    case: Case, run: Run, *, nominal_load_N: float, speed_m_s: float = NOMINAL_SPEED, work_kJ: float = 0.0
+) -> Setting:
+    """Return the setting of a run; its channels are all drivers, in SI."""
+    channels = {
+        one.name: si(case, one.name, run.columns[one.name]) for one in case.drivers if one.name in run.columns
+    }
+    first = {}
+    for one in case.drivers:
+        source = next((r for r in case.runs if one.name in r.columns), run)
+        first[one.name] = float(si(case, one.name, source.columns[one.name])[0]) if source.rows else 0.0
+    return Setting(
+        t=run.t,
+        elapsed_s=elapsed(case, run),
+        channels=channels,
+        conditions=run.conditions,
+        first=first,
+        slip_work_before_kJ=work_kJ,
+        nominal_load_N=nominal_load_N,
+        nominal_speed_m_s=speed_m_s,
+        # Forces stand in the machine's axes, which do not follow a reversed drum.
+        travel=-1.0 if run.conditions.get("rotation") == "reverse" else 1.0,
+        facing=-1.0 if run.conditions.get("mounting") == "turned" else 1.0,
+    )
+
+
+def elapsed(case: Case, run: Run) -> NDArray[np.float64]:
+    """Return the time since the case's first row [s].
+
+    Where the runs' clocks go on from one to the next, they are one clock; where each run begins anew, the
+    time is that within the run: what passed between runs is not known.
+    """
+    starts = [one.t[0] for one in case.runs if one.rows]
+    ends = [one.t[-1] for one in case.runs if one.rows]
+    onward = all(starts[i] >= ends[i - 1] for i in range(1, len(starts)))
+    return run.t - (starts[0] if onward and starts else (run.t[0] if run.rows else 0.0))
+
+
+def dimension(text: str) -> str:
+    """Return the dimension of a unit's text, the text itself where it is not known."""
+    try:
+        return unit(text).dimension
+    except UnitError:
+        return text
+
+
+def nominal_load(case: Case) -> float:
+    """Return the load [N] to which effects' parameters are counted.
+
+    That of the case's model file, else a parameter of the simulation that is named as a tire's nominal load
+    is named (`FZ0`, `FNOMIN`), else the median load of the recordings; 4000 N where none was recorded.
+    """
+    if case.nominal_load_N is not None:
+        return case.nominal_load_N
+    for one in case.parameters:
+        named = one.name.replace("_", "").upper() in _NOMINAL_LOADS
+        if named and dimension(one.unit) == dimension("N") and one.value > 0:
+            return one.value * unit(one.unit).factor
+    loads = [
+        si(case, name, run.columns[name])
+        for run in case.runs
+        for name in ("FZ", "FZ_CMD")
+        if name in run.columns and any(one.name == name for one in case.channels)
+    ]
+    if not loads:
+        return 4000.0
+    values = np.concatenate(loads)
+    values = np.abs(values[np.isfinite(values) & (np.abs(values) > 0)])
+    return float(np.median(values)) if len(values) else 4000.0
+
+
+def is_tire(names: Mapping[str, object] | set[str]) -> bool:
+    """Tell whether channels are those of a tire test: slip angle, load, and a force or moment."""
+    return ("SA" in names or "SA_CMD" in names) and ("FZ" in names or "FZ_CMD" in names)

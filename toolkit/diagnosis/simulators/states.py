@@ -1,0 +1,77 @@
+"""What the states of an equation are, as far as pairs and the recording's units tell: which effects fit them.
+
+A temperature has no dry friction, and a level no drag: such an effect would take the place of what is left
+out there, under a name that has no meaning.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from toolkit.diagnosis.simulators.setting import dimension
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from toolkit.diagnosis.simulators.simulator import Output
+
+_SPEEDS = frozenset({"speed", "frequency"})
+_PLACES = frozenset({"length", "angle"})
+_OPEN = frozenset({"ratio"})  # a number without unit may be anything
+_OF_SPEED = frozenset({"coulomb_friction", "viscous_damping", "quadratic_drag"})
+_OF_PLACE = frozenset({"cubic_stiffness", "periodic_ripple"})
+
+
+def dimensions(
+    x: NDArray[np.float64], shown: Mapping[str, NDArray[np.float64]], outputs: Sequence[Output]
+) -> dict[int, str]:
+    """Return the dimension of every state that one of the outputs shows alone, in proportion.
+
+    Parameters
+    ----------
+    x : the states of a run, shape (states, rows)
+    shown : the outputs at them, shape (rows,) each
+    """
+    found = {}
+    for one in outputs:
+        for i, state in enumerate(x):
+            at = int(np.argmax(np.abs(state)))
+            if np.ptp(state) == 0 or state[at] == 0:
+                continue
+            ratio = shown[one.name][at] / state[at]
+            off = np.abs(shown[one.name] - ratio * state).max()
+            if ratio and off <= 1e-9 * abs(ratio * state[at]):
+                found[i] = dimension(one.unit)
+    return {i: one for i, one in found.items() if one not in _OPEN}
+
+
+def fitting(
+    effect: str, states: Sequence[int], velocities: Mapping[int, int], known: Mapping[int, str]
+) -> list[int]:
+    """Return those of the states that an effect of a motion could act on.
+
+    Parameters
+    ----------
+    velocities : velocity -> position, of states of which one is the other's rate
+    known : state -> dimension, where the recording tells it; nothing where a case lists the states itself
+    """
+    pairs = [i for i in states if i in velocities]
+    if effect in _OF_SPEED:
+        return _motions(states, pairs, known, _SPEEDS)
+    if effect in _OF_PLACE and pairs:
+        return pairs
+    if effect == "cubic_stiffness":
+        return _motions(states, [], known, _PLACES)
+    return [] if effect in _OF_PLACE else list(states)
+
+
+def _motions(
+    states: Sequence[int], pairs: list[int], known: Mapping[int, str], wanted: frozenset[str]
+) -> list[int]:
+    if not known:
+        return list(states)
+    # Beside states of another kind, one of which nothing is known is of theirs.
+    return [i for i in states if i in pairs or known.get(i) in wanted]

@@ -1,0 +1,128 @@
+"""A tire test of any kind of simulation: what drives the tire, and its forces with effects in them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from toolkit.channels import Axes, Rotation, signs
+from toolkit.diagnosis.simulators.setting import NOMINAL_SPEED, si
+from toolkit.diagnosis.simulators.simulator import Active
+from toolkit.effects.effect import STAGES, Effect
+from toolkit.effects.signals import Drive, Setting, Tire, TireForces, drive
+from toolkit.effects.similarity import Steady, similar
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from toolkit.diagnosis.case.case import Case, Run
+
+
+def rotation(run: Run) -> Rotation:
+    """Return the drum's direction in a run."""
+    return "reverse" if run.conditions.get("rotation") == "reverse" else "forward"
+
+
+def tire_signs(source: Axes, target: Axes, run: Run) -> dict[str, int]:
+    """Return the factor of SA, FY and MZ from one axis system to another in a run."""
+    return signs(source, target, rotation(run))
+
+
+def first_of(case: Case, run: Run, *names: str, outputs: bool = True) -> NDArray[np.float64] | None:
+    """Return the first of these drivers, or of these outputs, in SI; None where the run has none."""
+    among = {one.name for one in (case.channels if outputs else case.drivers)}
+    for name in names:
+        if name in run.columns and name in among:
+            values = si(case, name, run.columns[name])
+            if np.isfinite(values).all():
+                return values
+    return None
+
+
+def base_drive(
+    case: Case, run: Run, *, load_N: float, speed_m_s: float = NOMINAL_SPEED, outputs: bool = True
+) -> Drive:
+    """Return what drives the tire in a run: measured columns where recorded, else the commanded ones.
+
+    Without ``outputs`` only what the simulation is given: a simulator of its own never saw an output.
+    """
+    turn = tire_signs(case.axes, "SAE", run)
+    zero = np.zeros(run.rows)
+    SA = first_of(case, run, "SA", "SA_CMD", outputs=outputs)
+    FZ = first_of(case, run, "FZ", "FZ_CMD", outputs=outputs)
+    IA = first_of(case, run, "IA", outputs=outputs)
+    V = first_of(case, run, "V", outputs=outputs)
+    return drive(
+        run.t,
+        zero if SA is None else turn["SA"] * SA,
+        zero + load_N if FZ is None else FZ,
+        IA=0.0 if IA is None else IA,
+        V=speed_m_s if V is None else V,
+    )
+
+
+def slip_work_before(
+    case: Case,
+    run: Run,
+    lateral: Callable[[Run, Drive], NDArray[np.float64] | None],
+    *,
+    load_N: float,
+    speed_m_s: float = NOMINAL_SPEED,
+) -> float:
+    """Return the slip work [kJ] that the runs before a run put into the tire; of all for one to predict.
+
+    Parameters
+    ----------
+    lateral : FY [N] of the nominal tire over a run under a drive, None where it is not known
+    """
+    total = 0.0
+    for one in case.runs:
+        if one.name == run.name:
+            break
+        start = base_drive(case, one, load_N=load_N, speed_m_s=speed_m_s)
+        FY = lateral(one, start)
+        if FY is not None and one.rows > 1:
+            power = np.abs(FY * start.V * np.sin(start.SA)) * 1e-3
+            total += float(np.sum(0.5 * (power[1:] + power[:-1]) * np.diff(one.t)))
+    return total
+
+
+def through_tire(
+    start: Drive, steady: Steady, active: Sequence[Active], run: Run, setting: Setting
+) -> TireForces:
+    """Return the forces in the machine's axes with every effect on road, carriage and tire."""
+
+    def tire(one: Drive) -> TireForces:
+        return similar(steady, one)
+
+    here = [one for one in active if one.acts_in(run)]
+    for one in sorted(here, key=lambda each: STAGES.index(each.effect.stage)):
+        if one.effect.drive is not None:
+            start = one.effect.drive(start, one.values, setting, tire)
+    return tire(start)
+
+
+def late(start: Drive, active: Sequence[Active], run: Run, setting: Setting, tire: Tire) -> Drive | None:
+    """Return the drive with the load as late as the carriage makes it, None where nothing does."""
+    lags = [one for one in active if one.effect.name == "load_lag" and one.acts_in(run)]
+    for one in lags:
+        if one.effect.drive is not None:
+            start = one.effect.drive(start, one.values, setting, tire)
+    return start if lags else None
+
+
+def tire_places(
+    effect: Effect, *, has_IA: bool, has_P: bool, varies: dict[str, bool]
+) -> list[tuple[str | None, str | None]]:
+    """Return where an effect on road, carriage or tire could act: nowhere, or in the one machine."""
+    if effect.drive is None:
+        return []
+    if effect.name == "camber_offset" and not has_IA:
+        return []
+    if effect.name == "pressure_change" and not has_P:
+        return []
+    if effect.name == "load_lag" and not varies.get("load_commanded", False):
+        return []
+    return [(None, None)]
