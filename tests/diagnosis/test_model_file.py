@@ -7,15 +7,15 @@ import shutil
 import numpy as np
 import pandas as pd
 import pytest
-from toolkit.diagnosis.answer.model_text import MODEL, model_text
 
 from tests.diagnosis.cases import HEAD, SIMULATOR, TWO, carriage, write_case
 from tests.diagnosis.tire_case import TIR, plain, python_tire, toml
+from toolkit.diagnosis.answer.model_text import MODEL, model_text
 from toolkit.diagnosis.case.reader import read_case
 from toolkit.diagnosis.diagnose import diagnose
 from toolkit.diagnosis.forward import simulate_model
 from toolkit.diagnosis.simulators.build_simulator import model_of
-from toolkit.diagnosis.simulators.simulator import Active
+from toolkit.effects.applied import AppliedEffect
 from toolkit.effects.catalogue import effects
 from toolkit.errors import ConfigError, ToolkitError
 from toolkit.simulation.model_file import read_model
@@ -166,7 +166,7 @@ def test_small_forces_act_beside_what_a_model_has_in_it(tmp_path):
     model = model_of(read_case(case, model=path), None)
     run, p = model.case.runs[0], {one.name: one.value for one in model.parameters}
     linear = model.pushed(run, p, (), "v", lambda x: np.ones((len(x), 1)))["h"][:, 0]
-    push = Active(effect=effects()["constant_force"], channel="v", values={"force": 1e-3})
+    push = AppliedEffect(effect=effects()["constant_force"], channel="v", values={"force": 1e-3})
     moved = (model.simulate(run, p, (push,))["h"] - model.simulate(run, p, ())["h"]) / 1e-3
     # the drag holds back: less than the t^2/2 of a body without it
     assert moved[-1] < 0.9 * run.t[-1] ** 2 / 2

@@ -127,12 +127,12 @@ class Shared:
         self, one: Correction, channel: str, conditions: Sequence[Condition]
     ) -> NDArray[np.float64]:
         """Return what the uncertainty of a correction moves in each condition [SI], machine axes."""
-        if one.channel != channel:
+        if one.applied.channel != channel:
             return np.zeros(len(conditions))
-        source = str(one.source)
+        source = str(one.applied.source)
         sign = np.ones(len(conditions)) if source == "FZ" else self.signed(source, conditions)
         values = np.array([getattr(each, source) for each in conditions], dtype=float)
-        return np.asarray(one.u * one.factor * sign * values)
+        return np.asarray(one.u_SI * sign * values)
 
     def calibration_parts(self, channel: str, moved: NDArray[np.float64]) -> list[Part]:
         """Return the record's parts of a weighted sum that its variables move by ``moved``."""
@@ -209,7 +209,7 @@ def shared_of(reduced: ReducedTest, *, machine: Machine, record: CalibrationReco
         machine=machine.name,
         test=identity_of(reduced),
         reversal=reduced.info.reversal,
-        corrections=tuple(one for one in machine.corrections if one.channel in ("FY", "MZ")),
+        corrections=tuple(one for one in machine.corrections if one.applied.channel in ("FY", "MZ")),
     )
 
 

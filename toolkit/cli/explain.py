@@ -92,7 +92,7 @@ def _told(one: Effect) -> dict[str, str]:
         "equation": one.equation,
         "signature": one.signature,
         "separates": one.separates,
-        "needs": ", ".join([*one.needs, *([" or ".join(one.any_of)] if one.any_of else [])]),
+        "needs": " or ".join(one.any_of),
         "source": one.reference,
     }
 

@@ -100,14 +100,13 @@ def _refuse_existing(out: Path) -> None:
 
 
 def _payload(made: Machine) -> dict[str, Any]:
-    import dataclasses
 
     return {
         "name": made.name,
         "title": made.title,
         "version": made.version,
         "supersedes": made.supersedes,
-        "corrections": [dataclasses.asdict(one) for one in made.corrections],
+        "corrections": [correction.as_dict() for correction in made.corrections],
         "findings": [],
     }
 

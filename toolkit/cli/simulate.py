@@ -14,7 +14,6 @@ if TYPE_CHECKING:
     from toolkit.errors import ToolkitError
     from toolkit.simulation.acquisition import OwnProgram
     from toolkit.simulation.plan import Plan
-    from toolkit.simulation.switched import Switched
 
 NAME = "simulate"
 
@@ -219,17 +218,7 @@ def _common(plan: Plan, out: Path, files: tuple[Path, ...]) -> dict[str, Any]:
 
 
 def _effects(plan: Plan) -> str:
-    return "".join(f"\n  effect       {_effect(one)}" for one in plan.effects)
-
-
-def _effect(one: Switched) -> str:
-    place = "" if one.channel is None else f" on {one.channel}"
-    place += "" if one.source is None else f" with {one.source}"
-    units = dict(one.units)
-    said = [f"{name} = {value:g} {units[name]}" for name, value in one.values]
-    said += [] if one.record is None else [f"record {one.record}"]
-    said += [] if one.only is None else [f"where {one.only[0]} is {' or '.join(one.only[1])}"]
-    return f"{one.effect.name}{place}{': ' if said else ''}{', '.join(said)}"
+    return "".join(f"\n  effect       {applied.as_text()}" for applied in plan.effects)
 
 
 def _registry(calibrations: Path | None, home: Path | None) -> Registry | None:

@@ -6,7 +6,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolkit.effects.effect import ChannelHook, EffectParameter, Values
+from toolkit.effects.effect import ChannelHook, EffectParameter
+from toolkit.effects.facts import Values
+from toolkit.effects.surroundings import of_channel
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -36,7 +38,7 @@ def _order(n: int, text: str, typical: tuple[float, float]) -> tuple[EffectParam
             unit="{channel}",
             text=text,
             typical=typical,
-            relative=True,
+            scale=of_channel,
             bounds=(0.0, float("inf")),
         ),
         EffectParameter(

@@ -67,8 +67,9 @@ def _with_version(text: str, made: dict[str, Any]) -> str:
 
 
 def _block(one: Correction) -> str:
-    entries: dict[str, Any] = {"effect": one.effect}
-    entries |= {key: value for key, value in (("channel", one.channel), ("source", one.source)) if value}
+    applied = one.applied
+    entries: dict[str, Any] = {"effect": applied.effect.name}
+    entries |= {key: text for key, text in (("channel", applied.channel), ("source", applied.source)) if text}
     entries |= {
         "parameter": one.parameter, "value": one.value, "unit": one.unit, "standard_uncertainty": one.u,
         "reason": one.reason, "by": one.by, "date": one.date, "answer_sha256": one.answer_sha256,

@@ -26,9 +26,7 @@ from toolkit.diagnosis.search.forward_step import Step
 from toolkit.diagnosis.search.screen_step import ALPHA
 from toolkit.diagnosis.search.search import Search
 from toolkit.diagnosis.simulators.channel_units import unit_of
-from toolkit.diagnosis.simulators.parameter_signs import sense
-from toolkit.diagnosis.simulators.simulator import Active
-from toolkit.effects.creep import FROM_REST
+from toolkit.effects.applied import AppliedEffect
 from toolkit.findings import Finding
 
 if TYPE_CHECKING:
@@ -91,7 +89,7 @@ def mostly_unknown(found: Search) -> bool:
     explained = sum(one.gain for one in found.steps)
     if explained < _MOSTLY * (explained + left):
         return True
-    if all(one.active.effect.name == "quantisation" for one in found.steps):
+    if all(one.active.effect.from_digits for one in found.steps):
         return False  # read off the digits: it does not imitate anything
     # Outputs that show nothing but noise do not count: of nothing, nothing is two thirds.
     shown = [
@@ -130,9 +128,8 @@ def _effect(found: Search, step: Step) -> FoundEffect:
         if one.active.effect.name not in (*same, active.effect.name)
     }
     return FoundEffect(
-        name=active.effect.name,
+        key=active.key,
         stage=active.effect.stage,
-        channel=active.channel,
         statement=active.effect.statement,
         equation=active.effect.equation,
         reference=active.effect.reference,
@@ -144,13 +141,15 @@ def _effect(found: Search, step: Step) -> FoundEffect:
     )
 
 
-def _parameters(found: Search, active: Active, runs: tuple[str, ...] | None) -> tuple[FoundParameter, ...]:
+def _parameters(
+    found: Search, active: AppliedEffect, runs: tuple[str, ...] | None
+) -> tuple[FoundParameter, ...]:
     from scipy.stats import t as student
 
     problem, made = found.problem, found.augmented
     at = len(problem.free)
     for other in made.active:
-        if _same(other, active):
+        if other.key == active.key:
             break
         at += len(other.searched)
     n = sum(int(one.sum()) for one in problem.kept.values())
@@ -168,7 +167,7 @@ def _parameters(found: Search, active: Active, runs: tuple[str, ...] | None) -> 
         half = active.values.get(f"_half_{one.name}")
         if half is not None:
             ci = (value - half, value + half)
-        turned = sense(active, one.name, problem.case.axes)
+        turned = one.sign_in(problem.case.axes)
         if turned < 0:
             value, ci = -value, None if ci is None else (-ci[1], -ci[0])
         unit = unit_of(problem.case, problem.model, active, one.name)
@@ -179,27 +178,17 @@ def _parameters(found: Search, active: Active, runs: tuple[str, ...] | None) -> 
     return tuple(result)
 
 
-def _named(active: Active, runs: tuple[str, ...] | None) -> tuple[FoundParameter, ...]:
+def _named(active: AppliedEffect, runs: tuple[str, ...] | None) -> tuple[FoundParameter, ...]:
     """Return what of an effect is no number: the other channel or record, its history, the runs it is in."""
-    names = {"channel_swap": "with", "wrong_calibration": "record", "crosstalk": "from"}
     told = {}
-    if active.effect.name in names and active.source is not None:
-        told[names[active.effect.name]] = active.source
-    if active.values.get(FROM_REST):
-        told["history"] = "unloaded before each run"
+    if active.effect.second is not None and active.source is not None:
+        told[active.effect.second] = active.source
+    if active.history:
+        told["history"] = active.history
     if not active.effect.parameters and runs is not None:
         told["runs"] = ", ".join(runs)
     return tuple(
         FoundParameter(name=name, value=value, unit="", ci95=None, runs=runs) for name, value in told.items()
-    )
-
-
-def _same(one: Active, other: Active) -> bool:
-    return (one.effect.name, one.channel, one.source, one.runs) == (
-        other.effect.name,
-        other.channel,
-        other.source,
-        other.runs,
     )
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 from toolkit.diagnosis.answer.answer import (
     Diagnosis,
@@ -18,6 +18,8 @@ from toolkit.diagnosis.answer.answer import (
     Place,
     Recorded,
 )
+from toolkit.effects.applied import EffectKey
+from toolkit.effects.facts import Second
 from toolkit.errors import ConfigError
 from toolkit.files import read_bytes
 from toolkit.findings import Finding
@@ -137,9 +139,8 @@ def _mismatch(one: dict[str, Any]) -> Mismatch:
 
 def _effect(one: dict[str, Any]) -> FoundEffect:
     return FoundEffect(
-        name=_text(one["name"]),
+        key=_key(one),
         stage=_text(one["stage"]),
-        channel=None if one["channel"] is None else _text(one["channel"]),
         statement=_text(one["statement"]),
         equation=_text(one["equation"]),
         reference=_text(one["reference"]),
@@ -157,6 +158,18 @@ def _effect(one: dict[str, Any]) -> FoundEffect:
         rejected=tuple((_text(o["name"]), -_number(o["log_likelihood_less"])) for o in one["rejected"]),
         held_out_log_score_gain=_number(one["evidence"]["held_out_log_score_gain"]),
         p_value=_number(one["evidence"]["p_value"]),
+    )
+
+
+def _key(one: dict[str, Any]) -> EffectKey:
+    """Return an effect's identity; its source and its runs stand among its parameters."""
+    words = {each["name"]: each["value"] for each in one["parameters"] if isinstance(each["value"], str)}
+    runs = next((each["runs"] for each in one["parameters"]), None)
+    return EffectKey(
+        name=_text(one["name"]),
+        channel=None if one["channel"] is None else _text(one["channel"]),
+        source=next((words[word] for word in get_args(Second) if word in words), None),
+        runs=None if runs is None else frozenset(_texts(runs)),
     )
 
 

@@ -7,10 +7,9 @@ from pathlib import Path
 from typing import Any
 
 from toolkit.diagnosis.case.case import KINDS, CaseParameter, Simulation
-from toolkit.effects.catalogue import effect
 from toolkit.errors import ConfigError
 from toolkit.machine import load_machine
-from toolkit.simulation.model_file import ModelEffect, ModelFile, ModelParameter, read_model
+from toolkit.simulation.model_file import FittedEffect, ModelFile, read_model
 
 
 def simulation_of(model: ModelFile) -> Simulation:
@@ -68,7 +67,7 @@ def tire_model(path: Path, where: str) -> ModelFile:
     return model
 
 
-def corrections_of(simulation: Simulation) -> tuple[ModelEffect, ...]:
+def corrections_of(simulation: Simulation) -> tuple[FittedEffect, ...]:
     """Return the corrections of a case's machine as effects: the recordings still have them.
 
     None where no tire is simulated: an acquisition program's arithmetic is not the machine's.
@@ -77,15 +76,9 @@ def corrections_of(simulation: Simulation) -> tuple[ModelEffect, ...]:
         return ()
     machine = load_machine(simulation.machine)
     return tuple(
-        ModelEffect(
-            effect=effect(one.effect, where=machine.name),
-            channel=one.channel,
-            source=one.source,
-            parameters=(
-                ModelParameter(
-                    name=one.parameter, value=one.value, unit=one.unit, standard_error=one.u or None
-                ),
-            ),
+        FittedEffect(
+            applied=one.applied,
+            standard_errors={one.parameter: one.u} if one.u else {},
             axes="machine",
             of_machine=True,
             origin=f"{machine.name}, version {machine.version}: answer {one.answer_sha256[:16]}",

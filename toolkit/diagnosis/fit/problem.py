@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from toolkit.diagnosis.fit.noise import Layout, layout
-from toolkit.diagnosis.simulators.simulator import Active, Model, Moving
+from toolkit.diagnosis.simulators.simulator import Model, Moving
+from toolkit.effects.applied import AppliedEffect
+from toolkit.errors import FitError
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -20,6 +22,7 @@ if TYPE_CHECKING:
     Stacked = dict[str, NDArray[np.float64]]
 
 _ISOLATED = 8.0  # robust standard deviations from the neighbours' median: no physics does that in one row
+_QUARTERS = 2  # of a cycle, by which the columns of a pattern are apart: cosine and sine make every phase
 _SHARE = 0.03  # of the rows; more than that is no outlier but a pattern
 
 
@@ -57,14 +60,14 @@ class Problem:
         good = self.kept[name] if rows is None else self.kept[name] & rows
         return layout([run.t for run in self.runs], [good[one] for one in self.slices])
 
-    def simulate(self, p: Sequence[float], active: Sequence[Active]) -> Stacked:
+    def simulate(self, p: Sequence[float], active: Sequence[AppliedEffect]) -> Stacked:
         """Return every output over all runs in their order; ``p`` are the free parameters."""
         values = dict(self.known)
         values.update(zip((one.name for one in self.free), map(float, p), strict=True))
         made = [self.model.simulate(run, values, active) for run in self.runs]
         return {name: np.concatenate([one[name] for one in made]) for name in self.names}
 
-    def prepare(self, wanted: Sequence[tuple[Sequence[float], Sequence[Active]]]) -> None:
+    def prepare(self, wanted: Sequence[tuple[Sequence[float], Sequence[AppliedEffect]]]) -> None:
         """Have several simulations made at once where the model can; `simulate` then finds them."""
         prepare = getattr(self.model, "prepare", None)
         if prepare is None:
@@ -75,7 +78,12 @@ class Problem:
             prepare(run, sets)
 
     def pushed(
-        self, p: Sequence[float], active: Sequence[Active], one: Active, pattern: Pattern, forces: int
+        self,
+        p: Sequence[float],
+        active: Sequence[AppliedEffect],
+        one: AppliedEffect,
+        pattern: Pattern,
+        forces: int,
     ) -> Stacked:
         """Return linear responses of every output over all runs to small forces, (rows, forces).
 
@@ -97,6 +105,47 @@ class Problem:
             for name, column in parts.items():
                 column.append(made.get(name, np.zeros((run.rows, forces))))
         return {name: np.concatenate(column) for name, column in parts.items()}
+
+    def patterned(
+        self,
+        p: Sequence[float],
+        active: Sequence[AppliedEffect],
+        one: AppliedEffect,
+        starts: Sequence[Mapping[str, float]],
+    ) -> list[Stacked]:
+        """Return the responses of an output to a term with a pattern, (rows, 2) for each start.
+
+        Hundreds of starts would be too many simulations; their linear responses along one are not.
+
+        Parameters
+        ----------
+        one : where and in which runs the term acts
+        starts : its parameters; the columns are a quarter of a cycle apart
+
+        Raises
+        ------
+        FitError
+            the simulation cannot be run, or has no linear response
+        """
+        pattern = None if one.effect.term is None else one.effect.term.pattern
+        if pattern is None:
+            return []
+        hook = pattern
+        made = self.pushed(p, active, one, lambda x: hook(x, starts), _QUARTERS * len(starts))
+        for column in made.values():
+            if not np.isfinite(column).all():
+                raise FitError(
+                    "an equation cannot be linearised along its motion",
+                    where=str(one.channel),
+                    got="responses without bound",
+                    expected="an equation that is smooth where it moves",
+                    next_step="look at the equation where it has corners",
+                    rule="simulator",
+                )
+        return [
+            {name: column[:, [k, k + len(starts)]] for name, column in made.items()}
+            for k in range(len(starts))
+        ]
 
     def sd_of(self, name: str) -> float | None:
         """Return the stated noise of an output."""

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolkit.diagnosis.simulators.simulator import Active
+from toolkit.effects.applied import AppliedEffect
 from toolkit.errors import FitError
 
 if TYPE_CHECKING:
@@ -29,13 +29,13 @@ class Space:
     """One hypothesis as a vector with bounds."""
 
     problem: Problem
-    active: tuple[Active, ...]
+    active: tuple[AppliedEffect, ...]
     sizes: Array
     low: Array
     high: Array
 
     @staticmethod
-    def of(problem: Problem, active: tuple[Active, ...]) -> Space:
+    def of(problem: Problem, active: tuple[AppliedEffect, ...]) -> Space:
         """Return the space of a problem's free parameters and of the values that effects search."""
         sizes, low, high = [], [], []
         for one in problem.free:
@@ -63,7 +63,7 @@ class Space:
         values = [*p, *(one.values[each.name] for one in self.active for each in one.searched)]
         return np.asarray(values, dtype=np.float64) / self.sizes
 
-    def split(self, x: Array) -> tuple[list[float], tuple[Active, ...]]:
+    def split(self, x: Array) -> tuple[list[float], tuple[AppliedEffect, ...]]:
         """Return free parameters and effects with their values."""
         values = (x * self.sizes).tolist()
         n = len(self.problem.free)
@@ -124,7 +124,7 @@ class Space:
         return points
 
 
-def _size(one: Active, name: str) -> float:
+def _size(one: AppliedEffect, name: str) -> float:
     """Return the size on which a parameter is searched: its value, or its typical one where that is off."""
     parameter = next(each for each in one.effect.parameters if each.name == name)
     value = abs(one.values.get(name, 0.0))
@@ -134,7 +134,7 @@ def _size(one: Active, name: str) -> float:
     return scale or abs(parameter.typical[0]) or 1.0
 
 
-def _clipped(one: Active, name: str) -> float:
+def _clipped(one: AppliedEffect, name: str) -> float:
     parameter = next(each for each in one.effect.parameters if each.name == name)
     low, high = parameter.bounds
     inside = 1e-9 * max(abs(low) if math.isfinite(low) else 0.0, 1e-9)

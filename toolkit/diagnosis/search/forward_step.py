@@ -10,11 +10,9 @@ import numpy as np
 
 from toolkit.diagnosis.fit.fit import Fit, fit
 from toolkit.diagnosis.fit.folds import Folds, HeldOut, beyond_form, hold_out, matters
-from toolkit.diagnosis.fit.nuisance import INPUT_NOISE
 from toolkit.diagnosis.fit.problem import Problem
-from toolkit.diagnosis.search.refit_masking import Key
 from toolkit.diagnosis.search.screen import Scored
-from toolkit.diagnosis.simulators.simulator import Active
+from toolkit.effects.applied import AppliedEffect, EffectKey
 from toolkit.errors import FitError
 
 _FAR_BEHIND = 0.25  # of the best gain: a candidate below cannot win a joint fit
@@ -22,15 +20,6 @@ _MOST = 0.5  # of the held-out mean square: what a candidate far behind must tak
 _REFINED = 8  # candidates that are fitted jointly, of those that screening ranks first
 _TRIED = 3  # of the joint fits
 _BOUND = 1e-3
-# By how much of what it does an effect's law may be off: what it leaves then is no effect of its own. One
-# factor and one exponent for a patch on a drum are off by up to a tenth beside bristles on a carcass.
-_FORM = {"drum_curvature": 0.1} | dict.fromkeys(
-    (
-        "relaxation thermal_friction wear load_friction speed_friction viscoelastic_settling turn_slip "
-        "surface_friction pressure_change coulomb_friction viscous_damping quadratic_drag cubic_stiffness"
-    ).split(),
-    0.03,
-)
 _SIGNAL = 0.5  # of an output in its right unit: what else it may have in it
 LEAST_GAIN = 1.5  # of the held-out log score
 
@@ -39,7 +28,7 @@ LEAST_GAIN = 1.5  # of the held-out log score
 class Rival:
     """A candidate fitted jointly in an effect's place: its log-likelihood less that of the chosen one."""
 
-    active: Active
+    active: AppliedEffect
     difference: float
 
 
@@ -47,7 +36,7 @@ class Rival:
 class Step:
     """An effect that was found: its evidence, and what else would explain the same."""
 
-    active: Active
+    active: AppliedEffect
     p_value: float
     held_out_gain: float
     gain: float
@@ -64,7 +53,7 @@ class Joint:
 
 
 def step_groups(
-    ranked: Sequence[Scored], hidden: frozenset[Key], least: float
+    ranked: Sequence[Scored], hidden: frozenset[EffectKey], least: float
 ) -> list[tuple[Sequence[Scored], float]]:
     """Return candidates in the order of joint fits, with the least share of the error that each must take.
 
@@ -113,7 +102,7 @@ def best_step(
     least : share of an output's held-out mean square that it must take away
     refitted : the held-out rows without any effect
     """
-    form = max((_FORM.get(one.effect.name, 0.0) for one in base.active), default=0.0)
+    form = max((one.effect.form_error for one in base.active), default=0.0)
     for one in joint[:_TRIED]:
         made = one.fit
         try:
@@ -128,7 +117,7 @@ def best_step(
             continue
         if not beyond_form(problem, refitted, held_base, held, form):
             continue
-        if made.active[-1].effect.name == "unit_error" and not _shows(problem, held, made.active[-1]):
+        if made.active[-1].effect.needs_signal and not _shows(problem, held, made.active[-1]):
             continue
         step = Step(
             active=made.active[-1],
@@ -141,8 +130,8 @@ def best_step(
     return None
 
 
-def _shows(problem: Problem, held: HeldOut, one: Active) -> bool:
-    """Tell whether an output in another unit has the signal in it, and is not only made small by a factor."""
+def _shows(problem: Problem, held: HeldOut, one: AppliedEffect) -> bool:
+    """Tell whether an output has the simulated signal in it, and is not only made small by a factor."""
     name = str(one.channel)
     if name not in problem.names:
         return True
@@ -163,7 +152,7 @@ def rivals(problem: Problem, chosen: Joint, joint: Sequence[Joint]) -> tuple[Riv
             + weight * (_shapes(other.scored.active) - _shapes(chosen.scored.active)),
         )
         for other in joint
-        if other is not chosen and other.scored.candidate.name != INPUT_NOISE.name
+        if other is not chosen and not other.scored.active.effect.nuisance
     )
 
 
@@ -172,7 +161,7 @@ def _weight(problem: Problem) -> float:
     return 0.5 * math.log(sum(int(one.sum()) for one in problem.kept.values()))
 
 
-def _fitted(problem: Problem, base: Fit, added: Active) -> Fit | None:
+def _fitted(problem: Problem, base: Fit, added: AppliedEffect) -> Fit | None:
     """Return the joint fit with one effect more, None where the simulation runs with no part of it.
 
     Screening is linear: the size to which it leads may be beyond what a simulation can run with, where the
@@ -190,12 +179,12 @@ def _fitted(problem: Problem, base: Fit, added: Active) -> Fit | None:
     return None
 
 
-def _shapes(one: Active) -> int:
+def _shapes(one: AppliedEffect) -> int:
     """Return how many parameters only shape an effect: they make it no less able to imitate another."""
     return sum(each.off is None and not each.ends_count for each in one.searched)
 
 
-def at_bound(one: Active) -> bool:
+def at_bound(one: AppliedEffect) -> bool:
     """Tell whether a parameter ends at a bound other than zero: then the effect only imitates another."""
     for parameter in one.searched:
         if parameter.ends_count:
@@ -205,8 +194,3 @@ def at_bound(one: Active) -> bool:
             if math.isfinite(bound) and bound != 0 and abs(value - bound) < _BOUND * abs(bound):
                 return True
     return False
-
-
-def place(one: Active) -> tuple[object, ...]:
-    """Return what tells effects of one hypothesis apart."""
-    return (one.effect.name, one.channel, one.source, one.runs)

@@ -19,14 +19,13 @@ from toolkit.errors import FitError
 if TYPE_CHECKING:
     from toolkit.diagnosis.fit.fit import Fit
     from toolkit.diagnosis.fit.problem import Problem
+    from toolkit.effects.applied import EffectKey
 
 _FAR = 3.0  # prior standard deviations that a parameter may move by itself
 _MOST = 4  # candidates that are fitted jointly on this ground
 
-Key = tuple[str, str | None, str | None, frozenset[str] | None]
 
-
-def absorbed(problem: Problem, base: Fit, left: Sequence[Candidate]) -> frozenset[Key]:
+def absorbed(problem: Problem, base: Fit, left: Sequence[Candidate]) -> frozenset[EffectKey]:
     """Return the candidates that explain most from the declared parameters; none where they hold.
 
     Parameters

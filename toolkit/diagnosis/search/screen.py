@@ -17,9 +17,8 @@ import numpy as np
 
 from toolkit.diagnosis.fit.fit import Fit, jacobian, log_prior
 from toolkit.diagnosis.fit.noise import Layout, Noise, fit_noise, log_likelihood, whiten
-from toolkit.diagnosis.search import ripple
 from toolkit.diagnosis.search.candidates import Candidate, Start
-from toolkit.diagnosis.simulators.simulator import Active
+from toolkit.effects.applied import AppliedEffect
 from toolkit.errors import FitError
 
 if TYPE_CHECKING:
@@ -46,7 +45,7 @@ class Scored:
 
     candidate: Candidate
     start: Start
-    active: Active
+    active: AppliedEffect
     gain: float
     directions: Stacked
     block: NDArray[np.float64]
@@ -111,7 +110,7 @@ class Screen:
         listed = [
             replace(one.active, values=values)
             for one in candidates
-            if one.name != ripple.NAME
+            if not one.has_pattern
             for start in one.starts
             for values in start.directions
         ]
@@ -143,10 +142,10 @@ class Screen:
 
     def _directions(self, candidate: Candidate) -> Iterator[Stacked]:
         """Give the responses of every start, nothing for one that the simulation cannot run."""
-        if candidate.name == ripple.NAME:
+        if candidate.has_pattern:
             try:
                 starts = [one.values for one in candidate.starts]
-                yield from ripple.responses(self.problem, self.base, candidate.active, starts)
+                yield from self.problem.patterned(self.base.p, self.base.active, candidate.active, starts)
             except FitError:
                 yield from ({} for _ in candidate.starts)
             return

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from toolkit.diagnosis.fit.fit import Fit
 from toolkit.diagnosis.fit.problem import Problem
 from toolkit.diagnosis.search.candidates import Candidate
-from toolkit.diagnosis.search.forward_step import place
 from toolkit.diagnosis.search.null import search_p_values
 from toolkit.diagnosis.search.screen import Scored, Screen, best_of
 
@@ -40,8 +39,8 @@ def look(problem: Problem, base: Fit, listed: Sequence[Candidate], *, turn: int,
     seed : of the null's draws
     """
     screen = Screen.of(problem, base)
-    taken = {place(one) for one in base.active}
-    left = [each for each in listed if place(each.active) not in taken and _is_sought(each, turn)]
+    taken = {one.key for one in base.active}
+    left = [each for each in listed if each.key not in taken and _is_sought(each, turn)]
     screen.prepare(left)
     scored = screen.sharpened([one for each in left for one in screen.score(each)], _SHARPENED)
     p_values = search_p_values(
@@ -55,7 +54,7 @@ def look(problem: Problem, base: Fit, listed: Sequence[Candidate], *, turn: int,
 def _is_sought(one: Candidate, turn: int) -> bool:
     """Tell whether a candidate is searched for.
 
-    Coarse steps have a test of their own; what is there or not (a sign, a swap, a unit) is so gross that it
-    comes first or second.
+    What is read off the digits has a test of its own; what is there or not (a sign, a swap, a unit) is so
+    gross that it comes first or second.
     """
-    return one.name != "quantisation" and not (one.discrete and turn > 1)
+    return not one.active.effect.from_digits and not (one.discrete and turn > 1)

@@ -11,10 +11,9 @@ import numpy as np
 
 from toolkit.diagnosis.fit.fit import Fit, fit, replace_effects
 from toolkit.diagnosis.fit.folds import Folds, HeldOut, folds_of, hold_out, matters
-from toolkit.diagnosis.fit.nuisance import INPUT_NOISE
 from toolkit.diagnosis.fit.problem import Problem, without_outliers
 from toolkit.diagnosis.search.candidates import candidates
-from toolkit.diagnosis.search.forward_step import LEAST_GAIN, Step, best_step, joint_fits, place, step_groups
+from toolkit.diagnosis.search.forward_step import LEAST_GAIN, Step, best_step, joint_fits, step_groups
 from toolkit.diagnosis.search.lattice import lattice_of
 from toolkit.diagnosis.search.nuisance_refit import refined, without
 from toolkit.diagnosis.search.refit_masking import absorbed
@@ -135,8 +134,8 @@ def search(problem: Problem, *, seed: int, budget: Budget) -> Search:
         skipped.append(str(error))
     base, steps = _with_a_size(problem, base, steps)
     # Every effect with its values of the last joint fit, not of the step that found it.
-    values = {place(one): one for one in base.active}
-    steps = [replace(one, active=values[place(one.active)]) for one in steps]
+    values = {one.key: one for one in base.active}
+    steps = [replace(one, active=values[one.active.key]) for one in steps]
     return Search(
         problem=problem,
         folds=folds,
@@ -156,17 +155,15 @@ def search(problem: Problem, *, seed: int, budget: Budget) -> Search:
 
 def _is_nuisance(step: Step, steps: Sequence[Step]) -> bool:
     """Tell whether a step is no physics: input noise, or the point from which a drift or a loop starts."""
-    if step.active.effect.name == INPUT_NOISE.name:
+    effect = step.active.effect
+    if effect.nuisance:
         return True
-    if step.active.effect.name != "zero_offset":
+    if not effect.is_zero:
         return False
     beside = [one.active for one in steps if one.active.channel == step.active.channel]
-    offset = abs(step.active.values["offset"])
+    offset = abs(step.active.values[effect.names[0]])
     return any(
-        one.effect.name in ("thermal_drift", "zero_drift")
-        # Where in its loop a channel stands at first depends on what came before the recording.
-        or (one.effect.name == "hysteresis" and offset <= 0.5 * one.values["width"])
-        for one in beside
+        one.effect.zero_beside is not None and offset <= one.effect.zero_beside(one.values) for one in beside
     )
 
 
@@ -176,14 +173,15 @@ def _stepped(
     """Add the outputs whose recorded values stand on a coarse lattice."""
     for candidate in candidates(problem):
         name = str(candidate.active.channel)
-        if candidate.name != "quantisation" or name not in problem.observed:
+        if not candidate.active.effect.from_digits or name not in problem.observed:
             continue
         kept = problem.kept[name]
         sd = float(np.std(base.residual[name][kept]))
         found = lattice_of(problem.observed[name][np.isfinite(problem.observed[name])], sd)
         if found is None:
             continue
-        active = replace(candidate.active, values={"step": found.step, "_half_step": found.half_width})
+        step = candidate.active.effect.names[0]
+        active = replace(candidate.active, values={step: found.step, f"_half_{step}": found.half_width})
         gain = found.log_score_gain
         made = Step(
             active=active, p_value=math.exp(-min(gain, 700.0)), held_out_gain=gain, gain=gain, rivals=()
@@ -220,8 +218,8 @@ def _pruned(
             continue
         if held_base.total - held.total < LEAST_GAIN:
             base, held_base = made, held
-            kept = {place(one) for one in rest}
-            steps = [one for one in steps if place(one.active) in kept]
+            kept = {one.key for one in rest}
+            steps = [one for one in steps if one.active.key in kept]
             return _pruned(problem, folds, base, held_base, steps)
     return base, held_base, steps
 
@@ -239,8 +237,8 @@ def _with_a_size(problem: Problem, base: Fit, steps: list[Step]) -> tuple[Fit, l
             float(np.abs(one[problem.kept[name]]).max(initial=0.0)) < _SEEN * base.noise[name].marginal_sd
             for name, one in moved.items()
         ):
-            kept = {place(one) for one in rest}
-            left = [one for one in steps if place(one.active) in kept]
+            kept = {one.key for one in rest}
+            left = [one for one in steps if one.active.key in kept]
             return _with_a_size(problem, replace_effects(problem, base, rest), left)
     return base, steps
 

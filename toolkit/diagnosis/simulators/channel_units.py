@@ -6,10 +6,11 @@ import re
 from collections.abc import Iterator
 
 from toolkit.diagnosis.case.case import Case
-from toolkit.diagnosis.simulators.simulator import Active, Model
+from toolkit.diagnosis.simulators.simulator import Model
+from toolkit.effects.applied import AppliedEffect
 
 
-def unit_of(case: Case, model: Model, active: Active, name: str) -> str:
+def unit_of(case: Case, model: Model, active: AppliedEffect, name: str) -> str:
     """Return the unit of one parameter of an effect at its place."""
     text = next(one.unit for one in active.effect.parameters if one.name == name)
     if "{" not in text:
@@ -37,7 +38,7 @@ def channel_unit(case: Case, model: Model, name: str | None) -> str:
     return "1"
 
 
-def _motion(case: Case, model: Model, active: Active) -> tuple[str, str, str]:
+def _motion(case: Case, model: Model, active: AppliedEffect) -> tuple[str, str, str]:
     forces = getattr(model, "force_units", None)
     if forces is not None:
         state = str(active.channel)

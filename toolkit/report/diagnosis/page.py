@@ -8,6 +8,7 @@ from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from toolkit.effects.catalogue import effects
 from toolkit.files import write_atomic
 from toolkit.report.diagnosis import figures
 from toolkit.report.diagnosis.chance import chance
@@ -167,7 +168,7 @@ def _why(one: FoundEffect) -> str:
     if one.rejected:
         told = ", ".join(f"{name} (by {-less:.1f})" for name, less in one.rejected[:5])
         text += f" Rejected, as they explain the recordings worse (log-likelihood less): {told}."
-    elif not one.equivalent_to and one.name != "quantisation":
+    elif not one.equivalent_to and not effects()[one.name].from_digits:
         text += " No other effect came near enough in the screening to be tried in its place."
     return escape(text)
 
