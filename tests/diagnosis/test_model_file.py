@@ -219,7 +219,7 @@ def test_a_case_names_a_model_in_place_of_its_simulation(tmp_path, drag):
     read = read_case(tmp_path / "next.toml")
     assert [one.name for one in read.parameters] == ["mass", "c"]
     assert read.parameters[0].value == read_model(path).parameters[0].value
-    assert [one.effect.name for one in read.effects] == ["quadratic_drag"]
+    assert [one.applied.effect.name for one in read.effects] == ["quadratic_drag"]
     assert read.sha256 != read_case(case).sha256
 
 
@@ -307,9 +307,9 @@ def test_what_is_found_on_top_of_a_model_is_written_with_it(tmp_path, drag):
     found = diagnose(read, None)
     text = model_text(read, found.search, found.diagnosis, tmp_path)
     (tmp_path / "second.toml").write_text(text)
-    made = {one.effect.name: one for one in read_model(tmp_path / "second.toml").effects}
+    made = {one.applied.effect.name: one for one in read_model(tmp_path / "second.toml").effects}
     assert set(made) == {"quadratic_drag", "coulomb_friction"}
-    assert made["coulomb_friction"].parameters[0].value == pytest.approx(30.0, abs=2.0)
+    assert made["coulomb_friction"].applied.values["coulomb"] == pytest.approx(30.0, abs=2.0)
 
 
 @pytest.mark.parametrize(

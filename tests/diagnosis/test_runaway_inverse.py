@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from tests.effects.rig import setting
-from toolkit.diagnosis.simulators.channels import undone
 from toolkit.effects.applied import AppliedEffect
 from toolkit.effects.catalogue import effects
+from toolkit.effects.forward import undone
 from toolkit.errors import FitError
 
 T = np.linspace(0, 10, 101)

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from toolkit.effects.unit_error import factors, factors_for
 
 from tests.effects.rig import setting
 from toolkit.effects.catalogue import effect
+from toolkit.effects.catalogue.unit_error import factors, factors_for
 from toolkit.units import unit
 
 T = np.linspace(0.0, 20.0, 4001)

@@ -5,10 +5,10 @@ import itertools
 import numpy as np
 import pytest
 from scipy.integrate import quad
-from toolkit.effects.dead_band import NOISE
 
 from tests.effects.rig import setting
 from toolkit.effects.catalogue import effects
+from toolkit.effects.catalogue.dead_band import NOISE
 
 WIDTH = 4.0
 Y = np.linspace(-9, 9, 37)

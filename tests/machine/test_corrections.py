@@ -10,6 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from toolkit.effects.applied import AppliedEffect
+from toolkit.effects.catalogue import effects
 from toolkit.errors import ConfigError, ToolkitError
 from toolkit.files import parse_toml, sha256_file
 from toolkit.machine import Correction, load_machine
@@ -40,10 +42,13 @@ code_version = "0"
 
 
 def correction(effect="steer_offset", value=0.3, unit="deg", u=0.01, **more):
-    parameter = {"steer_offset": "offset", "steer_compliance": "compliance", "crosstalk": "coefficient"}
+    parameter = effects()[effect].names[0]
+    place = {key: more.pop(key) for key in ("channel", "source") if key in more}
     told = {
-        "effect": effect, "channel": None, "source": None, "parameter": parameter[effect], "value": value,
-        "unit": unit, "u": u, "reason": "measured apart", "by": "a tester", "date": "2026-04-01",
+        "applied": AppliedEffect(
+            effect=effects()[effect], values={parameter: value}, units={parameter: unit}, **place
+        ),
+        "u": u, "reason": "measured apart", "by": "a tester", "date": "2026-04-01",
         "answer_sha256": "a" * 64, "case_sha256": "b" * 64, "code_version": "0",
     }  # fmt: skip
     return Correction(**(told | more))
@@ -173,7 +178,7 @@ def test_the_next_version_keeps_the_old_text_and_says_what_it_was_made_from(tmp_
     )
     assert third.version == 3
     assert third.supersedes == sha256_file(tmp_path / "b.toml")
-    assert [one.effect for one in third.corrections] == ["steer_offset", "crosstalk"]
+    assert [one.applied.effect.name for one in third.corrections] == ["steer_offset", "crosstalk"]
     assert again.count("supersedes =") == again.count("version =") - again.count("code_version =") == 1
 
 

@@ -18,6 +18,7 @@ from toolkit.diagnosis.answer.answer import (
     Mismatch,
     Place,
 )
+from toolkit.effects.applied import EffectKey
 from toolkit.findings import Finding
 from toolkit.report.build import build_content
 from toolkit.report.content import ReportContent
@@ -37,7 +38,7 @@ from toolkit.report.template.xml import stories
 from toolkit.report.vocabulary import REPORT
 
 EFFECT = FoundEffect(
-    name="quadratic_drag", stage="dynamics", channel="F", statement="Drag is missing.",
+    key=EffectKey("quadratic_drag", "F"), stage="dynamics", statement="Drag is missing.",
     equation="F = - drag v|v|", reference="Newton", equivalent_to=("viscous_damping",),
     rejected=(("coulomb_friction", -12.0),),
     held_out_log_score_gain=106.5, p_value=1e-12,

@@ -110,7 +110,8 @@ def _sized(model: ModelFile, fitted: FittedEffect, effect: Effect) -> tuple[Appl
         if way is not None and way.channels and model.axes != "machine":
             raise _wrong(
                 f"{effect.name} is a machine's own, and this case does not stand in the machine's axes",
-                model, f'axes = "{model.axes}"', 'axes = "machine"', "give the recordings in the machine's axes",
+                model, f'axes = "{model.axes}"', 'axes = "machine"',
+                "give the recordings in the machine's axes",
             )  # fmt: skip
         applied = fitted.applied
         return _applied(effect, applied.channel, applied.source, value, applied.units[parameter.name]), u
