@@ -203,11 +203,11 @@ def test_a_model_file_says_what_it_rests_on(tmp_path, drag):
     assert dict(model.recordings) == {run.name: run.sha256 for run in read.runs}
     assert [len(one) for _, one in model.recordings] == [64, 64]
     (effect,) = model.effects
-    (found,) = effect.parameters
-    told = drag.effects[0].parameters[0]
-    assert (found.value, found.unit) == (told.value, told.unit)
+    applied, told = effect.applied, drag.effects[0].parameters[0]
+    assert (applied.values, applied.units) == ({"drag": told.value}, {"drag": told.unit})
+    assert applied.key == drag.effects[0].key
     # a 95 % interval of some 160 rows reaches 1.97 to 1.98 standard errors
-    assert (told.ci95[1] - told.value) / found.standard_error == pytest.approx(1.975, abs=0.01)
+    assert (told.ci95[1] - told.value) / effect.standard_errors["drag"] == pytest.approx(1.975, abs=0.01)
     assert model.file("path").resolve() == (tmp_path / "sim.py").resolve()
 
 
@@ -246,7 +246,8 @@ def test_a_sign_is_that_of_the_axes_in_which_the_model_is_used(tmp_path):
     _, path = written(python_tire(tmp_path / "iso", "ISO-W", offset=0.3), tmp_path / "iso" / "answer")
     model = read_model(path)
     (effect,) = model.effects
-    angle = effect.parameters[0].value * (1 if effect.effect.name == "steer_offset" else -1)
+    (value,) = effect.applied.values.values()
+    angle = value * (1 if effect.applied.effect.name == "steer_offset" else -1)
     assert angle == pytest.approx(0.3, abs=0.005)
     SA = np.array([-2.0, 0.0, 3.0])
     frame = pd.DataFrame({"t": [0.0, 1.0, 2.0], "SA": SA, "FZ": [3000.0, 4000.0, 5000.0]})
@@ -275,9 +276,10 @@ def test_a_model_is_run_forward_on_inputs_alone(tmp_path, drag):
 def test_an_effect_of_some_runs_acts_by_their_condition(tmp_path, drag):
     model = read_model(tmp_path / "answer" / MODEL)
     (effect,) = model.effects
-    model = dataclasses.replace(
-        model, effects=(dataclasses.replace(effect, runs=("r0.csv",), condition=("surface", ("steel",))),)
+    confined = dataclasses.replace(
+        effect.applied, runs=frozenset({"r0.csv"}), condition=("surface", ("steel",))
     )
+    model = dataclasses.replace(model, effects=(dataclasses.replace(effect, applied=confined),))
     frame = carriage(seed=9).drop(columns="F")
     frame.to_csv(tmp_path / "in.csv", index=False)
     made = {}
@@ -285,7 +287,7 @@ def test_an_effect_of_some_runs_acts_by_their_condition(tmp_path, drag):
         ((_, text),), _ = simulate_model(model, [tmp_path / "in.csv"], None, conditions=given)
         made[key] = pd.read_csv(io.StringIO(text))
     np.testing.assert_array_equal(made["other"]["F"], made["none"]["F"])
-    size = effect.parameters[0].value
+    size = effect.applied.values["drag"]
     np.testing.assert_allclose(
         made["steel"]["F"] - made["other"]["F"], size * frame["v"] * frame["v"].abs(), rtol=1e-9, atol=1e-9
     )
