@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 
 import numpy as np
@@ -17,8 +18,6 @@ from toolkit.diagnosis.fit.problem import problem_of
 from toolkit.diagnosis.search.candidates import candidates
 from toolkit.diagnosis.simulators.build_simulator import model_of
 from toolkit.effects import catalogue
-from toolkit.machine import load_machine
-from toolkit.simulation.effect_text import parse_effect
 
 NEW = '''"""A cell that is stiffer in tension than in compression."""
 
@@ -76,11 +75,22 @@ def test_it_stands_behind_the_last_of_its_stage(tension_gain):
     assert names.index("tension_gain") == len(stages) - 1 - stages[::-1].index("load_cells")
 
 
-def test_it_is_explained_and_simulated(tension_gain, capsys):
-    assert run(["explain", "tension_gain", "--json"]) == 0
+def called(*arguments: object) -> int:
+    with pytest.raises(SystemExit) as ended:
+        run([str(argument) for argument in arguments])
+    return int(ended.value.code or 0)
+
+
+def test_it_is_explained_and_simulated(tension_gain, tmp_path, capsys):
+    assert called("explain", "tension_gain", "--json") == 0
     assert json.loads(capsys.readouterr().out)["equation"] == tension_gain.equation
-    (applied,) = parse_effect("tension_gain.D51=2%", load_machine("m15-virtual"))
-    assert applied.as_text() == "tension_gain on D51: gain = 0.02 1"
+    plan = tmp_path / "plan.toml"
+    plan.write_text("date = 2026-03-17\nslip_angles = { value = [0], unit = 'deg' }\n")
+    arguments = (plan, "--out", tmp_path / "out", "--effect", "tension_gain.D51=2%")
+    assert called("simulate", *arguments) == 0
+    assert "tension_gain on D51: gain = 0.02 1" in capsys.readouterr().out
+    (applied,) = json.loads((tmp_path / "out" / "truth.json").read_text())["effects"]
+    assert applied["parameters"] == [{"name": "gain", "value": 0.02, "unit": "1"}]
 
 
 def test_a_case_is_searched_for_it_and_names_it(tension_gain, tmp_path):
@@ -103,8 +113,6 @@ def test_a_case_is_searched_for_it_and_names_it(tension_gain, tmp_path):
 
 
 def test_a_fact_that_is_missing_is_told(tension_gain):
-    import dataclasses
-
     bare = dataclasses.replace(tension_gain, on_channel=None)
     with pytest.raises(AssertionError, match="says on which kinds"):
         test_facts.test_the_kind_of_the_effect_has_its_facts(bare)
