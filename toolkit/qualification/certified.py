@@ -18,8 +18,7 @@ import numpy as np
 
 from toolkit.calibration.fit.regression import fit_terms
 from toolkit.errors import ToolkitError
-from toolkit.qualification.agreement import correct_digits, digits_check
-from toolkit.qualification.model import Check, not_run
+from toolkit.qualification.model import Check, correct_digits, digits_check, not_run
 from toolkit.qualification.numbers import QUANTITIES, SETS, CertifiedSet, read_set
 
 if TYPE_CHECKING:

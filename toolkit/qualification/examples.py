@@ -13,8 +13,7 @@ from toolkit.calibration.fit.regression import TermFit, fit_terms
 from toolkit.calibration.standards.e74 import evaluate_e74
 from toolkit.errors import ToolkitError
 from toolkit.files import read_toml
-from toolkit.qualification.agreement import printed_check
-from toolkit.qualification.model import Check, not_run
+from toolkit.qualification.model import Check, not_run, printed_check
 from toolkit.qualification.numbers import damaged, number, numbers, read_set
 
 LINES = "ISO/TS 28037"

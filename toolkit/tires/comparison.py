@@ -13,8 +13,7 @@ from toolkit.channels import signs
 from toolkit.tires.evaluate import value_at
 from toolkit.tires.global_data import CHANNELS, Measured, cell
 from toolkit.tires.global_fit import undetermined
-from toolkit.tires.global_model import GlobalModel, make_rows
-from toolkit.tires.global_result import ModelFit, pooled_percent
+from toolkit.tires.global_model import GlobalModel, ModelFit, make_rows, pooled_percent
 from toolkit.tires.model import CurveFit
 from toolkit.tires.quality import scatter_floor_percent
 

@@ -11,12 +11,10 @@ import numpy as np
 from toolkit.channels import signs
 from toolkit.errors import FitError
 from toolkit.findings import Finding
-from toolkit.tires.global_checks import LACKS, why_not_global
 from toolkit.tires.global_data import CHANNELS, Measured, binned, what_varies
-from toolkit.tires.global_model import GlobalModel, Rows, Seeds
+from toolkit.tires.global_model import GlobalFit, GlobalModel, ModelFit, Rows, Seeds
 from toolkit.tires.global_report import Report
-from toolkit.tires.global_result import GlobalFit, ModelFit
-from toolkit.tires.global_seeds import seeds_of
+from toolkit.tires.global_seeds import LACKS, seeds_of, why_not_global
 from toolkit.tires.global_stage import Found, Task, refit, run
 from toolkit.tires.model import LOSSES, Loss
 

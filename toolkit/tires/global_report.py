@@ -10,8 +10,7 @@ import numpy as np
 from toolkit.channels import signs
 from toolkit.estimate import Estimate
 from toolkit.tires.global_data import Measured, cell
-from toolkit.tires.global_model import GlobalModel, make_rows
-from toolkit.tires.global_result import GlobalFit, LoadShare, pooled_percent
+from toolkit.tires.global_model import GlobalFit, GlobalModel, LoadShare, make_rows, pooled_percent
 from toolkit.tires.global_stage import Found
 from toolkit.tires.model import Parameter
 from toolkit.tires.quality import scatter_floor_percent

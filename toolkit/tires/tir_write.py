@@ -16,8 +16,7 @@ from toolkit.errors import ConfigError
 from toolkit.files import write_atomic
 from toolkit.findings import Finding
 from toolkit.tires.global_data import Measured
-from toolkit.tires.global_model import GlobalModel, GlobalParameter
-from toolkit.tires.global_result import ModelFit
+from toolkit.tires.global_model import GlobalModel, GlobalParameter, ModelFit
 from toolkit.tires.tir import TirFile, TirLine
 from toolkit.tires.tir_units import SI, factors, scale
 

@@ -10,22 +10,118 @@ from __future__ import annotations
 
 import datetime as dt
 import json
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolkit.calibration.control.errors import errors_by
-from toolkit.calibration.control.in_use import in_use_before
-from toolkit.calibration.registry.registry import load_many
+from toolkit.calibration.apply import apply_record
+from toolkit.calibration.registry.registry import load_checked, load_many
 from toolkit.calibration.registry.status import status_of
 from toolkit.calibration.registry.stored import stored_loads
-from toolkit.errors import ToolkitError
+from toolkit.errors import ToolkitError, UnitError
 from toolkit.findings import Finding
+from toolkit.units import si_scale
 
 if TYPE_CHECKING:
-    from toolkit.calibration.records.record import CalibrationRecord
+    from numpy.typing import NDArray
+
+    from toolkit.calibration.records.record import CalibrationRecord, Zero
+    from toolkit.calibration.registry.ledger import Ledger
     from toolkit.calibration.registry.registry import Registry
+    from toolkit.calibration.session.table import Table
+
+# Errors of a session's rows by a record that was not fitted to them.
+
+
+def errors_by(record: CalibrationRecord, table: Table, *, zero: Zero) -> dict[str, NDArray[np.float64]] | str:
+    """Return fitted minus reference (rows,) of each load that both have, in the table's unit.
+
+    ``zero`` is the session's. A text tells why the record cannot be held against these rows: another
+    indication or unit, or indications that were not tared where the record needs that. Tared rows under a
+    record that includes the zero are compared without its intercept.
+    """
+    if record.zero != "included" and zero == "included":
+        return f"{record.id} was fitted to tared indications, the session's are not tared"
+    missing = [name for name in record.indications if not table.has(name)]
+    if missing:
+        return f"{record.id} needs {', '.join(missing)}, which the session does not have"
+    units = dict(zip(record.indications, record.indication_units, strict=True))
+    try:
+        in_units = table.in_units(units)
+    except UnitError as error:
+        return f"{record.id}: {error.what}"
+    loads = [one.load for one in record.loads if table.has(one.load)]
+    if not loads:
+        return f"{record.id} has none of the session's loads"
+    tare = dict.fromkeys(units, 0.0) if (record.zero == "included") != (zero == "included") else None
+    try:
+        fitted = apply_record(
+            record, in_units.columns(record.indications), units=units, tare=tare, only=loads
+        )
+        return {
+            load: fitted[load] / si_scale(table.unit(load), where=f"column {load}") - table.column(load)
+            for load in loads
+        }
+    except ToolkitError as error:
+        return f"{record.id}: {error.what}"
+
+
+# Which record an instrument was used with when it came to a session.
+
+
+def in_use_before(
+    registry: Registry,
+    instrument: str,
+    on: dt.date,
+    *,
+    but: str | None = None,
+    ledger: Ledger | None = None,
+    checked: Mapping[str, CalibrationRecord] | None = None,
+) -> CalibrationRecord | None:
+    """Return the record that was in force when a session of day ``on`` began; None where there was none.
+
+    A session cannot be judged by itself: the record ``but`` is left out, and so is every fitted record of
+    the same day or later, whose approval may reach back. Else the rule is that of `Registry.in_force`, as
+    known on the session's day: a withdrawal that came later does not change what was in force then.
+
+    ``ledger`` and ``checked`` (records by id that passed their gates) are what a caller has read already.
+
+    Raises
+    ------
+    RegistryError, RecordError
+        the ledger is damaged, or that record fails a gate
+    """
+    ledger = registry.ledger(instrument) if ledger is None else ledger
+    ranks = [
+        rank
+        for record_id in ledger.entered()
+        if record_id != but
+        for rank in _approvals(ledger, record_id, on)
+    ]
+    for rank in sorted(ranks, reverse=True):
+        record = (checked or {}).get(rank[3]) or load_checked(registry.folder / instrument, rank[3], ledger)
+        if record.kind != "fit" or dt.date.fromisoformat(record.date) < on:
+            return record
+    return None
+
+
+def _approvals(ledger: Ledger, record_id: str, on: dt.date) -> list[tuple[bool, dt.date, int, str]]:
+    entries = ledger.of(record_id)
+    if not any(
+        entry.event == "approved" and entry.since is not None and entry.since <= on for entry in entries
+    ):
+        return []
+    status = status_of(record_id, entries, on)
+    if status.void_from is not None and on >= status.void_from:
+        return []
+    return [
+        (entry.known_on is not None and entry.known_on <= on, entry.since, entry.seq, record_id)
+        for entry in entries
+        if entry.event == "approved" and entry.since is not None and entry.since <= on
+    ]
+
 
 _SLACK = 1 + 1e-9
 

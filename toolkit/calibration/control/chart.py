@@ -14,11 +14,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolkit.calibration.control.as_found import phase_of
-from toolkit.calibration.control.errors import errors_by
-from toolkit.calibration.control.in_use import in_use_before
-from toolkit.calibration.control.rules import Break
-from toolkit.calibration.control.shewhart import LEAST_BASELINE, Limits, breaks_of, limits_of
+from toolkit.calibration.control.as_found import errors_by, in_use_before, phase_of
+from toolkit.calibration.control.shewhart import LEAST_BASELINE, Break, Limits, breaks_of, limits_of
 from toolkit.calibration.registry.registry import load_many
 from toolkit.calibration.registry.status import status_of
 from toolkit.calibration.registry.stored import stored_check

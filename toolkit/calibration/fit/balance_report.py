@@ -11,8 +11,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolkit.calibration.fit.balance import BalanceForm, fit_balance, loads_by_iteration, loads_by_newton
-from toolkit.calibration.fit.tares import Tares, estimate_tares
+from toolkit.calibration.fit.balance import (
+    BalanceForm,
+    Tares,
+    estimate_tares,
+    fit_balance,
+    loads_by_iteration,
+    loads_by_newton,
+)
 from toolkit.errors import SessionError
 from toolkit.findings import Finding
 

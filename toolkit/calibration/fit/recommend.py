@@ -18,9 +18,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolkit.calibration.fit.adequacy import RANK, terms_condition_number
+from toolkit.calibration.fit.adequacy import NOISE_SHARE, RANK, noise_shares, terms_condition_number
 from toolkit.calibration.fit.basis import build_basis
-from toolkit.calibration.fit.dilution import NOISE_SHARE, noise_shares
 from toolkit.calibration.terms import INTERCEPT, model_terms, term_matrix
 
 if TYPE_CHECKING:

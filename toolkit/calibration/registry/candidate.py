@@ -10,9 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from toolkit.calibration.fit.adequacy import check_levels
-from toolkit.calibration.fit.findings import session_findings
+from toolkit.calibration.fit.findings import readings_findings, session_findings
 from toolkit.calibration.fit.readings import SessionReadings, readings_of
-from toolkit.calibration.fit.readings_findings import readings_findings
 from toolkit.calibration.fit.session_fit import (
     LoadResult,
     SessionFit,

@@ -14,11 +14,10 @@ from typing import TYPE_CHECKING
 
 from toolkit.calibration.registry.gates import GateResult, check_loads
 from toolkit.calibration.registry.history import NO_HISTORY, History, agreeing, compared, history_of
-from toolkit.calibration.registry.plausible import plausible
+from toolkit.calibration.registry.plausible import plausible, tare_claim
 from toolkit.calibration.registry.polarity import machine_polarity, reading_polarity, unconfirmed
 from toolkit.calibration.registry.status import status_of
 from toolkit.calibration.registry.stored import stored_check, stored_loads
-from toolkit.calibration.registry.tare_claim import tare_claim
 from toolkit.calibration.session.polarity import PolarityReading, polarity_readings
 from toolkit.calibration.session.statements import scope_of, statements_of
 from toolkit.errors import ConfigError

@@ -17,8 +17,8 @@ from typing import TYPE_CHECKING
 from toolkit.calibration.records.use import CalibrationUse
 from toolkit.calibration.registry.clock import today
 from toolkit.calibration.registry.gates import GateResult
-from toolkit.calibration.registry.interval import parse_interval
 from toolkit.calibration.registry.judgement import judge_stored, machine_of
+from toolkit.calibration.registry.status import parse_interval
 from toolkit.errors import RecordError, ToolkitError
 
 if TYPE_CHECKING:

@@ -11,7 +11,7 @@ import numpy as np
 from toolkit.calibration.standards.cell_rows import CellRows, CellSource, cell_rows
 from toolkit.calibration.standards.e74 import E74Result, evaluate_e74
 from toolkit.calibration.standards.iso376 import Iso376Result, evaluate_iso376
-from toolkit.calibration.standards.iso376_runs import iso376_runs
+from toolkit.calibration.standards.iso376_input import iso376_runs
 from toolkit.errors import SessionError
 
 if TYPE_CHECKING:

@@ -22,8 +22,7 @@ import numpy as np
 from toolkit.calibration.session.statements import statements_of
 from toolkit.calibration.terms import term_matrix
 from toolkit.calibration.uncertainty.components import components_of
-from toolkit.calibration.uncertainty.conditions import Temperature
-from toolkit.calibration.uncertainty.model import Budget
+from toolkit.calibration.uncertainty.model import Budget, Temperature
 from toolkit.errors import SessionError
 from toolkit.estimate import coverage_factor, effective_dof
 

@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from toolkit.calibration.terms import term_matrix
-from toolkit.calibration.uncertainty.conditions import Temperature
-from toolkit.calibration.uncertainty.model import Component, Distribution, Evaluation
+from toolkit.calibration.uncertainty.model import Component, Distribution, Evaluation, Temperature
 from toolkit.calibration.uncertainty.readings import (
     creep,
     indication_errors,
