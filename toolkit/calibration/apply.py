@@ -51,10 +51,10 @@ def apply_record(
     check_units(record, units)
     _check_present(record, indications)
     return {
-        one.load: _evaluate(record, one, indications, tare, issued=issued)
-        * si_scale(one.unit, where=record.id)
-        for one in record.loads
-        if only is None or one.load in only
+        load.load: _evaluate(record, load, indications, tare, issued=issued)
+        * si_scale(load.unit, where=record.id)
+        for load in record.loads
+        if only is None or load.load in only
     }
 
 

@@ -27,7 +27,7 @@ def check_lines(folder: Path) -> list[Check]:
     """Solve the straight lines with known uncertainties, of y or of both variables, and predict by them."""
     try:
         examples = read_toml(folder / LINES_FILE)["example"]
-        return [check for one in examples for check in _line(one, folder / LINES_FILE)]
+        return [check for example in examples for check in _line(example, folder / LINES_FILE)]
     except ToolkitError as error:
         return [not_run(LINES, "examples", str(error))]
     except _BROKEN as error:

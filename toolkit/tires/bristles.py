@@ -120,8 +120,8 @@ def balance(tread: Tread, sx: Array, sy: Array, *, lines: int = 1, near: Balance
         for what is searched again there is another side of the same jump
     """
     made = [
-        _balance(tread.take(one), sx[one], sy[one], lines, None if near is None else near.take(one))
-        for one in _parts(tread, sx, lines)
+        _balance(tread.take(part), sx[part], sy[part], lines, None if near is None else near.take(part))
+        for part in _parts(tread, sx, lines)
     ]
     none = Balance(
         sums=np.zeros((3, 0)), slopes=np.zeros((2, 0)), inverse=np.zeros((2, 2, 0)), settled=np.zeros(0, bool)

@@ -92,8 +92,8 @@ def compare(
 ) -> Comparison:
     """Return the table of the models that were fitted to these rows; ``curves`` are of single loads."""
     made = []
-    for name in dict.fromkeys(one.model for one in curves):
-        own = [one for one in curves if one.model == name]
+    for name in dict.fromkeys(curve.model for curve in curves):
+        own = [curve for curve in curves if curve.model == name]
         for channel in ("FY", "MZ"):
             if channel in data.channels and any(one.channel == channel for one in own):
                 made += _of_curves(data, [one for one in own if one.channel == channel])

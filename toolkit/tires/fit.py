@@ -191,9 +191,12 @@ def _normalise(curves: Sequence[Curve]) -> tuple[Problems, _Scale]:
 def _solved(groups: Sequence[Problems], loss: Loss) -> list[tuple[Problems, Solution, Array]]:
     # Each group's problems with their final weights, its minima, and the inflation of their variance.
     if loss == "robust":
-        robust = [solve_robust(one) for one in groups]
+        robust = [solve_robust(group) for group in groups]
         return [(problems, solution, inflation) for solution, problems, inflation in robust]
-    return [(one, solution, np.ones(len(one.u))) for one, solution in zip(groups, solve(groups), strict=True)]
+    return [
+        (group, solution, np.ones(len(group.u)))
+        for group, solution in zip(groups, solve(groups), strict=True)
+    ]
 
 
 def _fit_group(

@@ -108,13 +108,13 @@ class _Fitter:
         self.data = data.turned(model.axes)
         self.flip = signs(model.axes, data.axes)
         self.varies = what_varies(data)
-        self.starts = np.stack([self._start(one) for one in model.starts(seeds)])
+        self.starts = np.stack([self._start(start) for start in model.starts(seeds)])
         self.values = self.starts[0].copy()
         self.sigma: dict[str, Array] = {}
 
     def _start(self, given: object) -> Array:
-        low = np.array([one.low for one in self.model.parameters])
-        high = np.array([one.high for one in self.model.parameters])
+        low = np.array([parameter.low for parameter in self.model.parameters])
+        high = np.array([parameter.high for parameter in self.model.parameters])
         return np.clip(self.model.values(given), low, high)  # type: ignore[arg-type]
 
     def stages(self) -> list[tuple[str, ...]]:
@@ -150,16 +150,16 @@ class _Fitter:
     def _free(self, channels: tuple[str, ...]) -> tuple[tuple[int, ...], tuple[tuple[int, str], ...]]:
         # What a stage searches, and what it cannot, with the reason.
         free, fixed = [], []
-        for place, one in enumerate(self.model.parameters):
-            if one.stage not in channels and not (self.model.joint and one.stage in ("FY", "MZ")):
+        for place, parameter in enumerate(self.model.parameters):
+            if parameter.stage not in channels and not (self.model.joint and parameter.stage in ("FY", "MZ")):
                 continue
-            if self.model.joint and channels == ("FX",) and one.stage != "FX":
+            if self.model.joint and channels == ("FX",) and parameter.stage != "FX":
                 continue
-            lacks = [need for need in one.needs if need not in self.varies]
+            lacks = [need for need in parameter.needs if need not in self.varies]
             if lacks:
-                self.values[place] = one.default
-                self.starts[:, place] = one.default
-                fixed.append((place, f"{LACKS[lacks[0]]}: fixed at {one.default:g}"))
+                self.values[place] = parameter.default
+                self.starts[:, place] = parameter.default
+                fixed.append((place, f"{LACKS[lacks[0]]}: fixed at {parameter.default:g}"))
             else:
                 free.append(place)
         limit = len(self.data) * len(channels) - 2

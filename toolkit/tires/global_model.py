@@ -229,7 +229,7 @@ class GlobalModel:
     @property
     def names(self) -> tuple[str, ...]:
         """Parameter names in their order."""
-        return tuple(one.name for one in self.parameters)
+        return tuple(parameter.name for parameter in self.parameters)
 
     def values(self, given: Mapping[str, float]) -> Array:
         """Return a parameter set from names and values, defaults for the rest.
@@ -241,7 +241,7 @@ class GlobalModel:
         """
         if unknown := set(given) - set(self.names):
             raise KeyError(sorted(unknown)[0])
-        return np.array([given.get(one.name, one.default) for one in self.parameters])
+        return np.array([given.get(parameter.name, parameter.default) for parameter in self.parameters])
 
 
 # GlobalFit: one channel of a model fitted over all loads, with what the data could and could not say.
@@ -304,7 +304,7 @@ class GlobalFit:
     @property
     def values(self) -> tuple[float, ...]:
         """Values of the channel's parameters in their order."""
-        return tuple(one.value for one in self.parameters)
+        return tuple(parameter.value for parameter in self.parameters)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -325,7 +325,7 @@ class ModelFit:
 
     def fit(self, channel: str) -> GlobalFit | None:
         """Return the fit of a channel, None where there is none."""
-        return next((one for one in self.fits if one.channel == channel), None)
+        return next((fit for fit in self.fits if fit.channel == channel), None)
 
 
 def pooled_percent(residual: Array, y: Array) -> float:

@@ -44,9 +44,11 @@ def seeds_of(data: Measured) -> Found:
         own = means.block == number
         channels: tuple[Literal["FY", "MZ"], ...] = ("FY", "MZ")
         curves += [
-            _curve(means, own, one, float(load)) for one in channels if one in base.channels and own.any()
+            _curve(means, own, channel, float(load))
+            for channel in channels
+            if channel in base.channels and own.any()
         ]
-    good = [one for one in curves if why_not(one) is None]
+    good = [curve for curve in curves if why_not(curve) is None]
     fits = fit_curves(good) if good else ()
     by_key = {(fit.channel, fit.load_N): fit for fit in fits}
     loads, stiffness, peak, angle, trail = [], [], [], [], []

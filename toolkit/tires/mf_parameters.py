@@ -156,7 +156,7 @@ Evaluator = Callable[..., Forces]
 
 def mf_forces(parameters: Sequence[GlobalParameter], evaluator: Evaluator) -> Any:
     """Return the function ``forces(values, rows)`` of an evaluator of tire files."""
-    names = tuple(one.name for one in parameters)
+    names = tuple(parameter.name for parameter in parameters)
 
     def forces(values: Sequence[Any], rows: Rows) -> Responses:
         p: Mapping[str, Any] = dict(zip(names, values, strict=True))

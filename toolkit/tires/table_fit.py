@@ -216,7 +216,9 @@ def row_findings(table: TireTable) -> tuple[Finding, ...]:
         IA=column("IA"), trail_m=LARGEST_TRAIL_M,
     )  # fmt: skip
     cause = "is a column in another unit than its header says?"
-    return tuple(one.finding("warning", cause=cause) for one in departures(readings, share=_OUTLIERS))
+    return tuple(
+        departure.finding("warning", cause=cause) for departure in departures(readings, share=_OUTLIERS)
+    )
 
 
 def repeat_findings(table: TireTable) -> list[Finding]:

@@ -77,7 +77,11 @@ def tire_fit(model: GlobalModel, fit: ModelFit, data: Measured, *, side: str = "
     made: list[tuple[str, tuple[tuple[str, str | float], ...]]] = []
     for channel in _SECTIONS:
         if any(one.channel == channel for one in fit.fits):
-            own = [one for one in model.parameters if one.stage == channel and (slips or not _of_slip(one))]
+            own = [
+                parameter
+                for parameter in model.parameters
+                if parameter.stage == channel and (slips or not _of_slip(parameter))
+            ]
             extra: list[tuple[str, str | float]] = (
                 [("PKY4", 2.0)] if channel == "FY" and FITTYP[model.name] > 60 else []
             )

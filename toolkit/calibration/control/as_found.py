@@ -52,7 +52,7 @@ def errors_by(record: CalibrationRecord, table: Table, *, zero: Zero) -> dict[st
         in_units = table.in_units(units)
     except UnitError as error:
         return f"{record.id}: {error.what}"
-    loads = [one.load for one in record.loads if table.has(one.load)]
+    loads = [load.load for load in record.loads if table.has(load.load)]
     if not loads:
         return f"{record.id} has none of the session's loads"
     tare = dict.fromkeys(units, 0.0) if (record.zero == "included") != (zero == "included") else None
@@ -170,12 +170,12 @@ class AsFound:
     @property
     def within(self) -> bool | None:
         """Whether every load was within its tolerance; None where nothing could be compared."""
-        return all(one.within for one in self.loads) if self.loads else None
+        return all(load.within for load in self.loads) if self.loads else None
 
     @property
     def worst_share(self) -> float | None:
         """Largest |error| of all loads as a share of its tolerance; None where nothing was compared."""
-        return max((abs(one.max_error) / one.tolerance for one in self.loads), default=None)
+        return max((abs(load.max_error) / load.tolerance for load in self.loads), default=None)
 
 
 def phase_of(record: CalibrationRecord) -> str | None:
@@ -228,13 +228,13 @@ def as_found_findings(found: AsFound) -> tuple[Finding, ...]:
     return tuple(
         Finding(
             rule="as-found",
-            where=one.load,
-            message=f"as found, {found.record} is off by {one.max_error:+.4g} {one.unit} in row "
-            f"{one.worst_row} ({one.max_percent_fs:.3g} % of full scale), tolerance {one.tolerance:.4g} "
-            f"{one.unit}",
+            where=load.load,
+            message=f"as found, {found.record} is off by {load.max_error:+.4g} {load.unit} in row "
+            f"{load.worst_row} ({load.max_percent_fs:.3g} % of full scale), tolerance {load.tolerance:.4g} "
+            f"{load.unit}",
         )
-        for one in found.loads
-        if not one.within
+        for load in found.loads
+        if not load.within
     )
 
 

@@ -76,7 +76,7 @@ class Series:
     @property
     def ranges(self) -> tuple[float, ...]:
         """Moving ranges, one fewer than the points."""
-        return tuple(np.abs(np.diff([one.error for one in self.points])).tolist())
+        return tuple(np.abs(np.diff([point.error for point in self.points])).tolist())
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -254,7 +254,7 @@ def _series(
                 rows=len(members),
             )
         )
-    values = np.array([one.error for one in points])
+    values = np.array([point.error for point in points])
     count = min(baseline, len(values)) if baseline is not None else max(len(values) - 1, 0)
     limits = limits_of(values[:count])
     return Series(

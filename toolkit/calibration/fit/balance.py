@@ -110,7 +110,7 @@ def fit_balance(
         responses=tuple(responses),
         loads=names,
         terms=terms,
-        coefficients=np.array([(*one.coefficients, *more) for one, more in zip(fits, rest, strict=True)]),
+        coefficients=np.array([(*fit.coefficients, *more) for fit, more in zip(fits, rest, strict=True)]),
         fits=fits,
         full_scale=np.array([float(np.abs(values).max()) for values in loads.values()]),
         not_excited=tuple(name for name in wanted if name not in terms),
@@ -316,7 +316,7 @@ def _move(
     design = term_matrix(terms, dict(zip(form.loads, total.T, strict=True)))
     q, _ = np.linalg.qr(design / np.linalg.norm(design, axis=0))
     slopes, rest = form.slopes(total), measured - form.predict(total)
-    scale = np.maximum(np.array([one.residual_sd for one in form.fits]), 1e-12 * np.abs(measured).max(axis=0))
+    scale = np.maximum(np.array([fit.residual_sd for fit in form.fits]), 1e-12 * np.abs(measured).max(axis=0))
     left, right = [], []
     for j, sd in enumerate(scale):
         column = (member[:, :, None] * slopes[:, j, None, :]).reshape(len(total), -1)

@@ -45,8 +45,8 @@ def session_findings(fit: SessionFit) -> tuple[Finding, ...]:
             f"condition number {fit.condition_number:.3g} of the indications, over {COLLINEAR_FINDING:g}"
         )
         found.append(Finding(rule="collinear", where=session.path.name, message=message))
-    for one in fit.loads:
-        found += _load_findings(session, one)
+    for load in fit.loads:
+        found += _load_findings(session, load)
     found += _robust_findings(fit)
     return tuple(found)
 
@@ -208,12 +208,12 @@ def _model_findings(fit: SessionFit) -> list[Finding]:
 
 def _misfits(fit: SessionFit) -> list[Finding]:
     table = fit.session.table
-    level = load_levels(table.matrix([one.name for one in fit.session.loads]))
+    level = load_levels(table.matrix([load.name for load in fit.session.loads]))
     found = []
-    for one in fit.loads:
-        lack = lack_of_fit(one.fit, level)
+    for load in fit.loads:
+        lack = lack_of_fit(load.fit, level)
         # Scatter that is rounding has no pure error to judge by.
-        if lack is None or one.fit.residual_sd <= 1e-9 * one.setting.tolerance:
+        if lack is None or load.fit.residual_sd <= 1e-9 * load.setting.tolerance:
             continue
         if lack.probability < _RISK / len(fit.loads):
             message = (
@@ -221,7 +221,7 @@ def _misfits(fit: SessionFit) -> list[Finding]:
                 f"{lack.pure_dof} degrees of freedom, p = {lack.probability:.1g}), and no model that a "
                 "session can name fits better: look at the residuals against the load and against the order"
             )
-            found.append(Finding(rule="lack-of-fit", where=one.setting.name, message=message, level="note"))
+            found.append(Finding(rule="lack-of-fit", where=load.setting.name, message=message, level="note"))
     return found
 
 
@@ -276,14 +276,14 @@ def readings_findings(found: SessionReadings, where: str) -> tuple[Finding, ...]
     made += [
         Finding(
             rule="zero-drift",
-            where=one.load,
-            message=f"the zeros of {', '.join(one.cells)} moved by {one.drift:+.4g} {one.unit} "
-            f"({one.percent_fs:+.3g} % of full scale), tolerance {one.tolerance:.4g} {one.unit}",
+            where=zero.load,
+            message=f"the zeros of {', '.join(zero.cells)} moved by {zero.drift:+.4g} {zero.unit} "
+            f"({zero.percent_fs:+.3g} % of full scale), tolerance {zero.tolerance:.4g} {zero.unit}",
         )
-        for one in found.zero_loads
-        if abs(one.drift) > one.tolerance
+        for zero in found.zero_loads
+        if abs(zero.drift) > zero.tolerance
     ]
-    made += [finding for one in found.shunts if (finding := _shunt(one)) is not None]
+    made += [finding for shunt in found.shunts if (finding := _shunt(shunt)) is not None]
     made += [
         Finding(
             rule="creep",

@@ -92,7 +92,7 @@ def residual_correlation(fit: SessionFit) -> NDArray[np.float64]:
 
     Loads without scatter, or one load alone, have none: the identity.
     """
-    rest = np.array([one.fit.residuals for one in fit.loads])
+    rest = np.array([load.fit.residuals for load in fit.loads])
     products = np.einsum("ij,kj->ik", rest, rest)
     length = np.sqrt(np.diag(products))
     safe = np.where(length > 0, length, 1.0)

@@ -127,8 +127,10 @@ def calibrate(
         judged = judge(
             unnumbered, history=history, machine=definition, loads=session.table, check=session.check
         )
-        said = {(one.rule, one.where) for one in findings}
-        findings += tuple(one.finding() for one in judged.results if (one.rule, one.where) not in said)
+        said = {(finding.rule, finding.where) for finding in findings}
+        findings += tuple(
+            result.finding() for result in judged.results if (result.rule, result.where) not in said
+        )
     return Candidate(
         record=record,
         path=folder / f"{record.id}.json",
@@ -214,7 +216,7 @@ def _record(fit: SessionFit) -> CalibrationRecord:
             )
             for c, (low, high) in zip(session.cells, ranges, strict=True)
         ),
-        loads=tuple(_load_fit(session, one) for one in fit.loads),
+        loads=tuple(_load_fit(session, load) for load in fit.loads),
         golden=_golden(session, ranges),
         data=(),
         settings=session.settings,

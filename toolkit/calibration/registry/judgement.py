@@ -44,12 +44,12 @@ class Judgement:
     @property
     def failed(self) -> tuple[GateResult, ...]:
         """What keeps the record from being approved."""
-        return tuple(one for one in self.results if one.effect != "tells")
+        return tuple(result for result in self.results if result.effect != "tells")
 
     @property
     def told(self) -> tuple[GateResult, ...]:
         """What does not, and is written down with the approval."""
-        return tuple(one for one in self.results if one.effect == "tells")
+        return tuple(result for result in self.results if result.effect == "tells")
 
 
 def judge(
@@ -92,7 +92,7 @@ def judge(
         # What has the wrong sign by one of them is not asked for: it is answered.
         pairs = {
             *agreeing(record, history, results), *stated.pairs,
-            *(tuple(one.where.split(", ")) for one in results if one.rule in ("sign", "polarity")),
+            *(tuple(result.where.split(", ")) for result in results if result.rule in ("sign", "polarity")),
         }  # fmt: skip
         results += unconfirmed(
             record,
@@ -101,7 +101,7 @@ def judge(
         )
     if loads is not None:
         u = statements_of(record).reference
-        results += tare_claim(record, tables, u_reference=[u.u(one.load) for one in record.loads])
+        results += tare_claim(record, tables, u_reference=[u.u(load.load) for load in record.loads])
     if check is not None:
         results += check_loads(record, check)
     return Judgement(results=tuple(results), evidence=(*stated.evidence, *read.evidence))

@@ -42,21 +42,21 @@ def plausible(
     """Return the sizes that cannot be: rules ``range``, ``lever``, ``bridge-range``, ``check-tolerance``."""
     failed: list[GateResult] = [] if machine is None else _levers(new, machine)
     rated = {} if machine is None else dict(machine.rated_loads)
-    for one in new.loads:
-        size, si = largest_load(one), unit(one.unit).si
+    for load in new.loads:
+        size, si = largest_load(load), unit(load.unit).si
         if math.isnan(size):
             continue
-        other = None if old is None else next((o for o in old.loads if o.load == one.load), None)
-        if old is not None and other is not None and same_dimension(one.unit, other.unit):
-            failed += _range(one.load, size, largest_load(other), si, f"in {old.id}")
-        if machine is not None and one.load in rated:
-            failed += _range(one.load, size, rated[one.load], si, f"as rated by machine {machine.name}")
-        if one.tolerance is not None and one.tolerance > TOLERANCE * one.largest:
+        other = None if old is None else next((o for o in old.loads if o.load == load.load), None)
+        if old is not None and other is not None and same_dimension(load.unit, other.unit):
+            failed += _range(load.load, size, largest_load(other), si, f"in {old.id}")
+        if machine is not None and load.load in rated:
+            failed += _range(load.load, size, rated[load.load], si, f"as rated by machine {machine.name}")
+        if load.tolerance is not None and load.tolerance > TOLERANCE * load.largest:
             message = (
-                f"the check loads' tolerance of {one.tolerance:.4g} {one.unit} is "
-                f"{100 * one.tolerance / one.largest:.3g} % of the largest load: is its unit right?"
+                f"the check loads' tolerance of {load.tolerance:.4g} {load.unit} is "
+                f"{100 * load.tolerance / load.largest:.3g} % of the largest load: is its unit right?"
             )
-            failed.append(GateResult(rule="check-tolerance", where=one.load, message=message))
+            failed.append(GateResult(rule="check-tolerance", where=load.load, message=message))
     bridges = [_largest(cell) for cell in new.cells if unit(cell.unit).dimension == "bridge_ratio"]
     strongest = max((size for size in bridges if not math.isnan(size)), default=math.nan)
     for cell in new.cells:
@@ -81,7 +81,7 @@ def _levers(new: CalibrationRecord, machine: Machine) -> list[GateResult]:
 
     It needs no history: one of two units that slipped moves a lever by 4.45 (lbf, N), 305 or 1000.
     """
-    loads = {one.load: one for one in new.loads}
+    loads = {load.load: load for load in new.loads}
     if "FY" not in loads:
         return []
     failed = []
@@ -156,7 +156,7 @@ def tare_claim(
     zeros = np.vstack([table.matrix(record.indications)[at] for table, at in zip(tables, rows, strict=True)])
     if len(zeros):
         failed += _offsets(record, tables[0], zeros, noise)
-    elif not all(INTERCEPT in one.terms for one in record.loads):
+    elif not all(INTERCEPT in load.terms for load in record.loads):
         message = (
             'zero = "tared" cannot be seen to hold: no row is at zero load and no intercept is fitted; '
             "record a row at zero load in each run"
@@ -184,8 +184,8 @@ def _intercept(record: CalibrationRecord, one: LoadFit, loads: Table) -> list[Ga
 def _zero_rows(record: CalibrationRecord, table: Table, noise: Sequence[float]) -> NDArray[np.bool_]:
     """Return which rows have every reference load at zero within its own uncertainty (rows,)."""
     at = np.ones(table.rows, dtype=bool)
-    for one, least in zip(record.loads, noise, strict=True):
-        at &= np.abs(table.column(one.load)) <= max(AT_ZERO * _limit(one), least)
+    for load, least in zip(record.loads, noise, strict=True):
+        at &= np.abs(table.column(load.load)) <= max(AT_ZERO * _limit(load), least)
     return at
 
 
@@ -204,16 +204,16 @@ def _offsets(
     failed = []
     for column, cell in enumerate(record.cells):
         judged = []
-        for one, least in zip(record.loads, noise, strict=True):
-            found = response(record, one, cell)
-            slope = found.value * unit(cell.unit).factor / unit(one.unit).factor
-            limit = max(_limit(one), least)
+        for load, least in zip(record.loads, noise, strict=True):
+            found = response(record, load, cell)
+            slope = found.value * unit(cell.unit).factor / unit(load.unit).factor
+            limit = max(_limit(load), least)
             if slope != 0:
-                judged.append((abs(slope) / limit, slope, limit, one))
+                judged.append((abs(slope) / limit, slope, limit, load))
         if not judged:
             continue
-        _, slope, limit, one = max(judged, key=lambda entry: entry[0])
-        scatter = _scatter(one, table, record.indications)
+        _, slope, limit, load = max(judged, key=lambda entry: entry[0])
+        scatter = _scatter(load, table, record.indications)
         moved = slope * zeros[:, column]
         mean, worst = float(moved.mean()), float(moved[np.abs(moved).argmax()])
         beyond_mean = abs(mean) > max(limit, _SIGMAS * scatter / len(moved) ** 0.5)
@@ -223,8 +223,8 @@ def _offsets(
         value, what = (mean, "on average") if beyond_mean else (worst, "at most")
         message = (
             f'zero = "tared" does not hold: at zero load ({len(moved)} rows) the indication is '
-            f"{value / slope:+.4g} {cell.unit} {what}, worth {value:+.4g} {one.unit} of {one.load} where the "
-            f"rows scatter by {scatter:.2g} {one.unit}; the tolerance is {limit:.4g} {one.unit}"
+            f"{value / slope:+.4g} {cell.unit} {what}, worth {value:+.4g} {load.unit} of {load.load} where "
+            f"the rows scatter by {scatter:.2g} {load.unit}; the tolerance is {limit:.4g} {load.unit}"
         )
         failed.append(GateResult(rule="tared", where=cell.name, message=message))
     return failed

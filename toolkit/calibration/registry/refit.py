@@ -69,20 +69,20 @@ def check_reproduces(record: CalibrationRecord, table: Table) -> None:
     inputs = np.asarray(golden.inputs)
     points = dict(zip(record.indications, inputs.T, strict=True))
     shared: dict[tuple[str, ...], _Solver] = {}
-    for at, one in enumerate(record.loads):
-        _same_unit(record, one.load, table.unit(one.load), one.unit)
-        if one.method in ("gls", "odr"):
-            known = _known_errors_solver(record, one, table, points)
-            _check_load(record, at, one, known, table)
+    for at, load in enumerate(record.loads):
+        _same_unit(record, load.load, table.unit(load.load), load.unit)
+        if load.method in ("gls", "odr"):
+            known = _known_errors_solver(record, load, table, points)
+            _check_load(record, at, load, known, table)
             continue
-        weights = _weights(one, table)
-        solver = shared.get(one.terms) if weights is None else None
+        weights = _weights(load, table)
+        solver = shared.get(load.terms) if weights is None else None
         if solver is None:
-            terms = term_matrix(one.terms, columns)
-            solver = _solver(terms, weights, one.terms[-1] == INTERCEPT, term_matrix(one.terms, points))
+            terms = term_matrix(load.terms, columns)
+            solver = _solver(terms, weights, load.terms[-1] == INTERCEPT, term_matrix(load.terms, points))
             if weights is None:
-                shared[one.terms] = solver
-        _check_load(record, at, one, solver, table)
+                shared[load.terms] = solver
+        _check_load(record, at, load, solver, table)
 
 
 def _known_errors_solver(

@@ -77,7 +77,7 @@ class Standing:
             id=self.record.id,
             sha256=self.record.sha256,
             unverified=not self.record.verified,
-            draft_reasons=tuple(one.text for one in self.reasons),
+            draft_reasons=tuple(reason.text for reason in self.reasons),
             since=self.since,
         )
 
@@ -95,13 +95,13 @@ def not_in_force(
 
     ``draft`` tells whether a draft may be made of it.
     """
-    steps = list(dict.fromkeys(one.next_step for one in reasons))
+    steps = list(dict.fromkeys(reason.next_step for reason in reasons))
     if draft:
         steps.append("or add --draft: every page then says that it is a draft")
     return RecordError(
         f"{record_id} may not be used: it is not approved and in force",
         where=where,
-        got="; ".join(one.text for one in reasons),
+        got="; ".join(reason.text for reason in reasons),
         expected=expected,
         next_step="; ".join(steps),
         rule=rule,
@@ -137,7 +137,7 @@ def standing(
     else:
         record = registry.load(named)
     reasons = _reasons(registry, record, instrument, on, known)
-    told = {one.text for one in reasons}
+    told = {reason.text for reason in reasons}
     later = () if known >= today() else _reasons(registry, record, instrument, on, today())
     return Standing(
         record=record,

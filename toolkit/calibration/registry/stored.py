@@ -42,7 +42,7 @@ def stored_check(registry: Path, record: CalibrationRecord) -> Table | None:
     if entry is None:
         return None
     path = registry / record.instrument / entry.file
-    loads = [one.load for one in record.loads]
+    loads = [load.load for load in record.loads]
     table = read_table(
         path.read_bytes(),
         where=path,
@@ -53,7 +53,7 @@ def stored_check(registry: Path, record: CalibrationRecord) -> Table | None:
     units = dict(zip(record.indications, record.indication_units, strict=True))
     other = [n for n, text in units.items() if unit(table.unit(n)).dimension != unit(text).dimension]
     table = converted(table, _bridges(record, other), units, where=path)
-    table = table.in_units(units | {one.load: one.unit for one in record.loads})
+    table = table.in_units(units | {load.load: load.unit for load in record.loads})
     return without_read_zeros(table, record.indications, loads, path) if record.zero == "run" else table
 
 
@@ -65,14 +65,14 @@ def parse_loads(record: CalibrationRecord, data: bytes, folder: Path) -> Table:
     RecordError
         ``data``: they cannot be read
     """
-    needed = [*record.indications, *(one.load for one in record.loads)]
-    uncertainties = row_columns([one.load for one in record.loads])
+    needed = [*record.indications, *(load.load for load in record.loads)]
+    uncertainties = row_columns([load.load for load in record.loads])
     file = record.data_file("loads")
     where = folder / ("loads" if file is None else file.file)
     try:
         table = read_table(data, where=where, required=needed, optional=uncertainties, labels=_labels(record))
         table = _as_fitted(record, table, where)
-        loads = [one.load for one in record.loads]
+        loads = [load.load for load in record.loads]
         return without_run_zeros(table, record.indications, loads) if record.zero == "run" else table
     except RegistryError:
         raise

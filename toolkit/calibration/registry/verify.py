@@ -61,10 +61,11 @@ def verify_registry(registry: Registry, head: str | None = None) -> tuple[Verify
             ledgers[instrument] = registry.ledger(instrument)
         except ToolkitError as error:
             ledgers[instrument] = Ledger(entries=(), damage=f"{error.what}: {error.got}")
-    if head is not None and not any(e.sha256 == head for one in ledgers.values() for e in one.entries):
+    if head is not None and not any(e.sha256 == head for ledger in ledgers.values() for e in ledger.entries):
         damage = f"no line has the given head {head}: the end of a ledger was cut off"
         ledgers = {
-            name: Ledger(entries=one.entries, damage=one.damage or damage) for name, one in ledgers.items()
+            name: Ledger(entries=ledger.entries, damage=ledger.damage or damage)
+            for name, ledger in ledgers.items()
         }
         if not ledgers:
             rows.append(VerifyRow(id=HEAD, ok=False, verified=False, reason=f"ledger: {damage}"))

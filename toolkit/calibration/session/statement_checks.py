@@ -146,10 +146,10 @@ def temperature_effect(
     parts = entry if isinstance(entry, dict) and not {"value", "unit"} & set(entry) else {"span": entry}
     check_keys(parts, ("span", "zero"), where=f"{bridge.where}: {key}")
     plain = {
-        name: one | {"unit": per(one["unit"], _PER_KELVIN)}
-        if isinstance(one, dict) and isinstance(one.get("unit"), str)
-        else one
-        for name, one in parts.items()
+        name: part | {"unit": per(part["unit"], _PER_KELVIN)}
+        if isinstance(part, dict) and isinstance(part.get("unit"), str)
+        else part
+        for name, part in parts.items()
     }
     span = zero = None
     if "span" in plain:

@@ -157,7 +157,7 @@ class E74Result:
     @property
     def class_name(self) -> str | None:
         """Best class granted, None where there is none."""
-        return next((one.name for one in self.classes if one.granted), None)
+        return next((class_.name for class_ in self.classes if class_.granted), None)
 
 
 def evaluate_e74(

@@ -84,8 +84,8 @@ def evaluations(fit: SessionFit) -> tuple[Evaluation, ...]:
     return tuple(
         Evaluation(
             standard=standard,
-            load=one.name,
-            load_unit=one.unit,
+            load=load.name,
+            load_unit=load.unit,
             indication=None,
             indication_unit=None,
             sense=None,
@@ -95,7 +95,7 @@ def evaluations(fit: SessionFit) -> tuple[Evaluation, ...]:
             left_out=session.table.rows,
         )
         for standard in STANDARDS
-        for one in session.loads
+        for load in session.loads
     )
 
 
@@ -109,7 +109,7 @@ def source_of(fit: SessionFit) -> CellSource:
         statements=session_statements(session),
         settings=session.settings,
         zero=session.zero,
-        loads=tuple(one.name for one in session.loads),
+        loads=tuple(load.name for load in session.loads),
         indications=session.indications,
         where=str(session.path),
     )

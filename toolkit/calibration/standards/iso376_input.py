@@ -38,8 +38,8 @@ class Iso376Run:
 def rotated(runs: Sequence[Iso376Run]) -> tuple[Iso376Run, ...]:
     """Return the first run of each mounting, in the order of the runs (X1, X3, X5 of the standard)."""
     first: dict[float, Iso376Run] = {}
-    for one in runs:
-        first.setdefault(one.rotation_deg % 360, one)
+    for run in runs:
+        first.setdefault(run.rotation_deg % 360, run)
     return tuple(first.values())
 
 
@@ -76,19 +76,19 @@ def check(
         raise _refused("the forces do not increase", forces.tolist(), "from above zero", "sort the rows")
     if not runs:
         raise _refused("there is no run", "no runs", "runs of increasing forces", "give the runs")
-    for number, one in enumerate(runs, start=1):
-        for values in (one.up, one.down):
+    for number, run in enumerate(runs, start=1):
+        for values in (run.up, run.down):
             if values is not None and (len(values) != n or not np.isfinite(values).all()):
                 raise _refused(
                     f"run {number} does not match the forces", f"{len(values)} values",
                     f"{n} finite values", "check the run",
                 )  # fmt: skip
         if not (
-            np.isfinite([zero for zero in (one.zero_before, one.zero_after) if zero is not None]).all()
-            and np.all(np.multiply(one.up, one.up[-1]) > 0)
+            np.isfinite([zero for zero in (run.zero_before, run.zero_after) if zero is not None]).all()
+            and np.all(np.multiply(run.up, run.up[-1]) > 0)
         ):
             raise _refused(
-                f"run {number} has a deflection or zero that is none", one.up,
+                f"run {number} has a deflection or zero that is none", run.up,
                 "deflections of one sign, finite zeros", "take the zero off and check the run",
             )  # fmt: skip
     uncertainty = np.asarray(0.0 if force_uncertainty is None else force_uncertainty, dtype=np.float64)

@@ -124,7 +124,7 @@ def typical_indications(record: CalibrationRecord, loads: Table, load: str, at: 
 
     The plane is indications on loads; it only sets the point at which sensitivities are taken.
     """
-    names = [one.load for one in record.loads]
+    names = [load.load for load in record.loads]
     design = np.column_stack([loads.matrix(names), np.ones(loads.rows)])
     scale = np.maximum(np.abs(design).max(axis=0), 1e-300)
     plane = np.linalg.lstsq(design / scale, loads.matrix(record.indications), rcond=None)[0]

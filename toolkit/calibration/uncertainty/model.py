@@ -71,7 +71,7 @@ class Budget:
     @property
     def not_stated(self) -> tuple[str, ...]:
         """Names of the components that nothing was stated or measured for."""
-        return tuple(one.name for one in self.components if not one.stated)
+        return tuple(component.name for component in self.components if not component.stated)
 
     @property
     def estimate(self) -> Estimate:
@@ -80,7 +80,7 @@ class Budget:
 
     def component(self, name: str) -> Component:
         """Return one component."""
-        return next(one for one in self.components if one.name == name)
+        return next(component for component in self.components if component.name == name)
 
     def share(self, component: Component) -> float:
         """Return a component's share of the combined variance, 0 to 1."""

@@ -49,7 +49,7 @@ def record_covariance(record: CalibrationRecord) -> dict[str, NDArray[np.float64
     A legacy record, which has no covariance, gives none; a session that states nothing gives the fit's own.
     """
     statements = statements_of(record)
-    return {one.load: _covariance(record, one, statements) for one in record.loads if one.covariance}
+    return {load.load: _covariance(record, load, statements) for load in record.loads if load.covariance}
 
 
 def scale_u(record: CalibrationRecord, one: LoadFit, statements: Statements) -> float:

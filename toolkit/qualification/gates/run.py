@@ -27,8 +27,8 @@ def check_gates(folder: Path) -> list[Check]:
         with tempfile.TemporaryDirectory(prefix="toolkit-qualify-") as place:
             stock = Bench(Path(place) / "stock").fill()
             return [
-                one.check(stock.copy(Path(place) / str(number)))
-                for number, one in enumerate(demonstrations(folder))
+                demonstration.check(stock.copy(Path(place) / str(number)))
+                for number, demonstration in enumerate(demonstrations(folder))
             ]
     except FAULTS as error:
         # Without a folder or a record in force nothing can be shown.
