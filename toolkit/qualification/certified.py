@@ -30,13 +30,13 @@ _NAMED_POWERS = 9
 
 def check_certified(folder: Path) -> list[Check]:
     """Solve every certified set; one check a quantity."""
-    found: list[Check] = []
+    checks: list[Check] = []
     for name in SETS:
         try:
-            found += _checks(read_set(name, folder))
+            checks += _checks(read_set(name, folder))
         except (ToolkitError, np.linalg.LinAlgError, ValueError, KeyError) as error:
-            found.append(not_run(GROUP, name, str(error)))
-    return found
+            checks.append(not_run(GROUP, name, str(error)))
+    return checks
 
 
 def solve(one: CertifiedSet) -> tuple[tuple[float, ...], tuple[float, ...], float]:

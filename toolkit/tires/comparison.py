@@ -141,10 +141,10 @@ def _rows(
     not_determined: tuple[str, ...],
 ) -> list[ComparisonRow]:
     pure = np.abs(data.rows.KAPPA) <= _FREE
-    made = []
+    rows = []
     for condition, own in (("pure", known & pure), ("combined", known & ~pure)):
         if own.any():
-            made.append(
+            rows.append(
                 ComparisonRow(
                     model=name,
                     channel=channel,
@@ -157,7 +157,7 @@ def _rows(
                     not_determined=not_determined,
                 )
             )
-    return made
+    return rows
 
 
 def model_curve(

@@ -234,7 +234,7 @@ def _result(
     curve: Curve,
     i: int,
     solution: Solution,
-    found: Spread,
+    spread: Spread,
     scale: _Scale,
     residual: Array,
     time: float,
@@ -242,17 +242,17 @@ def _result(
 ) -> CurveFit:
     middle, half, top = (float(one[i]) for one in (scale.middle, scale.half, scale.top))
     factor = np.array([1 / half, 1.0, top, 1.0, half, top])
-    values = found.theta[i] * factor
+    values = spread.theta[i] * factor
     values[4] -= middle
-    covariance = found.covariance[i] * np.outer(factor, factor)
-    errors = found.error[i] * np.abs(factor)
-    ends = found.ends[i] * factor[:, None]
+    covariance = spread.covariance[i] * np.outer(factor, factor)
+    errors = spread.error[i] * np.abs(factor)
+    ends = spread.ends[i] * factor[:, None]
     ends[4] -= middle
     names = [spec.name for spec in MODEL.parameters]
-    determined, bound = found.determined[i], found.at_bound[i]
+    determined, bound = spread.determined[i], spread.at_bound[i]
     unit = CHANNEL_UNIT[curve.channel]
 
-    dof = [float(one) for one in found.dof[i]]
+    dof = [float(one) for one in spread.dof[i]]
 
     def estimate(value: float, u: float, factor: float, unit: str, dof: float) -> Estimate | None:
         if not np.isfinite(u):
@@ -287,8 +287,8 @@ def _result(
         at_bound=at_bound,
         error_percent=error_percent(residual * top, curve.y),
         scatter_floor_percent=scatter_floor_percent(curve.SA, curve.y),
-        slope_at_zero=estimate(found.slope[i], found.slope_se[i], top / half, f"{unit}/rad", dof[6]),
-        value_at_zero=estimate(found.value[i], found.value_se[i], top, unit, dof[7]),
+        slope_at_zero=estimate(spread.slope[i], spread.slope_se[i], top / half, f"{unit}/rad", dof[6]),
+        value_at_zero=estimate(spread.value[i], spread.value_se[i], top, unit, dof[7]),
         loss=loss,
         converged=converged,
         message=_message(curve, values, converged, not_determined, at_bound, time),

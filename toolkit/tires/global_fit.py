@@ -65,18 +65,18 @@ def fit_global(
 
 def global_findings(fit: ModelFit) -> list[Finding]:
     """Return a finding for each channel whose minimum is not confirmed, a note for what data do not say."""
-    found = []
+    findings = []
     for one in fit.fits:
         where = f"{one.model} {one.channel} over all loads"
         if not one.converged:
-            found.append(Finding(rule="not-converged", where=where, message=one.message))
+            findings.append(Finding(rule="not-converged", where=where, message=one.message))
         if one.converged and (open_ := undetermined(one)):
             text = f"not determined by these data: {', '.join(open_)}"
-            found.append(Finding(rule="not-determined", where=where, message=text, level="note"))
+            findings.append(Finding(rule="not-determined", where=where, message=text, level="note"))
         if one.at_bound:
             text = f"{', '.join(one.at_bound)}: the search ended at the bound"
-            found.append(Finding(rule="at-bound", where=where, message=text, level="note"))
-    return found
+            findings.append(Finding(rule="at-bound", where=where, message=text, level="note"))
+    return findings
 
 
 def undetermined(fit: GlobalFit) -> tuple[str, ...]:
@@ -127,7 +127,7 @@ class _Fitter:
         return [(name,) for name in have]
 
     def result(self, *, predict: bool) -> ModelFit:
-        found: dict[tuple[str, ...], Found] = {}
+        founds: dict[tuple[str, ...], Found] = {}
         for channels in self.stages():
             free, fixed = self._free(channels)
             stage = self._run(channels, free, self.data)
@@ -136,13 +136,13 @@ class _Fitter:
                 stage = self._run(channels, free, self.data, (stage.values,))
             stage = replace(stage, fixed=(*fixed, *stage.fixed))
             self.values = stage.values
-            found[channels] = stage
+            founds[channels] = stage
         curves = self._curves(self.values, self.data)
         report = Report(
             model=self.model, given=self.given, data=self.data, values=self.values, curves=curves,
-            predicted=self._predict(found) if predict else {}, loss=self.loss, weights=self.weights,
+            predicted=self._predict(founds) if predict else {}, loss=self.loss, weights=self.weights,
         )  # fmt: skip
-        fits = [report.fit(name, channels, stage) for channels, stage in found.items() for name in channels]
+        fits = [report.fit(name, channels, stage) for channels, stage in founds.items() for name in channels]
         return ModelFit(
             model=self.model.name, values=self.values, fits=tuple(fits), curves=tuple(curves.items())
         )
@@ -215,19 +215,19 @@ class _Fitter:
             made = self.model.forces(values, rows)
         return {name: made[name] for name in self.model.channels if getattr(made, name) is not None}
 
-    def _predict(self, found: dict[tuple[str, ...], Found]) -> dict[str, Array]:
+    def _predict(self, founds: dict[tuple[str, ...], Found]) -> dict[str, Array]:
         # Every block predicted by a fit that never saw it, from where the whole fit ended.
         blocks = np.unique(self.data.block)
         if len(blocks) < _PREDICT_FROM:
             return {}
-        predicted = {name: np.zeros(len(self.data)) for channels in found for name in channels}
+        predicted = {name: np.zeros(len(self.data)) for channels in founds for name in channels}
         kept_values, kept_starts, kept_sigma = self.values.copy(), self.starts, dict(self.sigma)
         for block in blocks:
             own = self.data.block == block
             rest = self.data.take(~own)
             self.values = kept_values.copy()
             self.sigma = {name: one[~own] for name, one in kept_sigma.items()}
-            for channels, stage in found.items():
+            for channels, stage in founds.items():
                 self.starts = self.values[None]
                 self.values = self._refit(channels, stage.left, rest)
             curves = self._curves(self.values, self.data.take(own))

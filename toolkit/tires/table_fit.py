@@ -184,15 +184,15 @@ def _no_load(curve: Curve) -> FitError | None:
 
 def fit_findings(fits: list[CurveFit]) -> list[Finding]:
     """Return a finding for every fit whose minimum is not confirmed, and a note for every limitation."""
-    found = []
+    findings = []
     for fit in fits:
         load = "all loads" if fit.load_N is None else in_both(fit.load_N, "N", ".0f")
         where = f"{fit.model} {fit.channel} at {load}"
         if not fit.converged:
-            found.append(Finding(rule="not-converged", where=where, message=fit.message))
+            findings.append(Finding(rule="not-converged", where=where, message=fit.message))
         elif fit.not_determined:
-            found.append(Finding(rule="not-determined", where=where, message=fit.message, level="note"))
-    return found
+            findings.append(Finding(rule="not-determined", where=where, message=fit.message, level="note"))
+    return findings
 
 
 def row_findings(table: TireTable) -> tuple[Finding, ...]:
@@ -240,7 +240,7 @@ def repeat_findings(table: TireTable) -> list[Finding]:
 
 def axes_findings(table: TireTable, fits: Sequence[CurveFit]) -> list[Finding]:
     """Return a finding for a channel whose slopes at small angles contradict the axes of the table."""
-    found = []
+    findings = []
     for channel in ("FY", "MZ"):
         votes = []
         for fit in fits:
@@ -252,7 +252,7 @@ def axes_findings(table: TireTable, fits: Sequence[CurveFit]) -> list[Finding]:
         against = votes.count(-expected)
         if against and 2 * against > len(votes):
             word = "rises" if expected < 0 else "falls"
-            found.append(
+            findings.append(
                 Finding(
                     rule="axes-contradiction",
                     where=f"{table.path.name}, {channel}",
@@ -260,7 +260,7 @@ def axes_findings(table: TireTable, fits: Sequence[CurveFit]) -> list[Finding]:
                     f"blocks: that contradicts the declared axes {table.axes}; nothing was flipped",
                 )
             )
-    return found
+    return findings
 
 
 def _turn(source: Axes | str, target: Axes, channel: str) -> int:

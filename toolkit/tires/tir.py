@@ -222,9 +222,9 @@ def parse_tir(text: str, *, where: str = "") -> TirFile:
             lines.append(TirLine(section=section, text=line.rstrip()))
     if not section:
         raise _no_tir(where, "no [SECTION]")
-    found = TirFile(lines=tuple(lines), where=where)
-    _refuse_contradictions(found)
-    return found
+    tir_file = TirFile(lines=tuple(lines), where=where)
+    _refuse_contradictions(tir_file)
+    return tir_file
 
 
 def _no_tir(where: object, got: str) -> UnreadableError:

@@ -102,8 +102,8 @@ def tire_fit(model: GlobalModel, fit: ModelFit, data: Measured, *, side: str = "
     )
 
 
-def _of_slip(one: GlobalParameter) -> bool:
-    return bool({"kappa", "both_kappas", "alpha_and_kappa"} & set(one.needs))
+def _of_slip(parameter: GlobalParameter) -> bool:
+    return bool({"kappa", "both_kappas", "alpha_and_kappa"} & set(parameter.needs))
 
 
 def _range(values: np.ndarray) -> tuple[float, float]:

@@ -219,21 +219,21 @@ def as_found(registry: Registry, record: CalibrationRecord) -> AsFound:
     )
 
 
-def as_found_findings(found: AsFound) -> tuple[Finding, ...]:
+def as_found_findings(as_found: AsFound) -> tuple[Finding, ...]:
     """Return a finding for each load that was out of tolerance, or a note where nothing was compared."""
-    if found.reason is not None:
-        message = f"the as-found session could not be judged: {found.reason}"
-        level = "note" if found.record is None else "warning"
-        return (Finding(rule="as-found", where=found.session_record, message=message, level=level),)  # type: ignore[arg-type]
+    if as_found.reason is not None:
+        message = f"the as-found session could not be judged: {as_found.reason}"
+        level = "note" if as_found.record is None else "warning"
+        return (Finding(rule="as-found", where=as_found.session_record, message=message, level=level),)  # type: ignore[arg-type]
     return tuple(
         Finding(
             rule="as-found",
             where=load.load,
-            message=f"as found, {found.record} is off by {load.max_error:+.4g} {load.unit} in row "
+            message=f"as found, {as_found.record} is off by {load.max_error:+.4g} {load.unit} in row "
             f"{load.worst_row} ({load.max_percent_fs:.3g} % of full scale), tolerance {load.tolerance:.4g} "
             f"{load.unit}",
         )
-        for load in found.loads
+        for load in as_found.loads
         if not load.within
     )
 
@@ -258,8 +258,8 @@ def as_found_before(registry: Registry, as_left: CalibrationRecord) -> AsFound |
     entered = list(registry.ledger(as_left.instrument).entered())
     at = (as_left.date, entered.index(as_left.id) if as_left.id in entered else len(entered))
 
-    def place(one: CalibrationRecord) -> tuple[str, int]:
-        return one.date, entered.index(one.id)
+    def place(record: CalibrationRecord) -> tuple[str, int]:
+        return record.date, entered.index(record.id)
 
     found = [o for o in _of_phase(registry, as_left.instrument, "as_found") if place(o) < at]
     left = [o for o in _of_phase(registry, as_left.instrument, "as_left") if place(o) < at]

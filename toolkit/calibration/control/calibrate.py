@@ -83,14 +83,14 @@ def rehearse(
 
 def control_findings(registry: Registry, record: CalibrationRecord) -> tuple[Finding, ...]:
     """Return the findings of a session's record against the sessions and records before it."""
-    found: tuple[Finding, ...] = ()
+    findings: tuple[Finding, ...] = ()
     if phase_of(record) == "as_found":
-        found += _judged("as-found", record, lambda: as_found_findings(as_found(registry, record)))
+        findings += _judged("as-found", record, lambda: as_found_findings(as_found(registry, record)))
     if record.data_file("check") is not None and len(registry.ids(record.instrument)) > 1:
-        found += _judged(
+        findings += _judged(
             "chart", record, lambda: chart_findings(control_chart(registry, record.instrument), record.id)
         )
-    return found
+    return findings
 
 
 def _judged(

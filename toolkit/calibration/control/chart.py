@@ -144,13 +144,13 @@ def control_chart(
 
 def chart_findings(chart: Chart, session_record: str) -> tuple[Finding, ...]:
     """Return a finding for each rule that the points of one session break."""
-    found = []
+    findings = []
     for one in chart.series:
         for broken in one.breaks:
             point = one.points[broken.index]
             if point.session_record != session_record or one.limits is None:
                 continue
-            found.append(
+            findings.append(
                 Finding(
                     rule="chart",
                     where=f"{one.load} at {one.check_load}",
@@ -160,7 +160,7 @@ def chart_findings(chart: Chart, session_record: str) -> tuple[Finding, ...]:
                     f"of {one.limits.points} sessions",
                 )
             )
-    return tuple(found)
+    return tuple(findings)
 
 
 def _sessions(registry: Registry, instrument: str) -> tuple[list[_Session], list[tuple[str, str]]]:

@@ -286,13 +286,13 @@ def _left_over(design: NDArray[np.float64], loads: NDArray[np.float64]) -> list[
     return [_Sum(squares=float(one @ one), rows=n, dof=n - p) for one in below.T]
 
 
-def _root(one: LoadResult, rows: int) -> NDArray[np.float64]:
-    return np.ones(rows) if one.fit.weights is None else np.sqrt(one.fit.weights)
+def _root(load: LoadResult, rows: int) -> NDArray[np.float64]:
+    return np.ones(rows) if load.fit.weights is None else np.sqrt(load.fit.weights)
 
 
-def _exact(one: LoadResult) -> bool:
+def _exact(load: LoadResult) -> bool:
     # The tolerance is 0.1 % of full scale unless stated: scatter this small is rounding of the arithmetic.
-    return one.fit.residual_sd <= 1e-9 * one.setting.tolerance
+    return load.fit.residual_sd <= 1e-9 * load.setting.tolerance
 
 
 def _determined(

@@ -186,11 +186,13 @@ def _diagnosed(
     up: NDArray[np.bool_] | None,
     groups: NDArray[np.intp],
 ) -> Diagnostics:
-    found = diagnose(fit, cells=cells, load=load, up=up, replicates=groups)
+    diagnostics = diagnose(fit, cells=cells, load=load, up=up, replicates=groups)
     if not of_runs.any():
-        return found
+        return diagnostics
     within = diagnose(within_runs(fit, of_runs), cells=cells, load=load, up=up, replicates=groups)
-    return dataclasses.replace(found, outliers=within.outliers, heteroscedasticity=within.heteroscedasticity)
+    return dataclasses.replace(
+        diagnostics, outliers=within.outliers, heteroscedasticity=within.heteroscedasticity
+    )
 
 
 def load_uncertainty(session: Session, setting: LoadSetting) -> NDArray[np.float64] | None:

@@ -129,7 +129,7 @@ def _negligible(
 
 def layout(new: CalibrationRecord, old: CalibrationRecord) -> tuple[GateResult, ...]:
     """Return what changed in units, loads and indications: no fault by itself, and always told."""
-    told: list[GateResult] = []
+    gate_results: list[GateResult] = []
     kinds = (
         ("load", {o.load: (o.unit, None) for o in new.loads}, {o.load: (o.unit, None) for o in old.loads}),
         (
@@ -142,7 +142,9 @@ def layout(new: CalibrationRecord, old: CalibrationRecord) -> tuple[GateResult, 
         for name, units in now.items():
             if name not in before:
                 message = f"the {kind} is new: {old.id} does not have it"
-                told.append(GateResult(rule="layout-changed", where=name, message=message, effect="tells"))
+                gate_results.append(
+                    GateResult(rule="layout-changed", where=name, message=message, effect="tells")
+                )
                 continue
             unit_now, unit_before = (one[1] or one[0] for one in (units, before[name]))
             if same_unit(unit_now, unit_before) and same_unit(units[0], before[name][0]):
@@ -150,12 +152,14 @@ def layout(new: CalibrationRecord, old: CalibrationRecord) -> tuple[GateResult, 
             message = f"the unit changed: {unit_now}, in {old.id} {unit_before}"
             if not same_dimension(units[0], before[name][0]):
                 message += "; they measure different kinds of quantity, so that the span cannot be compared"
-            told.append(GateResult(rule="unit-changed", where=name, message=message, effect="tells"))
+            gate_results.append(GateResult(rule="unit-changed", where=name, message=message, effect="tells"))
         for name in before:
             if name not in now:
                 message = f"the {kind} of {old.id} is missing"
-                told.append(GateResult(rule="layout-changed", where=name, message=message, effect="tells"))
-    return tuple(told)
+                gate_results.append(
+                    GateResult(rule="layout-changed", where=name, message=message, effect="tells")
+                )
+    return tuple(gate_results)
 
 
 def check_loads(record: CalibrationRecord, check: Table) -> tuple[GateResult, ...]:

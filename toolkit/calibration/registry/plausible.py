@@ -165,20 +165,20 @@ def tare_claim(
     return tuple(failed)
 
 
-def _intercept(record: CalibrationRecord, one: LoadFit, loads: Table) -> list[GateResult]:
-    if INTERCEPT not in one.terms or not one.covariance:
+def _intercept(record: CalibrationRecord, load: LoadFit, loads: Table) -> list[GateResult]:
+    if INTERCEPT not in load.terms or not load.covariance:
         return []
-    at = one.terms.index(INTERCEPT)
-    scatter = scatter_of(record, loads, one)
-    value, u = one.coefficients[at], math.hypot(one.standard_errors[at], scatter.reversal, scatter.misfit)
-    if abs(value) <= max(AT_ZERO * _limit(one), _SIGMAS * u):
+    at = load.terms.index(INTERCEPT)
+    scatter = scatter_of(record, loads, load)
+    value, u = load.coefficients[at], math.hypot(load.standard_errors[at], scatter.reversal, scatter.misfit)
+    if abs(value) <= max(AT_ZERO * _limit(load), _SIGMAS * u):
         return []
     message = (
-        f'zero = "tared" does not hold: the intercept is {value:+.4g} {one.unit}, its standard uncertainty '
-        f"{u:.2g} {one.unit}; a tared test would read it as a load. Tare before each run, or say "
+        f'zero = "tared" does not hold: the intercept is {value:+.4g} {load.unit}, its standard uncertainty '
+        f"{u:.2g} {load.unit}; a tared test would read it as a load. Tare before each run, or say "
         'zero = "included" or zero = "run"'
     )
-    return [GateResult(rule="tared", where=f"{one.load}, {INTERCEPT}", message=message)]
+    return [GateResult(rule="tared", where=f"{load.load}, {INTERCEPT}", message=message)]
 
 
 def _zero_rows(record: CalibrationRecord, table: Table, noise: Sequence[float]) -> NDArray[np.bool_]:
@@ -189,9 +189,9 @@ def _zero_rows(record: CalibrationRecord, table: Table, noise: Sequence[float]) 
     return at
 
 
-def _limit(one: LoadFit) -> float:
+def _limit(load: LoadFit) -> float:
     """Return the check loads' tolerance in the load's own unit."""
-    return tolerance(one) / unit(one.unit).factor
+    return tolerance(load) / unit(load.unit).factor
 
 
 def _offsets(
@@ -230,8 +230,8 @@ def _offsets(
     return failed
 
 
-def _scatter(one: LoadFit, table: Table, indications: Sequence[str]) -> float:
+def _scatter(load: LoadFit, table: Table, indications: Sequence[str]) -> float:
     """Return the rows' scatter about the equation in the load's unit, robust against rows that are off."""
-    fitted = term_matrix(one.terms, table.columns(indications)) @ np.asarray(one.coefficients)
-    residuals = table.column(one.load) - fitted
+    fitted = term_matrix(load.terms, table.columns(indications)) @ np.asarray(load.coefficients)
+    residuals = table.column(load.load) - fitted
     return _MAD * float(np.median(np.abs(residuals - np.median(residuals))))

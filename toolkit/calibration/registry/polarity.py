@@ -138,10 +138,10 @@ def unconfirmed(
     return (GateResult(rule="polarity-reading", where=record.instrument, message=message, effect="asks"),)
 
 
-def _predicted(record: CalibrationRecord, one: PolarityReading, turned: str = "") -> float:
-    zero = dict(one.zero)
+def _predicted(record: CalibrationRecord, reading: PolarityReading, turned: str = "") -> float:
+    zero = dict(reading.zero)
     values = {}
-    for name, value in one.indications:
+    for name, value in reading.indications:
         rest = zero.get(name, 0.0)
         values[name] = np.array([2 * rest - value if name == turned else value])
     found = apply_record(
@@ -149,13 +149,13 @@ def _predicted(record: CalibrationRecord, one: PolarityReading, turned: str = ""
         values,
         units=dict(zip(record.indications, record.indication_units, strict=True)),
         tare={name: zero.get(name, 0.0) for name in record.indications} if zero else None,
-        only=(one.load,),
+        only=(reading.load,),
     )
-    return float(found[one.load][0]) / si_scale(one.unit)
+    return float(found[reading.load][0]) / si_scale(reading.unit)
 
 
-def _in_rows(one: PolarityReading, table: Table) -> bool:
-    names, values = zip(*one.indications, (one.load, one.value), strict=True)
+def _in_rows(reading: PolarityReading, table: Table) -> bool:
+    names, values = zip(*reading.indications, (reading.load, reading.value), strict=True)
     rows = table.matrix(names)
     scale = np.abs(rows).max(axis=0)
     return bool((np.abs(rows - np.array(values)) <= _EQUAL * scale).all(axis=1).any())

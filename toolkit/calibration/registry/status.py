@@ -152,8 +152,8 @@ def parse_interval(text: str) -> Interval:
         ``recall``: not a whole number of days, weeks, months or years, or more than 50 years
     """
     match = _TEXT.match(text)
-    found = None if match is None else Interval(count=int(match["count"]), unit=match["unit"].lower())
-    if found is None or found.count > _MOST[found.unit]:
+    interval = None if match is None else Interval(count=int(match["count"]), unit=match["unit"].lower())
+    if interval is None or interval.count > _MOST[interval.unit]:
         raise RegistryError(
             "the recall interval cannot be used",
             where="--recall",
@@ -162,4 +162,4 @@ def parse_interval(text: str) -> Interval:
             next_step="nothing was changed; write the interval again",
             rule="recall",
         )
-    return found
+    return interval

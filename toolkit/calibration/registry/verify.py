@@ -80,7 +80,7 @@ def _instrument(folder: Path, ledger: Ledger) -> list[VerifyRow]:
     on_disk = {path.stem for path in folder.glob("*.json") if path.name != HEAD and ID.match(path.stem)}
     owned = {HEAD, LEDGER}
     records = {record_id for record_id in {*on_disk, *entered} if ID.match(record_id)}
-    ids = sorted(records, key=lambda one: (len(one), one))
+    ids = sorted(records, key=lambda record: (len(record), record))
     for row, files in _judged(folder, ids, ledger):
         rows.append(row)
         owned |= {f"{row.id}.json", *files}

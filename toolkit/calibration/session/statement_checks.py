@@ -76,11 +76,11 @@ def check_columns(table: Table, loads: tuple[str, ...], where: object) -> None:
             )  # fmt: skip
 
 
-def _other_unit(where: str, found: Unit, dimension: str, allowed: str) -> UnitError:
+def _other_unit(where: str, unit: Unit, dimension: str, allowed: str) -> UnitError:
     return UnitError(
-        f"unit {found.text!r} is no unit of {dimension}",
+        f"unit {unit.text!r} is no unit of {dimension}",
         where=where,
-        got=f"{found.text} ({found.dimension})",
+        got=f"{unit.text} ({unit.dimension})",
         expected=f"a unit of {dimension}, such as {allowed}",
         next_step="correct the unit; nothing was written",
         rule="unit-dimension",

@@ -108,7 +108,7 @@ def cell_rows(source: CellSource, load: str, indication: str) -> tuple[CellRows,
     before, after = _stated_zeros(source, indication)
     creep = _creep(source, load, indication)
     run = np.zeros(table.rows) if table.run is None else table.run
-    found = []
+    cells = []
     for sense, sign in (("positive", 1.0), ("negative", -1.0)):
         mine = acting & alone & (np.sign(force) == sign)
         runs = []
@@ -120,7 +120,7 @@ def cell_rows(source: CellSource, load: str, indication: str) -> tuple[CellRows,
             last = float(reading[late[0]]) if late.size else after
             runs.append(_run(table, load, rows, reading, int(number), first, last))
         if runs:
-            found.append(
+            cells.append(
                 CellRows(
                     load=load,
                     load_unit=table.unit(load),
@@ -134,7 +134,7 @@ def cell_rows(source: CellSource, load: str, indication: str) -> tuple[CellRows,
                     left_out=int((acting & ~alone).sum()),
                 )
             )
-    return tuple(found)
+    return tuple(cells)
 
 
 def _run(

@@ -135,17 +135,17 @@ def evaluate_source(
         ``standard``: no such load or indication, or no row in which the load acts alone
     """
     preloads = source.statements.preloads if preloads is None else preloads
-    found: list[Evaluation] = []
+    evaluations: list[Evaluation] = []
     for rows in cell_rows(source, load, indication):
         if standard == "iso376":
-            found.append(_iso376(source, rows, preloads, degree))
+            evaluations.append(_iso376(source, rows, preloads, degree))
         else:
-            found += [
+            evaluations += [
                 _e74(rows, direction, degree)
                 for direction in ("up", "down")
                 if any((run.up == (direction == "up")).any() for run in rows.runs)
             ]
-    return tuple(found)
+    return tuple(evaluations)
 
 
 def _e74(rows: CellRows, direction: str, degree: int | None) -> Evaluation:

@@ -285,7 +285,7 @@ def _rank(name: str | None) -> int:
 
 
 def _ranges(rows: Sequence[Iso376Force]) -> tuple[Iso376Range, ...]:
-    found = []
+    ranges = []
     upper = rows[-1].force
     for rank, limits in enumerate(LIMITS):
         lower = None
@@ -294,8 +294,8 @@ def _ranges(rows: Sequence[Iso376Force]) -> tuple[Iso376Range, ...]:
                 break
             lower = row.force
         if lower is not None and lower <= upper / 2:
-            found.append(Iso376Range(class_name=limits.name, lower=lower, upper=upper))
-    return tuple(found)
+            ranges.append(Iso376Range(class_name=limits.name, lower=lower, upper=upper))
+    return tuple(ranges)
 
 
 def _procedure(

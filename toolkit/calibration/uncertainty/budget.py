@@ -147,20 +147,20 @@ def _budget(
     record: CalibrationRecord,
     loads: Table,
     check: Table | None,
-    one: LoadFit,
+    load: LoadFit,
     value: float,
     point: NDArray[np.float64],
     temperature: Temperature | None,
     probability: float,
 ) -> Budget:
     parts, scatter_dof = components_of(
-        record, statements_of(record), loads, check, one, value=value, point=point, temperature=temperature
+        record, statements_of(record), loads, check, load, value=value, point=point, temperature=temperature
     )
     joint = math.sqrt(math.fsum(part.u**2 for part in parts if part.joint))
     apart = [(part.u, part.dof) for part in parts if not part.joint]
     u, dof, k, U = combine([(joint, scatter_dof), *apart], probability)
     return Budget(
-        record=record.id, load=one.load, unit=one.unit, at=value, indications=tuple(point.tolist()),
+        record=record.id, load=load.load, unit=load.unit, at=value, indications=tuple(point.tolist()),
         components=parts, u=u, dof=dof, k=k, U=U, probability=probability,
         scatter_dof=scatter_dof,
     )  # fmt: skip

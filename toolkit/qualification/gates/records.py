@@ -99,20 +99,22 @@ def _first_load(change: Callable[[LoadFit], LoadFit]) -> Change:
     return alter
 
 
-def _negated(one: LoadFit) -> LoadFit:
-    coefficients = (-one.coefficients[0], *one.coefficients[1:])
-    return dataclasses.replace(one, coefficients=coefficients, polarity=polarity(coefficients))
+def _negated(load: LoadFit) -> LoadFit:
+    coefficients = (-load.coefficients[0], *load.coefficients[1:])
+    return dataclasses.replace(load, coefficients=coefficients, polarity=polarity(coefficients))
 
 
-def _smaller(one: LoadFit) -> LoadFit:
-    covariance = tuple(tuple(value / 4 for value in row) for row in one.covariance)
-    return dataclasses.replace(one, covariance=covariance)
+def _smaller(load: LoadFit) -> LoadFit:
+    covariance = tuple(tuple(value / 4 for value in row) for row in load.covariance)
+    return dataclasses.replace(load, covariance=covariance)
 
 
-def _less_scatter(one: LoadFit) -> LoadFit:
-    if one.scatter is None:
+def _less_scatter(load: LoadFit) -> LoadFit:
+    if load.scatter is None:
         raise ValueError("the record has no scatter components")
-    return dataclasses.replace(one, scatter=dataclasses.replace(one.scatter, within=one.scatter.within / 2))
+    return dataclasses.replace(
+        load, scatter=dataclasses.replace(load.scatter, within=load.scatter.within / 2)
+    )
 
 
 def _shifted_golden(record: CalibrationRecord) -> CalibrationRecord:
