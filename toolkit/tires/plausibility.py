@@ -110,5 +110,7 @@ def size_findings(fits: Sequence[CurveFit], where: str) -> tuple[Finding, ...]:
 
 
 def _range(values: Sequence[float]) -> str:
-    low, high = (f"{one:.0f}" if one >= 100 else f"{one:.3g}" for one in (min(values), max(values)))
+    low, high = (
+        f"{extreme:.0f}" if extreme >= 100 else f"{extreme:.3g}" for extreme in (min(values), max(values))
+    )
     return low if low == high else f"{low} to {high}"
