@@ -76,7 +76,8 @@ def calibration_budget(
     if not low <= value <= high:
         raise _refused(
             f"{record.id}, {load}", "the load lies outside the calibrated range",
-            f"{value:.6g} {fitted.unit}", f"{low:.6g} to {high:.6g} {fitted.unit}", "ask within the range, or calibrate over a larger one",
+            f"{value:.6g} {fitted.unit}", f"{low:.6g} to {high:.6g} {fitted.unit}",
+            "ask within the range, or calibrate over a larger one",
         )  # fmt: skip
     point = typical_indications(record, loads, load, value)
     return _budget(record, loads, check, fitted, value, point, temperature, probability)
