@@ -204,7 +204,7 @@ def test_a_model_file_says_what_it_rests_on(tmp_path, drag):
     assert [len(one) for _, one in model.recordings] == [64, 64]
     (effect,) = model.effects
     applied, told = effect.applied, drag.effects[0].parameters[0]
-    assert (applied.values, applied.units) == ({"drag": told.value}, {"drag": told.unit})
+    assert (applied.values, applied.units) == ({"drag": told.value}, {"drag": told.unit})  # noqa: PD011
     assert applied.key == drag.effects[0].key
     # a 95 % interval of some 160 rows reaches 1.97 to 1.98 standard errors
     assert (told.ci95[1] - told.value) / effect.standard_errors["drag"] == pytest.approx(1.975, abs=0.01)
@@ -246,7 +246,7 @@ def test_a_sign_is_that_of_the_axes_in_which_the_model_is_used(tmp_path):
     _, path = written(python_tire(tmp_path / "iso", "ISO-W", offset=0.3), tmp_path / "iso" / "answer")
     model = read_model(path)
     (effect,) = model.effects
-    (value,) = effect.applied.values.values()
+    (value,) = effect.applied.values.values()  # noqa: PD011
     angle = value * (1 if effect.applied.effect.name == "steer_offset" else -1)
     assert angle == pytest.approx(0.3, abs=0.005)
     SA = np.array([-2.0, 0.0, 3.0])
@@ -287,7 +287,7 @@ def test_an_effect_of_some_runs_acts_by_their_condition(tmp_path, drag):
         ((_, text),), _ = simulate_model(model, [tmp_path / "in.csv"], None, conditions=given)
         made[key] = pd.read_csv(io.StringIO(text))
     np.testing.assert_array_equal(made["other"]["F"], made["none"]["F"])
-    size = effect.applied.values["drag"]
+    size = effect.applied.values["drag"]  # noqa: PD011
     np.testing.assert_allclose(
         made["steel"]["F"] - made["other"]["F"], size * frame["v"] * frame["v"].abs(), rtol=1e-9, atol=1e-9
     )
@@ -311,7 +311,7 @@ def test_what_is_found_on_top_of_a_model_is_written_with_it(tmp_path, drag):
     (tmp_path / "second.toml").write_text(text)
     made = {one.applied.effect.name: one for one in read_model(tmp_path / "second.toml").effects}
     assert set(made) == {"quadratic_drag", "coulomb_friction"}
-    assert made["coulomb_friction"].applied.values["coulomb"] == pytest.approx(30.0, abs=2.0)
+    assert made["coulomb_friction"].applied.values["coulomb"] == pytest.approx(30.0, abs=2.0)  # noqa: PD011
 
 
 @pytest.mark.parametrize(

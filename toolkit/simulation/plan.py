@@ -242,7 +242,8 @@ def _texts(value: object, where: str) -> list[str]:
     if not isinstance(value, list) or not all(isinstance(one, str) for one in value):
         raise ConfigError(
             "effects are a list of texts", where=where, got=value,
-            expected='["NAME=VALUE"], each as --effect takes it', next_step="write each effect in quotes", rule="wrong-value",
+            expected='["NAME=VALUE"], each as --effect takes it',
+            next_step="write each effect in quotes", rule="wrong-value",
         )  # fmt: skip
     return list(value)
 
