@@ -70,27 +70,27 @@ def through(
     recorded : further channels that may show in the signals
     shown, stored : (name, values) to the unit in which effects act on the signal, and back from it
     """
-    made = dict(signals)
+    changed = dict(signals)
     others = recorded or {}
     for applied in in_order(effects):
         hook, name, source = applied.effect.channel, applied.channel, applied.source
-        if hook is None or name is None or name not in made:
+        if hook is None or name is None or name not in changed:
             continue
         if applied.effect.exchanges:
             other = str(source)
-            made[name], made[other] = (
-                stored(name, shown(other, made[other])),
-                stored(other, shown(name, made[name])),
+            changed[name], changed[other] = (
+                stored(name, shown(other, changed[other])),
+                stored(other, shown(name, changed[name])),
             )
             continue
-        seen = setting
+        local = setting
         if source is not None:
-            leaking = made.get(source, others.get(source))
+            leaking = changed.get(source, others.get(source))
             if leaking is None:
                 continue
-            seen = with_source(setting, shown(source, leaking))
-        made[name] = stored(name, hook(shown(name, made[name]), applied.values, seen))
-    return made
+            local = with_source(setting, shown(source, leaking))
+        changed[name] = stored(name, hook(shown(name, changed[name]), applied.values, local))
+    return changed
 
 
 def with_source(setting: Setting, values: NDArray[np.float64]) -> Setting:
@@ -116,7 +116,7 @@ def undone(
         return recorded
     if facts.inverse is not None:
         return facts.inverse(recorded, applied.values, setting)
-    seen = setting if applied.source is None else with_source(setting, others[applied.source])
+    local = setting if applied.source is None else with_source(setting, others[applied.source])
     # A row that was lost would take those after it along where an effect has a memory.
     present = np.isfinite(recorded)
     if not present.all():
@@ -129,7 +129,7 @@ def undone(
     most: float | None = None
     for _ in range(_STEPS):
         with np.errstate(over="ignore", invalid="ignore"):
-            missed = recorded - hook(guess, applied.values, seen)
+            missed = recorded - hook(guess, applied.values, local)
         error = float(np.abs(missed).max(initial=0.0))
         most = _WILD * max(size, error) if most is None else most
         if not error <= most or not math.isfinite(error):
@@ -188,12 +188,12 @@ def corrected(
     Backwards through the stages: the loads first, then the slip angle, which a corrected moment may turn.
     Each effect's value is in SI.
     """
-    made = dict(channels)
+    changed = dict(channels)
     for stage in reversed(STAGES):
         for applied in in_order(effects, stage):
             way = applied.effect.correctable
             if way is not None:
                 (value,) = applied.values.values()
-                name, values = way.undo(made, channels, value, applied.channel, applied.source)
-                made[name] = values
-    return made
+                name, values = way.undo(changed, channels, value, applied.channel, applied.source)
+                changed[name] = values
+    return changed

@@ -23,10 +23,10 @@ def harmonics(*angles: str) -> ChannelHook:
         angle = setting.channel(*angles)
         if angle is None:
             return y
-        made = y
+        total = y
         for n in (1, 2):
-            made = made + values[f"amplitude_{n}"] * np.cos(n * angle + np.deg2rad(values[f"phase_{n}"]))
-        return made
+            total = total + values[f"amplitude_{n}"] * np.cos(n * angle + np.deg2rad(values[f"phase_{n}"]))
+        return total
 
     return ripple
 

@@ -117,11 +117,11 @@ def _correction(table: Any, where: str) -> Correction:
     if not isinstance(table, dict):
         raise _wrong("a correction is no table", where, table, "[[correction]]")
     check_keys(table, _KEYS, where=where)
-    known = correctable()
-    effect = known.get(str(table.get("effect")))
+    listed = correctable()
+    effect = listed.get(str(table.get("effect")))
     if effect is None:
         raise _wrong(
-            "no reduction corrects this effect", f"{where}.effect", table.get("effect"), ", ".join(known)
+            "no reduction corrects this effect", f"{where}.effect", table.get("effect"), ", ".join(listed)
         )
     texts: dict[str, str] = {}
     for key in ("unit", "reason", "by", "date", "answer_sha256", "case_sha256", "code_version"):

@@ -50,8 +50,8 @@ def correction_findings(machine: Machine) -> list[Finding]:
         Finding(
             rule="machine-corrected",
             where=f"{machine.name}, version {machine.version}",
-            message=one.as_text(),
+            message=correction.as_text(),
             level="note",
         )
-        for one in machine.corrections
+        for correction in machine.corrections
     ]

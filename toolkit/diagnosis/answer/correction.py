@@ -38,12 +38,12 @@ def correction_of(model: ModelFile, effect: str, *, reason: str, by: str, date: 
             "an answer that was cut off corrects nothing", model, "complete = false", "a whole search",
             "diagnose the case again with a larger --budget",
         )  # fmt: skip
-    known, wanted = correctable(), effects().get(effect)
-    if effect not in known:
+    listed, wanted = correctable(), effects().get(effect)
+    if effect not in listed:
         instead = "" if wanted is None else wanted.not_correctable
         raise _wrong(
             "this effect cannot become a correction of the machine", model,
-            f"{effect}: {instead}" if instead else effect, ", ".join(known),
+            f"{effect}: {instead}" if instead else effect, ", ".join(listed),
             "put right what it names, or name an effect of those expected",
         )  # fmt: skip
     for one in model.effects:
@@ -56,7 +56,7 @@ def correction_of(model: ModelFile, effect: str, *, reason: str, by: str, date: 
                 f"{one.label} in {', '.join(sorted(applied.runs or ()))}", "an effect in all runs",
                 "find out what was different in those runs",
             )  # fmt: skip
-        sized, u = _sized(model, one, known[effect])
+        sized, u = _sized(model, one, listed[effect])
         return Correction(
             applied=sized,
             u=u,

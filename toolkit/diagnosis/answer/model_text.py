@@ -125,7 +125,7 @@ def _simulation(case: Case, found: Search, folder: Path) -> list[str]:
 def _carried(case: Case, found: Search, before: FittedEffect, names: Sequence[str]) -> FittedEffect:
     """Return an effect that the simulation had before, with its parameters as they are now."""
     values, errors = dict(before.applied.values), {}
-    at = {one.name: i for i, one in enumerate(found.problem.free)}
+    at = {free.name: i for i, free in enumerate(found.problem.free)}
     for name, parameter in zip(names, before.applied.effect.parameters, strict=True):
         if name in at:
             values[parameter.name] = found.augmented.p[at[name]]

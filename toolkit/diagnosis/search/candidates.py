@@ -43,18 +43,22 @@ class Start:
         coefficients : one for each direction
         off : of every amplitude the value at which the effect is not there, those without one left out
         """
-        made = dict(self.values)
+        values = dict(self.values)
         for name in dict.fromkeys(self.amplitudes):
             if name not in off:
                 continue
-            own = [c for one, c in zip(self.amplitudes, coefficients, strict=True) if one == name]
+            weights = [
+                weight
+                for amplitude, weight in zip(self.amplitudes, coefficients, strict=True)
+                if amplitude == name
+            ]
             size = self.values[name] - off[name]
             if name in self.phases:
-                made[name] = off[name] + math.hypot(*own) * size
-                made[self.phases[name]] = math.degrees(math.atan2(own[1], own[0]))
+                values[name] = off[name] + math.hypot(*weights) * size
+                values[self.phases[name]] = math.degrees(math.atan2(weights[1], weights[0]))
             else:
-                made[name] = off[name] + own[0] * size
-        return made
+                values[name] = off[name] + weights[0] * size
+        return values
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -94,10 +98,10 @@ def candidates(problem: Problem) -> tuple[Candidate, ...]:
         subsets = (None, *_subsets(problem, effect))
         for channel, source in problem.model.places(effect):
             case = CaseView(problem, channel, source)
-            here = effect.in_case(case)
-            starts = _starts(case, here)
+            confined = effect.in_case(case)
+            starts = _starts(case, confined)
             for runs in subsets if starts else ():
-                active = AppliedEffect(effect=here, channel=channel, source=source, runs=runs)
+                active = AppliedEffect(effect=confined, channel=channel, source=source, runs=runs)
                 listed.append(Candidate(active=active, starts=starts))
     return tuple(listed)
 
@@ -105,35 +109,49 @@ def candidates(problem: Problem) -> tuple[Candidate, ...]:
 def _starts(case: Surroundings, effect: Effect) -> tuple[Start, ...]:
     if not effect.parameters:
         return (Start(values={}, directions=({},), amplitudes=()),)
-    parameters = effect.parameters
-    scales = {one.name: 1.0 if one.scale is None else one.scale(case) for one in parameters}
-    extra = {f"_size_{one.name}": scales[one.name] * _middle(one) for one in parameters}
+    scales = {
+        parameter.name: 1.0 if parameter.scale is None else parameter.scale(case)
+        for parameter in effect.parameters
+    }
+    extra = {
+        f"_size_{parameter.name}": scales[parameter.name] * _middle(parameter)
+        for parameter in effect.parameters
+    }
     extra |= {} if effect.numerics is None else dict(effect.numerics(case))
-    phases = {one.phase_of: one.name for one in parameters if one.phase_of is not None}
+    phases = {
+        parameter.phase_of: parameter.name
+        for parameter in effect.parameters
+        if parameter.phase_of is not None
+    }
     still = dict.fromkeys(phases.values(), 0.0)
-    shapes = [one for one in parameters if one.off is None and one.phase_of is None]
-    amplitudes = [one for one in parameters if one.off is not None]
+    shapes = [
+        parameter for parameter in effect.parameters if parameter.off is None and parameter.phase_of is None
+    ]
+    amplitudes = [parameter for parameter in effect.parameters if parameter.off is not None]
+    off = {amplitude.name: float(amplitude.off or 0.0) for amplitude in amplitudes}
     starts = []
-    grids = [_shape_values(case, one, scales[one.name]) for one in shapes]
+    grids = [_shape_values(case, shape, scales[shape.name]) for shape in shapes]
     pasts = ({}, *(dict(past.values) for past in effect.histories))
-    for past, shape in itertools.product(pasts, itertools.product(*grids)):
-        fixed = dict(zip((one.name for one in shapes), shape, strict=True)) | extra | past | still
-        off = {one.name: float(one.off or 0.0) for one in amplitudes}
+    for past, point in itertools.product(pasts, itertools.product(*grids)):
+        fixed = dict(zip((shape.name for shape in shapes), point, strict=True)) | extra | past | still
         if len(amplitudes) == 1 and amplitudes[0].starts:
-            one = amplitudes[0]
-            for value in _amplitudes(case, one, scales[one.name]):
-                values = fixed | {one.name: value}
-                starts.append(Start(values=values, directions=(values,), amplitudes=(one.name,)))
+            (amplitude,) = amplitudes
+            for size in _amplitudes(case, amplitude, scales[amplitude.name]):
+                values = fixed | {amplitude.name: size}
+                starts.append(Start(values=values, directions=(values,), amplitudes=(amplitude.name,)))
             continue
         shares = effect.term.shares if effect.term is not None and case.motion.integrated else (1.0,)
         for share in shares:
-            sizes = {one.name: share * _middle(one) * scales[one.name] for one in amplitudes}
+            sizes = {
+                parameter.name: share * _middle(parameter) * scales[parameter.name]
+                for parameter in amplitudes
+            }
             directions, names = [], []
-            for one in amplitudes:
-                alone = fixed | off | {one.name: sizes[one.name]}
-                for phase in (0.0, 90.0) if one.name in phases else (None,):
-                    directions.append(alone if phase is None else alone | {phases[one.name]: phase})
-                    names.append(one.name)
+            for amplitude in amplitudes:
+                alone = fixed | off | {amplitude.name: sizes[amplitude.name]}
+                for phase in (0.0, 90.0) if amplitude.name in phases else (None,):
+                    directions.append(alone if phase is None else alone | {phases[amplitude.name]: phase})
+                    names.append(amplitude.name)
             starts.append(
                 Start(
                     values=fixed | sizes, directions=tuple(directions), amplitudes=tuple(names), phases=phases
@@ -142,19 +160,19 @@ def _starts(case: Surroundings, effect: Effect) -> tuple[Start, ...]:
     return tuple(starts)
 
 
-def _shape_values(case: Surroundings, one: EffectParameter, scale: float) -> list[float]:
+def _shape_values(case: Surroundings, shape: EffectParameter, scale: float) -> list[float]:
     """Return the values of a shape from which a search starts."""
-    if one.start_values is not None:
-        return list(one.start_values(case))
-    return [value * scale for value in one.starts or (_middle(one),)]
+    if shape.start_values is not None:
+        return list(shape.start_values(case))
+    return [value * scale for value in shape.starts or (_middle(shape),)]
 
 
-def _amplitudes(case: Surroundings, one: EffectParameter, scale: float) -> list[float]:
+def _amplitudes(case: Surroundings, amplitude: EffectParameter, scale: float) -> list[float]:
     """Return where the only amplitude of an effect starts."""
-    if one.start_values is not None:
-        return list(one.start_values(case))
-    starts = one.starts
-    if one.unit == "s":
+    if amplitude.start_values is not None:
+        return list(amplitude.start_values(case))
+    starts = amplitude.starts
+    if amplitude.unit == "s":
         # Of a plant whose rows are far apart, some rows: so far off the response is no straight line.
         far = [rows * case.row_time for rows in _LATE]
         far = [time for time in far if time > max(map(abs, starts))]
@@ -162,15 +180,16 @@ def _amplitudes(case: Surroundings, one: EffectParameter, scale: float) -> list[
     return [value * scale for value in starts]
 
 
-def _middle(one: EffectParameter) -> float:
-    low, high = one.typical
+def _middle(parameter: EffectParameter) -> float:
+    low, high = parameter.typical
     if low * high > 0:
         return math.copysign(math.sqrt(low * high), low)
     return high or low
 
 
 def _subsets(problem: Problem, effect: Effect) -> list[frozenset[str]]:
-    made: list[frozenset[str]] = []
+    """Return the sets of runs to which the conditions may confine an effect."""
+    subsets: list[frozenset[str]] = []
     names = {run.name for run in problem.runs}
     for key in effect.confining(key for run in problem.runs for key in run.conditions):
         levels: dict[str, list[str]] = {}
@@ -180,13 +199,13 @@ def _subsets(problem: Problem, effect: Effect) -> list[frozenset[str]]:
         if len(levels) < 2:
             continue
         ordered = _in_order(list(levels))
-        groups: list[Sequence[str]] = [[one] for one in ordered]
+        groups: list[Sequence[str]] = [[level] for level in ordered]
         groups += [ordered[:k] for k in range(2, len(ordered))]
         for group in groups[:_SUBSETS]:
-            chosen = frozenset(itertools.chain.from_iterable(levels[one] for one in group))
-            if chosen not in made and chosen != names:
-                made.append(chosen)
-    return made
+            runs = frozenset(itertools.chain.from_iterable(levels[level] for level in group))
+            if runs not in subsets and runs != names:
+                subsets.append(runs)
+    return subsets
 
 
 def _in_order(levels: list[str]) -> list[str]:

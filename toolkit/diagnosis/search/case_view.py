@@ -30,7 +30,7 @@ class CaseView:
     @property
     def drivers(self) -> frozenset[str]:
         """Channels that were recorded beside the outputs."""
-        return frozenset(one.name for one in self._problem.case.drivers)
+        return frozenset(channel.name for channel in self._problem.case.drivers)
 
     @property
     def outputs(self) -> frozenset[str]:

@@ -34,12 +34,12 @@ def effect(name: str, *, where: str = "--effect") -> Effect:
     ConfigError
         no effect has that name
     """
-    known = effects()
-    if name in known:
-        return known[name]
-    near = difflib.get_close_matches(name, known, n=1, cutoff=0.5)
+    listed = effects()
+    if name in listed:
+        return listed[name]
+    near = difflib.get_close_matches(name, listed, n=1, cutoff=0.5)
     raise ConfigError(
-        f"unknown effect {name!r}", where=where, got=name, expected=", ".join(known),
+        f"unknown effect {name!r}", where=where, got=name, expected=", ".join(listed),
         next_step=f"did you mean {near[0]!r}?" if near else "use one of those expected",
         rule="unknown-effect",
     )  # fmt: skip

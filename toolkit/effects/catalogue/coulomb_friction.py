@@ -34,10 +34,10 @@ def _recorded(t: NDArray[np.float64], velocity: NDArray[np.float64], values: Val
         return values["coulomb"] * np.sign(velocity)
     knots, travelled, ways = _path(t, velocity)
     sizes = np.diff(travelled)
-    z, made = _bristle(sizes, ways, reach, start=float(np.sign(velocity[0])))
+    z, bent = _bristle(sizes, ways, reach, start=float(np.sign(velocity[0])))
     # The bristle's mean over a piece, at an even speed along it.
     slow = sizes > 1e-9 * reach if reach > 0 else sizes > 0
-    settled = np.where(slow, (z - made) * reach / np.where(slow, sizes, 1.0) + ways, z)
+    settled = np.where(slow, (z - bent) * reach / np.where(slow, sizes, 1.0) + ways, z)
     area = np.concatenate([[0.0], np.cumsum(settled * np.diff(knots))])
     half = 0.5 * float(np.median(np.diff(t)))
     low, high = np.maximum(t - half, t[0]), np.minimum(t + half, t[-1])
@@ -69,12 +69,12 @@ def _bristle(
     sizes: NDArray[np.float64], ways: NDArray[np.float64], reach: float, *, start: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return the bristle at the beginning and at the end of each piece."""
-    keep = np.exp(-sizes / reach) if reach > 0 else (sizes <= 0).astype(float)
+    shares = np.exp(-sizes / reach) if reach > 0 else (sizes <= 0).astype(float)
     before, after = np.empty_like(sizes), np.empty_like(sizes)
     last = start
-    for i, (kept, way) in enumerate(zip(keep.tolist(), ways.tolist(), strict=True)):
+    for i, (share, way) in enumerate(zip(shares.tolist(), ways.tolist(), strict=True)):
         before[i] = last
-        last = after[i] = way + (last - way) * kept
+        last = after[i] = way + (last - way) * share
     return before, after
 
 

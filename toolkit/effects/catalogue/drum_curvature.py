@@ -17,10 +17,10 @@ _OF_A_BRUSH = 1.5  # force as the patch length squared, moment as its cube
 
 
 def _curved(drive: Drive, values: Values, setting: Setting, tire: Tire) -> Drive:
-    left = max(1 - values["reduction"], 0.01)
+    ratio = max(1 - values["reduction"], 0.01)
     # The moment's slope is force times trail: what the exponent has above one is the trail's.
-    trail = drive.trail * left ** (values.get(_EXPONENT, _OF_A_BRUSH) - 1)
-    return dataclasses.replace(drive, stiffness=drive.stiffness * left, trail=trail)
+    trail = drive.trail * ratio ** (values.get(_EXPONENT, _OF_A_BRUSH) - 1)
+    return dataclasses.replace(drive, stiffness=drive.stiffness * ratio, trail=trail)
 
 
 def _without_moment(case: Surroundings) -> bool:

@@ -36,8 +36,8 @@ def _relaxed(drive: Drive, values: Values, setting: Setting, tire: Tire) -> Driv
     for _ in range(_TURNS if falling else 1):
         ratio = np.ones_like(at_zero)
         if falling:
-            here = _slope(tire, dataclasses.replace(drive, SA=slip))
-            ratio = np.maximum(1 + falling * (_over(here, at_zero * nominal) - 1), _LEAST)
+            slope = _slope(tire, dataclasses.replace(drive, SA=slip))
+            ratio = np.maximum(1 + falling * (_over(slope, at_zero * nominal) - 1), _LEAST)
         length = values["relaxation_length"] * ratio * by_load
         slip = lag(drive.t, drive.SA, length / np.maximum(np.abs(drive.V), 1e-6))
     return dataclasses.replace(drive, SA=slip)

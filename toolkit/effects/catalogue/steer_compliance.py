@@ -20,10 +20,10 @@ _STEPS = 12  # of the fixed point; compliance times aligning stiffness is well b
 
 
 def _compliant(drive: Drive, values: Values, setting: Setting, tire: Tire) -> Drive:
-    made = drive
+    turned = drive
     for _ in range(_STEPS):
-        made = dataclasses.replace(made, SA=drive.SA - values["compliance"] * tire(made).MZ)
-    return made
+        turned = dataclasses.replace(turned, SA=drive.SA - values["compliance"] * tire(turned).MZ)
+    return turned
 
 
 def _taken_out(

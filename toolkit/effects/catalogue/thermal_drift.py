@@ -20,7 +20,7 @@ _TEMPERATURES = ("T_CELL", "T_AMBIENT", "T", "T_TREAD")  # the nearest to the ce
 
 
 def _warming(y: NDArray[np.float64], values: Values, setting: Setting) -> NDArray[np.float64]:
-    name = next((one for one in _TEMPERATURES if one in setting.channels), None)
+    name = next((channel for channel in _TEMPERATURES if channel in setting.channels), None)
     if name is None or not len(y):
         return y
     temperature = setting.channels[name]

@@ -32,7 +32,7 @@ def _heated(drive: Drive, values: Values, setting: Setting, tire: Tire) -> Drive
 
 
 def _rise(drive: Drive, values: Values, setting: Setting, tire: Tire) -> NDArray[np.float64]:
-    name = next((one for one in _TEMPERATURES if one in setting.channels), None)
+    name = next((channel for channel in _TEMPERATURES if channel in setting.channels), None)
     if name is not None and len(drive.t):
         recorded = setting.channels[name]
         return recorded - setting.first.get(name, float(recorded[0])) - values.get("reference", 0.0)

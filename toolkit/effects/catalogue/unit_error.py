@@ -30,12 +30,14 @@ _PREFIXES = {"kilo": 1000.0, "milli": 0.001}
 @cache
 def _all() -> dict[str, tuple[str | None, float]]:
     """Return for every confusion its dimension, None for any, and the factor of the number."""
-    made: dict[str, tuple[str | None, float]] = {name: (None, value) for name, value in _PREFIXES.items()}
+    confusions: dict[str, tuple[str | None, float]] = {
+        name: (None, value) for name, value in _PREFIXES.items()
+    }
     for pair in _MIXED:
         for true, taken in (pair, pair[::-1]):
-            one, other = unit(true), unit(taken)
-            made[f"{true} read as {taken}"] = (one.dimension, other.factor / one.factor)
-    return made
+            right, wrong = unit(true), unit(taken)
+            confusions[f"{true} read as {taken}"] = (right.dimension, wrong.factor / right.factor)
+    return confusions
 
 
 def factors() -> dict[str, float]:

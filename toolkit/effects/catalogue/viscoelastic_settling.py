@@ -16,11 +16,11 @@ if TYPE_CHECKING:
 def _settled(drive: Drive, values: Values, setting: Setting, tire: Tire) -> Drive:
     f, tau, of_load = values["fraction"], values["time_constant"], values["of_load"]
     if of_load < 1:
-        forces, own = tire(drive), (1 - of_load) * f
+        forces, of_force = tire(drive), (1 - of_load) * f
         drive = dataclasses.replace(
             drive,
-            FY=drive.FY + own * (forces.FY - lag(drive.t, forces.FY, tau)),
-            MZ=drive.MZ + own * (forces.MZ - lag(drive.t, forces.MZ, tau)),
+            FY=drive.FY + of_force * (forces.FY - lag(drive.t, forces.FY, tau)),
+            MZ=drive.MZ + of_force * (forces.MZ - lag(drive.t, forces.MZ, tau)),
         )
     if of_load > 0:
         drive = dataclasses.replace(
