@@ -55,7 +55,7 @@ class QuantityKind(Kind):
                     return None
             if "value" in value and isinstance(value.get("unit"), str):
                 return value["value"], value["unit"]
-        elif self.unit.plain and is_number(value):
+        elif self.unit.plain and self.number.suits(value):
             return value, self.name
         place.refuse(
             value, self.expected, rule="no-unit", what=f"{shown(value)} has no unit" if value else None

@@ -64,7 +64,7 @@ def test_the_default_says_that_a_drum_is_not_a_flat_belt() -> None:
         ('loads = { value = [2, 4], unit = "kN" }', "", "loads"),
         ('value = [2, 4], unit = "kN"', 'value = [2, 4], unit = "deg"', "force"),
         ("value = [2, 4]", "value = [2, 2]", "each once"),
-        ("value = [2, 4]", "value = [-2, 4]", "positive"),
+        ("value = [2, 4]", "value = [-2, 4]", "above 0 N"),
         ("value = [2, 4]", "value = []", "value = [NUMBER"),
         ("value = [2, 4]", "value = [2, nan]", "finite"),
         ("value = [0, 2, -2, 0]", "value = [0, 95]", "90 deg"),
