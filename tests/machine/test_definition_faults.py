@@ -39,10 +39,10 @@ def refused(tmp_path: Path, text: str, name: str = "own.toml") -> ConfigError:
         ('rotations = ["forward", "reverse"]', 'rotations = "forward"', "rotations", "a list"),
         ('rotations = ["forward", "reverse"]', "rotations = []", "rotations", "at least one"),
         ('["forward", "reverse"]', '["forward", "forward"]', "rotations", "each once"),
-        ('["forward", "reverse"]', '["forward", 1]', "rotations[2]", "forward, reverse"),
-        ('rotations = ["forward", "reverse"]', "rotations = [[]]", "rotations[1]", "forward, reverse"),
-        ('kind = "real"', 'kind = ["real"]', "kind", "real, simulated"),
-        ('kind = "real"', 'kind = "reel"', "kind", "real, simulated"),
+        ('["forward", "reverse"]', '["forward", 1]', "rotations[2]", "forward or reverse"),
+        ('rotations = ["forward", "reverse"]', "rotations = [[]]", "rotations[1]", "forward or reverse"),
+        ('kind = "real"', 'kind = ["real"]', "kind", "real or simulated"),
+        ('kind = "real"', 'kind = "reel"', "kind", "real or simulated"),
         ('axes = "machine"', "axes = 3", "axes", "SAE, adapted-SAE, ISO-W, machine"),
         ("schema = 1", "schema = 2", "schema", "1"),
         ("schema = 1", 'schema = "one"', "schema", "1"),
@@ -106,7 +106,7 @@ def refused(tmp_path: Path, text: str, name: str = "own.toml") -> ConfigError:
         (FZ, 'FZ = { u = 15, unit = "deg", source = "s" }', "type_b.FZ.unit", "a unit of force"),
         (FZ, 'FZ = { u = 15, unit = "Nn", source = "s" }', "type_b.FZ.unit", "N"),
         (FZ, 'FZ = { relative = 0.1, effect = 1, source = "s" }', "type_b.FZ.effect", "u, relative"),
-        (FZ, 'FZ = { relative = 0.1, common = "all", source = "s" }', "type_b.FZ.common", "machine, test"),
+        (FZ, 'FZ = { relative = 0.1, common = "all", source = "s" }', "type_b.FZ.common", "machine or test"),
     ],
 )  # fmt: skip
 def test_a_wrong_entry_is_named_with_its_line(

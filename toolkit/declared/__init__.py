@@ -57,6 +57,7 @@ a fixed length, ``Mapping[str, X]``, a dataclass (a table), ``tuple[Dataclass, .
   written; ``plain=True`` takes a number alone too, ``beside="unit"`` one whose unit stands in the entry
   ``unit`` of the same table;
 - `Text` (empty, stripped, pattern, from a number), `Day` (a date held as ISO 8601 text), `UnitName`;
+- `Short`: a value alone stands for a table with one entry;
 - `Size`, `Distinct`; `Keyed` for tables whose keys are names, ``[cells.D51]``, and `Names` for texts or
   keys that are among names given or declared by another entry: ``Names(of="loads")``.
 
@@ -95,6 +96,7 @@ from toolkit.declared.marks import (
     Keyed,
     Names,
     Quantity,
+    Short,
     Size,
     Text,
     Unit,
@@ -116,6 +118,7 @@ __all__ = [
     "Keyed",
     "Names",
     "Quantity",
+    "Short",
     "Size",
     "Source",
     "Text",

@@ -50,6 +50,7 @@ class TableKind(Kind):
     fields_of: Callable[[type], tuple[Field, ...]]
     form_of: Format | None = None
     named_by: str | None = None
+    short: str | None = None
 
     @property
     def fields(self) -> tuple[Field, ...]:
@@ -79,6 +80,8 @@ class TableKind(Kind):
 
     def read(self, value: Any, place: Place, stated: Mapping[str, Any] | None = None) -> Any:
         """Return an object of the class; ``stated`` are fields that no entry holds."""
+        if self.short is not None and not isinstance(value, dict):
+            value = {self.short: value}
         if not isinstance(value, dict):
             path = ".".join(part for part in place.path if isinstance(part, str))
             return place.refuse(
@@ -119,6 +122,10 @@ class TableKind(Kind):
             key = (*place.path, *fault.key)
             place.faults.append(replace(fault, key=key, form=place.form))
         return made if len(place.faults) == before else REFUSED
+
+    def suits(self, value: Any) -> bool:
+        """Tell whether a value is a table, or stands for one."""
+        return isinstance(value, dict) or self.short is not None
 
     def holds(self, value: Any) -> bool:
         """Tell whether it is an object of the class."""
