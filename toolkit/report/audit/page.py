@@ -208,7 +208,7 @@ def _effects(made: ArchiveAudit) -> Iterator[str]:
     yield "</tbody></table></div>"
 
 
-def _largest(effects: Sequence[Mapping[str, Any]], name: str, *, percent: bool) -> str:
+def _largest(effects: Sequence[Mapping[str, Any]], name: str, *, percent: bool = False) -> str:
     changes = [
         100 * one["change"] / abs(one["old"]) if percent and one["old"] else one["change"]
         for one in effects
