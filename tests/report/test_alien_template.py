@@ -181,10 +181,11 @@ def test_pages_are_read_with_leaders_and_roman_numbers() -> None:
 
 
 def _pictures() -> dict:
-    from toolkit.report.design.blocks import placeholder_png
+    from template_factory import grey_png
+
     from toolkit.report.figures import Picture
 
-    return dict.fromkeys(content().plots, Picture(png=placeholder_png(63, 37), width_px=63, height_px=37))
+    return dict.fromkeys(content().plots, Picture(png=grey_png(63, 37), width_px=63, height_px=37))
 
 
 def test_a_bound_control_around_a_literal_loses_its_binding(tmp_path: Path) -> None:

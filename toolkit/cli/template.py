@@ -111,14 +111,14 @@ def new(
 
     Example: toolkit template new report_templates/ours.docx --like summary
     """
+    from toolkit.cli.home import packaged_home
     from toolkit.errors import OutputError
     from toolkit.files import write_atomic
-    from toolkit.report.design.default import STYLE_FILE
-    from toolkit.report.design.files import packaged_templates
+    from toolkit.report.style import style_file
 
-    known = packaged_templates()
-    if like not in known:
-        raise typer.BadParameter(", ".join(known), param_hint="--like")
+    sources = {path.stem: path for path in sorted((packaged_home() / "report_templates").glob("*.docx"))}
+    if like not in sources:
+        raise typer.BadParameter(", ".join(sources), param_hint="--like")
 
     if file.suffix.lower() != ".docx":
         raise OutputError(
@@ -140,8 +140,9 @@ def new(
                 next_step="choose another name, or overwrite with --force",
                 rule="not-empty",
             )
-    write_atomic(file, known[like].build())
-    write_atomic(style, known[like].style or STYLE_FILE)
+    source = sources[like]
+    write_atomic(file, source.read_bytes())
+    write_atomic(style, (style_file(source) or source.with_name("org.toml")).read_bytes())
     answer({"template": file, "style": style}, f"{file}\n{style}", as_json=json, quiet=quiet)
     return 0
 
