@@ -121,6 +121,17 @@ def test_each_prints_all_that_it_asks_for(printed: dict[str, Delivered], name: s
     assert name in ("audit", "diagnosis") or report.filled.figures
 
 
+@pytest.mark.parametrize(("like", "style"), [("summary", "org"), ("pruefbericht", "pruefbericht")])
+def test_a_new_template_is_a_copy_with_the_style_file_that_serves_it(
+    like: str, style: str, tmp_path: Path
+) -> None:
+    from toolkit.cli.template import new
+
+    assert new(tmp_path / "ours.docx", like=like, quiet=True) == 0
+    assert (tmp_path / "ours.docx").read_bytes() == (FOLDER / f"{like}.docx").read_bytes()
+    assert (tmp_path / "ours.toml").read_bytes() == (FOLDER / f"{style}.toml").read_bytes()
+
+
 @office_needed
 def test_the_default_has_what_the_standard_asks_of_a_report(printed: dict[str, Delivered]) -> None:
     done = printed["org"]
