@@ -18,8 +18,7 @@ import numpy as np
 
 from toolkit.calibration.fit.regression import fit_terms
 from toolkit.errors import ToolkitError
-from toolkit.qualification.agreement import correct_digits, digits_check
-from toolkit.qualification.model import Check, not_run
+from toolkit.qualification.model import Check, correct_digits, digits_check, not_run
 from toolkit.qualification.numbers import QUANTITIES, SETS, CertifiedSet, read_set
 
 if TYPE_CHECKING:
@@ -31,13 +30,13 @@ _NAMED_POWERS = 9
 
 def check_certified(folder: Path) -> list[Check]:
     """Solve every certified set; one check a quantity."""
-    found: list[Check] = []
+    checks: list[Check] = []
     for name in SETS:
         try:
-            found += _checks(read_set(name, folder))
+            checks += _checks(read_set(name, folder))
         except (ToolkitError, np.linalg.LinAlgError, ValueError, KeyError) as error:
-            found.append(not_run(GROUP, name, str(error)))
-    return found
+            checks.append(not_run(GROUP, name, str(error)))
+    return checks
 
 
 def solve(one: CertifiedSet) -> tuple[tuple[float, ...], tuple[float, ...], float]:

@@ -13,8 +13,7 @@ from toolkit.calibration.fit.regression import TermFit, fit_terms
 from toolkit.calibration.standards.e74 import evaluate_e74
 from toolkit.errors import ToolkitError
 from toolkit.files import read_toml
-from toolkit.qualification.agreement import printed_check
-from toolkit.qualification.model import Check, not_run
+from toolkit.qualification.model import Check, not_run, printed_check
 from toolkit.qualification.numbers import damaged, number, numbers, read_set
 
 LINES = "ISO/TS 28037"
@@ -28,7 +27,7 @@ def check_lines(folder: Path) -> list[Check]:
     """Solve the straight lines with known uncertainties, of y or of both variables, and predict by them."""
     try:
         examples = read_toml(folder / LINES_FILE)["example"]
-        return [check for one in examples for check in _line(one, folder / LINES_FILE)]
+        return [check for example in examples for check in _line(example, folder / LINES_FILE)]
     except ToolkitError as error:
         return [not_run(LINES, "examples", str(error))]
     except _BROKEN as error:

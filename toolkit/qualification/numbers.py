@@ -67,8 +67,8 @@ def read_set(name: str, folder: Path) -> CertifiedSet:
             residual_sd=number(certified["residual_sd"], path),
             y=data.pop("y"),
             columns=data,
-            required=tuple(number(found["required"][one], path) for one in QUANTITIES),
-            public=tuple(number(found["public_qr"][one], path) for one in QUANTITIES),
+            required=tuple(number(found["required"][quantity], path) for quantity in QUANTITIES),
+            public=tuple(number(found["public_qr"][quantity], path) for quantity in QUANTITIES),
         )
     except (KeyError, TypeError, ValueError, AttributeError) as error:
         raise damaged(path, f"{type(error).__name__}: {error}") from error

@@ -120,8 +120,8 @@ def balance(tread: Tread, sx: Array, sy: Array, *, lines: int = 1, near: Balance
         for what is searched again there is another side of the same jump
     """
     made = [
-        _balance(tread.take(one), sx[one], sy[one], lines, None if near is None else near.take(one))
-        for one in _parts(tread, sx, lines)
+        _balance(tread.take(part), sx[part], sy[part], lines, None if near is None else near.take(part))
+        for part in _parts(tread, sx, lines)
     ]
     none = Balance(
         sums=np.zeros((3, 0)), slopes=np.zeros((2, 0)), inverse=np.zeros((2, 2, 0)), settled=np.zeros(0, bool)
@@ -134,11 +134,11 @@ def balance(tread: Tread, sx: Array, sy: Array, *, lines: int = 1, near: Balance
     )
 
 
-def sharpened(tread: Tread, sx: Array, sy: Array, found: Balance, *, lines: int = 1) -> Balance:
+def sharpened(tread: Tread, sx: Array, sy: Array, balance: Balance, *, lines: int = 1) -> Balance:
     """Return a balance with the ``inverse`` of differences: worth it where many states start from one."""
-    inverse = found.inverse.copy()
+    inverse = balance.inverse.copy()
     for one in _parts(tread, sx, lines):
-        part, here = tread.take(one), found.take(one)
+        part, here = tread.take(one), balance.take(one)
         made = [here.sums]
         for nudge in np.eye(2) * _NUDGE:
             moved = here.slopes + nudge[:, None]
@@ -149,7 +149,7 @@ def sharpened(tread: Tread, sx: Array, sy: Array, found: Balance, *, lines: int 
         good = np.abs(det) > 1e-3
         sharp = np.array([[d, -b], [-c, a]]) / np.where(good, det, 1.0)
         inverse[..., one] = np.where(good, sharp, here.inverse)
-    return Balance(sums=found.sums, slopes=found.slopes, inverse=inverse, settled=found.settled)
+    return Balance(sums=balance.sums, slopes=balance.slopes, inverse=inverse, settled=balance.settled)
 
 
 def _parts(tread: Tread, sx: Array, lines: int) -> list[NDArray[np.intp]]:

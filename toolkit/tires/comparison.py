@@ -13,8 +13,7 @@ from toolkit.channels import signs
 from toolkit.tires.evaluate import value_at
 from toolkit.tires.global_data import CHANNELS, Measured, cell
 from toolkit.tires.global_fit import undetermined
-from toolkit.tires.global_model import GlobalModel, make_rows
-from toolkit.tires.global_result import ModelFit, pooled_percent
+from toolkit.tires.global_model import GlobalModel, ModelFit, make_rows, pooled_percent
 from toolkit.tires.model import CurveFit
 from toolkit.tires.quality import scatter_floor_percent
 
@@ -93,8 +92,8 @@ def compare(
 ) -> Comparison:
     """Return the table of the models that were fitted to these rows; ``curves`` are of single loads."""
     made = []
-    for name in dict.fromkeys(one.model for one in curves):
-        own = [one for one in curves if one.model == name]
+    for name in dict.fromkeys(curve.model for curve in curves):
+        own = [curve for curve in curves if curve.model == name]
         for channel in ("FY", "MZ"):
             if channel in data.channels and any(one.channel == channel for one in own):
                 made += _of_curves(data, [one for one in own if one.channel == channel])
@@ -142,10 +141,10 @@ def _rows(
     not_determined: tuple[str, ...],
 ) -> list[ComparisonRow]:
     pure = np.abs(data.rows.KAPPA) <= _FREE
-    made = []
+    rows = []
     for condition, own in (("pure", known & pure), ("combined", known & ~pure)):
         if own.any():
-            made.append(
+            rows.append(
                 ComparisonRow(
                     model=name,
                     channel=channel,
@@ -158,7 +157,7 @@ def _rows(
                     not_determined=not_determined,
                 )
             )
-    return made
+    return rows
 
 
 def model_curve(

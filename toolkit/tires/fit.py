@@ -191,9 +191,12 @@ def _normalise(curves: Sequence[Curve]) -> tuple[Problems, _Scale]:
 def _solved(groups: Sequence[Problems], loss: Loss) -> list[tuple[Problems, Solution, Array]]:
     # Each group's problems with their final weights, its minima, and the inflation of their variance.
     if loss == "robust":
-        robust = [solve_robust(one) for one in groups]
+        robust = [solve_robust(group) for group in groups]
         return [(problems, solution, inflation) for solution, problems, inflation in robust]
-    return [(one, solution, np.ones(len(one.u))) for one, solution in zip(groups, solve(groups), strict=True)]
+    return [
+        (group, solution, np.ones(len(group.u)))
+        for group, solution in zip(groups, solve(groups), strict=True)
+    ]
 
 
 def _fit_group(
@@ -231,7 +234,7 @@ def _result(
     curve: Curve,
     i: int,
     solution: Solution,
-    found: Spread,
+    spread: Spread,
     scale: _Scale,
     residual: Array,
     time: float,
@@ -239,17 +242,17 @@ def _result(
 ) -> CurveFit:
     middle, half, top = (float(one[i]) for one in (scale.middle, scale.half, scale.top))
     factor = np.array([1 / half, 1.0, top, 1.0, half, top])
-    values = found.theta[i] * factor
+    values = spread.theta[i] * factor
     values[4] -= middle
-    covariance = found.covariance[i] * np.outer(factor, factor)
-    errors = found.error[i] * np.abs(factor)
-    ends = found.ends[i] * factor[:, None]
+    covariance = spread.covariance[i] * np.outer(factor, factor)
+    errors = spread.error[i] * np.abs(factor)
+    ends = spread.ends[i] * factor[:, None]
     ends[4] -= middle
     names = [spec.name for spec in MODEL.parameters]
-    determined, bound = found.determined[i], found.at_bound[i]
+    determined, bound = spread.determined[i], spread.at_bound[i]
     unit = CHANNEL_UNIT[curve.channel]
 
-    dof = [float(one) for one in found.dof[i]]
+    dof = [float(one) for one in spread.dof[i]]
 
     def estimate(value: float, u: float, factor: float, unit: str, dof: float) -> Estimate | None:
         if not np.isfinite(u):
@@ -284,8 +287,8 @@ def _result(
         at_bound=at_bound,
         error_percent=error_percent(residual * top, curve.y),
         scatter_floor_percent=scatter_floor_percent(curve.SA, curve.y),
-        slope_at_zero=estimate(found.slope[i], found.slope_se[i], top / half, f"{unit}/rad", dof[6]),
-        value_at_zero=estimate(found.value[i], found.value_se[i], top, unit, dof[7]),
+        slope_at_zero=estimate(spread.slope[i], spread.slope_se[i], top / half, f"{unit}/rad", dof[6]),
+        value_at_zero=estimate(spread.value[i], spread.value_se[i], top, unit, dof[7]),
         loss=loss,
         converged=converged,
         message=_message(curve, values, converged, not_determined, at_bound, time),

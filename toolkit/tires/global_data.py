@@ -93,12 +93,12 @@ def measured(
     and LONGVL are the medians of what was recorded.
     """
     FZ = columns["FZ"]
-    blocks = [one for one in load_blocks(FZ) if FZ[one].mean() >= _NO_LOAD]
+    blocks = [load_block for load_block in load_blocks(FZ) if FZ[load_block].mean() >= _NO_LOAD]
     kept = np.sort(np.concatenate(blocks)) if blocks else np.zeros(0, dtype=np.intp)
     number = np.zeros(len(FZ), dtype=np.intp)
-    for index, one in enumerate(blocks):
-        number[one] = index
-    loads = np.array([FZ[one].mean() for one in blocks])
+    for index, block in enumerate(blocks):
+        number[block] = index
+    loads = np.array([FZ[block].mean() for block in blocks])
     middle = (loads.min() + loads.max()) / 2 if len(loads) else 1.0
     nominal = rated_load_N or (float(loads[np.argmin(np.abs(loads - middle))]) if len(loads) else 1.0)
     pressure, speed = columns.get("P"), columns.get("V")

@@ -10,8 +10,7 @@ import numpy as np
 from toolkit.channels import signs
 from toolkit.estimate import Estimate
 from toolkit.tires.global_data import Measured, cell
-from toolkit.tires.global_model import GlobalModel, make_rows
-from toolkit.tires.global_result import GlobalFit, LoadShare, pooled_percent
+from toolkit.tires.global_model import GlobalFit, GlobalModel, LoadShare, make_rows, pooled_percent
 from toolkit.tires.global_stage import Found
 from toolkit.tires.model import Parameter
 from toolkit.tires.quality import scatter_floor_percent
@@ -50,9 +49,9 @@ class Report:
         no_slip = float(np.ptp(self.data.rows.KAPPA)) == 0.0
         own = [
             place
-            for place, one in enumerate(parameters)
-            if (one.stage == channel or (joint and one.stage in channels))
-            and not (no_slip and _SLIP & set(one.needs))
+            for place, parameter in enumerate(parameters)
+            if (parameter.stage == channel or (joint and parameter.stage in channels))
+            and not (no_slip and _SLIP & set(parameter.needs))
         ]
         errors = dict(zip(stage.left, np.sqrt(np.maximum(np.diag(stage.covariance), 0.0)), strict=True))
         fixed = dict(stage.fixed)

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from toolkit.estimate import coverage_factor
-from toolkit.tires.autocorrelation import autocorrelation_time
+from toolkit.tires.colour import autocorrelation_time
 from toolkit.tires.global_data import Measured
 from toolkit.tires.global_solver import Box, Descent, descend, linearise, spread_starts
 

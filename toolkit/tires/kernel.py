@@ -79,15 +79,15 @@ class State:
         """Return the states of an index."""
         return State(**{name: getattr(self, name)[index] for name in _FIELDS})
 
-    def put(self, where: NDArray[np.bool_], other: State) -> None:
+    def put(self, where: NDArray[np.bool_], state: State) -> None:
         """Take over the other's entries where a mask is true."""
         for name in _FIELDS:
-            getattr(self, name)[where] = getattr(other, name)[where]
+            getattr(self, name)[where] = getattr(state, name)[where]
 
-    def put_at(self, index: NDArray[np.intp], other: State) -> None:
+    def put_at(self, index: NDArray[np.intp], state: State) -> None:
         """Write the other's entries to positions."""
         for name in _FIELDS:
-            getattr(self, name)[index] = getattr(other, name)
+            getattr(self, name)[index] = getattr(state, name)
 
     def curvature(self) -> Array:
         """Return the Gauss-Newton matrix of the shape (problems, 4, 4), the linear part eliminated."""
@@ -142,7 +142,7 @@ def assess(p: Array, problems: Problems) -> State:
     scratch = _Scratch(size, points)
     if count <= size:
         return _assess(p, problems, scratch)
-    whole = State(
+    state = State(
         p=p,
         linear=np.empty((count, 2)),
         cost=np.empty(count),
@@ -163,8 +163,8 @@ def assess(p: Array, problems: Problems) -> State:
         )
         found = _assess(p[block], part, scratch)
         for name in _FIELDS[1:]:
-            getattr(whole, name)[block] = getattr(found, name)
-    return whole
+            getattr(state, name)[block] = getattr(found, name)
+    return state
 
 
 _BLOCK = 24_576  # points

@@ -74,15 +74,15 @@ def _pick(problems: Problems, count: int) -> Array:
     return np.clip(shapes[best], problems.low[:, None, :], problems.high[:, None, :])
 
 
-def _product(left: Array32, right: Array32) -> Array32:
+def _product(array32: Array32, right: Array32) -> Array32:
     # In blocks too small for the linear algebra to share among threads: their start and their waiting for a
     # core that is busy otherwise cost many times the product.
-    result = np.empty((len(left), right.shape[1]), dtype=np.float32)
+    result = np.empty((len(array32), right.shape[1]), dtype=np.float32)
     height, breadth = _BLOCK
-    for top in range(0, len(left), height):
+    for top in range(0, len(array32), height):
         for side in range(0, right.shape[1], breadth):
             place = (slice(top, top + height), slice(side, side + breadth))
-            np.matmul(left[place[0]], right[:, place[1]], out=result[place])
+            np.matmul(array32[place[0]], right[:, place[1]], out=result[place])
     return result
 
 

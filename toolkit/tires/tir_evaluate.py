@@ -119,26 +119,26 @@ def _pressure_change(
 
 
 def _lacking(tir: TirFile, p: Mapping[str, float]) -> list[Finding]:
-    found = []
+    findings = []
     for channel, names in _MAKES.items():
         absent = [name for name in names if name not in p]
         if len(absent) == len(names):
             text = f"the file has none of {', '.join(names)}: {channel} holds nothing of pure slip"
-            found.append(_note("tir-no-coefficients", tir, text))
+            findings.append(_note("tir-no-coefficients", tir, text))
         elif absent:
             text = f"the file has no {', '.join(absent)}, which count as zero: {channel} is doubtful"
-            found.append(Finding(rule="tir-no-coefficients", where=tir.where, message=text))
-    return found
+            findings.append(Finding(rule="tir-no-coefficients", where=tir.where, message=text))
+    return findings
 
 
-def _beyond(tir: TirFile, given: Mapping[str, ArrayLike]) -> list[Finding]:
+def _beyond(tir: TirFile, array_likes: Mapping[str, ArrayLike]) -> list[Finding]:
     found, units = [], factors(tir)
     for channel, low_key, high_key, unit in _RANGES:
         low, high = tir.get(low_key), tir.get(high_key)
-        if channel not in given or not isinstance(low, float) or not isinstance(high, float):
+        if channel not in array_likes or not isinstance(low, float) or not isinstance(high, float):
             continue
         low, high = low * (scale(low_key, units) or 1.0), high * (scale(high_key, units) or 1.0)
-        values = np.asarray(given[channel], dtype=np.float64)
+        values = np.asarray(array_likes[channel], dtype=np.float64)
         edge = _EDGE * max(abs(low), abs(high))
         outside = (values < low - edge) | (values > high + edge)
         if outside.any():

@@ -16,8 +16,7 @@ from toolkit.errors import ConfigError
 from toolkit.files import write_atomic
 from toolkit.findings import Finding
 from toolkit.tires.global_data import Measured
-from toolkit.tires.global_model import GlobalModel, GlobalParameter
-from toolkit.tires.global_result import ModelFit
+from toolkit.tires.global_model import GlobalModel, GlobalParameter, ModelFit
 from toolkit.tires.tir import TirFile, TirLine
 from toolkit.tires.tir_units import SI, factors, scale
 
@@ -78,7 +77,11 @@ def tire_fit(model: GlobalModel, fit: ModelFit, data: Measured, *, side: str = "
     made: list[tuple[str, tuple[tuple[str, str | float], ...]]] = []
     for channel in _SECTIONS:
         if any(one.channel == channel for one in fit.fits):
-            own = [one for one in model.parameters if one.stage == channel and (slips or not _of_slip(one))]
+            own = [
+                parameter
+                for parameter in model.parameters
+                if parameter.stage == channel and (slips or not _of_slip(parameter))
+            ]
             extra: list[tuple[str, str | float]] = (
                 [("PKY4", 2.0)] if channel == "FY" and FITTYP[model.name] > 60 else []
             )
@@ -99,8 +102,8 @@ def tire_fit(model: GlobalModel, fit: ModelFit, data: Measured, *, side: str = "
     )
 
 
-def _of_slip(one: GlobalParameter) -> bool:
-    return bool({"kappa", "both_kappas", "alpha_and_kappa"} & set(one.needs))
+def _of_slip(parameter: GlobalParameter) -> bool:
+    return bool({"kappa", "both_kappas", "alpha_and_kappa"} & set(parameter.needs))
 
 
 def _range(values: np.ndarray) -> tuple[float, float]:

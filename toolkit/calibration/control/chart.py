@@ -14,11 +14,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolkit.calibration.control.as_found import phase_of
-from toolkit.calibration.control.errors import errors_by
-from toolkit.calibration.control.in_use import in_use_before
-from toolkit.calibration.control.rules import Break
-from toolkit.calibration.control.shewhart import LEAST_BASELINE, Limits, breaks_of, limits_of
+from toolkit.calibration.control.as_found import errors_by, in_use_before, phase_of
+from toolkit.calibration.control.shewhart import LEAST_BASELINE, Break, Limits, breaks_of, limits_of
 from toolkit.calibration.registry.registry import load_many
 from toolkit.calibration.registry.status import status_of
 from toolkit.calibration.registry.stored import stored_check
@@ -79,7 +76,7 @@ class Series:
     @property
     def ranges(self) -> tuple[float, ...]:
         """Moving ranges, one fewer than the points."""
-        return tuple(np.abs(np.diff([one.error for one in self.points])).tolist())
+        return tuple(np.abs(np.diff([point.error for point in self.points])).tolist())
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -147,13 +144,13 @@ def control_chart(
 
 def chart_findings(chart: Chart, session_record: str) -> tuple[Finding, ...]:
     """Return a finding for each rule that the points of one session break."""
-    found = []
+    findings = []
     for one in chart.series:
         for broken in one.breaks:
             point = one.points[broken.index]
             if point.session_record != session_record or one.limits is None:
                 continue
-            found.append(
+            findings.append(
                 Finding(
                     rule="chart",
                     where=f"{one.load} at {one.check_load}",
@@ -163,7 +160,7 @@ def chart_findings(chart: Chart, session_record: str) -> tuple[Finding, ...]:
                     f"of {one.limits.points} sessions",
                 )
             )
-    return tuple(found)
+    return tuple(findings)
 
 
 def _sessions(registry: Registry, instrument: str) -> tuple[list[_Session], list[tuple[str, str]]]:
@@ -257,7 +254,7 @@ def _series(
                 rows=len(members),
             )
         )
-    values = np.array([one.error for one in points])
+    values = np.array([point.error for point in points])
     count = min(baseline, len(values)) if baseline is not None else max(len(values) - 1, 0)
     limits = limits_of(values[:count])
     return Series(

@@ -135,4 +135,4 @@ def reversals(
                 percent_fs=100 * difference / full,
             )
         )
-    return tuple(sorted(rows, key=lambda one: (one.run or 0, one.load)))
+    return tuple(sorted(rows, key=lambda row: (row.run or 0, row.load)))

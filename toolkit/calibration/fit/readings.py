@@ -166,11 +166,11 @@ def readings_of(record: CalibrationRecord, loads: Table) -> SessionReadings:
     columns = loads.columns(record.indications)
     full = {name: float(np.abs(columns[name] - rest[name]).max()) for name in record.indications}
     drifts = _zero_drifts(zero, scope, full)
-    series, left_out = _creeps(creep, scope, full, {one.load: one.largest for one in record.loads})
+    series, left_out = _creeps(creep, scope, full, {load.load: load.largest for load in record.loads})
     return SessionReadings(
         full_scale=tuple(full.items()),
         zero=drifts,
-        zero_loads=tuple(_load_drift(record, one, drifts, zero, rest) for one in record.loads if drifts),
+        zero_loads=tuple(_load_drift(record, load, drifts, zero, rest) for load in record.loads if drifts),
         shunts=tuple(_shunts(zero, cells, scope)),
         creep=series,
         creep_left_out=left_out,
@@ -191,27 +191,27 @@ def readings_of(record: CalibrationRecord, loads: Table) -> SessionReadings:
     )
 
 
-def readings_json(found: SessionReadings) -> dict[str, Any]:
+def readings_json(readings: SessionReadings) -> dict[str, Any]:
     """Return the readings as JSON values, by indication and load."""
 
     def named(parts: Iterable[Any], key: str) -> dict[str, Any]:
-        made = [dataclasses.asdict(one) for one in parts]
+        made = [dataclasses.asdict(part) for part in parts]
         return {one.pop(key): one for one in made}
 
     return {
-        "full_scale": dict(found.full_scale),
-        "zero": named(found.zero, "name"),
-        "zero_loads": named(found.zero_loads, "load"),
-        "shunt": [{**dataclasses.asdict(one), "within": one.within} for one in found.shunts],
-        "creep": [dataclasses.asdict(one) for one in found.creep],
-        "reversibility": named(found.reversibility, "load"),
-        "temperature_C": found.temperature_C,
+        "full_scale": dict(readings.full_scale),
+        "zero": named(readings.zero, "name"),
+        "zero_loads": named(readings.zero_loads, "load"),
+        "shunt": [{**dataclasses.asdict(shunt), "within": shunt.within} for shunt in readings.shunts],
+        "creep": [dataclasses.asdict(one) for one in readings.creep],
+        "reversibility": named(readings.reversibility, "load"),
+        "temperature_C": readings.temperature_C,
     }
 
 
 def _rest(record: CalibrationRecord, table: Table) -> dict[str, float]:
     """Return each indication without load: the mean of the unloaded rows, else by a line through all rows."""
-    matrix = table.matrix([one.load for one in record.loads])
+    matrix = table.matrix([load.load for load in record.loads])
     cells = table.matrix(record.indications)
     idle = (np.abs(matrix) <= _NO_LOAD * np.abs(matrix).max(axis=0)).all(axis=1)
     if idle.any():
@@ -223,7 +223,7 @@ def _rest(record: CalibrationRecord, table: Table) -> dict[str, float]:
 
 
 def _zero_drifts(zero: tuple[ZeroEntry, ...], scope: Scope, full: dict[str, float]) -> tuple[ZeroDrift, ...]:
-    made = []
+    zero_drifts = []
     for name in scope.indications:
         told = [
             (one.when, dict(one.values)[name]) for one in zero if not one.shunt and name in dict(one.values)
@@ -234,18 +234,18 @@ def _zero_drifts(zero: tuple[ZeroEntry, ...], scope: Scope, full: dict[str, floa
         first = next((i for i, text in enumerate(said) if text.startswith("before")), 0)
         last = max((i for i, text in enumerate(said) if text.startswith("after")), default=len(told) - 1)
         drift = told[last][1] - told[first][1]
-        made.append(
+        zero_drifts.append(
             ZeroDrift(
                 name=name, unit=scope.unit(name), before=told[first][0], after=told[last][0], drift=drift,
                 percent_fs=100 * drift / full[name],
             )
         )  # fmt: skip
-    return tuple(made)
+    return tuple(zero_drifts)
 
 
 def _load_drift(
     record: CalibrationRecord,
-    one: LoadFit,
+    load: LoadFit,
     drifts: tuple[ZeroDrift, ...],
     zero: tuple[ZeroEntry, ...],
     rest: dict[str, float],
@@ -255,11 +255,11 @@ def _load_drift(
         start |= {} if entry.shunt else dict(entry.values)
     moved = start | {drift.name: start[drift.name] + drift.drift for drift in drifts}
     points = {name: np.array([start[name], moved[name]]) for name in record.indications}
-    before, after = _equation(one, points).tolist()
-    tolerance = one.tolerance or 1e-3 * one.largest
+    before, after = _equation(load, points).tolist()
+    tolerance = load.tolerance or 1e-3 * load.largest
     return LoadDrift(
-        load=one.load, unit=one.unit, cells=tuple(drift.name for drift in drifts), drift=after - before,
-        percent_fs=100 * (after - before) / one.largest, tolerance=tolerance,
+        load=load.load, unit=load.unit, cells=tuple(drift.name for drift in drifts), drift=after - before,
+        percent_fs=100 * (after - before) / load.largest, tolerance=tolerance,
     )  # fmt: skip
 
 
@@ -327,7 +327,7 @@ def _reversibility(record: CalibrationRecord, table: Table) -> tuple[Reversibili
     if table.run is None or table.up is None:
         return ()
     up = table.up
-    names = [one.load for one in record.loads]
+    names = [load.load for load in record.loads]
     matrix = table.matrix(names)
     largest = np.abs(matrix).max(axis=0)
     loaded = (np.abs(matrix) > SAME_LOAD * largest).any(axis=1)
@@ -345,8 +345,8 @@ def _reversibility(record: CalibrationRecord, table: Table) -> tuple[Reversibili
         return ()
     columns = table.columns(record.indications)
     made = []
-    for one, full in zip(record.loads, largest.tolist(), strict=True):
-        error = (_equation(one, columns) - table.column(one.load))[loaded]
+    for load, full in zip(record.loads, largest.tolist(), strict=True):
+        error = (_equation(load, columns) - table.column(load.load))[loaded]
         mean_up, mean_down = (
             np.bincount(key[which], weights=error[which], minlength=len(ups))[both] / count[both]
             for which, count in ((rises, ups), (~rises, downs))
@@ -355,7 +355,7 @@ def _reversibility(record: CalibrationRecord, table: Table) -> tuple[Reversibili
         worst, rms = float(np.abs(apart).max()), float(np.sqrt(np.mean(apart**2)))
         made.append(
             Reversibility(
-                load=one.load, unit=one.unit, pairs=int(both.sum()), worst=worst, rms=rms,
+                load=load.load, unit=load.unit, pairs=int(both.sum()), worst=worst, rms=rms,
                 worst_percent_fs=100 * worst / full, rms_percent_fs=100 * rms / full,
             )
         )  # fmt: skip
@@ -375,6 +375,6 @@ def _levels(values: NDArray[np.float64], within: float) -> NDArray[np.int64]:
     return made
 
 
-def _equation(one: LoadFit, columns: dict[str, NDArray[np.float64]]) -> NDArray[np.float64]:
-    value: NDArray[np.float64] = term_matrix(one.terms, columns) @ np.asarray(one.coefficients)
+def _equation(load: LoadFit, columns: dict[str, NDArray[np.float64]]) -> NDArray[np.float64]:
+    value: NDArray[np.float64] = term_matrix(load.terms, columns) @ np.asarray(load.coefficients)
     return value

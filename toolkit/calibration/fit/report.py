@@ -117,7 +117,7 @@ def report_session(fit: SessionFit) -> tuple[FitReport, ...]:
     """Return the report of every load of a fitted session."""
     table = fit.session.table
     level = load_levels(table.matrix([load.name for load in fit.session.loads]))
-    return tuple(_report(fit, one, level) for one in fit.loads)
+    return tuple(_report(fit, load, level) for load in fit.loads)
 
 
 def prediction_half_width(

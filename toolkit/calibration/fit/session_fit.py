@@ -92,7 +92,7 @@ def residual_correlation(fit: SessionFit) -> NDArray[np.float64]:
 
     Loads without scatter, or one load alone, have none: the identity.
     """
-    rest = np.array([one.fit.residuals for one in fit.loads])
+    rest = np.array([load.fit.residuals for load in fit.loads])
     products = np.einsum("ij,kj->ik", rest, rest)
     length = np.sqrt(np.diag(products))
     safe = np.where(length > 0, length, 1.0)
@@ -186,11 +186,13 @@ def _diagnosed(
     up: NDArray[np.bool_] | None,
     groups: NDArray[np.intp],
 ) -> Diagnostics:
-    found = diagnose(fit, cells=cells, load=load, up=up, replicates=groups)
+    diagnostics = diagnose(fit, cells=cells, load=load, up=up, replicates=groups)
     if not of_runs.any():
-        return found
+        return diagnostics
     within = diagnose(within_runs(fit, of_runs), cells=cells, load=load, up=up, replicates=groups)
-    return dataclasses.replace(found, outliers=within.outliers, heteroscedasticity=within.heteroscedasticity)
+    return dataclasses.replace(
+        diagnostics, outliers=within.outliers, heteroscedasticity=within.heteroscedasticity
+    )
 
 
 def load_uncertainty(session: Session, setting: LoadSetting) -> NDArray[np.float64] | None:

@@ -71,9 +71,9 @@ def mark_of(uses: Sequence[CalibrationUse]) -> str | None:
     """
     said = []
     for word, chosen, why in (
-        (DRAFT_MARK, [one for one in uses if one.draft], "draft_reasons"),
-        (UNVERIFIED, [one for one in uses if one.unverified], None),
-        (SINCE, [one for one in uses if one.since], "since"),
+        (DRAFT_MARK, [use for use in uses if use.draft], "draft_reasons"),
+        (UNVERIFIED, [use for use in uses if use.unverified], None),
+        (SINCE, [use for use in uses if use.since], "since"),
     ):
         if chosen:
             text = f"{word}: {', '.join(dict.fromkeys(one.id for one in chosen))}"

@@ -109,13 +109,13 @@ def _entries(
     yield "zero", record.zero, settings.zero
     yield "indications", record.indications, settings.indications
     yield "serial", tuple(cell.serial for cell in record.cells), settings.serials
-    yield "loads", tuple(one.load for one in record.loads), settings.loads
-    for one in record.loads:
-        yield f"{one.load}, terms", one.terms, settings.terms
-        yield f"{one.load}, method", one.method, settings.method
-        largest = float(np.abs(table.column(one.load)).max())
-        tolerance = settings.tolerance(one.load, table.unit(one.load), largest, file)
-        yield f"{one.load}, tolerance", one.tolerance, tolerance
+    yield "loads", tuple(load.load for load in record.loads), settings.loads
+    for load in record.loads:
+        yield f"{load.load}, terms", load.terms, settings.terms
+        yield f"{load.load}, method", load.method, settings.method
+        largest = float(np.abs(table.column(load.load)).max())
+        tolerance = settings.tolerance(load.load, table.unit(load.load), largest, file)
+        yield f"{load.load}, tolerance", load.tolerance, tolerance
     if record.settings != settings.text:
         yield _first_difference(record.settings, settings.text)
     hashes = {one.role: one.sha256 for one in record.data}

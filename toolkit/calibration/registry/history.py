@@ -114,7 +114,7 @@ def agreeing(
     """
     if history.last is None:
         return frozenset()
-    units = {one.load: one.unit for one in history.last.loads}
+    units = {load.load: load.unit for load in history.last.loads}
     before = {cell.name: cell.unit for cell in history.last.cells}
     cells = {
         cell.name
@@ -123,13 +123,13 @@ def agreeing(
         and same_dimension(cell.unit, before[cell.name])
         and cell.name not in replaced(new, history)
     }
-    changed = {one.where for one in results if one.rule == "sign"}
+    changed = {result.where for result in results if result.rule == "sign"}
     return frozenset(
-        (one.load, name)
-        for one in new.loads
-        if one.load in units and same_dimension(one.unit, units[one.load])
-        for name in main_indications(new, one)
-        if name in cells and f"{one.load}, {name}" not in changed
+        (load.load, name)
+        for load in new.loads
+        if load.load in units and same_dimension(load.unit, units[load.load])
+        for name in main_indications(new, load)
+        if name in cells and f"{load.load}, {name}" not in changed
     )
 
 

@@ -95,10 +95,10 @@ class Ledger:
 
     @cached_property
     def _events(self) -> dict[str, tuple[Entry, ...]]:
-        found: dict[str, tuple[Entry, ...]] = {}
+        entries: dict[str, tuple[Entry, ...]] = {}
         for entry in self.entries:
-            found[entry.id] = (*found.get(entry.id, ()), entry)
-        return found
+            entries[entry.id] = (*entries.get(entry.id, ()), entry)
+        return entries
 
     @cached_property
     def _entered(self) -> dict[str, Entry]:

@@ -80,7 +80,7 @@ def check_possible(record: CalibrationRecord, *, where: object) -> None:
         ``unit-dimension``: a force or moment in another unit, an indication without a dimension
     """
     names = [cell.name for cell in record.cells]
-    loads = [one.load for one in record.loads]
+    loads = [load.load for load in record.loads]
     for key, found in (("indications", names), ("loads", loads)):
         if any(not NAME.match(name) or name in (INTERCEPT, "abs") for name in found):
             raise _wrong(where, key, ", ".join(found), "names such as FY, MZ, D51")
@@ -100,12 +100,12 @@ def check_possible(record: CalibrationRecord, *, where: object) -> None:
                 next_step="state the unit in which the coefficients take it; nothing was written",
                 rule="unit-dimension",
             )  # fmt: skip
-    for one in record.loads:
-        check_load_unit(one.load, one.unit, where=f"{where}: {one.load}.unit")
-        missing = [name for name in names if name not in one.terms]
+    for load in record.loads:
+        check_load_unit(load.load, load.unit, where=f"{where}: {load.load}.unit")
+        missing = [name for name in names if name not in load.terms]
         if missing:
             raise _wrong(
-                where, f"{one.load}.coefficients", f"no {', '.join(missing)} among {', '.join(one.terms)}",
+                where, f"{load.load}.coefficients", f"no {', '.join(missing)} among {', '.join(load.terms)}",
                 f"a coefficient of every indication ({', '.join(names)}); write 0 where it has none",
             )  # fmt: skip
 

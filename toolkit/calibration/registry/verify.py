@@ -61,10 +61,11 @@ def verify_registry(registry: Registry, head: str | None = None) -> tuple[Verify
             ledgers[instrument] = registry.ledger(instrument)
         except ToolkitError as error:
             ledgers[instrument] = Ledger(entries=(), damage=f"{error.what}: {error.got}")
-    if head is not None and not any(e.sha256 == head for one in ledgers.values() for e in one.entries):
+    if head is not None and not any(e.sha256 == head for ledger in ledgers.values() for e in ledger.entries):
         damage = f"no line has the given head {head}: the end of a ledger was cut off"
         ledgers = {
-            name: Ledger(entries=one.entries, damage=one.damage or damage) for name, one in ledgers.items()
+            name: Ledger(entries=ledger.entries, damage=ledger.damage or damage)
+            for name, ledger in ledgers.items()
         }
         if not ledgers:
             rows.append(VerifyRow(id=HEAD, ok=False, verified=False, reason=f"ledger: {damage}"))
@@ -79,7 +80,7 @@ def _instrument(folder: Path, ledger: Ledger) -> list[VerifyRow]:
     on_disk = {path.stem for path in folder.glob("*.json") if path.name != HEAD and ID.match(path.stem)}
     owned = {HEAD, LEDGER}
     records = {record_id for record_id in {*on_disk, *entered} if ID.match(record_id)}
-    ids = sorted(records, key=lambda one: (len(one), one))
+    ids = sorted(records, key=lambda record: (len(record), record))
     for row, files in _judged(folder, ids, ledger):
         rows.append(row)
         owned |= {f"{row.id}.json", *files}

@@ -108,7 +108,7 @@ def cell_rows(source: CellSource, load: str, indication: str) -> tuple[CellRows,
     before, after = _stated_zeros(source, indication)
     creep = _creep(source, load, indication)
     run = np.zeros(table.rows) if table.run is None else table.run
-    found = []
+    cells = []
     for sense, sign in (("positive", 1.0), ("negative", -1.0)):
         mine = acting & alone & (np.sign(force) == sign)
         runs = []
@@ -120,7 +120,7 @@ def cell_rows(source: CellSource, load: str, indication: str) -> tuple[CellRows,
             last = float(reading[late[0]]) if late.size else after
             runs.append(_run(table, load, rows, reading, int(number), first, last))
         if runs:
-            found.append(
+            cells.append(
                 CellRows(
                     load=load,
                     load_unit=table.unit(load),
@@ -130,11 +130,11 @@ def cell_rows(source: CellSource, load: str, indication: str) -> tuple[CellRows,
                     runs=tuple(runs),
                     resolution=source.statements.cell(indication).resolution,
                     creep=creep,
-                    zero_read=source.zero != "included" or all(one.zero_before is not None for one in runs),
+                    zero_read=source.zero != "included" or all(run.zero_before is not None for run in runs),
                     left_out=int((acting & ~alone).sum()),
                 )
             )
-    return tuple(found)
+    return tuple(cells)
 
 
 def _run(
@@ -188,7 +188,11 @@ def _creep(source: CellSource, load: str, indication: str) -> tuple[float, float
         if indication in named and (entry.load not in source.loads or entry.load == load):
             readings.setdefault(entry.load, {})[entry.seconds] = named[indication]
     early, late = _CREEP_SECONDS
-    pairs = [(one[early], one[late]) for one in readings.values() if early in one and late in one]
+    pairs = [
+        (reading[early], reading[late])
+        for reading in readings.values()
+        if early in reading and late in reading
+    ]
     return max(pairs, key=lambda pair: abs(pair[1] - pair[0])) if pairs else None
 
 

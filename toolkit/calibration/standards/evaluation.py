@@ -11,7 +11,7 @@ import numpy as np
 from toolkit.calibration.standards.cell_rows import CellRows, CellSource, cell_rows
 from toolkit.calibration.standards.e74 import E74Result, evaluate_e74
 from toolkit.calibration.standards.iso376 import Iso376Result, evaluate_iso376
-from toolkit.calibration.standards.iso376_runs import iso376_runs
+from toolkit.calibration.standards.iso376_input import iso376_runs
 from toolkit.errors import SessionError
 
 if TYPE_CHECKING:
@@ -84,8 +84,8 @@ def evaluations(fit: SessionFit) -> tuple[Evaluation, ...]:
     return tuple(
         Evaluation(
             standard=standard,
-            load=one.name,
-            load_unit=one.unit,
+            load=load.name,
+            load_unit=load.unit,
             indication=None,
             indication_unit=None,
             sense=None,
@@ -95,7 +95,7 @@ def evaluations(fit: SessionFit) -> tuple[Evaluation, ...]:
             left_out=session.table.rows,
         )
         for standard in STANDARDS
-        for one in session.loads
+        for load in session.loads
     )
 
 
@@ -109,7 +109,7 @@ def source_of(fit: SessionFit) -> CellSource:
         statements=session_statements(session),
         settings=session.settings,
         zero=session.zero,
-        loads=tuple(one.name for one in session.loads),
+        loads=tuple(load.name for load in session.loads),
         indications=session.indications,
         where=str(session.path),
     )
@@ -135,17 +135,17 @@ def evaluate_source(
         ``standard``: no such load or indication, or no row in which the load acts alone
     """
     preloads = source.statements.preloads if preloads is None else preloads
-    found: list[Evaluation] = []
+    evaluations: list[Evaluation] = []
     for rows in cell_rows(source, load, indication):
         if standard == "iso376":
-            found.append(_iso376(source, rows, preloads, degree))
+            evaluations.append(_iso376(source, rows, preloads, degree))
         else:
-            found += [
+            evaluations += [
                 _e74(rows, direction, degree)
                 for direction in ("up", "down")
                 if any((run.up == (direction == "up")).any() for run in rows.runs)
             ]
-    return tuple(found)
+    return tuple(evaluations)
 
 
 def _e74(rows: CellRows, direction: str, degree: int | None) -> Evaluation:

@@ -167,9 +167,9 @@ def evaluate_iso376(
     curve = mean - fit.residuals
     full = float(abs(mean[-1]))
     zeros = [
-        one.zero_after - one.zero_before
-        for one in runs
-        if one.zero_after is not None and one.zero_before is not None
+        run.zero_after - run.zero_before
+        for run in runs
+        if run.zero_after is not None and run.zero_before is not None
     ]
     f0 = 100 * max(zeros, key=abs) / full if zeros else None
     c = None if creep is None else 100 * abs(creep[1] - creep[0]) / full
@@ -232,7 +232,7 @@ def evaluate_iso376(
 def _repeatability(runs: Sequence[Iso376Run]) -> NDArray[np.float64] | None:
     if not iso376_input.repeated(runs):
         return None
-    first, second = (np.array(one.up) for one in runs[:2])
+    first, second = (np.array(run.up) for run in runs[:2])
     return np.asarray(100 * np.abs(second - first) / np.abs((first + second) / 2))
 
 
@@ -285,7 +285,7 @@ def _rank(name: str | None) -> int:
 
 
 def _ranges(rows: Sequence[Iso376Force]) -> tuple[Iso376Range, ...]:
-    found = []
+    ranges = []
     upper = rows[-1].force
     for rank, limits in enumerate(LIMITS):
         lower = None
@@ -294,8 +294,8 @@ def _ranges(rows: Sequence[Iso376Force]) -> tuple[Iso376Range, ...]:
                 break
             lower = row.force
         if lower is not None and lower <= upper / 2:
-            found.append(Iso376Range(class_name=limits.name, lower=lower, upper=upper))
-    return tuple(found)
+            ranges.append(Iso376Range(class_name=limits.name, lower=lower, upper=upper))
+    return tuple(ranges)
 
 
 def _procedure(

@@ -22,8 +22,7 @@ import numpy as np
 from toolkit.calibration.session.statements import statements_of
 from toolkit.calibration.terms import term_matrix
 from toolkit.calibration.uncertainty.components import components_of
-from toolkit.calibration.uncertainty.conditions import Temperature
-from toolkit.calibration.uncertainty.model import Budget
+from toolkit.calibration.uncertainty.model import Budget, Temperature
 from toolkit.errors import SessionError
 from toolkit.estimate import coverage_factor, effective_dof
 
@@ -125,7 +124,7 @@ def typical_indications(record: CalibrationRecord, loads: Table, load: str, at: 
 
     The plane is indications on loads; it only sets the point at which sensitivities are taken.
     """
-    names = [one.load for one in record.loads]
+    names = [load.load for load in record.loads]
     design = np.column_stack([loads.matrix(names), np.ones(loads.rows)])
     scale = np.maximum(np.abs(design).max(axis=0), 1e-300)
     plane = np.linalg.lstsq(design / scale, loads.matrix(record.indications), rcond=None)[0]
@@ -148,20 +147,20 @@ def _budget(
     record: CalibrationRecord,
     loads: Table,
     check: Table | None,
-    one: LoadFit,
+    load: LoadFit,
     value: float,
     point: NDArray[np.float64],
     temperature: Temperature | None,
     probability: float,
 ) -> Budget:
     parts, scatter_dof = components_of(
-        record, statements_of(record), loads, check, one, value=value, point=point, temperature=temperature
+        record, statements_of(record), loads, check, load, value=value, point=point, temperature=temperature
     )
     joint = math.sqrt(math.fsum(part.u**2 for part in parts if part.joint))
     apart = [(part.u, part.dof) for part in parts if not part.joint]
     u, dof, k, U = combine([(joint, scatter_dof), *apart], probability)
     return Budget(
-        record=record.id, load=one.load, unit=one.unit, at=value, indications=tuple(point.tolist()),
+        record=record.id, load=load.load, unit=load.unit, at=value, indications=tuple(point.tolist()),
         components=parts, u=u, dof=dof, k=k, U=U, probability=probability,
         scatter_dof=scatter_dof,
     )  # fmt: skip

@@ -57,7 +57,7 @@ def demonstrations(folder: Path) -> tuple[Demonstration, ...]:
 def _shown(name: str, rules: str, values: Callable[[], tuple[Departure, ...]]) -> Demonstration:
     def prepare(bench: Bench) -> Act:
         del bench  # values are judged without a registry
-        return lambda: [(one.rule, f"{one.where}: {one.message}") for one in values()]
+        return lambda: [(value.rule, f"{value.where}: {value.message}") for value in values()]
 
     return Demonstration(name=name, stage="values of a test", rules=tuple(rules.split()), prepare=prepare)
 

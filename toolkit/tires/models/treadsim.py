@@ -101,7 +101,11 @@ def _leaders(p: Mapping[str, Any], shape: tuple[int, ...]) -> tuple[NDArray[np.i
     # (copies,) the first copy whose bristles are nearly those of each copy, and where they are the same: a
     # derivative asks for copies of one tire that differ by a millionth, or in what acts on the sums alone.
     copies = shape[0] if len(shape) == 2 else 1
-    searched = [one for one in MODEL.parameters if one.name not in _OUTSIDE and np.size(p[one.name]) > 1]
+    searched = [
+        parameter
+        for parameter in MODEL.parameters
+        if parameter.name not in _OUTSIDE and np.size(p[parameter.name]) > 1
+    ]
     if copies == 1 or not searched:
         return np.zeros(copies, dtype=np.intp), np.arange(copies) > 0
     places = np.stack([np.ravel(p[one.name]) / one.size for one in searched], axis=1)
@@ -148,7 +152,7 @@ def _limit(p: Mapping[str, Any], load: Array, growth: Any, shape: tuple[int, ...
 
 def _flat(arrays: Mapping[str, Any]) -> tuple[tuple[int, ...], dict[str, Array]]:
     # All at one shape, then in one line of cases.
-    together = np.broadcast_arrays(*(np.asarray(one, dtype=np.float64) for one in arrays.values()))
+    together = np.broadcast_arrays(*(np.asarray(array, dtype=np.float64) for array in arrays.values()))
     shape = together[0].shape
     return shape, {name: np.ravel(one) for name, one in zip(arrays, together, strict=True)}
 
