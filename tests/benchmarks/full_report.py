@@ -143,8 +143,8 @@ def main() -> None:
     """Make the report: TEST HOME OUT."""
     from toolkit.report.deliver import deliver
     from toolkit.report.drawer import Drawer
-    from toolkit.report.pdf import Office
-    from toolkit.report.template.package import read_template
+    from toolkit.report.word.office import Office
+    from toolkit.report.word.package import read_template
 
     test, home, out = map(Path, sys.argv[1:4])
     with Office() as office, Drawer() as drawer:

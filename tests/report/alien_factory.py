@@ -9,7 +9,7 @@ from pathlib import Path
 
 from template_factory import W, grey_png
 
-from toolkit.report.template.xml import NS
+from toolkit.report.word.xml import NS
 
 _SPACES = " ".join(f'xmlns:{prefix}="{uri}"' for prefix, uri in NS.items()) + (
     ' xmlns:wps="http://schemas.microsoft.com/office/word/2010/wordprocessingShape" mc:Ignorable="w14 w15"'

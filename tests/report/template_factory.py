@@ -12,8 +12,8 @@ import docx
 from lxml import etree
 from PIL import Image
 
-from toolkit.report.template.package import Template, read_template
-from toolkit.report.template.xml import NS, Element
+from toolkit.report.word.package import Template, read_template
+from toolkit.report.word.xml import NS, Element
 
 HASH = "{{tk:calibration.hash}}"
 FOOTNOTES = (

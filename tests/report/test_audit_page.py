@@ -176,7 +176,7 @@ class TestSummary:
 
     def test_it_is_filled_converted_and_verified(self, view, tmp_path):
         from toolkit.report.deliver import deliver
-        from toolkit.report.template.package import read_template
+        from toolkit.report.word.package import read_template
 
         template = read_template(CHECKOUT / "report_templates" / "audit.docx")
         done = deliver(template, build_audit_content(view), tmp_path, name="audit")
@@ -188,7 +188,7 @@ class TestSummary:
         from docx import Document
 
         from toolkit.report.deliver import deliver
-        from toolkit.report.template.package import read_template
+        from toolkit.report.word.package import read_template
 
         (tmp_path / "nothing").mkdir()
         made = audit_archive(archive or tmp_path / "nothing", Registry(CHECKOUT / "calibrations"))

@@ -18,8 +18,8 @@ from toolkit.report.diagnosis.page import page
 from toolkit.report.diagnosis.plots import diagnosis_plots
 from toolkit.report.diagnosis.vocabulary import DIAGNOSIS, TABLES
 from toolkit.report.style import Style
-from toolkit.report.template.fill import fill
-from toolkit.report.template.package import read_template
+from toolkit.report.word.fill import fill
+from toolkit.report.word.package import read_template
 
 CHECKOUT = Path(__file__).resolve().parents[2]
 DAY = dt.date(2026, 4, 1)

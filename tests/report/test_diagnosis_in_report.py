@@ -27,12 +27,12 @@ from toolkit.report.diagnosis.vocabulary import DIAGNOSIS
 from toolkit.report.figures import Picture, _figure
 from toolkit.report.listing import list_tags
 from toolkit.report.style import Style
-from toolkit.report.template.check import check_template, vocabulary_of
-from toolkit.report.template.fill import Filled, fill
-from toolkit.report.template.package import open_package, read_template
-from toolkit.report.template.scan import scan
-from toolkit.report.template.xml import stories
 from toolkit.report.vocabulary import REPORT
+from toolkit.report.word.check import check_template, vocabulary_of
+from toolkit.report.word.fill import Filled, fill
+from toolkit.report.word.package import open_package, read_template
+from toolkit.report.word.scan import scan
+from toolkit.report.word.xml import stories
 
 EFFECT = FoundEffect(
     name="quadratic_drag", stage="dynamics", channel="F", statement="Drag is missing.",

@@ -21,11 +21,11 @@ from toolkit.report.build import build_content
 from toolkit.report.content import Table, Value
 from toolkit.report.figures import Picture
 from toolkit.report.style import Style
-from toolkit.report.template.fill import Filled, fill
-from toolkit.report.template.package import read_template
-from toolkit.report.template.verify import verify_docx
-from toolkit.report.template.verify_text import text_checks
-from toolkit.report.template.xml import NS
+from toolkit.report.word.fill import Filled, fill
+from toolkit.report.word.package import read_template
+from toolkit.report.word.verify import verify_docx
+from toolkit.report.word.verify_text import text_checks
+from toolkit.report.word.xml import NS
 
 DAY = dt.date(2026, 11, 21)
 PICTURE = Picture(png=grey_png(63, 37), width_px=63, height_px=37)

@@ -20,8 +20,8 @@ from toolkit.report.figures import draw, draw_svg
 from toolkit.report.handover import content_hash
 from toolkit.report.models import model_plots, model_rows
 from toolkit.report.tags import catalogue
-from toolkit.report.template.fill import fill, needed_figures
-from toolkit.report.template.package import read_template
+from toolkit.report.word.fill import fill, needed_figures
+from toolkit.report.word.package import read_template
 from toolkit.tires.comparison import Comparison
 
 office_needed = pytest.mark.skipif(

@@ -11,8 +11,8 @@ from template_factory import FOLDER, make, opened, p, run, sdt, tbl
 
 from toolkit.errors import TemplateError, ToolkitError
 from toolkit.report.style import Style
-from toolkit.report.template.check import RULES, check_template
-from toolkit.report.template.package import read_template
+from toolkit.report.word.check import RULES, check_template
+from toolkit.report.word.package import read_template
 
 CHECKOUT = Path(__file__).resolve().parents[2]
 

@@ -37,11 +37,10 @@ from toolkit.report.content import ReportContent
 from toolkit.report.deliver import Delivered, Job, deliver_all
 from toolkit.report.diagnosis.content import build_diagnosis_content
 from toolkit.report.style import Style, read_style, style_file
-from toolkit.report.template.check import check_template
-from toolkit.report.template.contents_pages import pdf_outline
-from toolkit.report.template.package import read_template
-from toolkit.report.template.verify import pdf_text
-from toolkit.report.template.xml import q
+from toolkit.report.word.check import check_template
+from toolkit.report.word.contents_pages import pdf_outline, pdf_text
+from toolkit.report.word.package import read_template
+from toolkit.report.word.xml import q
 from toolkit.report.words import say
 
 DAY = dt.date(2026, 11, 21)

@@ -60,7 +60,7 @@ def amend(
     from toolkit.cli.resolve import resolve_test
     from toolkit.errors import ToolkitError
     from toolkit.report.deliver import deliver_all
-    from toolkit.report.template.package import read_template
+    from toolkit.report.word.package import read_template
 
     wanted = list(_wanted(linked))
     if not wanted:

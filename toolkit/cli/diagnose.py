@@ -13,7 +13,7 @@ from toolkit.cli.home import calibrations_folder
 
 if TYPE_CHECKING:
     from toolkit.diagnosis.answer.answer import Diagnosis
-    from toolkit.report.template.package import Template
+    from toolkit.report.word.package import Template
 
 NAME = "diagnose"
 
@@ -113,7 +113,7 @@ def command(
 def _template(template: Path | None, home: Path | None) -> Template:
     """Return the template of the document, judged before anything is searched."""
     from toolkit.cli.delivery import home_template
-    from toolkit.report.template.package import read_template
+    from toolkit.report.word.package import read_template
 
     return read_template(template or home_template("diagnosis.docx", home))
 

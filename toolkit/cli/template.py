@@ -23,10 +23,10 @@ def check(
     Example: toolkit template check report_templates/org.docx
     """
     from toolkit.report.style import read_style, style_file
-    from toolkit.report.template.check import check_template
-    from toolkit.report.template.package import open_package, read_template
-    from toolkit.report.template.scan import scan
-    from toolkit.report.template.xml import stories
+    from toolkit.report.word.check import check_template
+    from toolkit.report.word.package import open_package, read_template
+    from toolkit.report.word.scan import scan
+    from toolkit.report.word.xml import stories
 
     template = read_template(file)
     found = check_template(template, read_style(style_file(file)))

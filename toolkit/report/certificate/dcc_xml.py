@@ -8,7 +8,7 @@ from typing import Any
 
 from lxml import etree
 
-from toolkit.report.template.xml import clean
+from toolkit.report.word.xml import clean
 
 Node = Any
 SPACES = {"dcc": "https://ptb.de/dcc", "si": "https://ptb.de/si"}

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from toolkit.report.tags import Tag, parse_tag
-from toolkit.report.template.xml import (
+from toolkit.report.word.xml import (
     SDT_CONTENT,
     SDT_PR,
     W_P,

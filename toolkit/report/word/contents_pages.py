@@ -5,26 +5,20 @@ from __future__ import annotations
 import io
 import re
 import subprocess
+import tempfile
 import zipfile
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 from lxml import etree
 
-from toolkit.report.template.bulk import with_rows, without_rows
-from toolkit.report.template.contents import ContentsEntry, contents_fields
-from toolkit.report.template.xml import (
-    SDT_CONTENT,
-    SDT_PR,
-    W_P,
-    W_R,
-    W_SDT,
-    W_T,
-    Element,
-    ancestor,
-    parser,
-    q,
-)
+from toolkit.errors import RenderError
+from toolkit.report.word.bulk import with_rows, without_rows
+from toolkit.report.word.contents import ContentsEntry, contents_fields
+from toolkit.report.word.filled import Filled
+from toolkit.report.word.office import Office
+from toolkit.report.word.xml import SDT_CONTENT, SDT_PR, W_P, W_R, W_SDT, W_T, Element, ancestor, parser, q
 
 Edit = Callable[[Element], None]
 _STORY = re.compile(r"word/[\w.-]+\.xml")
@@ -116,6 +110,47 @@ def with_numbers(docx: bytes, part: str, titles: Mapping[str, str]) -> bytes:
     return _edited(docx, {part: put})
 
 
+def pdf_text(pdf: Path) -> str:
+    """Return a PDF's text, a form feed after each page."""
+    with tempfile.TemporaryDirectory(prefix="toolkit-verify-") as folder:
+        # The text is the same without PDF/A's colour profile, which pdftotext sets up anew for each page:
+        # 50 ms a page. The name is blotted out in place, so that every offset stays right.
+        plain = Path(folder) / "text.pdf"
+        plain.write_bytes(pdf.read_bytes().replace(b"/OutputIntents", b"/OutputIntent_"))
+        return poppler(["pdftotext", "-raw", "-enc", "UTF-8", str(plain), "-"])
+
+
+def poppler(command: list[str]) -> str:
+    """Return what one of poppler's programs prints.
+
+    Raises
+    ------
+    RenderError
+        ``no-poppler``: it is not installed; ``render-timeout``: it does not end
+    """
+    try:
+        done = subprocess.run(command, capture_output=True, timeout=120, check=False)
+    except FileNotFoundError as error:
+        raise RenderError(
+            "the PDF cannot be verified",
+            where=command[0],
+            got="no program of that name on the PATH",
+            expected="poppler's pdftotext, pdffonts and pdfinfo",
+            next_step="run 'toolkit doctor': it prints the command that installs poppler-utils",
+            rule="no-poppler",
+        ) from error
+    except subprocess.TimeoutExpired as error:
+        raise RenderError(
+            "the PDF cannot be verified in time",
+            where=command[0],
+            got="no end after 120 s",
+            expected="an answer",
+            next_step="open the PDF; try again with --keep",
+            rule="render-timeout",
+        ) from error
+    return done.stdout.decode("utf-8", "replace")
+
+
 def pdf_outline(pdf: Path) -> list[tuple[str, int]]:
     """Return the PDF's own outline: (title, page), in the order of the document."""
     done = subprocess.run(
@@ -136,7 +171,7 @@ def titles_of(
     The PDF's title begins with the number that Word gives a heading by itself. A heading that the outline
     has not is left out.
     """
-    from toolkit.report.template.verify_text import squeeze
+    from toolkit.report.word.verify_text import squeeze
 
     found = []
     at = 0
@@ -199,3 +234,69 @@ def _unescaped(title: bytes) -> str:
     from html import unescape
 
     return unescape(title.decode("utf-8", "replace"))
+
+
+# The PDF of filled documents: converted in one call, tables of contents with the pages of the print.
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Printed:
+    """A document as it is handed over, with the pages in its contents, and its PDF."""
+
+    docx: bytes
+    pdf: Path
+
+
+def print_copies(filled: Sequence[Filled], office: Office, work: Path) -> list[Printed | RenderError]:
+    """Convert filled documents in one call; each PDF, or why there is none, in the same order.
+
+    A document whose headings Word numbers by itself is converted twice: the numbers of its contents are
+    those of the first PDF.
+    """
+    every = range(len(filled))
+    made = _converted(filled, dict(zip(every, (one.docx for one in filled), strict=True)), office, work)
+    again = [
+        i
+        for i, (one, pdf) in enumerate(zip(filled, made, strict=True))
+        if isinstance(pdf, Path) and any(entry.numbered for entry in one.contents.entries)
+    ]
+    documents = [one.docx for one in filled]
+    if again:
+        for i in again:
+            documents[i] = _numbered(filled[i], made[i])
+        second = _converted(filled, {i: documents[i] for i in again}, office, work)
+        for i, pdf in zip(again, second, strict=True):
+            made[i] = pdf
+    return [
+        one if isinstance(one, RenderError) else Printed(docx=_paged(own, data, one), pdf=one)
+        for own, data, one in zip(filled, documents, made, strict=True)
+    ]
+
+
+def _converted(
+    filled: Sequence[Filled], documents: Mapping[int, bytes], office: Office, work: Path
+) -> list[Path | RenderError]:
+    """Convert documents by their place in ``filled``: no PDF ever takes the name of another document's."""
+    sources = []
+    for index, data in documents.items():
+        one = filled[index]
+        source = work / f"{index:04d}.docx"
+        source.write_bytes(for_printing(data, one.main_part, contents=bool(one.contents.entries)))
+        sources.append(source)
+    return office.convert_each(sources, work) if sources else []
+
+
+def _numbered(filled: Filled, pdf: Path | RenderError) -> bytes:
+    if isinstance(pdf, RenderError):
+        return filled.docx
+    found = titles_of(filled.contents.headings, pdf_outline(pdf))
+    numbered = {one.bookmark for one in filled.contents.entries if one.numbered}
+    titles = {bookmark: title for bookmark, _, title, _ in found if bookmark in numbered}
+    return with_numbers(filled.docx, filled.main_part, titles)
+
+
+def _paged(filled: Filled, docx: bytes, pdf: Path) -> bytes:
+    if not filled.contents.entries:
+        return docx
+    pages = printed_pages(pdf_text(pdf), filled.contents.entries)
+    return with_pages(docx, filled.main_part, pages)

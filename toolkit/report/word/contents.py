@@ -15,8 +15,8 @@ from typing import Any
 
 from lxml import etree
 
-from toolkit.report.template.headings import StyleSheet, headings, style_of
-from toolkit.report.template.xml import (
+from toolkit.report.word.numbering import StyleSheet, headings, style_of
+from toolkit.report.word.xml import (
     W_P,
     W_R,
     W_T,
@@ -345,7 +345,7 @@ def _right_tab(properties: Element, width: int) -> None:
 
 
 def _text_width(root: Element) -> int:
-    from toolkit.report.template.pictures import section_room
+    from toolkit.report.word.pictures import section_room
 
     sections = list(root.iter(q("w:sectPr")))
     return section_room(sections[0])[0] if sections else 9000

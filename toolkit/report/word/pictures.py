@@ -12,8 +12,8 @@ from xml.sax.saxutils import quoteattr
 from lxml import etree
 
 from toolkit.report.figures import Picture
-from toolkit.report.template.scan import own_rows
-from toolkit.report.template.xml import (
+from toolkit.report.word.scan import own_rows
+from toolkit.report.word.xml import (
     NS,
     W_P,
     W_R,

@@ -1,7 +1,7 @@
 """The template lint: what a template must be before it is filled, each finding with a rule and a place.
 
 Errors keep a report from being made; warnings do not. What makes a file unsafe to open is refused
-earlier, by `toolkit.report.template.package`.
+earlier, by `toolkit.report.word.package`.
 """
 
 from __future__ import annotations
@@ -15,11 +15,10 @@ from toolkit.report.comparison.vocabulary import COMPARISON
 from toolkit.report.diagnosis.vocabulary import DIAGNOSIS
 from toolkit.report.style import Style
 from toolkit.report.tags import format_problem, parse_tag
-from toolkit.report.template.check_around import surroundings
-from toolkit.report.template.fonts import missing_fonts
-from toolkit.report.template.lint import RULES, LintFinding
-from toolkit.report.template.package import Template, open_package
-from toolkit.report.template.scan import (
+from toolkit.report.vocabulary import REPORT, Vocabulary
+from toolkit.report.word.lint import RULES, LintFinding, missing_fonts, surroundings
+from toolkit.report.word.package import Template, open_package
+from toolkit.report.word.scan import (
     LITERAL,
     Site,
     broken_literals,
@@ -32,7 +31,7 @@ from toolkit.report.template.scan import (
     scan,
     table_of,
 )
-from toolkit.report.template.xml import (
+from toolkit.report.word.xml import (
     SDT_CONTENT,
     W_P,
     W_SDT,
@@ -45,7 +44,6 @@ from toolkit.report.template.xml import (
     q,
     stories,
 )
-from toolkit.report.vocabulary import REPORT, Vocabulary
 
 
 def check_template(template: Template, style: Style, *, fonts: bool = True) -> tuple[LintFinding, ...]:

@@ -15,29 +15,27 @@ from toolkit.files import sha256_bytes
 from toolkit.report.content import ReportContent, Table
 from toolkit.report.figures import Picture
 from toolkit.report.tags import Tag
-from toolkit.report.template.bulk import Bulk, row_texts
-from toolkit.report.template.check import LintFinding, check_stories
-from toolkit.report.template.contents import write_contents
-from toolkit.report.template.controls import (
+from toolkit.report.word.bulk import Bulk, row_texts
+from toolkit.report.word.check import LintFinding, check_stories
+from toolkit.report.word.contents import write_contents
+from toolkit.report.word.controls import (
     apply_condition,
     fill_control,
     fill_literals,
+    from_the_right,
+    kept_whole,
     release,
     replace_content,
     settle,
 )
-from toolkit.report.template.direction import from_the_right, kept_whole
-from toolkit.report.template.fields import number_captions
-from toolkit.report.template.filled import Entry, Filled
-from toolkit.report.template.headings import levelled
-from toolkit.report.template.package import Template, open_package
-from toolkit.report.template.page_marks import PAGE_MARK, mark_pages
-from toolkit.report.template.pages import drop_notes, headers_shown
-from toolkit.report.template.pictures import Ids, free_height, insert_at_mark, picture_run
-from toolkit.report.template.properties import set_properties
-from toolkit.report.template.rows import fill_table
-from toolkit.report.template.scan import Site, row_in, scan, table_of
-from toolkit.report.template.xml import (
+from toolkit.report.word.filled import Entry, Filled
+from toolkit.report.word.numbering import levelled, number_captions
+from toolkit.report.word.package import Template, open_package
+from toolkit.report.word.pages import PAGE_MARK, drop_notes, headers_shown, mark_pages, set_properties
+from toolkit.report.word.pictures import Ids, free_height, insert_at_mark, picture_run
+from toolkit.report.word.rows import fill_table
+from toolkit.report.word.scan import Site, row_in, scan, table_of
+from toolkit.report.word.xml import (
     W_P,
     W_TR,
     Element,

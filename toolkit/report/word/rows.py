@@ -10,11 +10,11 @@ from toolkit.estimate import has_interval, round_to_uncertainty
 from toolkit.report.content import Cell, Table
 from toolkit.report.style import Style
 from toolkit.report.tags import Tag, format_number, parse_tag
-from toolkit.report.template.bulk import MANY, Bulk, Mould, fresh_ids
-from toolkit.report.template.controls import fill_control, fill_literals, set_cell
-from toolkit.report.template.pictures import Ids, free_row
-from toolkit.report.template.scan import LITERAL, control_tag, own_rows, row_in, visible_texts
-from toolkit.report.template.xml import W_P, W_SDT, W_TC, W_TR, Element, ancestor, paragraph_text, q
+from toolkit.report.word.bulk import MANY, Bulk, Mould, fresh_ids
+from toolkit.report.word.controls import fill_control, fill_literals, set_cell
+from toolkit.report.word.pictures import Ids, free_row
+from toolkit.report.word.scan import LITERAL, control_tag, own_rows, row_in, visible_texts
+from toolkit.report.word.xml import W_P, W_SDT, W_TC, W_TR, Element, ancestor, paragraph_text, q
 
 Said = Callable[[str, str], None]
 

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
-from toolkit.report.template.filled import Filled
+from toolkit.report.word.filled import Filled
 
 _SPACE = re.compile("[\\s\u00ad\u200b-\u200f\u202a-\u202e\u2066-\u2069\ufeff]+")
 _LONG, _UNBROKEN = 40, 20  # characters of prose, and of one word, that a page's end may cut

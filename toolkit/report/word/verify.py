@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
+import io
 import re
-import subprocess
-import tempfile
+import zipfile
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
-from toolkit.errors import RenderError
-from toolkit.report.template.filled import Filled
-from toolkit.report.template.scan import BROKEN, LITERAL, control_tag
-from toolkit.report.template.verify_text import Check, text_checks
-from toolkit.report.template.written import text_elements
-from toolkit.report.template.xml import SDT_PR, W_P, W_SDT, clean, in_fallback, paragraph_text, q
+from toolkit.report.word.contents_pages import pdf_outline, pdf_text, poppler, printed_pages, titles_of
+from toolkit.report.word.filled import Filled, text_elements
+from toolkit.report.word.scan import BROKEN, LITERAL, control_tag
+from toolkit.report.word.verify_text import Check, text_checks
+from toolkit.report.word.xml import SDT_PR, W_P, W_SDT, clean, in_fallback, paragraph_text, q
 
 
 def verify_docx(filled: Filled) -> tuple[Check, ...]:
@@ -59,12 +58,12 @@ def verify_pdf(pdf: Path, filled: Filled) -> tuple[tuple[Check, ...], int]:
     RenderError
         poppler's programs are not installed
     """
-    info = _run(["pdfinfo", str(pdf)])
+    info = poppler(["pdfinfo", str(pdf)])
     found = re.search(r"^Pages:\s+(\d+)", info, re.MULTILINE)
     pages = int(found[1]) if found else 0
     data = pdf.read_bytes()
     with ThreadPoolExecutor(2) as pool:
-        fonts = pool.submit(_run, ["pdffonts", str(pdf)])
+        fonts = pool.submit(poppler, ["pdffonts", str(pdf)])
         text = pdf_text(pdf)
         listing = fonts.result()
     pictures = data.count(b"/Subtype/Image")
@@ -111,8 +110,6 @@ def _margins(filled: Filled) -> list[Check]:
 
 
 def _contents(pdf: Path, text: str, filled: Filled) -> list[Check]:
-    from toolkit.report.template.verify_contents import contents_problems
-
     if not filled.contents.entries:
         return []
     problems = contents_problems(pdf, text, filled)
@@ -124,16 +121,6 @@ def _contents(pdf: Path, text: str, filled: Filled) -> list[Check]:
             message="; ".join(problems[:5]) or f"{lines} lines of contents with the pages of the print",
         )
     ]
-
-
-def pdf_text(pdf: Path) -> str:
-    """Return a PDF's text, a form feed after each page."""
-    with tempfile.TemporaryDirectory(prefix="toolkit-verify-") as folder:
-        # The text is the same without PDF/A's colour profile, which pdftotext sets up anew for each page:
-        # 50 ms a page. The name is blotted out in place, so that every offset stays right.
-        plain = Path(folder) / "text.pdf"
-        plain.write_bytes(pdf.read_bytes().replace(b"/OutputIntents", b"/OutputIntent_"))
-        return _run(["pdftotext", "-raw", "-enc", "UTF-8", str(plain), "-"])
 
 
 def _pdf_string(text: str) -> bytes:
@@ -156,25 +143,39 @@ def _line(info: str, name: str) -> str:
     return next((line for line in info.splitlines() if line.startswith(name)), "")
 
 
-def _run(command: list[str]) -> str:
-    try:
-        done = subprocess.run(command, capture_output=True, timeout=120, check=False)
-    except FileNotFoundError as error:
-        raise RenderError(
-            "the PDF cannot be verified",
-            where=command[0],
-            got="no program of that name on the PATH",
-            expected="poppler's pdftotext, pdffonts and pdfinfo",
-            next_step="run 'toolkit doctor': it prints the command that installs poppler-utils",
-            rule="no-poppler",
-        ) from error
-    except subprocess.TimeoutExpired as error:
-        raise RenderError(
-            "the PDF cannot be verified in time",
-            where=command[0],
-            got="no end after 120 s",
-            expected="an answer",
-            next_step="open the PDF; try again with --keep",
-            rule="render-timeout",
-        ) from error
-    return done.stdout.decode("utf-8", "replace")
+# Verify the tables of contents: their lines equal the headings, their pages those of the print.
+
+
+def contents_problems(pdf: Path, text: str, filled: Filled) -> list[str]:
+    """Return what is wrong with a report's tables of contents; empty where all is well.
+
+    The PDF's own outline is the witness: it is made from the headings, not from the contents.
+    """
+    contents = filled.contents
+    if not contents.entries:
+        return []
+    found = titles_of(contents.headings, pdf_outline(pdf))
+    pages = {bookmark: page for bookmark, _, _, page in found}
+    said = []
+    if len(found) < len(contents.headings):
+        seen = {one for _, one, _, _ in found}
+        said += [f"heading {one!r} is not in the PDF" for _, one in contents.headings if one not in seen]
+        said = said or ["a heading is not in the PDF"]
+    printed = printed_pages(text, contents.entries)
+    plain = not _restarts(filled)
+    for entry in contents.entries:
+        if not entry.paged or not entry.text.isascii():
+            continue
+        shown = printed.get(entry.bookmark)
+        if shown is None:
+            said.append(f"{entry.text!r} is not in the contents")
+        elif entry.heading and plain and shown != str(pages.get(entry.bookmark, shown)):
+            said.append(f"{entry.text!r} is on page {pages[entry.bookmark]}, the contents say {shown}")
+    return said
+
+
+def _restarts(filled: Filled) -> bool:
+    # A document that counts its pages otherwise than 1, 2, 3 shows labels, not numbers of pages.
+    with zipfile.ZipFile(io.BytesIO(filled.docx)) as archive:
+        xml = archive.read(filled.main_part)
+    return re.search(rb"<w:pgNumType[^>]*w:(?:start|fmt)=", xml) is not None

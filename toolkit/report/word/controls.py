@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import unicodedata
 from collections.abc import Callable
 from copy import deepcopy
+from typing import Any
 
 from lxml import etree
 
 from toolkit.report.tags import Tag, parse_tag
-from toolkit.report.template.scan import LITERAL, visible_texts
-from toolkit.report.template.xml import (
+from toolkit.report.word.scan import LITERAL, visible_texts
+from toolkit.report.word.xml import (
     SDT_CONTENT,
     SDT_PR,
     W_P,
@@ -19,6 +21,7 @@ from toolkit.report.template.xml import (
     W_TC,
     W_TR,
     Element,
+    Story,
     new_run,
     q,
     set_text,
@@ -195,3 +198,35 @@ def _repair(parent: Element) -> None:
 def _clear(element: Element) -> None:
     for child in list(element):
         element.remove(child)
+
+
+# Values in a document that is read from the right: a number keeps its sign, a size its order.
+
+
+_LRM = "\u200e"
+_OFF = ("0", "false", "off")
+
+
+def from_the_right(package: Any, parts: list[Story]) -> bool:
+    """Tell whether some paragraph, table or style of a document is set from right to left."""
+    styles = getattr(package.main_document_part, "_styles_part", None)
+    roots = [story.root for story in parts] + ([] if styles is None else [styles.element])
+    return any(
+        (one.get(q("w:val")) or "1").lower() not in _OFF
+        for root in roots
+        for one in root.iter(q("w:bidi"), q("w:bidiVisual"))
+    )
+
+
+def kept_whole(text: str) -> str:
+    """Return a text with a digit, and no letter from the right, between marks from the left, line by line.
+
+    >>> kept_whole("-33.4") == "\\u200e-33.4\\u200e", kept_whole("steel")
+    (True, 'steel')
+    """
+    return "\n".join(f"{_LRM}{line}{_LRM}" if _wants_marks(line) else line for line in text.split("\n"))
+
+
+def _wants_marks(line: str) -> bool:
+    kinds = {unicodedata.bidirectional(character) for character in line}
+    return "EN" in kinds and not kinds & {"R", "AL", "AN"}

@@ -15,7 +15,7 @@ from lxml import etree
 
 from toolkit.errors import TemplateError
 from toolkit.files import sha256_bytes
-from toolkit.report.template.xml import Element, parser, q, walk_fields
+from toolkit.report.word.xml import Element, parser, q, walk_fields
 
 _MAIN = "application/vnd.openxmlformats-officedocument.wordprocessingml.{}.main+xml"
 DOCUMENT, TEMPLATE = _MAIN.format("document"), _MAIN.format("template")

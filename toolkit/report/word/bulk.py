@@ -18,8 +18,8 @@ from xml.sax.saxutils import escape
 from lxml import etree
 
 from toolkit.report.tags import Tag
-from toolkit.report.template.pictures import Ids
-from toolkit.report.template.xml import (
+from toolkit.report.word.pictures import Ids
+from toolkit.report.word.xml import (
     W_P,
     W_TBL,
     W_TC,
