@@ -13,7 +13,7 @@ from toolkit.estimate import Estimate
 from toolkit.machine import TypeB
 from toolkit.pipeline import TestResult
 from toolkit.report.style import Style
-from toolkit.report.tables import build_tables, summary_load
+from toolkit.report.test.tables import build_tables, summary_load
 
 
 def with_budget(load: float, name: str, **sources: float) -> TestResult:

@@ -12,8 +12,8 @@ from lxml import etree
 from report_factory import make_record, make_result
 from template_factory import HASH, opened, p, run, sdt, tbl
 
-from toolkit.report.build import build_content
 from toolkit.report.content import ReportContent, Table
+from toolkit.report.test.content import build_content
 from toolkit.report.word import bulk, rows
 from toolkit.report.word.bulk import with_rows, without_rows
 from toolkit.report.word.fill import Filled, fill

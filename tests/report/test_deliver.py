@@ -17,8 +17,8 @@ from template_factory import opened, p, run, sdt, tbl
 from toolkit.errors import OutputError, RenderError, TemplateError
 from toolkit.recording.marks import is_own_output
 from toolkit.report import deliver as deliver_module
-from toolkit.report.build import build_content
 from toolkit.report.deliver import Delivered, deliver
+from toolkit.report.test.content import build_content
 from toolkit.report.word import office, verify, verify_text
 from toolkit.report.word.fill import Entry, Filled
 from toolkit.report.word.office import Office

@@ -19,7 +19,6 @@ from toolkit.diagnosis.answer.answer import (
     Place,
 )
 from toolkit.findings import Finding
-from toolkit.report.build import build_content
 from toolkit.report.content import ReportContent
 from toolkit.report.diagnosis.entries import REPORT_FIGURES, REPORT_TABLES, REPORT_VALUES
 from toolkit.report.diagnosis.in_report import Told
@@ -27,6 +26,7 @@ from toolkit.report.diagnosis.vocabulary import DIAGNOSIS
 from toolkit.report.figures import Picture, _figure
 from toolkit.report.listing import list_tags
 from toolkit.report.style import Style
+from toolkit.report.test.content import build_content
 from toolkit.report.vocabulary import REPORT
 from toolkit.report.word.check import check_template, vocabulary_of
 from toolkit.report.word.fill import Filled, fill

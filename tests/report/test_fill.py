@@ -17,10 +17,10 @@ from report_factory import SHA, make_record, make_result
 from template_factory import W, grey_png, make, opened, p, run, sdt, tbl, texts
 
 from toolkit.errors import TemplateError
-from toolkit.report.build import build_content
 from toolkit.report.content import Table, Value
 from toolkit.report.figures import Picture
 from toolkit.report.style import Style
+from toolkit.report.test.content import build_content
 from toolkit.report.word.fill import Filled, fill
 from toolkit.report.word.package import read_template
 from toolkit.report.word.verify import verify_docx

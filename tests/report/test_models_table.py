@@ -14,12 +14,12 @@ from toolkit.cli import resolve
 from toolkit.cli.report import Options, _compared, _job, command
 from toolkit.cli.resolve import Resolved
 from toolkit.errors import FitError, TemplateError
-from toolkit.report.build import build_content
 from toolkit.report.content import ReportContent
 from toolkit.report.figures import draw, draw_svg
 from toolkit.report.handover import content_hash
-from toolkit.report.models import model_plots, model_rows
 from toolkit.report.tags import catalogue
+from toolkit.report.test.content import build_content
+from toolkit.report.test.models import model_plots, model_rows
 from toolkit.report.word.fill import fill, needed_figures
 from toolkit.report.word.package import read_template
 from toolkit.tires.comparison import Comparison

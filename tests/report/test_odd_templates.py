@@ -13,10 +13,10 @@ from odd_templates import ALL
 from report_factory import make_record, make_result
 
 from toolkit.errors import ToolkitError
-from toolkit.report.build import build_content
 from toolkit.report.content import ReportContent
 from toolkit.report.deliver import Delivered, Job, deliver_all
 from toolkit.report.style import Style
+from toolkit.report.test.content import build_content
 from toolkit.report.word.check import check_template
 from toolkit.report.word.contents_pages import pdf_text
 from toolkit.report.word.controls import kept_whole

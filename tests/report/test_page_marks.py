@@ -16,10 +16,10 @@ from report_factory import make_record, make_result
 from template_factory import HASH
 
 from toolkit.calibration.records.use import CalibrationUse
-from toolkit.report.build import build_content
 from toolkit.report.content import ReportContent
 from toolkit.report.deliver import deliver
 from toolkit.report.style import Style
+from toolkit.report.test.content import build_content
 from toolkit.report.word.contents_pages import pdf_text
 from toolkit.report.word.fill import fill
 from toolkit.report.word.package import read_template

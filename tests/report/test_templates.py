@@ -30,13 +30,13 @@ from toolkit.errors import ConfigError
 from toolkit.recording.details import read_details
 from toolkit.report.audit.content import build_audit_content
 from toolkit.report.audit.page import AuditView
-from toolkit.report.build import build_content, report_id
 from toolkit.report.certificate.collect import collect
 from toolkit.report.certificate.content import build_content as certified
 from toolkit.report.content import ReportContent
 from toolkit.report.deliver import Delivered, Job, deliver_all
 from toolkit.report.diagnosis.content import build_diagnosis_content
 from toolkit.report.style import Style, read_style, style_file
+from toolkit.report.test.content import build_content, report_id
 from toolkit.report.word.check import check_template
 from toolkit.report.word.contents_pages import pdf_outline, pdf_text
 from toolkit.report.word.package import read_template

@@ -197,7 +197,7 @@ def _teller(*, show: bool) -> Any:
 
 def _text(made: Diagnosis, out: Path) -> str:
     from toolkit.diagnosis.answer.answer import cut_short
-    from toolkit.report.diagnosis.chance import chance
+    from toolkit.report.diagnosis.numbers import chance
 
     cut = made.verdict == "unknown" and cut_short(made.skipped)
     lines = [f"{made.title}: {_CUT if cut else _VERDICTS[made.verdict]}"]

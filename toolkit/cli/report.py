@@ -307,7 +307,7 @@ def _job(
     test: Path, resolved: Resolved, folder: Path, options: Options, comparison: Comparison | None
 ) -> Job:
     from toolkit.cli.handover import details_of, provenance, writers
-    from toolkit.report.build import build_content
+    from toolkit.report.test.content import build_content
     from toolkit.report.deliver import Job
     from toolkit.report.style import read_style, style_file
 

@@ -68,7 +68,7 @@ def tags(
     Example: toolkit template tags --test tests/2019-06-04
     """
     from toolkit.report.audit.vocabulary import AUDIT
-    from toolkit.report.build import build_content
+    from toolkit.report.test.content import build_content
     from toolkit.report.certificate.vocabulary import CERTIFICATE
     from toolkit.report.comparison.vocabulary import COMPARISON
     from toolkit.report.diagnosis.vocabulary import DIAGNOSIS

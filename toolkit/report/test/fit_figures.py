@@ -10,7 +10,7 @@ import numpy as np
 
 from toolkit.report.content import Curve, Plot
 from toolkit.report.figures import draw, draw_svg
-from toolkit.report.models import model_plot
+from toolkit.report.test.models import model_plot
 from toolkit.tires.comparison import Comparison, model_curve
 from toolkit.tires.evaluate import value_at
 from toolkit.tires.global_data import Measured, binned

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 from toolkit.estimate import round_to_uncertainty
 from toolkit.report.columns import TABLES, Column
 from toolkit.report.content import Cell, Table
-from toolkit.report.models import model_rows
-from toolkit.report.stated import stated_rows
 from toolkit.report.style import Style
+from toolkit.report.test.models import model_rows
+from toolkit.report.test.stated import stated_rows
 
 if TYPE_CHECKING:
     from toolkit.calibration.records.record import CalibrationRecord

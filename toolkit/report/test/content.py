@@ -15,13 +15,13 @@ from toolkit.files import sha256_bytes
 from toolkit.recording.details import ReportDetails
 from toolkit.report.columns import UNITS
 from toolkit.report.content import IMPOSSIBLE, Cell, ReportContent, Table, Value
-from toolkit.report.details import details_values
 from toolkit.report.diagnosis.in_report import Told, diagnosis_tables, diagnosis_values, told_plots
-from toolkit.report.models import model_plots
-from toolkit.report.plots import TURNED, build_plots, load_groups
 from toolkit.report.style import Style
-from toolkit.report.tables import build_tables, summary_load
 from toolkit.report.tags import FIGURES, catalogue, format_number
+from toolkit.report.test.details import details_values
+from toolkit.report.test.figures import TURNED, build_plots, load_groups
+from toolkit.report.test.models import model_plots
+from toolkit.report.test.tables import build_tables, summary_load
 from toolkit.report.words import say_plot, say_table, say_values
 
 if TYPE_CHECKING:
