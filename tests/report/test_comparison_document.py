@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from toolkit.calibration.records.use import CalibrationUse
-from toolkit.characteristics.rows import Row
+from toolkit.characteristics.model import Row
 from toolkit.characteristics.uncertain import Part, Uncertain
 from toolkit.comparison.compare import compare
 from toolkit.comparison.model import Comparison, Entry
@@ -29,15 +29,15 @@ SI = {"conicity": "N", "PRAT": "N*m", "secant_cornering": "N/rad"}
 
 def entry(label: str, shift: float, **more: Any) -> Entry:
     rows = [
-        Row(
-            name=name,
-            load_N=load,
-            rotation="forward" if name.startswith("secant") else "both",
-            number=Uncertain(
+        Row.of(
+            name,
+            Uncertain(
                 value=load / 100 + shift,
                 unit=unit,
                 parts=(Part(source="fit", key=f"{label}{name}{load}", u=2.0),),
             ),
+            load_N=load,
+            rotation="forward" if name.startswith("secant") else "both",
         )
         for name, unit in SI.items()
         for load in LOADS

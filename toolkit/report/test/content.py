@@ -10,9 +10,12 @@ from typing import TYPE_CHECKING
 
 from toolkit import __version__
 from toolkit.calibration.records.use import DRAFT, UNVERIFIED
+from toolkit.characteristics.catalogue import columns
+from toolkit.characteristics.layout import PULL, STIFFNESS
 from toolkit.estimate import has_interval, plus_minus
 from toolkit.files import sha256_bytes
 from toolkit.recording.details import ReportDetails
+from toolkit.report.characteristics import summary_estimates, summary_load
 from toolkit.report.columns import UNITS
 from toolkit.report.content import IMPOSSIBLE, Cell, ReportContent, Table, Value
 from toolkit.report.diagnosis.in_report import Told, diagnosis_tables, diagnosis_values, told_plots
@@ -21,11 +24,12 @@ from toolkit.report.tags import FIGURES, catalogue, format_number
 from toolkit.report.test.details import details_values
 from toolkit.report.test.figures import TURNED, build_plots, load_groups
 from toolkit.report.test.models import model_plots
-from toolkit.report.test.tables import build_tables, summary_load
+from toolkit.report.test.tables import build_tables
 from toolkit.report.words import say_plot, say_table, say_values
 
 if TYPE_CHECKING:
     from toolkit.calibration.records.record import CalibrationRecord
+    from toolkit.characteristics.characteristic import WideTable
     from toolkit.estimate import Estimate
     from toolkit.findings import Finding
     from toolkit.pipeline import TestResult
@@ -192,7 +196,7 @@ def _values(
             for name, unit in UNITS.items()
         },
     }
-    summary_load, summary = _summary(result)
+    load_N = summary_load(result)
     numbers: dict[str, float | None] = {
         "test.pressure.psi": psi,
         "test.pressure.bar": None if pressure is None else pressure / 1e5,
@@ -202,7 +206,7 @@ def _values(
         "test.files": len({c.file for c in reduced.conditions}),
         "test.conditions": len(used),
         "test.findings": len(findings),
-        "summary.load": summary_load,
+        "summary.load": load_N,
     }
     made = {path: Value(kind="text", value=text) for path, text in texts.items()}
     made |= {
@@ -212,10 +216,10 @@ def _values(
     entries = {one.path: one for one in catalogue() if one.kind == "number"}
     for path, number in numbers.items():
         made[path] = _number(number, path, entries[path].unit, entries[path].spec, style)
-    for name, estimate in summary.items():
+    for name, estimate in summary_estimates(result).items():
         path = f"summary.{name}"
         made[path] = _number(None, path, entries[path].unit, entries[path].spec, style, estimate=estimate)
-        text = _with_U(estimate, made[f"summary.{name}"], style) if summary_load else None
+        text = _with_U(estimate, made[f"summary.{name}"], style) if load_N else None
         made[f"summary.{name}.with_U"] = Value(kind="text", value=text)
     if record is not None:
         for load in record.loads:
@@ -264,32 +268,6 @@ def _angles(steps: Sequence[float | None]) -> str | None:
     return ", ".join(f"{angle:g}" for angle in found) + " deg" if found else None
 
 
-def _summary(result: TestResult) -> tuple[float | None, dict[str, Estimate | None]]:
-    """Return the load of the summary [N] and its estimates: N, N·m, per degree."""
-    chars = result.characteristics
-    load = summary_load(result)
-    if load is None:
-        return None, dict.fromkeys(_SUMMARY_NAMES)
-    near = 0.04 * load
-    stiff = next(
-        (s for s in chars.stiffness if s.rotation == "forward" and abs(s.load_N - load) <= near), None
-    )
-    pull = next((p for p in chars.pull if abs(p.load_N - load) <= near), None)
-
-    def pick(owner: object, name: str, factor: float = 1.0) -> Estimate | None:
-        found: Estimate | None = getattr(owner, name, None)
-        return None if found is None else found.scaled(factor, "")
-
-    return load, {
-        "cornering_stiffness": pick(stiff, "secant_cornering", math.pi / 180),
-        "aligning_stiffness": pick(stiff, "secant_aligning", math.pi / 180),
-        **{name: pick(pull, name) for name in ("conicity", "plysteer", "CRAT", "PRAT")},
-    }
-
-
-_SUMMARY_NAMES = ("cornering_stiffness", "aligning_stiffness", "conicity", "plysteer", "CRAT", "PRAT")
-
-
 def _with_U(estimate: Estimate | None, number: Value, style: Style) -> str:
     """Return ``45.0 ± 6.1`` in the organisation's unit."""
     if estimate is None or number.value is None or number.missing:
@@ -299,15 +277,17 @@ def _with_U(estimate: Estimate | None, number: Value, style: Style) -> str:
     return plus_minus(float(number.value), number.U, decimal_comma=style.decimal_comma)
 
 
+def _has_any(result: TestResult, table: WideTable, *, summarised: bool = False) -> bool:
+    """Tell whether a characteristic of a table has a value; ``summarised``: one that the summary has."""
+    names = {one.name for one in columns(table) if one.summary is not None or not summarised}
+    return any(row.name in names and row.estimate is not None for row in result.characteristics.rows)
+
+
 def _conditions(
     result: TestResult, values: dict[str, Value], tables: dict[str, Table], plots: list[str], findings: int
 ) -> dict[str, bool]:
-    info, chars = result.reduced.info, result.characteristics
-    pull = any(
-        getattr(one, name) is not None
-        for one in chars.pull
-        for name in ("conicity", "plysteer", "CRAT", "PRAT")
-    )
+    info = result.reduced.info
+    pull, stiffness = _has_any(result, PULL, summarised=True), _has_any(result, STIFFNESS)
     made = {path: not value.missing for path, value in values.items()}
     made |= {name: bool(table.rows) for name, table in tables.items()}
     made |= {name: name in plots for name in FIGURES}
@@ -321,12 +301,7 @@ def _conditions(
         "pull": pull,
         "no_pull": not pull,
         "reverse": any(c.rotation == "reverse" for c in result.reduced.used()),
-        "stiffness": any(
-            getattr(one, f"{way}_{kind}") is not None
-            for one in chars.stiffness
-            for way in ("secant", "slope")
-            for kind in ("cornering", "aligning")
-        ),
+        "stiffness": stiffness,
         "no_findings": findings == 0,
     }
 

@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
+from toolkit.characteristics.catalogue import figures
 from toolkit.estimate import plus_minus
 from toolkit.report.content import Curve, Plot
 from toolkit.report.style import Style
 from toolkit.report.tags import format_number
 
 if TYPE_CHECKING:
-    from toolkit.estimate import Estimate
+    from toolkit.characteristics.characteristic import Characteristic, Figure
+    from toolkit.characteristics.model import Row
     from toolkit.pipeline import TestResult
     from toolkit.reduction.model import Condition
     from toolkit.tires.model import CurveFit
@@ -55,8 +57,7 @@ def build_plots(result: TestResult, style: Style, watermark: str | None) -> dict
         maker.against_load("FY"),
         maker.against_load("MZ"),
         maker.gough(),
-        *maker.pull(),
-        *maker.stiffness(),
+        *maker.characteristics(),
     )
     return {plot.name: plot for plot in plots if plot is not None}
 
@@ -160,12 +161,13 @@ class _Plots:
     ) -> tuple[float, float] | None:
         """Return a value at a slip angle [deg] and its expanded uncertainty, 0 where none is known."""
         for rotation in self._rotations():
-            for one in self.result.characteristics.at_angles:
-                here = one.rotation == rotation and self._group(one.load_N) == self._group(load)
-                found: Estimate | None = getattr(one, channel)
-                if here and found is not None and abs(math.degrees(one.SA_rad) - angle) < 1e-6:
-                    U, _ = found.expanded()
-                    return found.value, U if math.isfinite(U) else 0.0
+            for row in self.result.characteristics.of(channel, rotation=rotation):
+                same_load = self._group(row.load_N) == self._group(load)
+                if not same_load or row.estimate is None or row.SA_rad is None:
+                    continue
+                if abs(math.degrees(row.SA_rad) - angle) < 1e-6:
+                    U, _ = row.estimate.expanded()
+                    return row.estimate.value, U if math.isfinite(U) else 0.0
         fit = self._fit("forward", load, channel) or self._fit("reverse", load, channel)
         if fit is not None:
             return float(curve_values(fit, np.radians([angle]))[0]), 0.0
@@ -243,81 +245,64 @@ class _Plots:
             legend="load FZ",
         )
 
-    def _series(
-        self, items: Sequence[object], pick: Callable[[object], Estimate | None], factor: float
-    ) -> tuple[list[float], list[float], list[float]]:
+    def _series(self, rows: Sequence[Row], factor: float) -> tuple[list[float], list[float], list[float]]:
+        """Return loads, values and expanded uncertainties as drawn; 0 where there is no uncertainty."""
         _, load_factor = self._scale("FZ")
         x, y, u = [], [], []
-        for one in items:
-            found = pick(one)
-            if found is not None and math.isfinite(found.value):
-                x.append(one.load_N * load_factor)  # type: ignore[attr-defined]
-                y.append(found.value * factor)
-                U = found.expanded()[0] * factor
+        for row in rows:
+            if row.estimate is not None and math.isfinite(row.estimate.value):
+                x.append(row.load_N * load_factor)
+                y.append(row.estimate.value * factor)
+                U = row.estimate.expanded()[0] * factor
                 u.append(U if math.isfinite(U) else 0.0)
         return x, y, u
 
     def _against(
-        self, name: str, what: str, quantity: str, series: list[tuple[str, str, list[object]]], angle: bool
+        self, figure: Figure, series: list[tuple[str, Characteristic, tuple[Row, ...]]]
     ) -> Plot | None:
-        base, factor = self._scale(quantity)
-        unit, load_unit = base, self._scale("FZ")[0]
-        if angle:
-            unit, factor = f"{base}/deg", factor * math.pi / 180
-        curves, said = [], []
-        for index, (label, attribute, items) in enumerate(series):
-            x, y, u = self._series(items, lambda one, a=attribute: getattr(one, a), factor)  # type: ignore[misc]
+        """Characteristics of one figure against load: (label, what it is, its rows)."""
+        first = series[0][1]
+        style_unit, factor = self.style.unit(first.printed_unit)
+        unit, load_unit = str(style_unit).replace("*", "·"), self._scale("FZ")[0]
+        factor *= first.factor
+        curves, listed = [], []
+        for index, (label, declared, rows) in enumerate(series):
+            x, y, u = self._series(rows, factor)
             if not x:
                 continue
             curves.append(_curve(label, x, y, index, "both", error=u, open_="reverse" in label))
-            spec = ".1f" if quantity == "FY" else ".2f"
-            listed = ", ".join(
+            spec = f".{declared.digits}f"
+            values = ", ".join(
                 f"{plus_minus(b, c, spec=spec, decimal_comma=self.style.decimal_comma)} at {self._number(a)}"
                 for a, b, c in zip(x, y, u, strict=True)
             )
-            said.append(f"{label}: {listed} {load_unit}")
+            listed.append(f"{label}: {values} {load_unit}")
         return self._plot(
-            name,
+            figure.name,
             f"load FZ [{load_unit}]",
-            f"{what} [{unit}]",
+            f"{figure.title} [{unit}]",
             curves,
-            f"{_upper(what)} against load; bars: expanded uncertainty (95 %). {_AXES_NOTE}",
-            f"{_upper(what)} [{unit}] against load [{load_unit}] with expanded uncertainty. "
-            f"{'; '.join(said)}.",
+            f"{_upper(figure.title)} against load; bars: expanded uncertainty (95 %). {_AXES_NOTE}",
+            f"{_upper(figure.title)} [{unit}] against load [{load_unit}] with expanded uncertainty. "
+            f"{'; '.join(listed)}.",
         )
 
-    def pull(self) -> list[Plot | None]:
-        """Conicity, plysteer, CRAT and PRAT against load."""
-        items: list[object] = list(self.result.characteristics.pull)
-        return [
-            self._against("conicity", "conicity", "FY", [("conicity", "conicity", items)], False),
-            self._against("plysteer", "plysteer", "FY", [("plysteer", "plysteer", items)], False),
-            self._against(
-                "crat", "conicity residual aligning torque", "MZ", [("CRAT", "CRAT", items)], False
-            ),
-            self._against(
-                "prat",
-                "plysteer residual aligning torque",
-                "MZ",
-                [("PRAT at 0 deg", "PRAT", items), ("PRAT at FY = 0", "PRAT_at_FY_zero", items)],
-                False,
-            ),
-        ]
-
-    def stiffness(self) -> list[Plot | None]:
-        """Cornering and aligning stiffness against load, by secant and by slope."""
+    def characteristics(self) -> list[Plot | None]:
+        """The catalogue's figures against load; those of directions with a series for each."""
         plots = []
-        for kind, quantity in (("cornering", "FY"), ("aligning", "MZ")):
-            series: list[tuple[str, str, list[object]]] = []
-            for rotation in self._rotations():
-                items: list[object] = [
-                    one for one in self.result.characteristics.stiffness if one.rotation == rotation
-                ]
-                series += [
-                    (f"±1 deg secant, {rotation}", f"secant_{kind}", items),
-                    (f"slope at 0 deg, {rotation}", f"slope_{kind}", items),
-                ]
-            plots.append(self._against(f"{kind}_stiffness", f"{kind} stiffness", quantity, series, True))
+        of = self.result.characteristics.of
+        for figure, members in figures().items():
+            rotations = self._rotations() if members[0].scope == "direction" else [None]
+            series = [
+                (
+                    one.series_label + (f", {rotation}" if rotation else ""),
+                    one,
+                    of(one.name, rotation=rotation),
+                )
+                for rotation in rotations
+                for one in members
+            ]
+            plots.append(self._against(figure, series) if series else None)
         return plots
 
 
