@@ -15,12 +15,12 @@ from toolkit.characteristics.layout import PULL, STIFFNESS
 from toolkit.estimate import has_interval, plus_minus
 from toolkit.files import sha256_bytes
 from toolkit.recording.details import ReportDetails
-from toolkit.report.characteristics import summary_estimates, summary_load
 from toolkit.report.columns import UNITS
 from toolkit.report.content import IMPOSSIBLE, Cell, ReportContent, Table, Value
 from toolkit.report.diagnosis.in_report import Told, diagnosis_tables, diagnosis_values, told_plots
 from toolkit.report.style import Style
 from toolkit.report.tags import FIGURES, catalogue, format_number
+from toolkit.report.test.characteristics import summary_estimates, summary_load
 from toolkit.report.test.details import details_values
 from toolkit.report.test.figures import TURNED, build_plots, load_groups
 from toolkit.report.test.models import model_plots

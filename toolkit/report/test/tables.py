@@ -9,10 +9,10 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from toolkit.characteristics.catalogue import tables
-from toolkit.report.characteristics import budget_rows, long_rows, wide_rows
 from toolkit.report.columns import TABLES, Column
 from toolkit.report.content import Cell, Table
 from toolkit.report.style import Style
+from toolkit.report.test.characteristics import budget_rows, long_rows, wide_rows
 from toolkit.report.test.models import model_rows
 from toolkit.report.test.stated import stated_rows
 
