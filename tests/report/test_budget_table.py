@@ -12,9 +12,9 @@ from toolkit.characteristics.model import Row
 from toolkit.estimate import Estimate
 from toolkit.machine import TypeB
 from toolkit.pipeline import TestResult
-from toolkit.report.characteristics import summary_load
 from toolkit.report.style import Style
-from toolkit.report.tables import build_tables
+from toolkit.report.test.characteristics import summary_load
+from toolkit.report.test.tables import build_tables
 
 
 def with_budget(load: float, name: str, **sources: float) -> TestResult:

@@ -92,7 +92,7 @@ def command(
         check_parquet(parquet)
     opened = None
     if template is not None:
-        from toolkit.report.template.package import read_template
+        from toolkit.report.word.package import read_template
 
         if out is None:
             raise typer.BadParameter("a summary needs --out, where it is written", param_hint="--template")

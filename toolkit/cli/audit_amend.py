@@ -60,7 +60,7 @@ def amend(
     from toolkit.cli.resolve import resolve_test
     from toolkit.errors import ToolkitError
     from toolkit.report.deliver import deliver_all
-    from toolkit.report.template.package import read_template
+    from toolkit.report.word.package import read_template
 
     wanted = list(_wanted(linked))
     if not wanted:
@@ -94,7 +94,7 @@ def _wanted(linked: Linked) -> Iterator[tuple[PastReport, str]]:
 
 def _job(past: PastReport, resolved: Resolved, test: Path, template: Any, out: Path) -> Job:
     from toolkit.cli.handover import details_of, provenance
-    from toolkit.report.build import build_content
+    from toolkit.report.test.content import build_content
     from toolkit.report.deliver import Job
     from toolkit.report.style import read_style, style_file
 

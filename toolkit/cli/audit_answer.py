@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from toolkit.calibration.records.use import CalibrationUse
     from toolkit.calibration.registry.registry import Registry
     from toolkit.cli.audit_amend import Amended
-    from toolkit.report.template.package import Template
+    from toolkit.report.word.package import Template
 
 PAGE, LINES = "audit.html", "audit.jsonl"
 _SHOWN, _WORST, _SETTINGS = 40, 6, 10

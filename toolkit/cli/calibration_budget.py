@@ -91,7 +91,7 @@ def command(
         findings += more
     written = None
     if figure is not None:
-        from toolkit.report.calibration.uncertainty_figure import write_figure
+        from toolkit.report.calibration.chart_figures import write_figure
 
         written = write_figure(figure, found[0][0], found[0][1])
     payload = {

@@ -71,7 +71,7 @@ def command(
     from toolkit.report.certificate.dcc import build_dcc
     from toolkit.report.deliver import deliver
     from toolkit.report.style import read_style, style_file
-    from toolkit.report.template.package import read_template
+    from toolkit.report.word.package import read_template
 
     started = time.perf_counter()
     opened = read_template(template or home_template("certificate.docx", home))

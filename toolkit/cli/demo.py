@@ -298,7 +298,7 @@ def _tire_file(resolved: Resolved, path: Path) -> str:
 
 
 def _figures(resolved: Resolved, stage: Path) -> list[str]:
-    from toolkit.report.build import build_content
+    from toolkit.report.test.content import build_content
     from toolkit.report.figures import draw
     from toolkit.report.style import read_style, style_file
 

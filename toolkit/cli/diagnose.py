@@ -13,7 +13,7 @@ from toolkit.cli.home import calibrations_folder
 
 if TYPE_CHECKING:
     from toolkit.diagnosis.answer.answer import Diagnosis
-    from toolkit.report.template.package import Template
+    from toolkit.report.word.package import Template
 
 NAME = "diagnose"
 
@@ -113,7 +113,7 @@ def command(
 def _template(template: Path | None, home: Path | None) -> Template:
     """Return the template of the document, judged before anything is searched."""
     from toolkit.cli.delivery import home_template
-    from toolkit.report.template.package import read_template
+    from toolkit.report.word.package import read_template
 
     return read_template(template or home_template("diagnosis.docx", home))
 
@@ -197,7 +197,7 @@ def _teller(*, show: bool) -> Any:
 
 def _text(made: Diagnosis, out: Path) -> str:
     from toolkit.diagnosis.answer.answer import cut_short
-    from toolkit.report.diagnosis.chance import chance
+    from toolkit.report.diagnosis.numbers import chance
 
     cut = made.verdict == "unknown" and cut_short(made.skipped)
     lines = [f"{made.title}: {_CUT if cut else _VERDICTS[made.verdict]}"]

@@ -9,7 +9,7 @@ if TYPE_CHECKING:
     from toolkit.calibration.records.use import CalibrationUse
     from toolkit.diagnosis.case.case import Case
     from toolkit.diagnosis.diagnose import Result
-    from toolkit.report.template.package import Template
+    from toolkit.report.word.package import Template
 
 
 def write_document(

@@ -36,9 +36,9 @@ if TYPE_CHECKING:
     from toolkit.report.deliver import Delivered, Job
     from toolkit.report.diagnosis.in_report import Told
     from toolkit.report.drawer import Drawer
-    from toolkit.report.pdf import Office
+    from toolkit.report.word.office import Office
     from toolkit.report.style import Style
-    from toolkit.report.template.package import Template
+    from toolkit.report.word.package import Template
     from toolkit.tires.comparison import Comparison
 
 NAME = "report"
@@ -160,7 +160,7 @@ def command(
     from functools import partial
 
     from toolkit.report.drawer import Drawer
-    from toolkit.report.pdf import Office
+    from toolkit.report.word.office import Office
 
     chosen = choose_reader(reader)
     started = time.perf_counter()
@@ -170,7 +170,7 @@ def command(
         from toolkit.cli.handover import diagnosis_of
         from toolkit.cli.resolve import resolve_test
         from toolkit.cli.units import unit_choice
-        from toolkit.report.template.package import read_template
+        from toolkit.report.word.package import read_template
 
         compared = model_choice(models) if models else ()
         shown = None if units is None else unit_choice(units)
@@ -307,7 +307,7 @@ def _job(
     test: Path, resolved: Resolved, folder: Path, options: Options, comparison: Comparison | None
 ) -> Job:
     from toolkit.cli.handover import details_of, provenance, writers
-    from toolkit.report.build import build_content
+    from toolkit.report.test.content import build_content
     from toolkit.report.deliver import Job
     from toolkit.report.style import read_style, style_file
 

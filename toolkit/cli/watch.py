@@ -82,8 +82,8 @@ def command(
     from toolkit.cli.units import unit_choice
     from toolkit.cli.watching import Watcher
     from toolkit.errors import ConfigError
-    from toolkit.report.pdf import find_soffice
-    from toolkit.report.template.package import read_template
+    from toolkit.report.word.office import find_soffice
+    from toolkit.report.word.package import read_template
 
     if not folder.is_dir():
         raise ConfigError(
@@ -153,7 +153,7 @@ def _report(
     from toolkit.cli.report import Made, make_reports
     from toolkit.errors import ToolkitError
     from toolkit.report.drawer import Drawer
-    from toolkit.report.pdf import Office
+    from toolkit.report.word.office import Office
 
     tests = list(resolved)
     own = replace(options, resolve=resolved.__getitem__)
