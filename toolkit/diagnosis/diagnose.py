@@ -20,7 +20,8 @@ from toolkit.diagnosis.search.search import Budget, BudgetSpentError, Search, se
 from toolkit.diagnosis.search.time_budget import Watch
 from toolkit.diagnosis.simulators.build_simulator import model_of
 from toolkit.diagnosis.simulators.built_in import built_in_findings
-from toolkit.diagnosis.simulators.guard import kept_apart
+from toolkit.diagnosis.simulators.simulator import Supervised
+from toolkit.diagnosis.simulators.user_code import kept_apart
 from toolkit.findings import Finding
 
 if TYPE_CHECKING:
@@ -68,10 +69,9 @@ def _diagnosed(case: Case, calibrations: Path | None, watch: Watch, budget_s: fl
         model = watch.guarded(model_of)(case, calibrations)
     except BudgetSpentError:
         return Result(diagnosis=_too_late(case, None, None, (), watch.step), search=None)
-    problem = problem_of(case, model)
-    simulate = model.simulate
-    refused = Refused(simulate)
-    model.simulate = watch.guarded(refused)  # type: ignore[method-assign]
+    refused = Refused(model.simulate)
+    supervised = Supervised(model, watch.guarded(refused))
+    problem = problem_of(case, supervised)
     told = (
         *case_findings(problem),
         *built_in_findings(case),
@@ -93,7 +93,7 @@ def _diagnosed(case: Case, calibrations: Path | None, watch: Watch, budget_s: fl
     except BudgetSpentError as error:
         made = _too_late(case, problem, declared, told, str(error))
     finally:
-        model.simulate = simulate  # type: ignore[method-assign]
+        supervised.release()
     made = replace(made, findings=(*made.findings, *refused.findings(case)))
     files, late = _predictions(problem, found, watch, budget_s)
     if late:
@@ -107,7 +107,7 @@ def _first_look(problem: Problem, watch: Watch) -> dict[str, NDArray[np.float64]
     values = tuple(one.value for one in problem.free)
     made = problem.simulate(values, ())
     quick = watch.last_s < _QUICK_S
-    repeats = getattr(problem.model, "repeats", None)
+    repeats = problem.model.capability.repeats
     if quick and repeats is not None:
         repeats(problem.runs[0], problem.known)
     for run in problem.case.predict if quick else ():

@@ -16,7 +16,7 @@ from toolkit.diagnosis.case.recordings import read_run
 from toolkit.diagnosis.fit.predict import csv_of, prediction_names
 from toolkit.diagnosis.simulators.build_simulator import model_of
 from toolkit.diagnosis.simulators.built_in import built_in_findings
-from toolkit.diagnosis.simulators.guard import kept_apart
+from toolkit.diagnosis.simulators.user_code import kept_apart
 from toolkit.errors import ConfigError
 from toolkit.files import read_bytes
 

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 def case_findings(problem: Problem) -> tuple[Finding, ...]:
     """Return notes on the recordings, one run only or inputs interpolated, and what the model has to tell."""
     case = problem.case
-    made: list[Finding] = list(getattr(problem.model, "findings", ()))
+    made: list[Finding] = list(problem.model.capability.findings)
     if len(problem.runs) == 1:
         made.append(
             Finding(
@@ -62,7 +62,7 @@ def calibration_use(case: Case, calibrations: Path | None) -> CalibrationUse | N
     from toolkit.calibration.records.use import CalibrationUse
     from toolkit.calibration.registry.registry import Registry
     from toolkit.calibration.registry.standing import unapproved, withdrawal
-    from toolkit.diagnosis.simulators.build_simulator import record_of
+    from toolkit.diagnosis.simulators.cells import record_of
     from toolkit.errors import RegistryError
 
     named = case.simulation.calibration

@@ -50,12 +50,7 @@ def _always(problem: Problem, active: Active) -> list[str]:
     is_load = name == "crosstalk" and active.channel == "FY" and active.source in ("FZ", "FZ_CMD")
     if (name in ("conicity", "camber_offset") or is_load) and not turned:
         return list(_PULL)
-    cells = getattr(problem.model, "cells", None)
-    record = getattr(problem.model, "record", None)
-    of_cells = (cells.names if cells is not None else ()) or (
-        record.indications if record is not None else ()
-    )
-    if name == "channel_sign" and active.channel in of_cells:
+    if name == "channel_sign" and active.channel in problem.model.capability.cells:
         return ["channel_sign", "wrong_calibration"]
     if name == "wrong_calibration":
         return ["wrong_calibration", "channel_sign"]

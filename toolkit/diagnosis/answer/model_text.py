@@ -47,7 +47,7 @@ def model_text(case: Case, found: Search, made: Diagnosis, folder: Path) -> str 
     ]
     time = next((one.name for one in case.channels if one.role == "time"), None)
     lines += _entries({} if time is None else {"time": time})
-    load = getattr(found.problem.model, "nominal_load_N", None) or nominal_load(case)
+    load = found.problem.model.capability.nominal_load_N or nominal_load(case)
     lines += _entries({"nominal_load_N": load})
     lines += [
         "",

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from toolkit.diagnosis.fit.noise import Layout, layout
-from toolkit.diagnosis.simulators.simulator import Active, Model, Moving
+from toolkit.diagnosis.simulators.simulator import Active, Model
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -66,13 +66,13 @@ class Problem:
 
     def prepare(self, wanted: Sequence[tuple[Sequence[float], Sequence[Active]]]) -> None:
         """Have several simulations made at once where the model can; `simulate` then finds them."""
-        prepare = getattr(self.model, "prepare", None)
-        if prepare is None:
+        together = self.model.capability.together
+        if together is None:
             return
         names = [one.name for one in self.free]
         sets = [(self.known | dict(zip(names, map(float, p), strict=True)), active) for p, active in wanted]
         for run in self.runs:
-            prepare(run, sets)
+            together(run, sets)
 
     def pushed(
         self, p: Sequence[float], active: Sequence[Active], one: Active, pattern: Pattern, forces: int
@@ -89,7 +89,7 @@ class Problem:
         values = dict(self.known)
         values.update(zip((each.name for each in self.free), map(float, p), strict=True))
         parts: dict[str, list[NDArray[np.float64]]] = {name: [] for name in self.names}
-        moving = self.model if isinstance(self.model, Moving) else None
+        moving = self.model.capability.motion
         for run in self.runs:
             made: Stacked = {}
             if moving is not None and one.acts_in(run):
@@ -112,7 +112,7 @@ def problem_of(case: Case, model: Model) -> Problem:
         for name, column in observed.items():
             column.append(made.get(name, np.full(run.rows, np.nan)))
     stacked = {name: np.concatenate(columns) for name, columns in observed.items()}
-    unsure: dict[str, float] = getattr(model, "unsure", {})
+    unsure = model.capability.unsure
     ends = np.cumsum([run.rows for run in runs])
     slices = tuple(slice(int(end - run.rows), int(end)) for end, run in zip(ends, runs, strict=True))
     return Problem(

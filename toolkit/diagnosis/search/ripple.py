@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolkit.diagnosis.simulators.simulator import Moving
 from toolkit.errors import FitError
 
 if TYPE_CHECKING:
@@ -48,7 +47,8 @@ def periods(problem: Problem, channel: str | None) -> tuple[float, ...]:
 
 
 def _way(problem: Problem, channel: str | None) -> tuple[float, float]:
-    return problem.model.way(channel) if isinstance(problem.model, Moving) else (0.0, 0.0)
+    moving = problem.model.capability.motion
+    return (0.0, 0.0) if moving is None else moving.way(channel)
 
 
 def responses(

@@ -11,7 +11,7 @@ import numpy as np
 from toolkit.diagnosis.simulators.forces import Forces
 from toolkit.diagnosis.simulators.inputs import Inputs
 from toolkit.diagnosis.simulators.integrate import OFF
-from toolkit.diagnosis.simulators.python import silenced
+from toolkit.diagnosis.simulators.user_code import silenced
 from toolkit.errors import FitError
 
 if TYPE_CHECKING:
