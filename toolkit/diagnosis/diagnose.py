@@ -16,6 +16,7 @@ from toolkit.diagnosis.answer.truncated_answer import STEPS, does_not_vary, with
 from toolkit.diagnosis.case.case import Case
 from toolkit.diagnosis.fit.predict import prediction_csv, prediction_names
 from toolkit.diagnosis.fit.problem import Problem, problem_of
+from toolkit.diagnosis.policy import BUDGET
 from toolkit.diagnosis.search.search import Budget, BudgetSpentError, Search, search
 from toolkit.diagnosis.search.time_budget import Watch
 from toolkit.diagnosis.simulators.build_simulator import model_of
@@ -29,9 +30,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from toolkit.diagnosis.fit.fit import Fit
-
-_QUICK_S = 2.0  # of a simulation: a slower one is not run twice to see whether it repeats itself
-_GRACE = 0.25  # of the budget, for predictions after a search that has spent it
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -106,7 +104,7 @@ def _first_look(problem: Problem, watch: Watch) -> dict[str, NDArray[np.float64]
     watch.tell("the simulation as declared")
     values = tuple(one.value for one in problem.free)
     made = problem.simulate(values, ())
-    quick = watch.last_s < _QUICK_S
+    quick = watch.last_s < BUDGET.quick_s
     repeats = problem.model.capability.repeats
     if quick and repeats is not None:
         repeats(problem.runs[0], problem.known)
@@ -120,7 +118,7 @@ def _predictions(
 ) -> tuple[tuple[tuple[str, str], ...], str]:
     """Return the files of predictions, or what was skipped where the time is up."""
     runs = problem.case.predict
-    left = max(watch.until - time.monotonic(), _GRACE * budget_s)
+    left = max(watch.until - time.monotonic(), BUDGET.grace * budget_s)
     if not runs or len(runs) * 3 * watch.last_s > left:
         return (), "predictions" if runs else ""
     fits: list[Fit | None] = [None, None, None]

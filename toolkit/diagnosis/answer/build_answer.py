@@ -22,8 +22,8 @@ from toolkit.diagnosis.answer.classes import equivalent_to, parted
 from toolkit.diagnosis.answer.locate import places
 from toolkit.diagnosis.answer.power import not_found
 from toolkit.diagnosis.case.case import Case
+from toolkit.diagnosis.policy import PRIORS, SCREENING, VERDICT
 from toolkit.diagnosis.search.forward_step import Step
-from toolkit.diagnosis.search.screen_step import ALPHA
 from toolkit.diagnosis.search.search import Search
 from toolkit.diagnosis.simulators.channel_units import unit_of
 from toolkit.diagnosis.simulators.parameter_signs import sense
@@ -33,11 +33,6 @@ from toolkit.findings import Finding
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
-
-_FAR = 3.0  # prior standard deviations that a parameter must not be moved by
-_SHOWN = 1.1  # times the noise's mean square: an output with less shows no mismatch
-_TAKEN = 2 / 3  # of the held-out mean square above the noise, in one output at least
-_MOSTLY = 0.5  # of the log-likelihood that named effects must explain, beside the structure that stays
 
 
 def answer_of(case: Case, found: Search, told: tuple[Finding, ...]) -> Diagnosis:
@@ -67,7 +62,7 @@ def answer_of(case: Case, found: Search, told: tuple[Finding, ...]) -> Diagnosis
         held_out=_held_out(found, unknown=unknown),
         held_out_by=found.folds.told(len(found.problem.runs)),
         depends_on=tuple((one.output, one.variables) for one in found.structure),
-        not_found=not_found(found.screen, found.scored, named, alpha=ALPHA / tests, units=units),
+        not_found=not_found(found.screen, found.scored, named, alpha=SCREENING.alpha / tests, units=units),
         next_measurements=_next(found, effects, verdict),
         findings=(*told, *_outliers(case, found)),
         complete=not found.skipped,
@@ -89,7 +84,7 @@ def mostly_unknown(found: Search) -> bool:
         return False
     left = found.structure[0].gain / 2
     explained = sum(one.gain for one in found.steps)
-    if explained < _MOSTLY * (explained + left):
+    if explained < VERDICT.mostly * (explained + left):
         return True
     if all(one.active.effect.name == "quantisation" for one in found.steps):
         return False  # read off the digits: it does not imitate anything
@@ -97,15 +92,17 @@ def mostly_unknown(found: Search) -> bool:
     shown = [
         (one.refitted_rmse**2 - one.augmented_rmse**2, one.refitted_rmse**2 - one.noise_floor**2)
         for one in _held_out(found, unknown=False)
-        if one.refitted_rmse**2 > _SHOWN * one.noise_floor**2
+        if one.refitted_rmse**2 > VERDICT.shown * one.noise_floor**2
     ]
-    return bool(shown) and all(taken < _TAKEN * above for taken, above in shown)
+    return bool(shown) and all(taken < VERDICT.taken * above for taken, above in shown)
 
 
 def implausible(found: Search) -> tuple[str, ...]:
     """Return the parameters that are far off their priors beside every effect that was found."""
     values = zip(found.problem.free, found.augmented.p, strict=True)
-    return tuple(one.name for one, p in values if one.sd is not None and abs(p - one.value) > _FAR * one.sd)
+    return tuple(
+        one.name for one, p in values if one.sd is not None and abs(p - one.value) > PRIORS.far * one.sd
+    )
 
 
 def _verdict(
@@ -115,7 +112,7 @@ def _verdict(
         return "equivalent" if any(one.equivalent_to for one in effects) else "named"
     if unknown or found.structure:
         return "unknown"
-    if found.skipped or any(abs(one.shift_in_sd or 0.0) > _FAR for one in nominal):
+    if found.skipped or any(abs(one.shift_in_sd or 0.0) > PRIORS.far for one in nominal):
         return "untestable"
     return "nothing"
 
@@ -154,7 +151,7 @@ def _parameters(found: Search, active: Active, runs: tuple[str, ...] | None) -> 
             break
         at += len(other.searched)
     n = sum(int(one.sum()) for one in problem.kept.values())
-    quantile = float(student.ppf(0.975, max(n - len(made.covariance), 1)))
+    quantile = float(student.ppf((1 + VERDICT.interval) / 2, max(n - len(made.covariance), 1)))
     result = []
     for i, one in enumerate(active.effect.parameters):
         value = active.values.get(one.name, 0.0)
@@ -162,7 +159,7 @@ def _parameters(found: Search, active: Active, runs: tuple[str, ...] | None) -> 
         if active.searched:
             variance = found.variance(at + i)
             reach = quantile * math.sqrt(max(variance, 0.0))
-            if math.isfinite(reach) and reach < 1e5 * max(abs(value), 1e-300):
+            if math.isfinite(reach) and reach < VERDICT.open_interval * max(abs(value), 1e-300):
                 ci = (max(value - reach, one.bounds[0]), min(value + reach, one.bounds[1]))
         # Read off the recorded digits, not fitted: a bound, which covers more than 95 %.
         half = active.values.get(f"_half_{one.name}")
@@ -235,7 +232,7 @@ def _mismatches(found: Search, *, unknown: bool) -> tuple[Mismatch, ...]:
             ratio = float(np.mean(signal[kept] ** 2)) / max(
                 found.augmented.noise[name].marginal_sd ** 2, 1e-300
             )
-            if ratio * kept.sum() > 20:
+            if ratio * kept.sum() > VERDICT.telling:
                 p_values.append(found.steps[0].p_value)
         else:
             share, signal = _structured(found, name)

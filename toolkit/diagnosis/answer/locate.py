@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from toolkit.diagnosis.answer.answer import Place
+from toolkit.diagnosis.policy import LOCATION
 from toolkit.units import unit
 
 if TYPE_CHECKING:
@@ -15,11 +16,6 @@ if TYPE_CHECKING:
 
     from toolkit.diagnosis.case.case import Case
     from toolkit.diagnosis.fit.problem import Problem
-
-_BINS = 10
-_HELD = 0.8  # of the mismatch's energy that a range must hold
-_NARROW = 0.7  # of the rows: a range that is wider says nothing
-_WHOLE = 0.95  # of the rows: no range is narrower
 
 
 def places(
@@ -59,13 +55,13 @@ def places(
                         end=high,
                         unit=measure,
                         runs=_runs(problem, energy * inside),
-                        whole=share > _WHOLE,
+                        whole=share > LOCATION.whole,
                     ),
                 )
             )
     found += _conditions(problem, energy, rows)
     found.sort(key=lambda one: (one[1].variable not in depends_on, one[0]))
-    chosen = [place for share, place in found if share <= _NARROW][:3]
+    chosen = [place for share, place in found if share <= LOCATION.narrow][: LOCATION.ranges]
     return tuple(chosen) if chosen else tuple(place for _, place in found[:1])
 
 
@@ -93,7 +89,7 @@ def _range(
 ) -> tuple[float, float, float] | None:
     """Return the share of rows, and the ends, of the narrowest range of bins that holds most energy."""
     values = x[rows]
-    edges = np.unique(np.quantile(values, np.linspace(0, 1, _BINS + 1)))
+    edges = np.unique(np.quantile(values, np.linspace(0, 1, LOCATION.bins + 1)))
     if len(edges) < 3:
         return None
     at = np.clip(np.searchsorted(edges, x, side="right") - 1, 0, len(edges) - 2)
@@ -103,7 +99,7 @@ def _range(
     best: tuple[float, float, float] | None = None
     for i in range(len(per_bin)):
         for j in range(i, len(per_bin)):
-            if per_bin[i : j + 1].sum() >= _HELD * whole:
+            if per_bin[i : j + 1].sum() >= LOCATION.held * whole:
                 share = float(count[i : j + 1].sum() / n)
                 if best is None or share < best[0]:
                     best = (share, float(edges[i]), float(edges[j + 1]))
@@ -126,7 +122,7 @@ def _conditions(
             continue
         for level, which in levels.items():
             held = sum(float(energy[problem.slices[i]].sum()) for i in which)
-            if held >= _HELD * whole:
+            if held >= LOCATION.held * whole:
                 share = sum(float(rows[problem.slices[i]].sum()) for i in which) / n
                 runs = tuple(problem.runs[i].name for i in which)
                 found.append((share, Place(variable=key, start=level, end=level, unit="", runs=runs)))
@@ -138,5 +134,7 @@ def _runs(problem: Problem, energy: NDArray[np.float64]) -> tuple[str, ...]:
     if sums.sum() <= 0:
         return ()
     return tuple(
-        run.name for run, held in zip(problem.runs, sums, strict=True) if held > 0.2 * sums.sum() / len(sums)
+        run.name
+        for run, held in zip(problem.runs, sums, strict=True)
+        if held > LOCATION.run * sums.sum() / len(sums)
     )

@@ -9,13 +9,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from toolkit.diagnosis.answer.answer import NotFound
+from toolkit.diagnosis.policy import VERDICT
 from toolkit.effects.catalogue import effects
 
 if TYPE_CHECKING:
     from toolkit.diagnosis.search.screen import Scored, Screen
-
-_POWER = 0.8
-_VISIBLE = 1e-3  # of a response that the nominal parameters must leave, for the effect to be observable
 
 
 def not_found(
@@ -36,7 +34,7 @@ def not_found(
         if name in named:
             continue
         length, share, amplitude = _distance(screen, one)
-        visible = share > _VISIBLE and length > 0
+        visible = share > VERDICT.observable and length > 0
         needed = _noncentrality(alpha, one.dof)
         size = abs(amplitude) * needed / length if visible and amplitude else None
         known = best.get(name)
@@ -92,6 +90,8 @@ def _noncentrality(alpha: float, dof: int) -> float:
     for _ in range(60):
         middle = 0.5 * (low + high)
         low, high = (
-            (middle, high) if float(ncx2.sf(critical, dof, max(middle, 1e-12))) < _POWER else (low, middle)
+            (middle, high)
+            if float(ncx2.sf(critical, dof, max(middle, 1e-12))) < VERDICT.power
+            else (low, middle)
         )
     return math.sqrt(high)

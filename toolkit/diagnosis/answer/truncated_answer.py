@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from toolkit.diagnosis.answer.answer import Diagnosis, HeldOutFit, NominalParameter, NotFound, recorded
+from toolkit.diagnosis.policy import ROWS
 from toolkit.effects.catalogue import effects
 
 if TYPE_CHECKING:
@@ -27,12 +28,11 @@ STEPS = (
     "joint fits",
     "power of what was not found",
 )
-_FEW = 3  # rows with which nothing can be told apart from anything
 
 
 def is_flat(values: NDArray[np.float64]) -> bool:
     """Tell whether recorded values are too few, or all the same."""
-    return len(values) < _FEW or float(np.ptp(values)) == 0.0
+    return len(values) < ROWS.fewest or float(np.ptp(values)) == 0.0
 
 
 def does_not_vary(problem: Problem) -> bool:

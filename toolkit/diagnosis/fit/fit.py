@@ -13,6 +13,7 @@ from toolkit.diagnosis.fit.covariance import covariance
 from toolkit.diagnosis.fit.descent import Derivatives, descend
 from toolkit.diagnosis.fit.noise import Layout, Noise, fit_noise, log_likelihood
 from toolkit.diagnosis.fit.space import Space
+from toolkit.diagnosis.policy import NOISE
 from toolkit.diagnosis.simulators.simulator import Active
 
 if TYPE_CHECKING:
@@ -24,8 +25,6 @@ if TYPE_CHECKING:
 
 _OUTER = 4  # times that the noise is estimated anew
 _BETTER = 0.02  # of the log-likelihood: less is no step worth another round
-_APART = 2.0  # of its own standard deviation: a larger difference of two solutions is none of chance
-_SAME = 0.05  # by which the coloured fit's residual variance may exceed the plain one's
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -149,7 +148,7 @@ def _absorbs(coloured: _Solved, plain: _Solved, layouts: dict[str, Layout]) -> b
         one = float(np.mean(coloured.residual[name][where.index] ** 2)) if where.n else 0.0
         other = float(np.mean(plain.residual[name][where.index] ** 2)) if where.n else 0.0
         worth = plain.noise[name].correlation_rows / max(where.n, 1)
-        if one > other * (1 + _SAME + 3 * len(plain.x) * worth):
+        if one > other * (1 + NOISE.absorbed + NOISE.absorbed_by_chance * len(plain.x) * worth):
             return True
     return False
 
@@ -271,5 +270,5 @@ def _covariance(
         unsure = np.diag(covariance(J, prior, space.sizes, layouts, other.noise, plain=True))
         apart = ((other.x - solved.x) * space.sizes) ** 2
         expected = np.maximum(unsure - np.diag(made), 0.0)
-        made = made + np.diag(np.where(apart > _APART**2 * expected, apart, 0.0))
+        made = made + np.diag(np.where(apart > NOISE.apart**2 * expected, apart, 0.0))
     return made

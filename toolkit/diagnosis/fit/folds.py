@@ -9,14 +9,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from toolkit.diagnosis.fit.fit import Fit, fit, held_out_score, jacobian
+from toolkit.diagnosis.policy import ROWS
 from toolkit.diagnosis.simulators.simulator import Active
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from toolkit.diagnosis.fit.problem import Problem
-
-_FOLDS = 5
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -41,7 +40,7 @@ def folds_of(problem: Problem, made: Fit) -> Folds:
     """
     runs = [one for one in problem.slices if one.stop > one.start]
     if len(runs) >= 2 and not _own_parameters(problem, made):
-        count = min(_FOLDS, len(runs))
+        count = min(ROWS.folds, len(runs))
         held = []
         for k in range(count):
             mask = np.zeros(problem.rows, dtype=bool)
@@ -50,10 +49,10 @@ def folds_of(problem: Problem, made: Fit) -> Folds:
             held.append(mask)
         return Folds(held=tuple(held), by_run=True)
     held = []
-    for k in range(_FOLDS):
+    for k in range(ROWS.folds):
         mask = np.zeros(problem.rows, dtype=bool)
         for one in runs:
-            mask[np.array_split(np.arange(one.start, one.stop), _FOLDS)[k]] = True
+            mask[np.array_split(np.arange(one.start, one.stop), ROWS.folds)[k]] = True
         if mask.any():
             held.append(mask)
     return Folds(held=tuple(held), by_run=False)

@@ -13,13 +13,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from toolkit.diagnosis.policy import NOISE
+
 if TYPE_CHECKING:
     from numpy.typing import NDArray
-
-_GAP = 3.0  # median steps of time, beyond which a series begins anew
-_FEWEST = 24  # values of a segment below which nothing can be told of its colour
-_ORDERS = 8
-_MISMATCH = 3.0  # times a stated noise: a larger residual is mostly no noise
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -101,7 +98,7 @@ def layout(times: Sequence[NDArray[np.float64]], kept: Sequence[NDArray[np.bool_
         if len(at):
             steps = np.diff(t[at])
             usual = np.median(np.diff(t)) if len(t) > 1 else 1.0
-            breaks = np.flatnonzero(steps > _GAP * usual) + 1
+            breaks = np.flatnonzero(steps > NOISE.gap * usual) + 1
             for piece in np.split(at, breaks):
                 segments.append(slice(start, start + len(piece)))
                 start += len(piece)
@@ -128,18 +125,18 @@ def fit_noise(
     if n == 0:
         return Noise(reflection=(), sd=floor)
     variance = float(np.mean(residual**2))
-    if sd is not None and variance > (_MISMATCH * sd) ** 2:
+    if sd is not None and variance > (NOISE.mismatch * sd) ** 2:
         # Most of it is none of the sensor's. Taken as coloured noise, a smooth mismatch foretells itself, and
         # what mends all but a jagged rest of it would look worse than nothing.
         return Noise(reflection=(), sd=math.sqrt(variance * n / max(n - used, 1)))
     reflection: list[float] = []
     best, best_score = 0, math.log(max(variance, 1e-300))
-    usable = [one for one in where.segments if one.stop - one.start >= _FEWEST]
+    usable = [one for one in where.segments if one.stop - one.start >= NOISE.fewest]
     if usable:
         forward = [residual[one].copy() for one in usable]
         backward = [residual[one].copy() for one in usable]
         left = variance
-        for order in range(1, _ORDERS + 1):
+        for order in range(1, NOISE.orders + 1):
             top = bottom = 0.0
             for i, (f, b) in enumerate(zip(forward, backward, strict=True)):
                 forward[i], backward[i] = f[1:], b[:-1]

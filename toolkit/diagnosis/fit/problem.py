@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from toolkit.diagnosis.fit.noise import Layout, layout
+from toolkit.diagnosis.policy import ROWS
 from toolkit.diagnosis.simulators.simulator import Active, Model
 
 if TYPE_CHECKING:
@@ -18,9 +19,6 @@ if TYPE_CHECKING:
     from toolkit.diagnosis.simulators.simulator import Pattern
 
     Stacked = dict[str, NDArray[np.float64]]
-
-_ISOLATED = 8.0  # robust standard deviations from the neighbours' median: no physics does that in one row
-_SHARE = 0.03  # of the rows; more than that is no outlier but a pattern
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -141,14 +139,14 @@ def without_outliers(problem: Problem, residual: Stacked) -> Problem:
         good = problem.kept[name].copy()
         for one in problem.slices:
             here = np.flatnonzero(good[one]) + one.start
-            if len(here) < 12:
+            if len(here) < ROWS.fewest_for_outliers:
                 continue
             values = r[here]
             away = values - _running_median(values)
             scale = 1.4826 * float(np.median(np.abs(away))) or float(np.std(away))
             steps = 1.4826 * float(np.median(np.abs(np.diff(values)))) / np.sqrt(2)
-            far = np.abs(away) > _ISOLATED * max(scale, steps, 1e-300)
-            if 0 < far.sum() <= max(1, _SHARE * len(here)):
+            far = np.abs(away) > ROWS.isolated * max(scale, steps, 1e-300)
+            if 0 < far.sum() <= max(1, ROWS.outliers * len(here)):
                 good[here[far]] = False
         kept[name] = good
     return replace(problem, kept=kept)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from toolkit.diagnosis.policy import PRIORS
 from toolkit.diagnosis.simulators.simulator import Active
 from toolkit.errors import FitError
 
@@ -21,7 +22,6 @@ if TYPE_CHECKING:
     Stacked = dict[str, Array]
 
 _STEP = 1e-4  # of a parameter's size, for differences
-_WITHIN = 4.0  # prior standard deviations; further off a parameter is not uncertain but imitates an effect
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -42,7 +42,7 @@ class Space:
             size = one.sd or abs(one.value) or 1.0
             sizes.append(size)
             bounds = one.bounds or (-math.inf, math.inf)
-            reach = _WITHIN * one.sd if one.sd else math.inf
+            reach = PRIORS.within * one.sd if one.sd else math.inf
             low.append(max(bounds[0], one.value - reach) / size)
             high.append(min(bounds[1], one.value + reach) / size)
         for each in active:

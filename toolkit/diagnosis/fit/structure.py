@@ -12,15 +12,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from toolkit.diagnosis.policy import STRUCTURE
+
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from toolkit.diagnosis.fit.fit import Fit
     from toolkit.diagnosis.fit.problem import Problem
 
-_KNOTS = 7
 _ANGLES = ("TIRE_ANGLE", "DRUM_ANGLE")
-_FEWEST = 4.0  # rows for each column
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -59,7 +59,7 @@ def groups(problem: Problem, base: Fit) -> list[Group]:
         if len(problem.runs) > 1:
             found.append((("run",), _run_offsets(problem)))
         for names, columns in found:
-            if columns.shape[1] * _FEWEST <= n:
+            if columns.shape[1] * STRUCTURE.rows_per_column <= n:
                 made.append(Group(output=output, variables=names, columns=columns))
     return made
 
@@ -92,10 +92,10 @@ def _spline(x: NDArray[np.float64]) -> NDArray[np.float64] | None:
     if len(values) < 2 or np.ptp(values) <= 1e-9 * np.abs(values).max():
         return None
     scaled = (x - values[0]) / np.ptp(values)
-    if len(values) <= _KNOTS + 1:
+    if len(values) <= STRUCTURE.knots + 1:
         columns = np.stack([scaled**k for k in range(1, min(len(values), 4))], axis=1)
     else:
-        knots = np.unique(np.quantile(scaled, np.linspace(0, 1, _KNOTS)))
+        knots = np.unique(np.quantile(scaled, np.linspace(0, 1, STRUCTURE.knots)))
         columns = np.stack([scaled, *[np.abs(scaled - knot) ** 3 for knot in knots[1:-1]]], axis=1)
     return np.asarray(columns - columns.mean(axis=0))
 

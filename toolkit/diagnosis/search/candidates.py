@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from toolkit.diagnosis.fit.nuisance import INPUT_NOISE
+from toolkit.diagnosis.policy import STARTS
 from toolkit.diagnosis.search import ripple
 from toolkit.diagnosis.simulators.channel_units import channel_unit
 from toolkit.diagnosis.simulators.forces import LEAST_REACH
@@ -37,10 +38,6 @@ _IN_TIME = frozenset(
         "turn_slip load_lag input_noise"
     ).split()
 )
-_SUBSETS = 8
-_LOADS = 0.2  # of the largest load: less tells nothing of what goes with it
-_LATE = (1, 4, 12)  # rows
-_SHORT = 0.05  # of the position's spread: the longest distance over which dry friction builds up
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -132,7 +129,7 @@ def _as_known(problem: Problem, effect: Effect) -> Effect:
 
 def _several_loads(problem: Problem) -> bool:
     loads = _values(problem, "FZ")
-    return len(loads) > 0 and float(np.ptp(loads)) > _LOADS * float(np.abs(loads).max())
+    return len(loads) > 0 and float(np.ptp(loads)) > STARTS.loads * float(np.abs(loads).max())
 
 
 def _within_reach(problem: Problem, active: Active) -> Active:
@@ -150,7 +147,7 @@ def _within_reach(problem: Problem, active: Active) -> Active:
     if not sizes.has_position:
         longest = max((float(run.t[-1] - run.t[0]) for run in problem.runs if run.rows), default=0.0)
         way = sizes.speed * longest
-    most = max(_SHORT * way, sizes.speed * _row_time(problem))
+    most = max(STARTS.bristle * way, sizes.speed * _row_time(problem))
     return _bounded(active, "presliding", most)
 
 
@@ -232,7 +229,7 @@ def _steps(problem: Problem, active: Active, one: EffectParameter) -> tuple[floa
     """Return where the only amplitude of an effect starts: a unit is taken for one of its own dimension."""
     if one.unit == "s":
         # Of a plant whose rows are far apart, some rows: so far off the response is no straight line.
-        far = [rows * _row_time(problem) for rows in _LATE]
+        far = [rows * _row_time(problem) for rows in STARTS.late]
         far = [time for time in far if time > max(map(abs, one.starts))]
         return (*one.starts, *far, *(-time for time in far if min(one.starts) < 0))
     if active.effect.name != "unit_error":
@@ -363,7 +360,7 @@ def _subsets(problem: Problem, effect: Effect) -> list[frozenset[str]]:
         ordered = _in_order(list(levels))
         groups: list[Sequence[str]] = [[one] for one in ordered]
         groups += [ordered[:k] for k in range(2, len(ordered))]
-        for group in groups[:_SUBSETS]:
+        for group in groups[: STARTS.subsets]:
             chosen = frozenset(itertools.chain.from_iterable(levels[one] for one in group))
             if chosen not in made and chosen != names:
                 made.append(chosen)

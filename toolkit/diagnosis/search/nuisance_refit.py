@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from toolkit.diagnosis.fit.fit import Fit, fit
 from toolkit.diagnosis.fit.folds import Folds, HeldOut, hold_out
+from toolkit.diagnosis.policy import STEP
 from toolkit.effects.dead_band import NOISE
 from toolkit.errors import FitError
 
@@ -17,8 +18,6 @@ if TYPE_CHECKING:
     from toolkit.diagnosis.fit.problem import Problem
     from toolkit.diagnosis.search.candidates import Candidate
     from toolkit.diagnosis.simulators.simulator import Active
-
-_BETTER = 2.0  # of the log posterior: noise that goes through a band is taken for more likely
 
 
 def refined(
@@ -43,7 +42,7 @@ def refined(
     # Rows inside a band have no noise, so that a fold's noise, and its score, hang on which rows it has: the
     # noise before a band is for the band's width alone, and the score stays that of the sharp one.
     for one in base.active:
-        base = _better(problem, base, _with_noise(base, one), _BETTER)
+        base = _better(problem, base, _with_noise(base, one), STEP.band_noise)
     return base, held
 
 

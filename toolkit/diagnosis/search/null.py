@@ -14,12 +14,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from toolkit.diagnosis.policy import SCREENING
+
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from toolkit.diagnosis.search.screen import Screen
-
-_DRAWS = 4_000
 
 
 def search_p_values(
@@ -43,10 +43,10 @@ def search_p_values(
     n = screen.n
     left = max(n - screen.sizes.size - int(keep.sum()), 1)
     rng = np.random.default_rng(seed)
-    normal = rng.standard_normal((_DRAWS, root.shape[1]))
+    normal = rng.standard_normal((SCREENING.draws, root.shape[1]))
     z = normal @ root.T
-    whole = (normal**2).sum(axis=1) + rng.chisquare(left, _DRAWS)
-    smallest = np.full(_DRAWS, math.inf)
+    whole = (normal**2).sum(axis=1) + rng.chisquare(left, SCREENING.draws)
+    smallest = np.full(SCREENING.draws, math.inf)
     starts = np.cumsum([0, *widths[:-1]])
     for width in sorted(set(widths) - {0}):
         chosen = starts[[i for i, one in enumerate(widths) if one == width]]
@@ -59,12 +59,12 @@ def search_p_values(
     for gain, width in zip(gains, widths, strict=True):
         p = float(_log_p(np.array([max(gain, 0.0)]), max(width, 1))[0])
         below = int(np.searchsorted(smallest, p, side="right"))
-        if below >= 20:
-            found.append((below + 1) / (_DRAWS + 1))
+        if below >= SCREENING.fewest_draws:
+            found.append((below + 1) / (SCREENING.draws + 1))
         else:
             # Beyond what was drawn: Bonferroni on as many independent tests as the drawn tail shows.
-            tail = float(smallest[int(0.01 * _DRAWS)])
-            found.append(min(1.0, math.exp(min(0.0, p - tail)) * 0.01))
+            tail = float(smallest[int(SCREENING.tail * SCREENING.draws)])
+            found.append(min(1.0, math.exp(min(0.0, p - tail)) * SCREENING.tail))
     return found
 
 

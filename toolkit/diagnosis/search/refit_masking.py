@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from toolkit.diagnosis.policy import PRIORS
 from toolkit.diagnosis.search.candidates import Candidate
 from toolkit.diagnosis.search.screen import Screen, best_of
 from toolkit.errors import FitError
@@ -20,8 +21,6 @@ if TYPE_CHECKING:
     from toolkit.diagnosis.fit.fit import Fit
     from toolkit.diagnosis.fit.problem import Problem
 
-_FAR = 3.0  # prior standard deviations that a parameter may move by itself
-_MOST = 4  # candidates that are fitted jointly on this ground
 
 Key = tuple[str, str | None, str | None, frozenset[str] | None]
 
@@ -39,7 +38,7 @@ def absorbed(problem: Problem, base: Fit, left: Sequence[Candidate]) -> frozense
         for value, one in zip(base.p, problem.free, strict=True)
         if one.sd is not None
     ]
-    if not moved or max(moved) < _FAR:
+    if not moved or max(moved) < PRIORS.far:
         return frozenset()
     declared = tuple(one.value for one in problem.free)
     try:
@@ -49,4 +48,4 @@ def absorbed(problem: Problem, base: Fit, left: Sequence[Candidate]) -> frozense
     residual = {name: problem.observed[name] - values for name, values in simulated.items()}
     screen = Screen.of(problem, replace(base, p=declared, simulated=simulated, residual=residual))
     ranked = best_of([one for each in left for one in screen.score(each)])
-    return frozenset(one.candidate.key for one in ranked[:_MOST])
+    return frozenset(one.candidate.key for one in ranked[: PRIORS.masked])

@@ -17,6 +17,7 @@ import numpy as np
 
 from toolkit.diagnosis.fit.fit import Fit, jacobian, log_prior
 from toolkit.diagnosis.fit.noise import Layout, Noise, fit_noise, log_likelihood, whiten
+from toolkit.diagnosis.policy import SCREENING
 from toolkit.diagnosis.search import ripple
 from toolkit.diagnosis.search.candidates import Candidate, Start
 from toolkit.diagnosis.simulators.simulator import Active
@@ -28,11 +29,6 @@ if TYPE_CHECKING:
     from toolkit.diagnosis.fit.problem import Problem
 
     Stacked = dict[str, NDArray[np.float64]]
-
-_TURNS = 2
-_OF_ONE = 6  # starts of one candidate whose gain is made exact
-_SHORT, _LEAST_TRUST = 10.0, 0.3
-_COLLINEAR = 1e-11  # of the largest eigenvalue: what lies below adds nothing that could be told apart
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -185,7 +181,7 @@ class Screen:
         series of AR(1) noise.
         """
         worth = sum(where.n / noise[name].correlation_rows for name, where in self.layouts.items())
-        return max(_LEAST_TRUST, 1 - _SHORT / max(worth, 1.0))
+        return max(SCREENING.least_trust, 1 - SCREENING.short / max(worth, 1.0))
 
     @property
     def _is_coloured(self) -> bool:
@@ -209,7 +205,7 @@ class Screen:
         seen = Counter[object]()
         for one in sorted(scored, key=lambda one: -one.gain):
             seen[one.candidate.key] += 1
-            chosen = len(first) < most and seen[one.candidate.key] <= _OF_ONE
+            chosen = len(first) < most and seen[one.candidate.key] <= SCREENING.starts
             (first if chosen else later).append(one)
         made = [self._exact(one) for one in first]
         least = min((one.gain for one in made), default=0.0)
@@ -238,7 +234,7 @@ class Screen:
         best, chosen, left = -math.inf, tuple([1.0] * width), self.base.noise
         for first in (self.base.noise, None) if self._is_coloured else (self.base.noise,):
             known = first
-            for _ in range(_TURNS):
+            for _ in range(SCREENING.turns):
                 made = self._once(directions, known, fixed=fixed)
                 if made is None:
                     break
@@ -350,7 +346,7 @@ def _solved(blocks: list[NDArray[np.float64]], targets: list[NDArray[np.float64]
     size = np.sqrt(np.diag(gram))
     size[size == 0] = 1.0
     values, vectors = np.linalg.eigh(gram / np.outer(size, size))
-    keep = values > _COLLINEAR * values.max()
+    keep = values > SCREENING.collinear * values.max()
     return np.asarray(((vectors[:, keep] / values[keep]) @ (vectors[:, keep].T @ (right / size))) / size)
 
 

@@ -7,13 +7,11 @@ from dataclasses import dataclass
 
 from toolkit.diagnosis.fit.fit import Fit
 from toolkit.diagnosis.fit.problem import Problem
+from toolkit.diagnosis.policy import SCREENING
 from toolkit.diagnosis.search.candidates import Candidate
 from toolkit.diagnosis.search.forward_step import place
 from toolkit.diagnosis.search.null import search_p_values
 from toolkit.diagnosis.search.screen import Scored, Screen, best_of
-
-ALPHA = 0.003  # of the whole search, a step
-_SHARPENED = 30  # starts whose gain is computed with the noise estimated anew
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -43,12 +41,12 @@ def look(problem: Problem, base: Fit, listed: Sequence[Candidate], *, turn: int,
     taken = {place(one) for one in base.active}
     left = [each for each in listed if place(each.active) not in taken and _is_sought(each, turn)]
     screen.prepare(left)
-    scored = screen.sharpened([one for each in left for one in screen.score(each)], _SHARPENED)
+    scored = screen.sharpened([one for each in left for one in screen.score(each)], SCREENING.sharpened)
     p_values = search_p_values(
         screen, [one.block for one in scored], [one.gain * one.trust for one in scored], seed
     )
     p_of = {id(one): p for one, p in zip(scored, p_values, strict=True)}
-    significant = tuple(one for one in best_of(scored) if p_of[id(one)] < ALPHA)
+    significant = tuple(one for one in best_of(scored) if p_of[id(one)] < SCREENING.alpha)
     return Look(screen, tuple(left), tuple(scored), significant, p_of)
 
 

@@ -13,22 +13,19 @@ from toolkit.diagnosis.fit.fit import Fit, fit, replace_effects
 from toolkit.diagnosis.fit.folds import Folds, HeldOut, folds_of, hold_out, matters
 from toolkit.diagnosis.fit.nuisance import INPUT_NOISE
 from toolkit.diagnosis.fit.problem import Problem, without_outliers
+from toolkit.diagnosis.policy import STEP
 from toolkit.diagnosis.search.candidates import candidates
-from toolkit.diagnosis.search.forward_step import LEAST_GAIN, Step, best_step, joint_fits, place, step_groups
+from toolkit.diagnosis.search.forward_step import Step, best_step, joint_fits, place, step_groups
 from toolkit.diagnosis.search.lattice import lattice_of
 from toolkit.diagnosis.search.nuisance_refit import refined, without
 from toolkit.diagnosis.search.refit_masking import absorbed
 from toolkit.diagnosis.search.screen import Scored, Screen
 from toolkit.diagnosis.search.screen_step import look
-from toolkit.diagnosis.search.unexplained import NOTICED, StructureFound, remainder
+from toolkit.diagnosis.search.unexplained import StructureFound, remainder
 from toolkit.errors import FitError
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
-
-MOST_EFFECTS = 4
-_SEEN = 0.01  # of the noise: an effect that never moves an output by more is not there
-_LATER = 0.05  # of the held-out mean square: what an effect beside others must take away
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -102,7 +99,7 @@ def search(problem: Problem, *, seed: int, budget: Budget) -> Search:
     before: tuple[StructureFound, ...] = ()
     structure: tuple[StructureFound, ...] = ()
     try:
-        for turn in range(MOST_EFFECTS + 1):
+        for turn in range(STEP.most_effects + 1):
             budget.check(f"step {turn + 1}: screening {len(listed)} candidates")
             seen = look(problem, base, listed, turn=turn, seed=seed + turn)
             screen, scored = seen.screen, seen.scored
@@ -110,11 +107,11 @@ def search(problem: Problem, *, seed: int, budget: Budget) -> Search:
             structure = remainder(problem, screen, base, seed + 100 + turn)
             if turn == 0:
                 before = structure
-            if turn == MOST_EFFECTS:
+            if turn == STEP.most_effects:
                 break
             found = None
             hidden = absorbed(problem, base, seen.left) if seen.significant else frozenset()
-            for promising, least in step_groups(seen.significant, hidden, _LATER if turn else 2 * NOTICED):
+            for promising, least in step_groups(seen.significant, hidden, STEP.later if turn else STEP.first):
                 told = ", ".join(dict.fromkeys(one.candidate.name for one in promising))
                 budget.check(f"step {turn + 1}: joint fits of {told}")
                 joint = joint_fits(problem, base, promising)
@@ -165,7 +162,7 @@ def _is_nuisance(step: Step, steps: Sequence[Step]) -> bool:
     return any(
         one.effect.name in ("thermal_drift", "zero_drift")
         # Where in its loop a channel stands at first depends on what came before the recording.
-        or (one.effect.name == "hysteresis" and offset <= 0.5 * one.values["width"])
+        or (one.effect.name == "hysteresis" and offset <= STEP.loop_offset * one.values["width"])
         for one in beside
     )
 
@@ -195,7 +192,7 @@ def _stepped(
             simulated={**held_base.simulated, name: _rounded(held_base.simulated[name], found.step)},
             fits=held_base.fits,
         )
-        if matters(problem, held_base, held, 2 * NOTICED):
+        if matters(problem, held_base, held, STEP.first):
             held_base = held
         base = with_steps
     return base, held_base, steps
@@ -218,7 +215,7 @@ def _pruned(
             held = hold_out(problem, folds, made.active, made)
         except FitError:  # what is left cannot be simulated: the effect is needed
             continue
-        if held_base.total - held.total < LEAST_GAIN:
+        if held_base.total - held.total < STEP.least_gain:
             base, held_base = made, held
             kept = {place(one) for one in rest}
             steps = [one for one in steps if place(one.active) in kept]
@@ -236,7 +233,8 @@ def _with_a_size(problem: Problem, base: Fit, steps: list[Step]) -> tuple[Fit, l
             continue
         moved = {name: one - bare[name] for name, one in base.simulated.items()}
         if all(
-            float(np.abs(one[problem.kept[name]]).max(initial=0.0)) < _SEEN * base.noise[name].marginal_sd
+            float(np.abs(one[problem.kept[name]]).max(initial=0.0))
+            < STEP.visible * base.noise[name].marginal_sd
             for name, one in moved.items()
         ):
             kept = {place(one) for one in rest}

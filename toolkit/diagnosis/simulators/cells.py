@@ -10,6 +10,7 @@ import numpy as np
 from toolkit.calibration.apply import apply_record
 from toolkit.calibration.records.record import CalibrationRecord, from_bytes
 from toolkit.calibration.registry.registry import Registry
+from toolkit.diagnosis.policy import SURFACE
 from toolkit.diagnosis.simulators.channels import channel_places, undone
 from toolkit.diagnosis.simulators.simulator import Active, Output
 from toolkit.effects.effect import Effect
@@ -35,7 +36,6 @@ _BY_VALUE = (
     "filter_lag",
     "channel_delay",
 )
-_LEAST_ROWS = 20  # of a run, to tell what its cells carried from its loads
 _ON_TARE = ("channel_sign", "sensitivity_error", "unit_error")
 
 
@@ -125,7 +125,7 @@ class Cells:
         columns += [run.columns[name] for name in ("FZ",) if np.isfinite(run.columns.get(name, np.nan)).all()]
         there = np.column_stack([*columns, np.ones(len(shown))])
         good = np.isfinite(there).all(axis=1) & np.isfinite(shown)
-        if int(good.sum()) < _LEAST_ROWS:
+        if int(good.sum()) < SURFACE.cell_rows:
             return shown
         return np.asarray(there @ np.linalg.lstsq(there[good], shown[good], rcond=None)[0])
 

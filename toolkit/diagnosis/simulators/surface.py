@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from toolkit.diagnosis.policy import SURFACE
 from toolkit.diagnosis.simulators.gaussian_process import Process, cells_of, likeliest, thinned
 from toolkit.diagnosis.simulators.setting import nominal_load
 from toolkit.diagnosis.simulators.tire import base_drive, rotation
@@ -19,14 +20,10 @@ if TYPE_CHECKING:
     from toolkit.diagnosis.case.case import Case, Run
 
 _OUTPUTS = ("FY", "MZ")
-_ENOUGH = 0.02  # of the simulated output's spread that the surface may miss
 _POINTS, _TRIED = 400, 130  # through which it goes, and by which its shape is chosen
 _FINE, _LOADS = 121, 17  # of the table that stands for it in simulations
 _LEAST = 0.05  # nominal loads, below which a force is no longer counted to its load
 _NO_STATE = frozenset(("date", "order", "repeat_of"))
-# An angle that is left out has neighbours twice as far away as a point between angles has, and an
-# interpolation of third order is off by the third power of that.
-_CLOSER = 8.0
 
 
 class Surface:
@@ -73,10 +70,10 @@ class Surface:
         found = Process(shape, points[many], y[many] / over[many])
         self._fits[name, way] = _Table(found, self._slips, self._loads)
         missed = float(np.sqrt(np.mean((over * self._fits[name, way].at(points) - y) ** 2)))
-        if missed > _ENOUGH * max(float(np.std(y)), 1e-300):
+        if missed > SURFACE.missed * max(float(np.std(y)), 1e-300):
             self.good = False
         left_out = over[many] * found.left_out()
-        between = float(np.sqrt(np.mean(left_out**2))) / _CLOSER
+        between = float(np.sqrt(np.mean(left_out**2))) / SURFACE.closer
         self.between[name] = max(between, self.between.get(name, 0.0))
 
     def too_coarse(self) -> tuple[Finding, ...]:
