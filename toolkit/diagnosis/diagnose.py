@@ -17,8 +17,8 @@ from toolkit.diagnosis.case.case import Case
 from toolkit.diagnosis.fit.predict import prediction_csv, prediction_names
 from toolkit.diagnosis.fit.problem import Problem, problem_of
 from toolkit.diagnosis.policy import BUDGET
-from toolkit.diagnosis.search.search import Budget, BudgetSpentError, Search, search
-from toolkit.diagnosis.search.time_budget import Watch
+from toolkit.diagnosis.search.search import Search, search
+from toolkit.diagnosis.search.time_budget import BudgetSpentError, TimeBudget
 from toolkit.diagnosis.simulators.build_simulator import model_of
 from toolkit.diagnosis.simulators.built_in import built_in_findings
 from toolkit.diagnosis.simulators.simulator import Supervised
@@ -59,16 +59,16 @@ def diagnose(
         the case cannot be used; FitError: its simulation gives no usable output as declared
     """
     with kept_apart():
-        return _diagnosed(case, calibrations, Watch(budget_s, tell), budget_s)
+        return _diagnosed(case, calibrations, TimeBudget(budget_s, tell), budget_s)
 
 
-def _diagnosed(case: Case, calibrations: Path | None, watch: Watch, budget_s: float) -> Result:
+def _diagnosed(case: Case, calibrations: Path | None, budget: TimeBudget, budget_s: float) -> Result:
     try:
-        model = watch.guarded(model_of)(case, calibrations)
+        model = budget.guarded(model_of)(case, calibrations)
     except BudgetSpentError:
-        return Result(diagnosis=_too_late(case, None, None, (), watch.step), search=None)
+        return Result(diagnosis=_too_late(case, None, None, (), budget.step), search=None)
     refused = Refused(model.simulate)
-    supervised = Supervised(model, watch.guarded(refused))
+    supervised = Supervised(model, budget.guarded(refused))
     problem = problem_of(case, supervised)
     told = (
         *case_findings(problem),
@@ -77,7 +77,7 @@ def _diagnosed(case: Case, calibrations: Path | None, watch: Watch, budget_s: fl
     )
     declared, found = None, None
     try:
-        declared = _first_look(problem, watch)
+        declared = _first_look(problem, budget)
         if does_not_vary(problem):
             made = without_search(
                 case, problem, declared, why="the outputs do not vary", findings=told,
@@ -85,7 +85,6 @@ def _diagnosed(case: Case, calibrations: Path | None, watch: Watch, budget_s: fl
             )  # fmt: skip
         else:
             seed = int(case.sha256[:12], 16)
-            budget = Budget(now=time.monotonic, until=watch.until, tell=watch.tell)
             found = search(problem, seed=seed, budget=budget)
             made = answer_of(case, found, told)
     except BudgetSpentError as error:
@@ -93,18 +92,18 @@ def _diagnosed(case: Case, calibrations: Path | None, watch: Watch, budget_s: fl
     finally:
         supervised.release()
     made = replace(made, findings=(*made.findings, *refused.findings(case)))
-    files, late = _predictions(problem, found, watch, budget_s)
+    files, late = _predictions(problem, found, budget, budget_s)
     if late:
         made = replace(made, complete=False, skipped=(*made.skipped, late))
     return Result(diagnosis=made, search=found, predictions=files)
 
 
-def _first_look(problem: Problem, watch: Watch) -> dict[str, NDArray[np.float64]]:
+def _first_look(problem: Problem, budget: TimeBudget) -> dict[str, NDArray[np.float64]]:
     """Return the simulation as declared; what cannot be simulated ends here."""
-    watch.tell("the simulation as declared")
+    budget.tell("the simulation as declared")
     values = tuple(one.value for one in problem.free)
     made = problem.simulate(values, ())
-    quick = watch.last_s < BUDGET.quick_s
+    quick = budget.last_s < BUDGET.quick_s
     repeats = problem.model.capability.repeats
     if quick and repeats is not None:
         repeats(problem.runs[0], problem.known)
@@ -114,18 +113,18 @@ def _first_look(problem: Problem, watch: Watch) -> dict[str, NDArray[np.float64]
 
 
 def _predictions(
-    problem: Problem, found: Search | None, watch: Watch, budget_s: float
+    problem: Problem, found: Search | None, budget: TimeBudget, budget_s: float
 ) -> tuple[tuple[tuple[str, str], ...], str]:
     """Return the files of predictions, or what was skipped where the time is up."""
     runs = problem.case.predict
-    left = max(watch.until - time.monotonic(), BUDGET.grace * budget_s)
-    if not runs or len(runs) * 3 * watch.last_s > left:
+    left = max(budget.until - time.monotonic(), BUDGET.grace * budget_s)
+    if not runs or len(runs) * 3 * budget.last_s > left:
         return (), "predictions" if runs else ""
     fits: list[Fit | None] = [None, None, None]
     if found is not None:
         fits[1] = found.refitted
         fits[2] = found.refitted if mostly_unknown(found) else found.augmented
-    watch.tell("predictions")
+    budget.tell("predictions")
     return tuple(
         (name, prediction_csv(problem, run, fits))
         for name, run in zip(prediction_names(runs), runs, strict=True)

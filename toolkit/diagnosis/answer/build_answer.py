@@ -22,11 +22,11 @@ from toolkit.diagnosis.answer.classes import equivalent_to, parted
 from toolkit.diagnosis.answer.locate import places
 from toolkit.diagnosis.answer.power import not_found
 from toolkit.diagnosis.case.case import Case
+from toolkit.diagnosis.fit.structure import groups
 from toolkit.diagnosis.policy import PRIORS, SCREENING, VERDICT
 from toolkit.diagnosis.search.forward_step import Step
 from toolkit.diagnosis.search.search import Search
-from toolkit.diagnosis.simulators.channel_units import unit_of
-from toolkit.diagnosis.simulators.parameter_signs import sense
+from toolkit.diagnosis.simulators.parameter_units import sense, unit_of
 from toolkit.diagnosis.simulators.simulator import Active
 from toolkit.effects.creep import FROM_REST
 from toolkit.findings import Finding
@@ -261,8 +261,6 @@ def _depends_on(found: Search, name: str) -> tuple[str, ...]:
 
 def _structured(found: Search, name: str) -> tuple[float, NDArray[np.float64]]:
     """Return share and signal of the smooth structure in an output's refitted residual."""
-    from toolkit.diagnosis.fit.structure import groups
-
     problem, kept = found.problem, found.problem.kept[name]
     residual = found.refitted.residual[name]
     best, signal = 0.0, np.zeros(problem.rows)

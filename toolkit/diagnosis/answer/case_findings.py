@@ -7,10 +7,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from toolkit.calibration.records.use import CalibrationUse
+from toolkit.calibration.registry.registry import Registry
+from toolkit.calibration.registry.standing import unapproved, withdrawal
+from toolkit.diagnosis.simulators.cells import record_of
+from toolkit.errors import RegistryError
 from toolkit.findings import Finding
 
 if TYPE_CHECKING:
-    from toolkit.calibration.records.use import CalibrationUse
     from toolkit.diagnosis.case.case import Case
     from toolkit.diagnosis.fit.problem import Problem
 
@@ -59,12 +63,6 @@ def calibration_use(case: Case, calibrations: Path | None) -> CalibrationUse | N
     A case has no date of its own: a record counts as in force where it is approved and not void on every day.
     A candidate is accepted, and what is made with it says that it is a draft.
     """
-    from toolkit.calibration.records.use import CalibrationUse
-    from toolkit.calibration.registry.registry import Registry
-    from toolkit.calibration.registry.standing import unapproved, withdrawal
-    from toolkit.diagnosis.simulators.cells import record_of
-    from toolkit.errors import RegistryError
-
     named = case.simulation.calibration
     if not named:
         return None

@@ -12,8 +12,7 @@ from typing import TYPE_CHECKING, Any
 from toolkit import __version__
 from toolkit.diagnosis.fit.nuisance import INPUT_NOISE
 from toolkit.diagnosis.simulators.built_in import parameter_names
-from toolkit.diagnosis.simulators.channel_units import unit_of
-from toolkit.diagnosis.simulators.parameter_signs import sense
+from toolkit.diagnosis.simulators.parameter_units import sense, unit_of
 from toolkit.diagnosis.simulators.setting import nominal_load
 from toolkit.effects.sense import turned
 from toolkit.files import sha256_file

@@ -13,8 +13,8 @@ import numpy as np
 from toolkit.diagnosis.fit.nuisance import INPUT_NOISE
 from toolkit.diagnosis.policy import STARTS
 from toolkit.diagnosis.search import ripple
-from toolkit.diagnosis.simulators.channel_units import channel_unit
 from toolkit.diagnosis.simulators.forces import LEAST_REACH
+from toolkit.diagnosis.simulators.parameter_units import channel_unit
 from toolkit.diagnosis.simulators.simulator import DISCRETE, Active, MotionSizes
 from toolkit.effects.catalogue import effects
 from toolkit.effects.creep import FROM_REST
@@ -38,6 +38,10 @@ _IN_TIME = frozenset(
         "turn_slip load_lag input_noise"
     ).split()
 )
+
+
+# What tells candidates apart: name, channel, source, runs.
+Key = tuple[str, str | None, str | None, frozenset[str] | None]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -84,7 +88,7 @@ class Candidate:
     discrete: bool
 
     @property
-    def key(self) -> tuple[str, str | None, str | None, frozenset[str] | None]:
+    def key(self) -> Key:
         """What tells candidates apart."""
         return (self.active.effect.name, self.active.channel, self.active.source, self.active.runs)
 

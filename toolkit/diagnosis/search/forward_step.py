@@ -13,7 +13,7 @@ from toolkit.diagnosis.fit.folds import Folds, HeldOut, beyond_form, hold_out, m
 from toolkit.diagnosis.fit.nuisance import INPUT_NOISE
 from toolkit.diagnosis.fit.problem import Problem
 from toolkit.diagnosis.policy import STEP
-from toolkit.diagnosis.search.refit_masking import Key
+from toolkit.diagnosis.search.candidates import Key
 from toolkit.diagnosis.search.screen import Scored
 from toolkit.diagnosis.simulators.simulator import Active
 from toolkit.errors import FitError

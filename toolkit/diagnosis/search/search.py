@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolkit.diagnosis.fit.fit import Fit, fit, replace_effects
+from toolkit.diagnosis.fit.fit import Fit, fit, noise_of, replace_effects
 from toolkit.diagnosis.fit.folds import Folds, HeldOut, folds_of, hold_out, matters
 from toolkit.diagnosis.fit.nuisance import INPUT_NOISE
 from toolkit.diagnosis.fit.problem import Problem, without_outliers
@@ -18,9 +18,9 @@ from toolkit.diagnosis.search.candidates import candidates
 from toolkit.diagnosis.search.forward_step import Step, best_step, joint_fits, place, step_groups
 from toolkit.diagnosis.search.lattice import lattice_of
 from toolkit.diagnosis.search.nuisance_refit import refined, without
-from toolkit.diagnosis.search.refit_masking import absorbed
 from toolkit.diagnosis.search.screen import Scored, Screen
-from toolkit.diagnosis.search.screen_step import look
+from toolkit.diagnosis.search.screen_step import look, masked
+from toolkit.diagnosis.search.time_budget import BudgetSpentError, TimeBudget
 from toolkit.diagnosis.search.unexplained import StructureFound, remainder
 from toolkit.errors import FitError
 
@@ -55,33 +55,14 @@ class Search:
         return float(made.covariance[at, at]) / self.screen.trust(made.noise)
 
 
-class BudgetSpentError(Exception):
-    """The budget is spent."""
-
-
-@dataclass(slots=True)
-class Budget:
-    """How long a search may take; ``check`` raises where the time is over."""
-
-    now: Callable[[], float]
-    until: float
-    tell: Callable[[str], None]
-
-    def check(self, what: str) -> None:
-        """Tell what comes next, or raise."""
-        if self.now() > self.until:
-            raise BudgetSpentError(what)
-        self.tell(what)
-
-
-def search(problem: Problem, *, seed: int, budget: Budget) -> Search:
+def search(problem: Problem, *, seed: int, budget: TimeBudget) -> Search:
     """Search for what a simulation leaves out.
 
     Parameters
     ----------
     problem : runs, outputs, nominal parameters
     seed : of the null's draws; from the case's hash, so that an answer repeats
-    budget : of time; a spent one ends the search with what it has
+    budget : a spent one ends the search with what it has
     """
     nominal = _as_declared(problem)
     budget.check("refit of the nominal parameters")
@@ -110,7 +91,7 @@ def search(problem: Problem, *, seed: int, budget: Budget) -> Search:
             if turn == STEP.most_effects:
                 break
             found = None
-            hidden = absorbed(problem, base, seen.left) if seen.significant else frozenset()
+            hidden = masked(problem, base, seen.left) if seen.significant else frozenset()
             for promising, least in step_groups(seen.significant, hidden, STEP.later if turn else STEP.first):
                 told = ", ".join(dict.fromkeys(one.candidate.name for one in promising))
                 budget.check(f"step {turn + 1}: joint fits of {told}")
@@ -245,8 +226,6 @@ def _with_a_size(problem: Problem, base: Fit, steps: list[Step]) -> tuple[Fit, l
 
 def _as_declared(problem: Problem) -> Fit:
     """Return the simulation as declared, its residual and noise, nothing fitted."""
-    from toolkit.diagnosis.fit.fit import noise_of
-
     p = tuple(one.value for one in problem.free)
     simulated = problem.simulate(p, ())
     residual = {name: problem.observed[name] - simulated[name] for name in simulated}

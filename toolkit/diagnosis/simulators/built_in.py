@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from toolkit.diagnosis.case.case import CaseParameter
-from toolkit.diagnosis.simulators.channel_units import unit_of
+from toolkit.diagnosis.simulators.parameter_units import unit_of
 from toolkit.diagnosis.simulators.simulator import Active, Capability, Model
 from toolkit.effects.sense import computed_in
 from toolkit.errors import ConfigError

@@ -14,12 +14,12 @@ from toolkit.diagnosis.simulators.batch_integration import (
     integrate_together,
     takes_columns,
 )
-from toolkit.diagnosis.simulators.channel_units import reduced
 from toolkit.diagnosis.simulators.channels import channel_places, slopes, through_channels
 from toolkit.diagnosis.simulators.equation import Equation, failed
 from toolkit.diagnosis.simulators.forces import Forces
 from toolkit.diagnosis.simulators.integrate import IntegrationError, integrate
 from toolkit.diagnosis.simulators.linear_response import propagated
+from toolkit.diagnosis.simulators.parameter_units import reduced
 from toolkit.diagnosis.simulators.setting import nominal_load, setting
 from toolkit.diagnosis.simulators.simulator import Active, Capability, MotionSizes, Moving, Output
 from toolkit.diagnosis.simulators.states import dimensions, fitting
