@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from toolkit.diagnosis.answer.answer import Diagnosis
 from toolkit.diagnosis.answer.build_answer import answer_of, mostly_unknown
 from toolkit.diagnosis.answer.case_findings import calibration_findings, case_findings
-from toolkit.diagnosis.answer.failed_runs import Refused
+from toolkit.diagnosis.answer.failed_runs import FailedRuns
 from toolkit.diagnosis.answer.truncated_answer import STEPS, does_not_vary, without_search
 from toolkit.diagnosis.case.case import Case
 from toolkit.diagnosis.fit.predict import prediction_csv, prediction_names
@@ -67,8 +67,8 @@ def _diagnosed(case: Case, calibrations: Path | None, budget: TimeBudget, budget
         model = budget.guarded(model_of)(case, calibrations)
     except BudgetSpentError:
         return Result(diagnosis=_too_late(case, None, None, (), budget.step), search=None)
-    refused = Refused(model.simulate)
-    supervised = Supervised(model, budget.guarded(refused))
+    failed = FailedRuns(model.simulate)
+    supervised = Supervised(model, budget.guarded(failed))
     problem = problem_of(case, supervised)
     told = (
         *case_findings(problem),
@@ -91,7 +91,7 @@ def _diagnosed(case: Case, calibrations: Path | None, budget: TimeBudget, budget
         made = _too_late(case, problem, declared, told, str(error))
     finally:
         supervised.release()
-    made = replace(made, findings=(*made.findings, *refused.findings(case)))
+    made = replace(made, findings=(*made.findings, *failed.findings(case)))
     files, late = _predictions(problem, found, budget, budget_s)
     if late:
         made = replace(made, complete=False, skipped=(*made.skipped, late))

@@ -13,11 +13,11 @@ from toolkit.diagnosis.policy import VERDICT
 from toolkit.effects.catalogue import effects
 
 if TYPE_CHECKING:
-    from toolkit.diagnosis.search.screen import Scored, Screen
+    from toolkit.diagnosis.search.screen import LinearisedFit, Scored
 
 
 def not_found(
-    screen: Screen, scored: Sequence[Scored], named: set[str], *, alpha: float, units: dict[int, str]
+    screen: LinearisedFit, scored: Sequence[Scored], named: set[str], *, alpha: float, units: dict[int, str]
 ) -> tuple[NotFound, ...]:
     """Return every effect that is not named, with its minimum detectable size.
 
@@ -65,7 +65,7 @@ def not_found(
     return tuple(made)
 
 
-def _distance(screen: Screen, one: Scored) -> tuple[float, float, float]:
+def _distance(screen: LinearisedFit, one: Scored) -> tuple[float, float, float]:
     """Return the whitened response off the nominal parameters, its share of the whole, and the amplitude."""
     raw = screen.rows(one.directions)[:, 0]
     whole = float(np.linalg.norm(raw))

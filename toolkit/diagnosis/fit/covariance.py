@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolkit.diagnosis.fit.noise import Layout, Noise, autocovariance, whiten
+from toolkit.diagnosis.fit.noise import Autoregression, Layout, autocovariance, whiten
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -22,7 +22,7 @@ def covariance(
     prior: NDArray[np.float64],
     sizes: NDArray[np.float64],
     layouts: dict[str, Layout],
-    noise: dict[str, Noise],
+    noise: dict[str, Autoregression],
     *,
     plain: bool,
 ) -> NDArray[np.float64]:
@@ -60,7 +60,7 @@ def covariance(
     return np.asarray(inverse * np.outer(scale, scale))
 
 
-def _correlated(columns: NDArray[np.float64], where: Layout, noise: Noise) -> NDArray[np.float64]:
+def _correlated(columns: NDArray[np.float64], where: Layout, noise: Autoregression) -> NDArray[np.float64]:
     """Return the noise's covariance matrix times columns, segment by segment."""
     from scipy.signal import fftconvolve
 

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolkit.diagnosis.fit.noise import Layout, Noise, whiten
+from toolkit.diagnosis.fit.noise import Autoregression, Layout, whiten
 from toolkit.diagnosis.fit.space import Space
 from toolkit.errors import FitError
 
@@ -81,7 +81,7 @@ class Derivatives:
 class Weighing:
     """What rows are worth: their layouts and noise, and the priors beside them."""
 
-    def __init__(self, space: Space, layouts: dict[str, Layout], noise: dict[str, Noise]) -> None:
+    def __init__(self, space: Space, layouts: dict[str, Layout], noise: dict[str, Autoregression]) -> None:
         self._space, self._layouts, self._noise = space, layouts, noise
         self._prior_sd = np.array([one.sd or 1.0 for one in space.problem.free])
         self._declared = np.array([one.value for one in space.problem.free])
@@ -116,7 +116,7 @@ class Weighing:
 
 
 def descend(
-    space: Space, layouts: dict[str, Layout], x: Array, noise: dict[str, Noise], known: Derivatives
+    space: Space, layouts: dict[str, Layout], x: Array, noise: dict[str, Autoregression], known: Derivatives
 ) -> Array:
     """Return the vector of least squares, searched from ``x``.
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from toolkit.diagnosis.fit.covariance import covariance
 from toolkit.diagnosis.fit.descent import Derivatives, descend
-from toolkit.diagnosis.fit.noise import Layout, Noise, fit_noise, log_likelihood
+from toolkit.diagnosis.fit.noise import Autoregression, Layout, fit_noise, log_likelihood
 from toolkit.diagnosis.fit.space import Space
 from toolkit.diagnosis.policy import NOISE
 from toolkit.diagnosis.simulators.simulator import Active
@@ -39,7 +39,7 @@ class Fit:
     active: tuple[Active, ...]
     residual: Stacked
     simulated: Stacked
-    noise: dict[str, Noise]
+    noise: dict[str, Autoregression]
     log_posterior: float
     covariance: NDArray[np.float64]
     rows: NDArray[np.bool_] | None
@@ -53,7 +53,7 @@ class _Solved:
     x: NDArray[np.float64]
     simulated: Stacked
     residual: Stacked
-    noise: dict[str, Noise]
+    noise: dict[str, Autoregression]
     score: float
 
 
@@ -63,7 +63,7 @@ def fit(
     *,
     start: Sequence[float] | None = None,
     rows: NDArray[np.bool_] | None = None,
-    noise: dict[str, Noise] | None = None,
+    noise: dict[str, Autoregression] | None = None,
     rounds: int = _OUTER,
     plain: bool | None = None,
 ) -> Fit:
@@ -107,7 +107,7 @@ def _coloured(
     space: Space,
     layouts: dict[str, Layout],
     x: NDArray[np.float64],
-    noise: dict[str, Noise] | None,
+    noise: dict[str, Autoregression] | None,
     rounds: int,
     derivatives: Derivatives,
 ) -> _Solved:
@@ -131,7 +131,7 @@ def _plain(space: Space, layouts: dict[str, Layout], from_: _Solved, known: Deri
     if not len(from_.x) or not any(one.reflection for one in from_.noise.values()):
         return None
     weights = {
-        name: Noise(reflection=(), sd=one.marginal_sd * math.sqrt(one.correlation_rows))
+        name: Autoregression(reflection=(), sd=one.marginal_sd * math.sqrt(one.correlation_rows))
         for name, one in from_.noise.items()
     }
     return _solve(space, layouts, from_.x, weights, known)
@@ -157,7 +157,7 @@ def _solve(
     space: Space,
     layouts: dict[str, Layout],
     x: NDArray[np.float64],
-    weights: dict[str, Noise],
+    weights: dict[str, Autoregression],
     known: Derivatives,
 ) -> _Solved:
     x = descend(space, layouts, x, weights, known)
@@ -190,7 +190,7 @@ def _columns(problem: Problem, active: Sequence[Active]) -> list[tuple[object, .
 
 def noise_of(
     problem: Problem, residual: Stacked, layouts: dict[str, Layout], *, used: int = 0
-) -> dict[str, Noise]:
+) -> dict[str, Autoregression]:
     """Return the noise of every output's residual."""
     return {
         name: fit_noise(
@@ -227,12 +227,12 @@ def jacobian(problem: Problem, made: Fit) -> tuple[dict[str, NDArray[np.float64]
     return space.around(space.at(made.p))[1], space.sizes
 
 
-def _white(problem: Problem, residual: Stacked, layouts: dict[str, Layout]) -> dict[str, Noise]:
+def _white(problem: Problem, residual: Stacked, layouts: dict[str, Layout]) -> dict[str, Autoregression]:
     made = {}
     for name, where in layouts.items():
         values = residual[name][where.index]
         size = math.sqrt(float(np.mean(values**2))) if len(values) else 0.0
-        made[name] = Noise(reflection=(), sd=max(size, problem.floor[name]))
+        made[name] = Autoregression(reflection=(), sd=max(size, problem.floor[name]))
     return made
 
 
@@ -241,7 +241,7 @@ def _score(
     x: NDArray[np.float64],
     residual: Stacked,
     layouts: dict[str, Layout],
-    noise: dict[str, Noise],
+    noise: dict[str, Autoregression],
 ) -> float:
     p, _ = space.split(x)
     total = log_prior(space.problem, p)

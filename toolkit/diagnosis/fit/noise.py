@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Noise:
+class Autoregression:
     """An autoregression: reflection coefficients, and the innovations' standard deviation.
 
     ``reflection`` has one entry an order; white noise has none. ``sd`` is in the output's unit.
@@ -52,7 +52,7 @@ def predictor(reflection: Sequence[float]) -> list[NDArray[np.float64]]:
     return made
 
 
-def autocovariance(noise: Noise, count: int) -> NDArray[np.float64]:
+def autocovariance(noise: Autoregression, count: int) -> NDArray[np.float64]:
     """Return the noise's autocovariance at lags 0 to ``count`` - 1, shape (count,)."""
     orders = predictor(noise.reflection)
     gamma = np.zeros(count)
@@ -110,7 +110,7 @@ def layout(times: Sequence[NDArray[np.float64]], kept: Sequence[NDArray[np.bool_
 
 def fit_noise(
     residual: NDArray[np.float64], where: Layout, *, floor: float, sd: float | None = None, used: int = 0
-) -> Noise:
+) -> Autoregression:
     """Return the noise of a residual: Burg's method over all segments, the order by BIC.
 
     Parameters
@@ -123,12 +123,12 @@ def fit_noise(
     """
     n = where.n
     if n == 0:
-        return Noise(reflection=(), sd=floor)
+        return Autoregression(reflection=(), sd=floor)
     variance = float(np.mean(residual**2))
     if sd is not None and variance > (NOISE.mismatch * sd) ** 2:
         # Most of it is none of the sensor's. Taken as coloured noise, a smooth mismatch foretells itself, and
         # what mends all but a jagged rest of it would look worse than nothing.
-        return Noise(reflection=(), sd=math.sqrt(variance * n / max(n - used, 1)))
+        return Autoregression(reflection=(), sd=math.sqrt(variance * n / max(n - used, 1)))
     reflection: list[float] = []
     best, best_score = 0, math.log(max(variance, 1e-300))
     usable = [one for one in where.segments if one.stop - one.start >= NOISE.fewest]
@@ -153,15 +153,15 @@ def fit_noise(
             if score < best_score - 1e-12:
                 best, best_score = order, score
     chosen = tuple(reflection[:best])
-    white = whiten(residual, where, Noise(reflection=chosen, sd=1.0))
+    white = whiten(residual, where, Autoregression(reflection=chosen, sd=1.0))
     dof = max(n - used, 1)
     made = math.sqrt(float(np.sum(white**2)) / dof)
     if sd is not None:
         made = max(made, sd * math.sqrt(math.prod(1 - k * k for k in chosen)) if not chosen else made)
-    return Noise(reflection=chosen, sd=max(made, floor))
+    return Autoregression(reflection=chosen, sd=max(made, floor))
 
 
-def whiten(values: NDArray[np.float64], where: Layout, noise: Noise) -> NDArray[np.float64]:
+def whiten(values: NDArray[np.float64], where: Layout, noise: Autoregression) -> NDArray[np.float64]:
     """Return innovations over their standard deviation; ``values`` (n,) or (n, columns).
 
     Exact for a stationary autoregression: the first values of a segment are predicted by lower orders.
@@ -184,7 +184,7 @@ def whiten(values: NDArray[np.float64], where: Layout, noise: Noise) -> NDArray[
     return made / noise.sd
 
 
-def log_likelihood(residual: NDArray[np.float64], where: Layout, noise: Noise) -> float:
+def log_likelihood(residual: NDArray[np.float64], where: Layout, noise: Autoregression) -> float:
     """Return the Gaussian log-likelihood of a residual under a noise (natural logarithm)."""
     white = whiten(residual, where, noise)
     p = len(noise.reflection)

@@ -24,7 +24,7 @@ _ANGLES = ("TIRE_ANGLE", "DRUM_ANGLE")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Group:
+class SmoothDependence:
     """Columns of a smooth dependence: the output it is in, the variables it depends on."""
 
     output: str
@@ -37,10 +37,10 @@ class Group:
         return {name: self.columns if name == self.output else none for name in problem.names}
 
 
-def groups(problem: Problem, base: Fit) -> list[Group]:
+def groups(problem: Problem, base: Fit) -> list[SmoothDependence]:
     """Return the groups of a case."""
     variables = _variables(problem)
-    made: list[Group] = []
+    made: list[SmoothDependence] = []
     for output in problem.names:
         n = int(problem.kept[output].sum())
         found: list[tuple[tuple[str, ...], NDArray[np.float64]]] = []
@@ -60,7 +60,7 @@ def groups(problem: Problem, base: Fit) -> list[Group]:
             found.append((("run",), _run_offsets(problem)))
         for names, columns in found:
             if columns.shape[1] * STRUCTURE.rows_per_column <= n:
-                made.append(Group(output=output, variables=names, columns=columns))
+                made.append(SmoothDependence(output=output, variables=names, columns=columns))
     return made
 
 

@@ -80,7 +80,7 @@ class Start:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Candidate:
+class CandidateEffect:
     """An effect at a place, and how a search may start; ``discrete`` ones are there or not."""
 
     active: Active
@@ -98,7 +98,7 @@ class Candidate:
         return self.active.effect.name
 
 
-def candidates(problem: Problem) -> tuple[Candidate, ...]:
+def candidates(problem: Problem) -> tuple[CandidateEffect, ...]:
     """Return every candidate of a case."""
     made = []
     for effect in (*effects().values(), INPUT_NOISE):
@@ -111,7 +111,9 @@ def candidates(problem: Problem) -> tuple[Candidate, ...]:
                 active = replace(whole, runs=runs)
                 starts = _starts(problem, active)
                 if starts:
-                    made.append(Candidate(active=active, starts=starts, discrete=effect.name in DISCRETE))
+                    made.append(
+                        CandidateEffect(active=active, starts=starts, discrete=effect.name in DISCRETE)
+                    )
     return tuple(made)
 
 

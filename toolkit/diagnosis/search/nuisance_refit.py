@@ -16,12 +16,12 @@ from toolkit.errors import FitError
 
 if TYPE_CHECKING:
     from toolkit.diagnosis.fit.problem import Problem
-    from toolkit.diagnosis.search.candidates import Candidate
+    from toolkit.diagnosis.search.candidates import CandidateEffect
     from toolkit.diagnosis.simulators.simulator import Active
 
 
 def refined(
-    problem: Problem, folds: Folds, base: Fit, held: HeldOut, listed: Sequence[Candidate]
+    problem: Problem, folds: Folds, base: Fit, held: HeldOut, listed: Sequence[CandidateEffect]
 ) -> tuple[Fit, HeldOut]:
     """Return the hypothesis that a search found with what its effects' sizes depend on.
 
@@ -67,7 +67,7 @@ def _better(problem: Problem, base: Fit, active: tuple[Active, ...] | None, leas
     return made if made.log_posterior >= base.log_posterior + least else base
 
 
-def _with_zeros(base: Fit, listed: Sequence[Candidate]) -> tuple[Active, ...] | None:
+def _with_zeros(base: Fit, listed: Sequence[CandidateEffect]) -> tuple[Active, ...] | None:
     there = {one.channel for one in base.active if one.effect.name == "zero_offset"}
     wanted = {one.channel for one in base.active if one.effect.name == "thermal_drift"} - there
     zeros = tuple(

@@ -19,11 +19,11 @@ from toolkit.diagnosis.policy import SCREENING
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from toolkit.diagnosis.search.screen import Screen
+    from toolkit.diagnosis.search.screen import LinearisedFit
 
 
 def search_p_values(
-    screen: Screen, blocks: Sequence[NDArray[np.float64]], gains: Sequence[float], seed: int
+    screen: LinearisedFit, blocks: Sequence[NDArray[np.float64]], gains: Sequence[float], seed: int
 ) -> list[float]:
     """Return for every statistic the chance that a search without an effect finds one as improbable.
 

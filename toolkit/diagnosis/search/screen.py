@@ -16,10 +16,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from toolkit.diagnosis.fit.fit import Fit, jacobian, log_prior
-from toolkit.diagnosis.fit.noise import Layout, Noise, fit_noise, log_likelihood, whiten
+from toolkit.diagnosis.fit.noise import Autoregression, Layout, fit_noise, log_likelihood, whiten
 from toolkit.diagnosis.policy import SCREENING
 from toolkit.diagnosis.search import ripple
-from toolkit.diagnosis.search.candidates import Candidate, Start
+from toolkit.diagnosis.search.candidates import CandidateEffect, Start
 from toolkit.diagnosis.simulators.simulator import Active
 from toolkit.errors import FitError
 
@@ -37,10 +37,10 @@ class Scored:
 
     ``directions`` are its responses over all rows of each output, one column for each amplitude; ``block``
     the same whitened, off the nominal parameters, orthonormal. A gain is first a quick one, at the noise of
-    the fit or at white noise, whichever is larger; `Screen.sharpened` makes the best ones exact.
+    the fit or at white noise, whichever is larger; `LinearisedFit.sharpened` makes the best ones exact.
     """
 
-    candidate: Candidate
+    candidate: CandidateEffect
     start: Start
     active: Active
     gain: float
@@ -58,7 +58,7 @@ class Scored:
 class Weighed:
     """Rows of all outputs under one noise, with the priors beneath; what the nominal parameters span."""
 
-    noise: dict[str, Noise]
+    noise: dict[str, Autoregression]
     span: NDArray[np.float64]
     left: NDArray[np.float64]
 
@@ -69,7 +69,7 @@ class Weighed:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Screen:
+class LinearisedFit:
     """What every candidate is held against: a fit, its Jacobian, and its residual under two noises."""
 
     problem: Problem
@@ -82,15 +82,15 @@ class Screen:
     white: Weighed
 
     @staticmethod
-    def of(problem: Problem, base: Fit) -> Screen:
+    def of(problem: Problem, base: Fit) -> LinearisedFit:
         """Return the screen about a fit."""
         columns, sizes = jacobian(problem, base)
         layouts = {name: problem.layout(name) for name in problem.names}
-        plain = {name: Noise(reflection=(), sd=one.marginal_sd) for name, one in base.noise.items()}
+        plain = {name: Autoregression(reflection=(), sd=one.marginal_sd) for name, one in base.noise.items()}
         coloured, white = (
             _weighed(problem, base, columns, sizes, layouts, noise) for noise in (base.noise, plain)
         )
-        bare = Screen(problem, base, columns, sizes, layouts, 0.0, coloured, white)
+        bare = LinearisedFit(problem, base, columns, sizes, layouts, 0.0, coloured, white)
         # What the nominal parameters reach by the same steps without a response: gains count from there.
         none = {name: np.zeros((problem.rows, 0)) for name in problem.names}
         reached = max(0.5 * bare.gain(none)[0], base.log_posterior)
@@ -101,7 +101,7 @@ class Screen:
         """Number of values that count."""
         return sum(where.n for where in self.layouts.values())
 
-    def prepare(self, candidates: Sequence[Candidate]) -> None:
+    def prepare(self, candidates: Sequence[CandidateEffect]) -> None:
         """Have the simulations made at once that scoring the candidates asks for."""
         base = self.base
         listed = [
@@ -113,7 +113,7 @@ class Screen:
         ]
         self.problem.prepare([(base.p, base.active), *((base.p, (*base.active, one)) for one in listed)])
 
-    def score(self, candidate: Candidate) -> list[Scored]:
+    def score(self, candidate: CandidateEffect) -> list[Scored]:
         """Return a candidate with its quick gains, one for each start that the simulation can run."""
         made = []
         for start, directions in zip(candidate.starts, self._directions(candidate), strict=True):
@@ -137,7 +137,7 @@ class Screen:
             )
         return made
 
-    def _directions(self, candidate: Candidate) -> Iterator[Stacked]:
+    def _directions(self, candidate: CandidateEffect) -> Iterator[Stacked]:
         """Give the responses of every start, nothing for one that the simulation cannot run."""
         if candidate.name == ripple.NAME:
             try:
@@ -174,7 +174,7 @@ class Screen:
         # White noise overrates what is smooth; as a first look that is what is wanted.
         return (max(gains) if self._is_coloured else gains[0]), blocks[0]
 
-    def trust(self, noise: dict[str, Noise]) -> float:
+    def trust(self, noise: dict[str, Autoregression]) -> float:
         """Return the share of a gain that short coloured series leave: their noise is known from few rows.
 
         In the manner of Bartlett's correction, with rows counted by what they are worth; found on clean
@@ -191,7 +191,7 @@ class Screen:
         """Return responses whitened by the fit's noise, (values and priors, columns)."""
         return self._rows(directions, self.coloured.noise)
 
-    def _rows(self, directions: Stacked, noise: dict[str, Noise]) -> NDArray[np.float64]:
+    def _rows(self, directions: Stacked, noise: dict[str, Autoregression]) -> NDArray[np.float64]:
         parts = [
             whiten(directions[name][where.index], where, noise[name]) for name, where in self.layouts.items()
         ]
@@ -244,8 +244,8 @@ class Screen:
         return 2 * (best - self.log_likelihood), chosen, self.trust(left)
 
     def _once(
-        self, directions: Stacked, noise: dict[str, Noise] | None, *, fixed: bool
-    ) -> tuple[float, tuple[float, ...], dict[str, Noise]] | None:
+        self, directions: Stacked, noise: dict[str, Autoregression] | None, *, fixed: bool
+    ) -> tuple[float, tuple[float, ...], dict[str, Autoregression]] | None:
         problem, base = self.problem, self.base
         n_p = len(self.sizes)
         width = 0 if fixed else next(iter(directions.values())).shape[1]
@@ -258,7 +258,7 @@ class Screen:
             matrix = self.columns[name][at]
             if not fixed:
                 matrix = np.hstack([matrix, directions[name][at]])
-            used = noise[name] if noise is not None else Noise(reflection=(), sd=_rms(r) or 1.0)
+            used = noise[name] if noise is not None else Autoregression(reflection=(), sd=_rms(r) or 1.0)
             white = whiten(np.hstack([matrix, r[:, None]]), where, used)
             blocks.append(white[:, :-1])
             targets.append(white[:, -1])
@@ -297,7 +297,7 @@ def _weighed(
     columns: Stacked,
     sizes: NDArray[np.float64],
     layouts: dict[str, Layout],
-    noise: dict[str, Noise],
+    noise: dict[str, Autoregression],
 ) -> Weighed:
     blocks, targets = [], []
     for name, where in layouts.items():

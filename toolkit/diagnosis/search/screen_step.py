@@ -8,10 +8,10 @@ from dataclasses import dataclass, replace
 from toolkit.diagnosis.fit.fit import Fit
 from toolkit.diagnosis.fit.problem import Problem
 from toolkit.diagnosis.policy import PRIORS, SCREENING
-from toolkit.diagnosis.search.candidates import Candidate, Key
+from toolkit.diagnosis.search.candidates import CandidateEffect, Key
 from toolkit.diagnosis.search.forward_step import place
 from toolkit.diagnosis.search.null import search_p_values
-from toolkit.diagnosis.search.screen import Scored, Screen, best_of
+from toolkit.diagnosis.search.screen import LinearisedFit, Scored, best_of
 from toolkit.errors import FitError
 
 
@@ -23,14 +23,14 @@ class Look:
     were looked at.
     """
 
-    screen: Screen
-    left: tuple[Candidate, ...]
+    screen: LinearisedFit
+    left: tuple[CandidateEffect, ...]
     scored: tuple[Scored, ...]
     significant: tuple[Scored, ...]
     p_of: dict[int, float]
 
 
-def look(problem: Problem, base: Fit, listed: Sequence[Candidate], *, turn: int, seed: int) -> Look:
+def look(problem: Problem, base: Fit, listed: Sequence[CandidateEffect], *, turn: int, seed: int) -> Look:
     """Look from a fit at the candidates that are not in it.
 
     Parameters
@@ -38,7 +38,7 @@ def look(problem: Problem, base: Fit, listed: Sequence[Candidate], *, turn: int,
     turn : how many steps were made before
     seed : of the null's draws
     """
-    screen = Screen.of(problem, base)
+    screen = LinearisedFit.of(problem, base)
     taken = {place(one) for one in base.active}
     left = [each for each in listed if place(each.active) not in taken and _is_sought(each, turn)]
     screen.prepare(left)
@@ -51,7 +51,7 @@ def look(problem: Problem, base: Fit, listed: Sequence[Candidate], *, turn: int,
     return Look(screen, tuple(left), tuple(scored), significant, p_of)
 
 
-def _is_sought(one: Candidate, turn: int) -> bool:
+def _is_sought(one: CandidateEffect, turn: int) -> bool:
     """Tell whether a candidate is searched for.
 
     Coarse steps have a test of their own; what is there or not (a sign, a swap, a unit) is so gross that it
@@ -60,7 +60,7 @@ def _is_sought(one: Candidate, turn: int) -> bool:
     return one.name != "quantisation" and not (one.discrete and turn > 1)
 
 
-def masked(problem: Problem, base: Fit, left: Sequence[Candidate]) -> frozenset[Key]:
+def masked(problem: Problem, base: Fit, left: Sequence[CandidateEffect]) -> frozenset[Key]:
     """Return the candidates that explain most from the declared parameters; none where they hold.
 
     Where a parameter left its prior far behind, it stands in for something that was left out. Seen from there
@@ -86,6 +86,6 @@ def masked(problem: Problem, base: Fit, left: Sequence[Candidate]) -> frozenset[
     except FitError:  # from there, an effect that was found already is beyond what can be simulated
         return frozenset()
     residual = {name: problem.observed[name] - values for name, values in simulated.items()}
-    screen = Screen.of(problem, replace(base, p=declared, simulated=simulated, residual=residual))
+    screen = LinearisedFit.of(problem, replace(base, p=declared, simulated=simulated, residual=residual))
     ranked = best_of([one for each in left for one in screen.score(each)])
     return frozenset(one.candidate.key for one in ranked[: PRIORS.masked])

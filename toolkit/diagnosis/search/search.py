@@ -18,7 +18,7 @@ from toolkit.diagnosis.search.candidates import candidates
 from toolkit.diagnosis.search.forward_step import Step, best_step, joint_fits, place, step_groups
 from toolkit.diagnosis.search.lattice import lattice_of
 from toolkit.diagnosis.search.nuisance_refit import refined, without
-from toolkit.diagnosis.search.screen import Scored, Screen
+from toolkit.diagnosis.search.screen import LinearisedFit, Scored
 from toolkit.diagnosis.search.screen_step import look, masked
 from toolkit.diagnosis.search.time_budget import BudgetSpentError, TimeBudget
 from toolkit.diagnosis.search.unexplained import StructureFound, remainder
@@ -42,7 +42,7 @@ class Search:
     structure_before: tuple[StructureFound, ...]
     held_refitted: HeldOut
     held_augmented: HeldOut
-    screen: Screen
+    screen: LinearisedFit
     scored: tuple[Scored, ...]
     skipped: tuple[str, ...]
 
@@ -75,7 +75,7 @@ def search(problem: Problem, *, seed: int, budget: TimeBudget) -> Search:
     steps: list[Step] = []
     base = refitted
     held_base = held_refitted = hold_out(problem, folds, (), refitted)
-    screen = Screen.of(problem, base)
+    screen = LinearisedFit.of(problem, base)
     scored: tuple[Scored, ...] = ()
     before: tuple[StructureFound, ...] = ()
     structure: tuple[StructureFound, ...] = ()

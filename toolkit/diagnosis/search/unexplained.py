@@ -10,10 +10,10 @@ import numpy as np
 from toolkit.diagnosis.fit.fit import Fit
 from toolkit.diagnosis.fit.lines import strongest_line
 from toolkit.diagnosis.fit.problem import Problem
-from toolkit.diagnosis.fit.structure import Group, groups
+from toolkit.diagnosis.fit.structure import SmoothDependence, groups
 from toolkit.diagnosis.policy import STEP, STRUCTURE
 from toolkit.diagnosis.search.null import search_p_values
-from toolkit.diagnosis.search.screen import Screen
+from toolkit.diagnosis.search.screen import LinearisedFit
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -26,9 +26,9 @@ class StructureFound:
     p_value: float
 
 
-def remainder(problem: Problem, screen: Screen, base: Fit, seed: int) -> tuple[StructureFound, ...]:
+def remainder(problem: Problem, screen: LinearisedFit, base: Fit, seed: int) -> tuple[StructureFound, ...]:
     """Return what stays unexplained about a fit, the largest first; nothing that matters to nobody."""
-    listed: list[Group] = groups(problem, base)
+    listed: list[SmoothDependence] = groups(problem, base)
     directions = [one.directions(problem) for one in listed]
     quick = [screen.quick(one) for one in directions]
     order = sorted(range(len(listed)), key=lambda i: -quick[i][0])
@@ -76,7 +76,7 @@ def _beyond_noise(problem: Problem, base: Fit, name: str) -> StructureFound | No
     return StructureFound(output=name, variables=("more than its stated noise",), gain=gain, p_value=p)
 
 
-def _share(problem: Problem, base: Fit, group: Group) -> float:
+def _share(problem: Problem, base: Fit, group: SmoothDependence) -> float:
     """Return the share of a residual's variance that a group's columns explain."""
     kept = problem.kept[group.output]
     residual, columns = base.residual[group.output][kept], group.columns[kept]

@@ -39,7 +39,7 @@ _BY_VALUE = (
 _ON_TARE = ("channel_sign", "sensitivity_error", "unit_error")
 
 
-class Cells:
+class CaseCells:
     """Recorded cells and the record that turns them into loads, with the tare of the case's tare runs."""
 
     def __init__(self, case: Case, record: CalibrationRecord) -> None:

@@ -11,7 +11,7 @@ import numpy as np
 
 from toolkit.calibration.registry.registry import Registry
 from toolkit.diagnosis.simulators.acquisition import AcquisitionModel
-from toolkit.diagnosis.simulators.cells import Cells, record_of
+from toolkit.diagnosis.simulators.cells import CaseCells, record_of
 from toolkit.diagnosis.simulators.channels import channel_places, through_channels
 from toolkit.diagnosis.simulators.setting import setting, si
 from toolkit.diagnosis.simulators.simulator import Active, Capability, Output
@@ -54,7 +54,7 @@ class MachineModel:
         self._tire = TirTire(tir)
         self._speed = speed_m_s
         self._load = self._tire.FNOMIN
-        self.cells = None if record is None else Cells(case, record)
+        self.cells = None if record is None else CaseCells(case, record)
         self.capability = Capability(
             nominal_load_N=self._load,
             cells=() if self.cells is None else self.cells.names,
