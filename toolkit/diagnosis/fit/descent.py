@@ -83,8 +83,6 @@ class Weighing:
 
     def __init__(self, space: Space, layouts: dict[str, Layout], noise: dict[str, Autoregression]) -> None:
         self._space, self._layouts, self._noise = space, layouts, noise
-        self._prior_sd = np.array([one.sd or 1.0 for one in space.problem.free])
-        self._declared = np.array([one.value for one in space.problem.free])
 
     def _whitened(self, values: Stacked) -> Array:
         parts = [
@@ -103,15 +101,13 @@ class Weighing:
         try:
             residual = self._space.residual(self._space.simulated(x))
         except FitError:
-            return np.full(sum(one.n for one in self._layouts.values()) + len(self._declared), 1e6)
+            return np.full(sum(one.n for one in self._layouts.values()) + len(self._space.problem.free), 1e6)
         p, _ = self._space.split(x)
-        return np.concatenate([self._whitened(residual), (np.array(p) - self._declared) / self._prior_sd])
+        return np.concatenate([self._whitened(residual), self._space.problem.off_priors(p)])
 
     def slope(self, slopes: Stacked) -> Array:
         """Return d(cost)/dx from d(simulated)/dx."""
-        n = len(self._declared)
-        prior = np.zeros((n, len(self._space.sizes)))
-        prior[range(n), range(n)] = self._space.sizes[:n] / self._prior_sd
+        prior = self._space.problem.prior_rows(self._space.sizes, len(self._space.sizes))
         return np.concatenate([self._whitened({name: -one for name, one in slopes.items()}), prior])
 
 

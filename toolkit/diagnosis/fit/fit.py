@@ -262,9 +262,7 @@ def _covariance(
     if not len(solved.x):
         return np.zeros((0, 0))
     J = space.around(solved.x)[1]
-    prior = np.zeros((len(space.problem.free), len(solved.x)))
-    for i, one in enumerate(space.problem.free):
-        prior[i, i] = space.sizes[i] / (one.sd or 1.0)
+    prior = space.problem.prior_rows(space.sizes, len(solved.x))
     made = covariance(J, prior, space.sizes, layouts, solved.noise, plain=plain)
     if other is not None:
         unsure = np.diag(covariance(J, prior, space.sizes, layouts, other.noise, plain=True))

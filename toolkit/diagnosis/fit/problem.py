@@ -96,6 +96,24 @@ class Problem:
                 column.append(made.get(name, np.zeros((run.rows, forces))))
         return {name: np.concatenate(column) for name, column in parts.items()}
 
+    def prior_rows(self, sizes: NDArray[np.float64], columns: int) -> NDArray[np.float64]:
+        """Return d(parameter over its prior's sd)/dx below the rows of the data, (free, columns).
+
+        Parameters
+        ----------
+        sizes : of the searched vector x, the free parameters first
+        columns : of the whole matrix; what stands behind the free parameters has no prior
+        """
+        rows = np.zeros((len(self.free), columns))
+        for i, parameter in enumerate(self.free):
+            rows[i, i] = sizes[i] / (parameter.sd or 1.0)
+        return rows
+
+    def off_priors(self, p: Sequence[float]) -> NDArray[np.float64]:
+        """Return how far free parameters are off their declared values, in prior sd, (free,)."""
+        pairs = zip(p, self.free, strict=True)
+        return np.array([(value - parameter.value) / (parameter.sd or 1.0) for value, parameter in pairs])
+
     def sd_of(self, name: str) -> float | None:
         """Return the stated noise of an output."""
         return next(one.sd for one in self.model.outputs if one.name == name)

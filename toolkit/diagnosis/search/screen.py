@@ -263,11 +263,8 @@ class LinearisedFit:
             blocks.append(white[:, :-1])
             targets.append(white[:, -1])
         free = problem.free
-        prior = np.zeros((len(free), n_p + width))
-        for i, one in enumerate(free):
-            prior[i, i] = self.sizes[i] / (one.sd or 1.0)
-        at_prior = [-(v - one.value) / (one.sd or 1.0) for v, one in zip(base.p, free, strict=True)]
-        found = _solved([*blocks, prior], [*targets, np.array(at_prior)])
+        prior = problem.prior_rows(self.sizes, n_p + width)
+        found = _solved([*blocks, prior], [*targets, -problem.off_priors(base.p)])
         if not np.isfinite(found).all():
             return None
         total, made = 0.0, {}
@@ -303,12 +300,8 @@ def _weighed(
     for name, where in layouts.items():
         blocks.append(whiten(columns[name][where.index], where, noise[name]))
         targets.append(whiten(base.residual[name][where.index], where, noise[name]))
-    prior = np.zeros((len(problem.free), len(sizes)))
-    for i, one in enumerate(problem.free):
-        prior[i, i] = sizes[i] / (one.sd or 1.0)
-    at_prior = [-(v - one.value) / (one.sd or 1.0) for v, one in zip(base.p, problem.free, strict=True)]
-    span = _orthonormal(np.vstack([*blocks, prior]))
-    target = np.concatenate([*targets, np.array(at_prior)])
+    span = _orthonormal(np.vstack([*blocks, problem.prior_rows(sizes, len(sizes))]))
+    target = np.concatenate([*targets, -problem.off_priors(base.p)])
     return Weighed(noise, span, target - span @ (span.T @ target))
 
 
