@@ -70,60 +70,60 @@ def _diagnosed(case: Case, calibrations: Path | None, budget: TimeBudget, budget
     failed = FailedRuns(model.simulate)
     supervised = Supervised(model, budget.guarded(failed))
     problem = problem_of(case, supervised)
-    told = (
+    findings = (
         *case_findings(problem),
         *built_in_findings(case),
         *calibration_findings(case, calibrations),
     )
-    declared, found = None, None
+    declared, outcome = None, None
     try:
         declared = _first_look(problem, budget)
         if does_not_vary(problem):
-            made = without_search(
-                case, problem, declared, why="the outputs do not vary", findings=told,
+            answer = without_search(
+                case, problem, declared, why="the outputs do not vary", findings=findings,
                 next_measurements=("Vary the inputs: an output that stands still tells nothing.",),
             )  # fmt: skip
         else:
             seed = int(case.sha256[:12], 16)
-            found = search(problem, seed=seed, budget=budget)
-            made = answer_of(case, found, told)
+            outcome = search(problem, seed=seed, budget=budget)
+            answer = answer_of(case, outcome, findings)
     except BudgetSpentError as error:
-        made = _too_late(case, problem, declared, told, str(error))
+        answer = _too_late(case, problem, declared, findings, str(error))
     finally:
         supervised.release()
-    made = replace(made, findings=(*made.findings, *failed.findings(case)))
-    files, late = _predictions(problem, found, budget, budget_s)
+    answer = replace(answer, findings=(*answer.findings, *failed.findings(case)))
+    files, late = _predictions(problem, outcome, budget, budget_s)
     if late:
-        made = replace(made, complete=False, skipped=(*made.skipped, late))
-    return Result(diagnosis=made, search=found, predictions=files)
+        answer = replace(answer, complete=False, skipped=(*answer.skipped, late))
+    return Result(diagnosis=answer, search=outcome, predictions=files)
 
 
 def _first_look(problem: Problem, budget: TimeBudget) -> dict[str, NDArray[np.float64]]:
     """Return the simulation as declared; what cannot be simulated ends here."""
     budget.tell("the simulation as declared")
-    values = tuple(one.value for one in problem.free)
-    made = problem.simulate(values, ())
+    values = tuple(parameter.value for parameter in problem.free)
+    simulated = problem.simulate(values, ())
     quick = budget.last_s < BUDGET.quick_s
     repeats = problem.model.capability.repeats
     if quick and repeats is not None:
         repeats(problem.runs[0], problem.known)
     for run in problem.case.predict if quick else ():
         problem.model.simulate(run, problem.known, ())
-    return made
+    return simulated
 
 
 def _predictions(
-    problem: Problem, found: Search | None, budget: TimeBudget, budget_s: float
+    problem: Problem, outcome: Search | None, budget: TimeBudget, budget_s: float
 ) -> tuple[tuple[tuple[str, str], ...], str]:
     """Return the files of predictions, or what was skipped where the time is up."""
     runs = problem.case.predict
-    left = max(budget.until - time.monotonic(), BUDGET.grace * budget_s)
-    if not runs or len(runs) * 3 * budget.last_s > left:
+    seconds = max(budget.until - time.monotonic(), BUDGET.grace * budget_s)
+    if not runs or len(runs) * 3 * budget.last_s > seconds:
         return (), "predictions" if runs else ""
     fits: list[Fit | None] = [None, None, None]
-    if found is not None:
-        fits[1] = found.refitted
-        fits[2] = found.refitted if mostly_unknown(found) else found.augmented
+    if outcome is not None:
+        fits[1] = outcome.refitted
+        fits[2] = outcome.refitted if mostly_unknown(outcome) else outcome.augmented
     budget.tell("predictions")
     return tuple(
         (name, prediction_csv(problem, run, fits))
@@ -135,12 +135,12 @@ def _too_late(
     case: Case,
     problem: Problem | None,
     declared: dict[str, NDArray[np.float64]] | None,
-    told: tuple[Finding, ...],
+    findings: tuple[Finding, ...],
     at: str,
 ) -> Diagnosis:
     """Return the partial answer of a budget that was spent before anything could be judged."""
     return without_search(
-        case, problem, declared, why="the budget was spent before the search", findings=told,
+        case, problem, declared, why="the budget was spent before the search", findings=findings,
         next_measurements=("Give a larger --budget, fewer rows, or a faster simulation.",),
         skipped=tuple(dict.fromkeys((at, *STEPS))),
     )  # fmt: skip

@@ -67,8 +67,14 @@ def without_search(
         mismatch=(),
         effects=(),
         nominal_parameters=tuple(
-            NominalParameter(name=one.name, before=one.value, after=one.value, unit=one.unit, prior_sd=one.sd)
-            for one in case.parameters
+            NominalParameter(
+                name=parameter.name,
+                before=parameter.value,
+                after=parameter.value,
+                unit=parameter.unit,
+                prior_sd=parameter.sd,
+            )
+            for parameter in case.parameters
         ),
         held_out=() if problem is None or simulated is None else _as_declared(problem, simulated),
         held_out_by="none: no fit was made",
@@ -87,17 +93,17 @@ def without_search(
 
 def _as_declared(problem: Problem, simulated: Stacked) -> tuple[HeldOutFit, ...]:
     """Return the error of the simulation as declared, three times; noise that nobody stated is unknown."""
-    made = []
-    for one in problem.model.outputs:
-        kept = problem.kept[one.name]
-        if not kept.any():
+    errors = []
+    for output in problem.model.outputs:
+        counted = problem.kept[output.name]
+        if not counted.any():
             continue
-        away = problem.observed[one.name][kept] - simulated[one.name][kept]
+        away = problem.observed[output.name][counted] - simulated[output.name][counted]
         error = math.sqrt(float(np.mean(away**2)))
-        made.append(
+        errors.append(
             HeldOutFit(
-                channel=one.name, unit=one.unit, nominal_rmse=error, refitted_rmse=error,
-                augmented_rmse=error, noise_floor=one.sd or math.nan,
+                channel=output.name, unit=output.unit, nominal_rmse=error, refitted_rmse=error,
+                augmented_rmse=error, noise_floor=output.sd or math.nan,
             )
         )  # fmt: skip
-    return tuple(made)
+    return tuple(errors)

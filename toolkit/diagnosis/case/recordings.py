@@ -46,8 +46,8 @@ def read_run(
     ColumnError
         a column is missing or doubled; CellError: a cell is no number; UnreadableError: no rows, no text
     """
-    names = {one.name for one in channels} | set(simulated.values())
-    units = {one.name: one.unit for one in channels}
+    names = {channel.name for channel in channels} | set(simulated.values())
+    units = {channel.name: channel.unit for channel in channels}
     table, present, own = _read(path, data, machine=machine, units=units, wanted=names)
     columns: dict[str, NDArray[np.float64]] = {}
     for channel in channels:
@@ -82,13 +82,13 @@ def read_run(
 
 def conditions(declared: Mapping[str, Any]) -> dict[str, str]:
     """Return the conditions of a run's table as texts, a quantity as number and unit."""
-    made = {}
+    texts = {}
     for key, value in declared.items():
         if isinstance(value, dict) and set(value) == {"value", "unit"}:
-            made[key] = f"{value['value']} {value['unit']}"
+            texts[key] = f"{value['value']} {value['unit']}"
         elif key != "file":
-            made[key] = str(value)
-    return made
+            texts[key] = str(value)
+    return texts
 
 
 def _read(

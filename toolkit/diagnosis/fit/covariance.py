@@ -46,10 +46,10 @@ def covariance(
             spread = spread + weight**2 * columns.T @ _correlated(columns, where, noise[name])
         else:
             parts.append(whiten(columns, where, noise[name]))
-    whole = np.vstack([*parts, prior])
-    size = np.sqrt((whole**2).sum(axis=0))
+    rows = np.vstack([*parts, prior])
+    size = np.sqrt((rows**2).sum(axis=0))
     size[size == 0] = 1.0
-    _, s, vt = np.linalg.svd(whole / size, full_matrices=False)
+    _, s, vt = np.linalg.svd(rows / size, full_matrices=False)
     keep = s > 1e-10 * s.max()
     inverse = (vt[keep].T / s[keep] ** 2) @ vt[keep]
     if plain:
@@ -64,10 +64,10 @@ def _correlated(columns: NDArray[np.float64], where: Layout, noise: Autoregressi
     """Return the noise's covariance matrix times columns, segment by segment."""
     from scipy.signal import fftconvolve
 
-    made = np.empty_like(columns)
-    for one in where.segments:
-        n = one.stop - one.start
+    products = np.empty_like(columns)
+    for segment in where.segments:
+        n = segment.stop - segment.start
         gamma = autocovariance(noise, n)
         kernel = np.concatenate([gamma[:0:-1], gamma])[:, None]
-        made[one] = fftconvolve(columns[one], kernel, mode="full", axes=0)[n - 1 : 2 * n - 1]
-    return made
+        products[segment] = fftconvolve(columns[segment], kernel, mode="full", axes=0)[n - 1 : 2 * n - 1]
+    return products

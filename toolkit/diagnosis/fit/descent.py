@@ -53,16 +53,16 @@ class Derivatives:
         step = x - before
         if not step.any():
             return slopes
-        here = self._space.simulated(x)
-        moved = {name: one - there[name] for name, one in here.items()}
-        off = {name: one - slopes[name] @ step for name, one in moved.items()}
+        simulated = self._space.simulated(x)
+        moved = {name: column - there[name] for name, column in simulated.items()}
+        off = {name: change - slopes[name] @ step for name, change in moved.items()}
         if weighing.size(off) > max(_BENT * weighing.size(moved), _NOTHING):
             return self.anew(x)
         along = step / float(step @ step)
         self._last = (
             x.copy(),
-            here,
-            {name: one + np.outer(off[name], along) for name, one in slopes.items()},
+            simulated,
+            {name: slope + np.outer(off[name], along) for name, slope in slopes.items()},
         )
         return self._last[2]
 
@@ -71,9 +71,9 @@ class Derivatives:
         if self._fresh is None:
             return False
         begun, there, slopes = self._fresh
-        here = self._space.simulated(x)
-        moved = {name: one - there[name] for name, one in here.items()}
-        off = {name: one - slopes[name] @ (x - begun) for name, one in moved.items()}
+        simulated = self._space.simulated(x)
+        moved = {name: column - there[name] for name, column in simulated.items()}
+        off = {name: change - slopes[name] @ (x - begun) for name, change in moved.items()}
         way = weighing.size(moved)
         return way < _NOTHING or weighing.size(off) < _STRAIGHT * way
 
@@ -89,8 +89,8 @@ class Weighing:
             whiten(values[name][where.index], where, self._noise[name])
             for name, where in self._layouts.items()
         ]
-        made = np.concatenate(parts)
-        return np.where(np.isfinite(made), made, 1e6)
+        white = np.concatenate(parts)
+        return np.where(np.isfinite(white), white, 1e6)
 
     def size(self, values: Stacked) -> float:
         """Return the size of a difference of simulations in standard deviations of the noise."""
@@ -108,7 +108,7 @@ class Weighing:
     def slope(self, slopes: Stacked) -> Array:
         """Return d(cost)/dx from d(simulated)/dx."""
         prior = self._space.problem.prior_rows(self._space.sizes, len(self._space.sizes))
-        return np.concatenate([self._whitened({name: -one for name, one in slopes.items()}), prior])
+        return np.concatenate([self._whitened({name: -slope for name, slope in slopes.items()}), prior])
 
 
 def descend(

@@ -48,7 +48,7 @@ def strongest_line(problem: Problem, name: str, residual: NDArray[np.float64]) -
         return None
     n = min(len(values) for _, values in runs)
     step = runs[0][0]
-    if any(abs(one - step) > STRUCTURE.line_even * step for one, _ in runs):
+    if any(abs(run_step - step) > STRUCTURE.line_even * step for run_step, _ in runs):
         return None
     window = np.hanning(n + 2)[1:-1]
     power = np.zeros(n // 2 + 1)
@@ -61,8 +61,8 @@ def strongest_line(problem: Problem, name: str, residual: NDArray[np.float64]) -
     k = int(np.argmax(ratio))
     # A sum of R independent periodograms is chi-squared with 2R degrees, its median the level.
     p = min(1.0, len(power) * _tail(ratio[k], len(runs)))
-    held = power[max(k - 1, 1) : k + 2].sum() - 3 * level[k]
-    share = max(0.0, float(held / max(power[1:].sum(), 1e-300)))
+    line_power = power[max(k - 1, 1) : k + 2].sum() - 3 * level[k]
+    share = max(0.0, float(line_power / max(power[1:].sum(), 1e-300)))
     return Line(frequency=k / (n * step), p_value=p, share=share)
 
 

@@ -40,40 +40,40 @@ class SmoothDependence:
 def groups(problem: Problem, base: Fit) -> list[SmoothDependence]:
     """Return the groups of a case."""
     variables = _variables(problem)
-    made: list[SmoothDependence] = []
+    dependences: list[SmoothDependence] = []
     for output in problem.names:
         n = int(problem.kept[output].sum())
-        found: list[tuple[tuple[str, ...], NDArray[np.float64]]] = []
-        own = _spline(base.simulated[output])
+        listed: list[tuple[tuple[str, ...], NDArray[np.float64]]] = []
+        own_spline = _spline(base.simulated[output])
         for name, x in [*variables, (output, base.simulated[output])]:
-            columns = own if name == output else _spline(x)
+            columns = own_spline if name == output else _spline(x)
             if columns is not None:
-                found.append(((name,), columns))
+                listed.append(((name,), columns))
             if name in _ANGLES or name.lower() in ("tire_angle", "drum_angle"):
-                found.append(((name,), _harmonics(x)))
+                listed.append(((name,), _harmonics(x)))
         for i, (a, x) in enumerate(variables):
             for b, y in variables[i + 1 :]:
                 product = _product(x, y)
                 if product is not None and "time" not in (a, b):
-                    found.append(((a, b), product))
+                    listed.append(((a, b), product))
         if len(problem.runs) > 1:
-            found.append((("run",), _run_offsets(problem)))
-        for names, columns in found:
+            listed.append((("run",), _run_offsets(problem)))
+        for names, columns in listed:
             if columns.shape[1] * STRUCTURE.rows_per_column <= n:
-                made.append(SmoothDependence(output=output, variables=names, columns=columns))
-    return made
+                dependences.append(SmoothDependence(output=output, variables=names, columns=columns))
+    return dependences
 
 
 def _variables(problem: Problem) -> list[tuple[str, NDArray[np.float64]]]:
-    found = [
-        (one.name, np.concatenate([run.columns[one.name] for run in problem.runs]))
-        for one in problem.case.drivers
-        if all(one.name in run.columns for run in problem.runs)
+    variables = [
+        (channel.name, np.concatenate([run.columns[channel.name] for run in problem.runs]))
+        for channel in problem.case.drivers
+        if all(channel.name in run.columns for run in problem.runs)
     ]
     rates = []
     if problem.case.has_time:
         elapsed = np.concatenate([run.t - run.t[0] for run in problem.runs])
-        for name, x in found:
+        for name, x in variables:
             steps = []
             for run, place in zip(problem.runs, problem.slices, strict=True):
                 column = x[place]
@@ -82,8 +82,8 @@ def _variables(problem: Problem) -> list[tuple[str, NDArray[np.float64]]]:
             if np.ptp(rate) > 0:
                 low, high = np.quantile(rate, (0.005, 0.995))
                 rates.append((f"d{name}/dt", np.clip(rate, low, high)))
-        found.append(("time", elapsed))
-    return [*found, *rates]
+        variables.append(("time", elapsed))
+    return [*variables, *rates]
 
 
 def _spline(x: NDArray[np.float64]) -> NDArray[np.float64] | None:
@@ -115,6 +115,6 @@ def _harmonics(angle: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def _run_offsets(problem: Problem) -> NDArray[np.float64]:
     columns = np.zeros((problem.rows, len(problem.slices)))
-    for i, one in enumerate(problem.slices):
-        columns[one, i] = 1.0
+    for i, rows in enumerate(problem.slices):
+        columns[rows, i] = 1.0
     return columns[:, 1:] if len(problem.slices) > 1 else columns

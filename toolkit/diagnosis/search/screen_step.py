@@ -19,12 +19,12 @@ from toolkit.errors import FitError
 class Look:
     """What was seen: ``significant`` are candidates by their best start, the best first.
 
-    ``p_of`` has the p-value of every entry of ``scored``, by its identity; ``left`` are the candidates that
+    ``p_of`` has the p-value of every entry of ``scored``, by its identity; ``candidates`` are those that
     were looked at.
     """
 
     screen: LinearisedFit
-    left: tuple[CandidateEffect, ...]
+    candidates: tuple[CandidateEffect, ...]
     scored: tuple[Scored, ...]
     significant: tuple[Scored, ...]
     p_of: dict[int, float]
@@ -39,28 +39,34 @@ def look(problem: Problem, base: Fit, listed: Sequence[CandidateEffect], *, turn
     seed : of the null's draws
     """
     screen = LinearisedFit.of(problem, base)
-    taken = {place(one) for one in base.active}
-    left = [each for each in listed if place(each.active) not in taken and _is_sought(each, turn)]
-    screen.prepare(left)
-    scored = screen.sharpened([one for each in left for one in screen.score(each)], SCREENING.sharpened)
-    p_values = search_p_values(
-        screen, [one.block for one in scored], [one.gain * one.trust for one in scored], seed
+    taken = {place(applied) for applied in base.active}
+    candidates = [
+        candidate
+        for candidate in listed
+        if place(candidate.active) not in taken and _is_sought(candidate, turn)
+    ]
+    screen.prepare(candidates)
+    scored = screen.sharpened(
+        [one for candidate in candidates for one in screen.score(candidate)], SCREENING.sharpened
     )
-    p_of = {id(one): p for one, p in zip(scored, p_values, strict=True)}
+    p_values = search_p_values(
+        screen, [trial.block for trial in scored], [trial.gain * trial.trust for trial in scored], seed
+    )
+    p_of = {id(trial): p for trial, p in zip(scored, p_values, strict=True)}
     significant = tuple(one for one in best_of(scored) if p_of[id(one)] < SCREENING.alpha)
-    return Look(screen, tuple(left), tuple(scored), significant, p_of)
+    return Look(screen, tuple(candidates), tuple(scored), significant, p_of)
 
 
-def _is_sought(one: CandidateEffect, turn: int) -> bool:
+def _is_sought(candidate: CandidateEffect, turn: int) -> bool:
     """Tell whether a candidate is searched for.
 
     Coarse steps have a test of their own; what is there or not (a sign, a swap, a unit) is so gross that it
     comes first or second.
     """
-    return one.name != "quantisation" and not (one.discrete and turn > 1)
+    return candidate.name != "quantisation" and not (candidate.discrete and turn > 1)
 
 
-def masked(problem: Problem, base: Fit, left: Sequence[CandidateEffect]) -> frozenset[Key]:
+def masked(problem: Problem, base: Fit, candidates: Sequence[CandidateEffect]) -> frozenset[Key]:
     """Return the candidates that explain most from the declared parameters; none where they hold.
 
     Where a parameter left its prior far behind, it stands in for something that was left out. Seen from there
@@ -71,21 +77,21 @@ def masked(problem: Problem, base: Fit, left: Sequence[CandidateEffect]) -> froz
     Parameters
     ----------
     base : the fit so far, its effects with their values
-    left : candidates that may be added to it
+    candidates : those that may be added to it
     """
     moved = [
-        abs(value - one.value) / one.sd
-        for value, one in zip(base.p, problem.free, strict=True)
-        if one.sd is not None
+        abs(value - parameter.value) / parameter.sd
+        for value, parameter in zip(base.p, problem.free, strict=True)
+        if parameter.sd is not None
     ]
     if not moved or max(moved) < PRIORS.far:
         return frozenset()
-    declared = tuple(one.value for one in problem.free)
+    declared = tuple(parameter.value for parameter in problem.free)
     try:
         simulated = problem.simulate(declared, base.active)
     except FitError:  # from there, an effect that was found already is beyond what can be simulated
         return frozenset()
     residual = {name: problem.observed[name] - values for name, values in simulated.items()}
     screen = LinearisedFit.of(problem, replace(base, p=declared, simulated=simulated, residual=residual))
-    ranked = best_of([one for each in left for one in screen.score(each)])
-    return frozenset(one.candidate.key for one in ranked[: PRIORS.masked])
+    ranked = best_of([one for candidate in candidates for one in screen.score(candidate)])
+    return frozenset(trial.candidate.key for trial in ranked[: PRIORS.masked])

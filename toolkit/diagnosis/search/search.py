@@ -51,8 +51,8 @@ class Search:
 
         What a short series leaves open of its noise's colour widens it as it shortens a gain.
         """
-        made = self.augmented
-        return float(made.covariance[at, at]) / self.screen.trust(made.noise)
+        fit = self.augmented
+        return float(fit.covariance[at, at]) / self.screen.trust(fit.noise)
 
 
 def search(problem: Problem, *, seed: int, budget: TimeBudget) -> Search:
@@ -82,26 +82,26 @@ def search(problem: Problem, *, seed: int, budget: TimeBudget) -> Search:
     try:
         for turn in range(STEP.most_effects + 1):
             budget.check(f"step {turn + 1}: screening {len(listed)} candidates")
-            seen = look(problem, base, listed, turn=turn, seed=seed + turn)
-            screen, scored = seen.screen, seen.scored
+            view = look(problem, base, listed, turn=turn, seed=seed + turn)
+            screen, scored = view.screen, view.scored
             budget.check(f"step {turn + 1}: structure of the residual")
             structure = remainder(problem, screen, base, seed + 100 + turn)
             if turn == 0:
                 before = structure
             if turn == STEP.most_effects:
                 break
-            found = None
-            hidden = masked(problem, base, seen.left) if seen.significant else frozenset()
-            for promising, least in step_groups(seen.significant, hidden, STEP.later if turn else STEP.first):
-                told = ", ".join(dict.fromkeys(one.candidate.name for one in promising))
-                budget.check(f"step {turn + 1}: joint fits of {told}")
+            outcome = None
+            hidden = masked(problem, base, view.candidates) if view.significant else frozenset()
+            for promising, least in step_groups(view.significant, hidden, STEP.later if turn else STEP.first):
+                names = ", ".join(dict.fromkeys(trial.candidate.name for trial in promising))
+                budget.check(f"step {turn + 1}: joint fits of {names}")
                 joint = joint_fits(problem, base, promising)
-                found = best_step(problem, folds, base, held_base, joint, seen.p_of, least, held_refitted)
-                if found is not None:
+                outcome = best_step(problem, folds, base, held_base, joint, view.p_of, least, held_refitted)
+                if outcome is not None:
                     break
-            if found is None:
+            if outcome is None:
                 break
-            base, held_base, step = found
+            base, held_base, step = outcome
             if not _is_nuisance(step, steps):
                 steps.append(step)
         base, held_base = refined(problem, folds, base, held_base, listed)
@@ -113,8 +113,8 @@ def search(problem: Problem, *, seed: int, budget: TimeBudget) -> Search:
         skipped.append(str(error))
     base, steps = _with_a_size(problem, base, steps)
     # Every effect with its values of the last joint fit, not of the step that found it.
-    values = {place(one): one for one in base.active}
-    steps = [replace(one, active=values[place(one.active)]) for one in steps]
+    values = {place(applied): applied for applied in base.active}
+    steps = [replace(step, active=values[place(step.active)]) for step in steps]
     return Search(
         problem=problem,
         folds=folds,
@@ -138,13 +138,13 @@ def _is_nuisance(step: Step, steps: Sequence[Step]) -> bool:
         return True
     if step.active.effect.name != "zero_offset":
         return False
-    beside = [one.active for one in steps if one.active.channel == step.active.channel]
+    beside = [other.active for other in steps if other.active.channel == step.active.channel]
     offset = abs(step.active.values["offset"])
     return any(
-        one.effect.name in ("thermal_drift", "zero_drift")
+        other.effect.name in ("thermal_drift", "zero_drift")
         # Where in its loop a channel stands at first depends on what came before the recording.
-        or (one.effect.name == "hysteresis" and offset <= STEP.loop_offset * one.values["width"])
-        for one in beside
+        or (other.effect.name == "hysteresis" and offset <= STEP.loop_offset * other.values["width"])
+        for other in beside
     )
 
 
@@ -156,21 +156,21 @@ def _stepped(
         name = str(candidate.active.channel)
         if candidate.name != "quantisation" or name not in problem.observed:
             continue
-        kept = problem.kept[name]
-        sd = float(np.std(base.residual[name][kept]))
-        found = lattice_of(problem.observed[name][np.isfinite(problem.observed[name])], sd)
-        if found is None:
+        counted = problem.kept[name]
+        sd = float(np.std(base.residual[name][counted]))
+        lattice = lattice_of(problem.observed[name][np.isfinite(problem.observed[name])], sd)
+        if lattice is None:
             continue
-        active = replace(candidate.active, values={"step": found.step, "_half_step": found.half_width})
-        gain = found.log_score_gain
-        made = Step(
+        active = replace(candidate.active, values={"step": lattice.step, "_half_step": lattice.half_width})
+        gain = lattice.log_score_gain
+        step = Step(
             active=active, p_value=math.exp(-min(gain, 700.0)), held_out_gain=gain, gain=gain, rivals=()
         )
-        steps = [*steps, made]
+        steps = [*steps, step]
         with_steps = replace_effects(problem, base, (*base.active, active))
         held = HeldOut(
             scores=held_base.scores,
-            simulated={**held_base.simulated, name: _rounded(held_base.simulated[name], found.step)},
+            simulated={**held_base.simulated, name: _rounded(held_base.simulated[name], lattice.step)},
             fits=held_base.fits,
         )
         if matters(problem, held_base, held, STEP.first):
@@ -190,16 +190,16 @@ def _pruned(
     for i in range(len(steps) - 1):
         if len(base.active) < 2:
             break
-        rest = without(base.active, steps[i].active)
+        remaining = without(base.active, steps[i].active)
         try:
-            made = fit(problem, rest, start=base.p)
-            held = hold_out(problem, folds, made.active, made)
+            pruned = fit(problem, remaining, start=base.p)
+            held = hold_out(problem, folds, pruned.active, pruned)
         except FitError:  # what is left cannot be simulated: the effect is needed
             continue
         if held_base.total - held.total < STEP.least_gain:
-            base, held_base = made, held
-            kept = {place(one) for one in rest}
-            steps = [one for one in steps if place(one.active) in kept]
+            base, held_base = pruned, held
+            places = {place(applied) for applied in remaining}
+            steps = [step for step in steps if place(step.active) in places]
             return _pruned(problem, folds, base, held_base, steps)
     return base, held_base, steps
 
@@ -207,26 +207,26 @@ def _pruned(
 def _with_a_size(problem: Problem, base: Fit, steps: list[Step]) -> tuple[Fit, list[Step]]:
     """Return a hypothesis without effects that a later one left nothing to do."""
     for step in steps:
-        rest = without(base.active, step.active)
+        remaining = without(base.active, step.active)
         try:
-            bare = problem.simulate(base.p, rest)
+            bare = problem.simulate(base.p, remaining)
         except (FitError, BudgetSpentError):  # the simulation needs it, or there is no time to look
             continue
-        moved = {name: one - bare[name] for name, one in base.simulated.items()}
+        moved = {name: column - bare[name] for name, column in base.simulated.items()}
         if all(
-            float(np.abs(one[problem.kept[name]]).max(initial=0.0))
+            float(np.abs(change[problem.kept[name]]).max(initial=0.0))
             < STEP.visible * base.noise[name].marginal_sd
-            for name, one in moved.items()
+            for name, change in moved.items()
         ):
-            kept = {place(one) for one in rest}
-            left = [one for one in steps if place(one.active) in kept]
-            return _with_a_size(problem, replace_effects(problem, base, rest), left)
+            places = {place(applied) for applied in remaining}
+            remaining_steps = [step for step in steps if place(step.active) in places]
+            return _with_a_size(problem, replace_effects(problem, base, remaining), remaining_steps)
     return base, steps
 
 
 def _as_declared(problem: Problem) -> Fit:
     """Return the simulation as declared, its residual and noise, nothing fitted."""
-    p = tuple(one.value for one in problem.free)
+    p = tuple(parameter.value for parameter in problem.free)
     simulated = problem.simulate(p, ())
     residual = {name: problem.observed[name] - simulated[name] for name in simulated}
     layouts = {name: problem.layout(name) for name in problem.names}

@@ -47,14 +47,14 @@ class TimeBudget:
         computes in Python never outlives the budget; elsewhere the call that is running is the last.
         """
 
-        def call(*arguments: Any, **named: Any) -> T:
+        def call(*arguments: Any, **keywords: Any) -> T:
             started = time.monotonic()
-            left = self.until - started
-            if left <= 0:
+            seconds = self.until - started
+            if seconds <= 0:
                 raise BudgetSpentError(self.step)
             try:
-                with _alarm(left):
-                    return function(*arguments, **named)
+                with _alarm(seconds):
+                    return function(*arguments, **keywords)
             except _AlarmError:
                 raise BudgetSpentError(self.step) from None
             finally:

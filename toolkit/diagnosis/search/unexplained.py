@@ -29,8 +29,8 @@ class StructureFound:
 def remainder(problem: Problem, screen: LinearisedFit, base: Fit, seed: int) -> tuple[StructureFound, ...]:
     """Return what stays unexplained about a fit, the largest first; nothing that matters to nobody."""
     listed: list[SmoothDependence] = groups(problem, base)
-    directions = [one.directions(problem) for one in listed]
-    quick = [screen.quick(one) for one in directions]
+    directions = [dependence.directions(problem) for dependence in listed]
+    quick = [screen.quick(dependence) for dependence in directions]
     order = sorted(range(len(listed)), key=lambda i: -quick[i][0])
     gains = [gain for gain, _ in quick]
     trusts = [screen.trust(base.noise)] * len(listed)
@@ -42,33 +42,35 @@ def remainder(problem: Problem, screen: LinearisedFit, base: Fit, seed: int) -> 
         gains[i] = min(gains[i], least)
     weighed = [gain * trust for gain, trust in zip(gains, trusts, strict=True)]
     p_values = search_p_values(screen, [block for _, block in quick], weighed, seed)
-    found = [
-        StructureFound(output=one.output, variables=one.variables, gain=gain, p_value=p)
-        for one, gain, p in zip(listed, gains, p_values, strict=True)
-        if p < STRUCTURE.alpha and _share(problem, base, one) > STEP.first
+    findings = [
+        StructureFound(output=dependence.output, variables=dependence.variables, gain=gain, p_value=p)
+        for dependence, gain, p in zip(listed, gains, p_values, strict=True)
+        if p < STRUCTURE.alpha and _share(problem, base, dependence) > STEP.first
     ]
     for name in problem.names:
         line = strongest_line(problem, name, base.residual[name])
         if line is not None and line.p_value < STRUCTURE.line and line.share > STRUCTURE.line_share:
             gain = -2 * math.log(max(line.p_value, 1e-300))
-            told = f"time (a line at {line.frequency:.4g} Hz)"
-            found.append(StructureFound(output=name, variables=(told,), gain=gain, p_value=line.p_value))
+            line_text = f"time (a line at {line.frequency:.4g} Hz)"
+            findings.append(
+                StructureFound(output=name, variables=(line_text,), gain=gain, p_value=line.p_value)
+            )
         beyond = _beyond_noise(problem, base, name)
         if beyond is not None:
-            found.append(beyond)
-    return tuple(sorted(found, key=lambda one: -one.gain))
+            findings.append(beyond)
+    return tuple(sorted(findings, key=lambda dependence: -dependence.gain))
 
 
 def _beyond_noise(problem: Problem, base: Fit, name: str) -> StructureFound | None:
     """Return the finding that a residual is larger than the sensor noise which a certificate states."""
     from scipy.stats import chi2
 
-    sd, kept = problem.sd_of(name), problem.kept[name]
-    if sd is None or kept.sum() < STRUCTURE.stated_rows:
+    sd, counted = problem.sd_of(name), problem.kept[name]
+    if sd is None or counted.sum() < STRUCTURE.stated_rows:
         return None
     # Coarse steps add their own to what the sensor is stated to have.
-    ratio = float(np.mean(base.residual[name][kept] ** 2)) / (sd**2 + problem.floor[name] ** 2)
-    worth = max(kept.sum() / base.noise[name].correlation_rows, STRUCTURE.stated_worth)
+    ratio = float(np.mean(base.residual[name][counted] ** 2)) / (sd**2 + problem.floor[name] ** 2)
+    worth = max(counted.sum() / base.noise[name].correlation_rows, STRUCTURE.stated_worth)
     p = float(chi2.sf(ratio / STRUCTURE.stated**2 * worth, worth))
     if p >= STRUCTURE.alpha:
         return None
@@ -78,7 +80,9 @@ def _beyond_noise(problem: Problem, base: Fit, name: str) -> StructureFound | No
 
 def _share(problem: Problem, base: Fit, group: SmoothDependence) -> float:
     """Return the share of a residual's variance that a group's columns explain."""
-    kept = problem.kept[group.output]
-    residual, columns = base.residual[group.output][kept], group.columns[kept]
-    found = np.linalg.lstsq(columns, residual, rcond=None)[0]
-    return 1 - float(np.sum((residual - columns @ found) ** 2)) / max(float(np.sum(residual**2)), 1e-300)
+    counted = problem.kept[group.output]
+    residual, columns = base.residual[group.output][counted], group.columns[counted]
+    coefficients = np.linalg.lstsq(columns, residual, rcond=None)[0]
+    return 1 - float(np.sum((residual - columns @ coefficients) ** 2)) / max(
+        float(np.sum(residual**2)), 1e-300
+    )

@@ -56,8 +56,8 @@ class Equation:
         self, case: Case, rhs: Callable[..., Any], outputs: Callable[..., Any], initial: Callable[..., Any]
     ) -> None:
         self.case, self.rhs, self._outputs, self._initial = case, rhs, outputs, initial
-        self._drivers = tuple(one.name for one in case.drivers)
-        self._shown = tuple(one.name for one in case.outputs)
+        self._drivers = tuple(channel.name for channel in case.drivers)
+        self._shown = tuple(output.name for output in case.outputs)
 
     def inputs(self, run: Run) -> Inputs:
         """Return a run's inputs between its rows."""
@@ -117,7 +117,7 @@ class Equation:
     ) -> Callable[..., Any]:
         """Return the same for several sets at once, a column each."""
         plain, u = self.rhs, self.inputs(run)
-        there = [(k, one) for k, one in enumerate(forces) if one.listed]
+        there = [(k, force) for k, force in enumerate(forces) if force.listed]
 
         def rhs(t: float, x: NDArray[np.float64]) -> NDArray[np.float64]:
             rate = np.zeros_like(x)

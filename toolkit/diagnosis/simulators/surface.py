@@ -153,7 +153,7 @@ def scatter(case: Case, name: str, load_N: float) -> float | None:
     Nothing changes within one slip angle, load and condition; which run of several it is does not count, nor
     its date. None where no place has two rows.
     """
-    stated = next((one.sd for one in case.outputs if one.name == name), None)
+    stated = next((output.sd for output in case.outputs if output.name == name), None)
     if stated is not None:
         return stated
     places: dict[object, list[float]] = {}
