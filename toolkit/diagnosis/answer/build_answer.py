@@ -15,11 +15,11 @@ from toolkit.diagnosis.answer.answer import (
     Mismatch,
     NominalParameter,
     Verdict,
-    cut_short,
     recorded,
 )
-from toolkit.diagnosis.answer.classes import equivalent_to, parted
+from toolkit.diagnosis.answer.classes import equivalent_to
 from toolkit.diagnosis.answer.locate import places
+from toolkit.diagnosis.answer.next_measurements import implausible, next_measurements
 from toolkit.diagnosis.answer.power import not_found
 from toolkit.diagnosis.case.case import Case
 from toolkit.diagnosis.fit.structure import groups
@@ -65,7 +65,7 @@ def answer_of(case: Case, search: Search, findings: tuple[Finding, ...]) -> Diag
         held_out_by=search.folds.told(len(search.problem.runs)),
         depends_on=tuple((structure.output, structure.variables) for structure in search.structure),
         not_found=not_found(search.screen, search.scored, names, alpha=SCREENING.alpha / tests, units=units),
-        next_measurements=_next(search, effects, verdict),
+        next_measurements=next_measurements(search, effects, verdict),
         findings=(*findings, *_outliers(case, search)),
         complete=not search.skipped,
         skipped=search.skipped,
@@ -100,16 +100,6 @@ def mostly_unknown(search: Search) -> bool:
         if output.refitted_rmse**2 > VERDICT.shown * output.noise_floor**2
     ]
     return bool(shown) and all(removed < VERDICT.taken * above for removed, above in shown)
-
-
-def implausible(search: Search) -> tuple[str, ...]:
-    """Return the parameters that are far off their priors beside every effect that was found."""
-    values = zip(search.problem.free, search.augmented.p, strict=True)
-    return tuple(
-        parameter.name
-        for parameter, p in values
-        if parameter.sd is not None and abs(p - parameter.value) > PRIORS.far * parameter.sd
-    )
 
 
 def _verdict(
@@ -331,61 +321,6 @@ def _floor(search: Search, name: str, sd: float | None) -> float:
         refitted = math.sqrt(float(np.mean(search.refitted.residual[name][counted] ** 2)))
         noise = min(noise, refitted * math.sqrt(max(1 - share, 0.0)))
     return noise
-
-
-def _next(search: Search, effects: tuple[FoundEffect, ...], verdict: Verdict) -> tuple[str, ...]:
-    sentences = [text for effect in effects if (text := parted(effect))]
-    if verdict == "unknown":
-        sentences += _to_find_it(search)
-        beside = ", ".join(dict.fromkeys(step.active.effect.name for step in search.steps))
-        sentences += [
-            f"Measure {name} by itself: even beside the nearest effects ({beside}) it is far off its prior."
-            for name in (implausible(search) if search.steps else ())
-        ]
-    if cut_short(search.skipped):
-        sentences.append(
-            "Give the search more time (--budget): it ended before every known effect was tried."
-        )
-    elif verdict == "untestable":
-        sentences.append(
-            "Tighten the priors of the parameters that moved (certificate, data sheet), or vary the inputs."
-        )
-    if len(search.problem.runs) == 1:
-        sentences.append("Repeat the run: with one recording alone, only blocks of it could be held out.")
-    return tuple(sentences)
-
-
-def _to_find_it(search: Search) -> list[str]:
-    """Return what would narrow down a mismatch that no effect explains, by what it depends on."""
-    variables = dict.fromkeys(name for structure in search.structure for name in structure.variables)
-    channels = {channel.name for channel in search.problem.case.drivers}
-    rates = {f"d{name}/dt": f"the rate of {name}" for name in channels}
-    varied = [rates.get(name, name) for name in variables if name in channels or name in rates]
-    sentences = []
-    if varied:
-        sentences.append(
-            f"The mismatch depends on {', '.join(varied)}: repeat the run with {varied[0]} alone varied, "
-            "everything else held."
-        )
-    outputs = [output.name for output in search.problem.model.outputs if output.name in variables]
-    if outputs:
-        sentences.append(
-            f"The mismatch depends on the size of {', '.join(outputs)}: apply known loads over its range."
-        )
-    lines = [
-        name.removeprefix("time (a line at ").removesuffix(")") for name in variables if "a line at" in name
-    ]
-    if lines:
-        sentences.append(
-            f"The mismatch swings at {' and '.join(lines)}: record what turns or swings at this frequency."
-        )
-    if "run" in variables:
-        sentences.append(
-            "The mismatch differs from run to run: repeat one run unchanged, and note what else changed."
-        )
-    if "time" in variables:
-        sentences.append("The mismatch goes with time: hold all inputs still for as long as a run takes.")
-    return sentences or ["Vary one input alone, everything else held, and record what else may act."]
 
 
 def _outliers(case: Case, search: Search) -> tuple[Finding, ...]:
