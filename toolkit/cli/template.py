@@ -68,12 +68,12 @@ def tags(
     Example: toolkit template tags --test tests/2019-06-04
     """
     from toolkit.report.audit.vocabulary import AUDIT
-    from toolkit.report.test.content import build_content
     from toolkit.report.certificate.vocabulary import CERTIFICATE
     from toolkit.report.comparison.vocabulary import COMPARISON
     from toolkit.report.diagnosis.vocabulary import DIAGNOSIS
     from toolkit.report.listing import list_tags
     from toolkit.report.style import read_style, style_file
+    from toolkit.report.test.content import build_content
     from toolkit.report.vocabulary import REPORT
 
     kinds = {one.name: one for one in (REPORT, CERTIFICATE, COMPARISON, DIAGNOSIS, AUDIT)}
