@@ -16,8 +16,7 @@ from toolkit.findings import Finding
 if TYPE_CHECKING:
     from toolkit.calibration.records.record import CalibrationRecord, LoadFit
     from toolkit.calibration.session.table import Table
-    from toolkit.calibration.uncertainty.conditions import Temperature
-    from toolkit.calibration.uncertainty.model import Budget
+    from toolkit.calibration.uncertainty.model import Budget, Temperature
     from toolkit.calibration.uncertainty.monte_carlo import MonteCarlo
 
 RANGE_POINTS = 11
@@ -273,7 +272,7 @@ def _indications(text: str) -> dict[str, float]:
 
 
 def _temperature(span: float | None, coefficient: float | None) -> Temperature | None:
-    from toolkit.calibration.uncertainty.conditions import Temperature
+    from toolkit.calibration.uncertainty.model import Temperature
 
     if span is None:
         if coefficient is not None:

@@ -26,7 +26,7 @@ def command(
 
     Example: toolkit calibration discard m15-r3 --reason "cable of D52 was loose" --by "first person"
     """
-    from toolkit.calibration.registry.discard import discard
+    from toolkit.calibration.registry.approval import discard
     from toolkit.calibration.registry.registry import Registry, instrument_of
 
     registry = Registry(calibrations_folder(calibrations, home))

@@ -26,7 +26,7 @@ def command(
     from toolkit.calibration.fit.findings import session_findings
     from toolkit.calibration.fit.session_fit import fit_session
     from toolkit.calibration.registry.registry import Registry
-    from toolkit.calibration.registry.stored_session import stored_session
+    from toolkit.calibration.registry.stored import stored_session
 
     registry = Registry(calibrations_folder(calibrations, home))
     record = registry.load(record_id)

@@ -17,8 +17,7 @@ if TYPE_CHECKING:
     from toolkit.cli.resolve import Resolved
     from toolkit.tires.comparison import Comparison
     from toolkit.tires.global_data import Measured
-    from toolkit.tires.global_model import GlobalModel
-    from toolkit.tires.global_result import ModelFit
+    from toolkit.tires.global_model import GlobalModel, ModelFit
     from toolkit.tires.model import CurveFit, Loss, TireModel
 
 
@@ -215,9 +214,8 @@ def _global(
     where: str,
     seconds: dict[str, float],
 ) -> tuple[tuple[ModelFit, ...], tuple[Finding, ...], tuple[CurveFit, ...]]:
-    from toolkit.tires.global_checks import why_not_global
     from toolkit.tires.global_fit import fit_global, global_findings, not_varied
-    from toolkit.tires.global_seeds import seeds_of
+    from toolkit.tires.global_seeds import seeds_of, why_not_global
 
     if not models:
         return (), (), ()

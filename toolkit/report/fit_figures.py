@@ -16,7 +16,7 @@ from toolkit.tires.evaluate import value_at
 from toolkit.tires.global_data import Measured, binned
 
 if TYPE_CHECKING:
-    from toolkit.tires.global_result import ModelFit
+    from toolkit.tires.global_model import ModelFit
     from toolkit.tires.model import CurveFit
 
 _LABELS = {

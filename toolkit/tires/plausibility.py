@@ -67,11 +67,11 @@ def size_findings(fits: Sequence[CurveFit], where: str) -> tuple[Finding, ...]:
         if fit.slope_at_zero is not None and fit.load_N:
             slopes[fit.channel, fit.load_N] = abs(fit.slope_at_zero.value), fit.slope_at_zero.u
     ratios = [(value / load, u / load) for (name, load), (value, u) in slopes.items() if name == "FY"]
-    found = []
+    findings = []
     low, high = STIFFNESS.low, STIFFNESS.high
     odd = [value for value, u in ratios if value + _SURE * u < low or value - _SURE * u > high]
     if 2 * len(odd) > len(ratios):
-        found.append(
+        findings.append(
             Finding(
                 rule="implausible-stiffness",
                 where=f"{where}, FY",
@@ -87,7 +87,7 @@ def size_findings(fits: Sequence[CurveFit], where: str) -> tuple[Finding, ...]:
     ]
     long = [value for value, u in trails if value - _SURE * u > LARGEST_TRAIL_M]
     if 2 * len(long) > len(trails):
-        found.append(
+        findings.append(
             Finding(
                 rule="implausible-stiffness",
                 where=f"{where}, MZ",
@@ -98,7 +98,7 @@ def size_findings(fits: Sequence[CurveFit], where: str) -> tuple[Finding, ...]:
         )
     loads = [load for _, load in slopes]
     if loads and max(loads) < LEAST_LOAD_N:
-        found.append(
+        findings.append(
             Finding(
                 rule="implausible-load",
                 where=f"{where}, FZ",
@@ -106,9 +106,11 @@ def size_findings(fits: Sequence[CurveFit], where: str) -> tuple[Finding, ...]:
                 "forces in another unit than their headers say?",
             )
         )
-    return tuple(found)
+    return tuple(findings)
 
 
 def _range(values: Sequence[float]) -> str:
-    low, high = (f"{one:.0f}" if one >= 100 else f"{one:.3g}" for one in (min(values), max(values)))
+    low, high = (
+        f"{extreme:.0f}" if extreme >= 100 else f"{extreme:.3g}" for extreme in (min(values), max(values))
+    )
     return low if low == high else f"{low} to {high}"
