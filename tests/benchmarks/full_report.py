@@ -16,7 +16,7 @@ FIGURES, TABLES = 30, 20
 
 def content(test: Path, home: Path) -> Any:
     """Return the content of a test with its figures and tables repeated."""
-    from toolkit.cli.resolve import resolve_test
+    from toolkit.lab.resolve import resolve_test
     from toolkit.report.build import build_content
     from toolkit.report.style import Style
     from toolkit.report.vocabulary import REPORT

@@ -4,13 +4,13 @@ import math
 import time
 
 import pytest
-from toolkit.diagnosis.answer.serial import as_json
-from toolkit.diagnosis.search.search import BudgetSpentError
-from toolkit.diagnosis.search.time_budget import Watch
 
 from tests.diagnosis.cases import HEAD, ONE, SIMULATOR, TWO, carriage, write_case
+from toolkit.diagnosis.answer.serial import as_json
 from toolkit.diagnosis.case.reader import read_case
 from toolkit.diagnosis.diagnose import diagnose
+from toolkit.diagnosis.search.search import BudgetSpentError
+from toolkit.diagnosis.search.time_budget import Watch
 
 WAITS = SIMULATOR.replace("import pandas as pd", "import pandas as pd, time\n    WAIT")
 PREDICT = '[[recording.predict]]\nfile = "more.csv"\n'

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from scipy.linalg import toeplitz
 from scipy.stats import multivariate_normal
+
 from toolkit.diagnosis.fit.noise import (
     Noise,
     autocovariance,

@@ -7,10 +7,10 @@ import shutil
 import numpy as np
 import pandas as pd
 import pytest
-from toolkit.diagnosis.answer.model_text import MODEL, model_text
 
 from tests.diagnosis.cases import HEAD, SIMULATOR, TWO, carriage, write_case
 from tests.diagnosis.tire_case import TIR, plain, python_tire, toml
+from toolkit.diagnosis.answer.model_text import MODEL, model_text
 from toolkit.diagnosis.case.reader import read_case
 from toolkit.diagnosis.diagnose import diagnose
 from toolkit.diagnosis.forward import simulate_model

@@ -3,8 +3,8 @@
 from types import SimpleNamespace
 
 import pytest
-from toolkit.diagnosis.answer.failed_runs import Refused
 
+from toolkit.diagnosis.answer.failed_runs import Refused
 from toolkit.diagnosis.simulators.simulator import Active
 from toolkit.effects.catalogue import effects
 from toolkit.errors import FitError

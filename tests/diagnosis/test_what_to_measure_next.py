@@ -6,6 +6,7 @@ from types import SimpleNamespace as Of
 
 import numpy as np
 import pytest
+
 from toolkit.diagnosis.answer.build_answer import _to_find_it
 from toolkit.diagnosis.answer.classes import apart
 from toolkit.diagnosis.answer.locate import places

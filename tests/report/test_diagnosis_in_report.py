@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 from report_factory import make_record, make_result
 from template_factory import opened, p, texts
+
 from toolkit.diagnosis.answer.answer import (
     Diagnosis,
     FoundEffect,
@@ -17,7 +18,6 @@ from toolkit.diagnosis.answer.answer import (
     Mismatch,
     Place,
 )
-
 from toolkit.findings import Finding
 from toolkit.report.build import build_content
 from toolkit.report.content import ReportContent

@@ -10,10 +10,11 @@ import pytest
 from report_factory import COMPARISON, LOADS_N, entry, make_record, make_result
 from template_factory import make, p, tbl
 
-from toolkit.cli import resolve
-from toolkit.cli.report import Options, _compared, _job, command
-from toolkit.cli.resolve import Resolved
+from toolkit.cli.report import command
 from toolkit.errors import FitError, TemplateError
+from toolkit.lab import resolve
+from toolkit.lab.reports import Options, _compared, _job
+from toolkit.lab.resolve import Resolved
 from toolkit.report.build import build_content
 from toolkit.report.content import ReportContent
 from toolkit.report.design.default import build_default

@@ -15,11 +15,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from toolkit.cli.console import Json, Quiet, answer
-from toolkit.cli.home import packaged_home
 from toolkit.estimate import plus_minus, round_uncertainty
 
 if TYPE_CHECKING:
-    from toolkit.cli.resolve import Resolved
+    from toolkit.lab.resolve import Resolved
 
 NAME = "demo"
 
@@ -132,6 +131,7 @@ def _stage(out: Path) -> Iterator[Path]:
 
 def _steps(stage: Path) -> list[Step]:
     from toolkit.examples.fig4_4 import packaged_fig4_4
+    from toolkit.lab.home import packaged_home
 
     home = stage / "home"
     for name in ("calibrations", "report_templates"):
@@ -264,36 +264,17 @@ def _told_fit(payload: Payload) -> str:
 
 
 def _resolved(stage: Path) -> Resolved:
-    from toolkit.cli.resolve import resolve_test
+    from toolkit.lab.resolve import resolve_test
 
     return resolve_test(stage / "test.xlsx", home=stage / "home")
 
 
 def _tire_file(resolved: Resolved, path: Path) -> str:
     """Write MF 6.1 over all loads of the forward run, and tell how well it fits."""
-    import numpy as np
+    from toolkit.lab.tire_files import write_test_tir
 
-    from toolkit.characteristics.groups import group
-    from toolkit.reduction.averaging import free_radius_m
-    from toolkit.tires.global_data import measured
-    from toolkit.tires.global_fit import fit_global
-    from toolkit.tires.models.mf61 import MODEL
-    from toolkit.tires.tir_write import tire_fit, write_tir
-
-    reduced = resolved.result.reduced
-    run = [one for one in group(reduced) if one.rotation == "forward"]
-    radius = free_radius_m(reduced.info.tire_size)
-    if radius is None:
-        raise ValueError("the packaged plan names a tire size that gives its radius")
-    columns = {
-        "SA": np.concatenate([one.SA for one in run]),
-        "FZ": np.concatenate([np.full(len(one.SA), one.load_N) for one in run]),
-        **{name: np.concatenate([one.values(name) for one in run]) for name in ("FY", "MZ")},
-    }
-    data = measured(columns, axes="SAE", rated_load_N=reduced.info.rated_load_N, unloaded_radius_m=radius)
-    fit = fit_global(MODEL, data, predict=False)
-    write_tir(path, tire_fit(MODEL, fit, data), comments=["simulated: the virtual M-15, drum forward"])
-    errors = ", ".join(f"{one.channel} {one.error_percent:.2f} %" for one in fit.fits)
+    fit = write_test_tir(path, resolved.result.reduced, comments=["simulated: the virtual M-15"])
+    errors = ", ".join(f"{channel.channel} {channel.error_percent:.2f} %" for channel in fit.fits)
     return f"tire.tir: MF 6.1 over all loads, error {errors}"
 
 

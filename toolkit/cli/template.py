@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
-from toolkit.cli.console import Calibrations, Draft, Home, Json, Quiet, answer, table
+from toolkit.cli.console import Calibrations, Draft, Home, Json, Quiet, answer
 
 app = typer.Typer(help="The contract of report templates.", no_args_is_help=True, rich_markup_mode=None)
 
@@ -67,6 +67,7 @@ def tags(
 
     Example: toolkit template tags --test tests/2019-06-04
     """
+    from toolkit.lab.answers import table
     from toolkit.report.audit.vocabulary import AUDIT
     from toolkit.report.build import build_content
     from toolkit.report.certificate.vocabulary import CERTIFICATE
@@ -82,14 +83,19 @@ def tags(
     style = read_style(style_file(template)) if template else read_style(None)
     content = None
     if test is not None:
-        from toolkit.cli.resolve import resolve_test
+        from toolkit.lab.resolve import resolve_test
 
         resolved = resolve_test(
             test, calibration=calibration, calibrations=calibrations, home=home, draft=draft
         )
         content = build_content(resolved.result, resolved.record, findings=resolved.findings, style=style)
     listed = list_tags(content, style, kinds[kind])
-    answer({"tags": listed}, _text(listed), as_json=json, quiet=quiet)
+    rows = [
+        [tag["tag"], tag["kind"], tag["unit"] or "", str(tag["value"] or "")[:40], tag["description"]]
+        for tag in listed
+    ]
+    text = table(["tag", "kind", "unit", "value", "description"], rows, align="<<<<<")
+    answer({"tags": listed}, text, as_json=json, quiet=quiet)
     return 0
 
 
@@ -144,11 +150,3 @@ def new(
     write_atomic(style, known[like].style or STYLE_FILE)
     answer({"template": file, "style": style}, f"{file}\n{style}", as_json=json, quiet=quiet)
     return 0
-
-
-def _text(listed: list[dict[str, Any]]) -> str:
-    rows = [
-        [one["tag"], one["kind"], one["unit"] or "", str(one["value"] or "")[:40], one["description"]]
-        for one in listed
-    ]
-    return table(["tag", "kind", "unit", "value", "description"], rows, align="<<<<<")

@@ -6,12 +6,10 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from toolkit.cli.console import finding_lines, table
-from toolkit.cli.delivery import draft_keys, mark_words
+from toolkit.lab.answers import draft_keys, estimate_keys, finding_lines, mark_words, table
 
 if TYPE_CHECKING:
     from toolkit.comparison.model import Comparison, Difference, Entry, FactorSpread, Spread
-    from toolkit.estimate import Estimate
     from toolkit.findings import Finding
     from toolkit.report.style import Style
 
@@ -32,10 +30,10 @@ def comparison_payload(found: Comparison) -> dict[str, Any]:
             {
                 "quantity": one.name,
                 "load_N": one.load_N,
-                "regular": _estimate(one.regular),
-                "reversed": _estimate(one.reversed),
-                "pattern": _estimate(one.pattern),
-                "body": _estimate(one.body),
+                "regular": estimate_keys(one.regular),
+                "reversed": estimate_keys(one.reversed),
+                "pattern": estimate_keys(one.pattern),
+                "body": estimate_keys(one.body),
             }
             for one in found.pattern
         ],
@@ -55,18 +53,6 @@ def _entry(one: Entry) -> dict[str, Any]:
     }
 
 
-def _estimate(one: Estimate) -> dict[str, Any]:
-    U, k = one.expanded()
-    return {
-        "value": one.value,
-        "standard_uncertainty": one.u,
-        "dof": one.dof,
-        "expanded_uncertainty": U,
-        "k": k,
-        "unit": one.unit,
-    }
-
-
 def _difference(one: Difference) -> dict[str, Any]:
     base = one.reference.value
     return {
@@ -76,9 +62,9 @@ def _difference(one: Difference) -> dict[str, Any]:
         "SA_rad": one.SA_rad,
         "load_N": one.load_N,
         "label": one.label,
-        "reference": _estimate(one.reference),
-        "other": _estimate(one.other),
-        "difference": _estimate(one.difference),
+        "reference": estimate_keys(one.reference),
+        "other": estimate_keys(one.other),
+        "difference": estimate_keys(one.difference),
         "difference_percent": 100 * one.difference.value / abs(base) if base else None,
         "standard_uncertainty_if_nothing_were_shared": one.u_apart,
         "p": one.p,

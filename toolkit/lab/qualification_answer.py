@@ -1,49 +1,18 @@
-"""`toolkit qualify`: the software's own qualification."""
+"""What `qualify` says of this installation: the record as JSON, and as text for the auditor."""
 
 from __future__ import annotations
 
 import dataclasses
-import json as jsonlib
-from datetime import UTC, datetime
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
-import typer
-
-from toolkit.cli.console import Json, Quiet, answer, table
+from toolkit.lab.answers import table
 
 if TYPE_CHECKING:
     from toolkit.qualification.model import Check, QualificationRecord
 
-NAME = "qualify"
 
-
-def command(
-    out: Annotated[
-        Path | None, typer.Option("--out", help="Write the record here: .json, else as text.")
-    ] = None,
-    json: Json = False,
-    quiet: Quiet = False,
-) -> int:
-    """Qualify this installation: certified sets, published examples, golden vectors, and every refusal once.
-
-    Example: toolkit qualify --out qualification.json
-    """
-    from toolkit.cli.home import packaged_home
-    from toolkit.files import write_atomic
-    from toolkit.qualification.run import qualify
-
-    record = qualify(calibrations=packaged_home() / "calibrations", on=datetime.now(tz=UTC).date())
-    payload, text = _payload(record), _text(record)
-    if out is not None:
-        document = jsonlib.dumps({"schema": 1, **payload}, ensure_ascii=False, indent=2, allow_nan=False)
-        write_atomic(out, (document if out.suffix.lower() == ".json" else text) + "\n")
-        text += f"\nwritten: {out}"
-    answer(payload, text, as_json=json, quiet=quiet)
-    return 0 if record.passed else 1
-
-
-def _payload(record: QualificationRecord) -> dict[str, Any]:
+def qualification_payload(record: QualificationRecord) -> dict[str, Any]:
+    """Return a qualification as the JSON answer."""
     return {
         "passed": record.passed,
         "software": record.software,
@@ -57,7 +26,8 @@ def _payload(record: QualificationRecord) -> dict[str, Any]:
     }
 
 
-def _text(record: QualificationRecord) -> str:
+def qualification_text(record: QualificationRecord) -> str:
+    """Return a qualification for people."""
     packages = ", ".join(f"{name} {number}" for name, number in record.packages)
     failed = len(record.failed)
     lines = [

@@ -14,9 +14,9 @@ from toolkit import __version__
 from toolkit.recording.marks import OWN_OUTPUT
 
 if TYPE_CHECKING:
-    from toolkit.cli.resolve import Resolved
     from toolkit.diagnosis.answer.answer import Diagnosis
     from toolkit.findings import Finding
+    from toolkit.lab.resolve import Resolved
     from toolkit.recording.details import ReportDetails
     from toolkit.report.diagnosis.in_report import Told
 
@@ -211,43 +211,9 @@ def _directions(rotations: Sequence[str]) -> str:
 
 
 def _tir(resolved: Resolved, path: Path) -> None:
-    """Write MF 6.1 over all loads of the first direction; the radius is that of the tire's size."""
-    import numpy as np
+    from toolkit.lab.tire_files import write_test_tir
 
-    from toolkit.characteristics.groups import group
-    from toolkit.cli.fit_tir import STAND_IN_RADIUS
-    from toolkit.errors import FitError
-    from toolkit.reduction.averaging import free_radius_m
-    from toolkit.tires.global_data import measured, what_varies
-    from toolkit.tires.global_fit import fit_global
-    from toolkit.tires.models.mf61 import MODEL
-    from toolkit.tires.tir_write import tire_fit, write_tir
-
-    reduced = resolved.result.reduced
-    every = group(reduced)
-    run = [one for one in every if one.rotation == every[0].rotation]
-    radius = free_radius_m(reduced.info.tire_size)
-    data = measured(
-        {
-            "SA": np.concatenate([one.SA for one in run]),
-            "FZ": np.concatenate([np.full(len(one.SA), one.load_N) for one in run]),
-            **{name: np.concatenate([one.values(name) for one in run]) for name in ("FY", "MZ")},
-        },
-        axes="SAE",
-        rated_load_N=reduced.info.rated_load_N,
-        unloaded_radius_m=radius or STAND_IN_RADIUS,
-    )
-    if radius is None or "two_loads" not in what_varies(data):
-        raise FitError(
-            "a tire file needs the tire's size and two loads or more",
-            where=reduced.info.name,
-            got=f"size {reduced.info.tire_size or 'unknown'}, {len(data.loads)} loads",
-            expected="a size such as 205/55 R16 in [tire] of test.toml, and several loads",
-            next_step="leave out --tir, or complete the test",
-            rule="one-load",
-        )
-    fit = fit_global(MODEL, data, predict=False)
-    write_tir(path, tire_fit(MODEL, fit, data), comments=[*_comments(resolved), f"drum {run[0].rotation}"])
+    write_test_tir(path, resolved.result.reduced, comments=_comments(resolved))
 
 
 def _comments(resolved: Resolved) -> list[str]:

@@ -1,4 +1,4 @@
-"""`toolkit doctor`: what this machine lacks, and the command that mends it."""
+"""What this machine lacks, and the command that mends it."""
 
 from __future__ import annotations
 
@@ -7,10 +7,6 @@ import shutil
 import subprocess
 import sys
 from dataclasses import dataclass
-
-from toolkit.cli.console import Json, Quiet, answer, table
-
-NAME = "doctor"
 
 PACKAGES = (
     "libreoffice-writer-nogui fonts-crosextra-carlito fonts-crosextra-caladea fonts-liberation2 poppler-utils"
@@ -28,24 +24,9 @@ class Check:
     needed_for: str
 
 
-def command(json: Json = False, quiet: Quiet = False) -> int:
-    """Tell what this machine lacks, and what mends it.
-
-    Example: toolkit doctor
-    """
-    checks = [_python(), *_programs(), *_fonts()]
-    mend = None if all(check.ok for check in checks) else mending_command()
-    rows = [["ok" if c.ok else "MISSING", c.name, c.found, c.needed_for] for c in checks]
-    text = table(["", "what", "found", "needed for"], rows, align="<<<<")
-    text += f"\n\nmend it with:\n  {mend}" if mend else "\n\nnothing is missing"
-    payload = {
-        "checks": [
-            {"name": c.name, "ok": c.ok, "found": c.found, "needed_for": c.needed_for} for c in checks
-        ],
-        "mend": mend,
-    }
-    answer(payload, text, as_json=json, quiet=quiet)
-    return 1 if mend else 0
+def checks() -> tuple[Check, ...]:
+    """Return everything that is looked for: Python, programs, fonts."""
+    return (_python(), *_programs(), *_fonts())
 
 
 def mending_command() -> str:

@@ -20,8 +20,8 @@ from toolkit.errors import OutputError, RegistryError, ToolkitError
 from toolkit.files import sha256_bytes
 
 if TYPE_CHECKING:
-    from toolkit.cli.report import Made
-    from toolkit.cli.resolve import Resolved
+    from toolkit.lab.reports import MadeReport
+    from toolkit.lab.resolve import Resolved
 
 STATE = "watch.json"
 SET_ASIDE = "set-aside"
@@ -58,7 +58,7 @@ class Aside:
 class Round:
     """What one look at the folder made, and which tests wait or stand aside at its end."""
 
-    made: tuple[Made, ...]
+    made: tuple[MadeReport, ...]
     waiting: tuple[Waiting, ...]
     set_aside: tuple[Aside, ...]
 
@@ -85,7 +85,7 @@ class Watcher:
         out: Path,
         *,
         resolve: Callable[[Path], Resolved],
-        report: Callable[[dict[Path, Resolved], Sequence[Path]], list[Made]],
+        report: Callable[[dict[Path, Resolved], Sequence[Path]], list[MadeReport]],
         settle_s: float,
         patience_s: float,
         clock: Callable[[], float],
@@ -175,7 +175,7 @@ class Watcher:
         contents: dict[Path, str],
         waiting: list[Waiting],
         aside: list[Aside],
-    ) -> list[Made]:
+    ) -> list[MadeReport]:
         if not ready:
             return []
         delivered = []

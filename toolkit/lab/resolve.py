@@ -8,8 +8,8 @@ from datetime import date
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
-from toolkit.cli.home import calibrations_folder
 from toolkit.errors import ConfigError
+from toolkit.lab.home import calibrations_folder
 
 if TYPE_CHECKING:
     from toolkit.calibration.records.record import CalibrationRecord

@@ -1,4 +1,4 @@
-"""`toolkit fit --tir`: the tire file of a model over all loads, and what it does not know."""
+"""Tire files: the model over all loads that one holds, of a table or of a test, and what it does not know."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from toolkit.findings import Finding
 
 if TYPE_CHECKING:
     from toolkit.calibration.records.use import CalibrationUse
+    from toolkit.reduction.model import ReducedTest
     from toolkit.tires.global_data import Measured
     from toolkit.tires.global_result import ModelFit
 
@@ -105,3 +106,50 @@ def write_fit(
     if side == "UNKNOWN":
         notes.append(("tir-side", "TYRESIDE is UNKNOWN: say --side LEFT, RIGHT or SYMMETRIC as tested"))
     return tuple(Finding(rule=rule, where=str(tir), message=message, level="note") for rule, message in notes)
+
+
+def write_test_tir(path: Path, reduced: ReducedTest, *, comments: Sequence[str]) -> ModelFit:
+    """Write MF 6.1 over all loads of a test's first direction, and return the fit.
+
+    The radius is that of the tire's size.
+
+    Raises
+    ------
+    FitError
+        the test states no tire size, or has one load
+    """
+    import numpy as np
+
+    from toolkit.characteristics.groups import group
+    from toolkit.errors import FitError
+    from toolkit.reduction.averaging import free_radius_m
+    from toolkit.tires.global_data import measured, what_varies
+    from toolkit.tires.global_fit import fit_global
+    from toolkit.tires.models.mf61 import MODEL
+    from toolkit.tires.tir_write import tire_fit, write_tir
+
+    groups = group(reduced)
+    run = [block for block in groups if block.rotation == groups[0].rotation]
+    radius = free_radius_m(reduced.info.tire_size)
+    data = measured(
+        {
+            "SA": np.concatenate([block.SA for block in run]),
+            "FZ": np.concatenate([np.full(len(block.SA), block.load_N) for block in run]),
+            **{name: np.concatenate([block.values(name) for block in run]) for name in ("FY", "MZ")},
+        },
+        axes="SAE",
+        rated_load_N=reduced.info.rated_load_N,
+        unloaded_radius_m=radius or STAND_IN_RADIUS,
+    )
+    if radius is None or "two_loads" not in what_varies(data):
+        raise FitError(
+            "a tire file needs the tire's size and two loads or more",
+            where=reduced.info.name,
+            got=f"size {reduced.info.tire_size or 'unknown'}, {len(data.loads)} loads",
+            expected="a size such as 205/55 R16 in [tire] of test.toml, and several loads",
+            next_step="leave out --tir, or complete the test",
+            rule="one-load",
+        )
+    fit = fit_global(MODEL, data, predict=False)
+    write_tir(path, tire_fit(MODEL, fit, data), comments=[*comments, f"drum {run[0].rotation}"])
+    return fit

@@ -6,15 +6,14 @@ import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from toolkit.cli.console import finding_lines, table
-from toolkit.cli.delivery import draft_keys, mark_words
 from toolkit.estimate import plus_minus
+from toolkit.lab.answers import draft_keys, findings_text, mark_words, table
 from toolkit.tires.table_fit import slope_sign
 
 if TYPE_CHECKING:
-    from toolkit.cli.fit_models import Fitted
     from toolkit.estimate import Estimate
     from toolkit.findings import Finding
+    from toolkit.lab.fit_models import Fitted
     from toolkit.tires.comparison import Comparison
     from toolkit.tires.global_result import GlobalFit
     from toolkit.tires.model import CurveFit
@@ -23,7 +22,7 @@ _PER_DEGREE = 3.141592653589793 / 180
 _WORDS = {"pure": "Pure", "combined": "Combined"}
 
 
-def payload(fitted: Fitted) -> dict[str, Any]:
+def fit_payload(fitted: Fitted) -> dict[str, Any]:
     """Return fits and comparison as JSON."""
     every = [one for fit in fitted.globals for one in fit.fits]
     return {
@@ -109,7 +108,7 @@ def _finite(dof: float | None) -> float | None:
     return dof if dof is not None and math.isfinite(dof) else None
 
 
-def text(fitted: Fitted, findings: Sequence[Finding]) -> str:
+def fit_text(fitted: Fitted, findings: Sequence[Finding]) -> str:
     """Return what a person reads: single loads, models over all loads, the comparison, findings."""
     parts = []
     if fitted.use:
@@ -130,7 +129,7 @@ def text(fitted: Fitted, findings: Sequence[Finding]) -> str:
     if len(fitted.comparison.models) > 1:
         parts.append(comparison_text(fitted.comparison))
     if findings:
-        parts.append("findings (toolkit explain RULE tells more):\n" + "\n".join(finding_lines(findings)))
+        parts.append(findings_text(findings))
     return "\n\n".join(parts)
 
 

@@ -1,33 +1,27 @@
-"""The answer of `toolkit audit`: the JSON document, the text for people, and the files of ``--out``."""
+"""What an audit says: the JSON document, whose long lists are iterators, and the text for people."""
 
 from __future__ import annotations
 
-import json
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from toolkit.audit.model import CLEAN
-from toolkit.cli.console import table
+from toolkit.lab.answers import table
 
 if TYPE_CHECKING:
     from toolkit.audit.archive import ArchiveAudit
     from toolkit.audit.corrected import Copy
     from toolkit.audit.linked import Linked
     from toolkit.audit.since_good import Drift, DriftedFile, DriftedTest
-    from toolkit.calibration.records.use import CalibrationUse
-    from toolkit.calibration.registry.registry import Registry
-    from toolkit.cli.audit_amend import Amended
-    from toolkit.report.template.package import Template
+    from toolkit.lab.amended import Amended
 
-PAGE, LINES = "audit.html", "audit.jsonl"
-_SHOWN, _WORST, _SETTINGS = 40, 6, 10
+_SHOWN, _SETTINGS = 40, 10
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Answer:
+class AuditAnswer:
     """An audit and what was asked for besides; None where it was not."""
 
     made: ArchiveAudit
@@ -39,13 +33,13 @@ class Answer:
     amended: tuple[Amended, ...] = ()
 
 
-def payload_of(told: Answer) -> dict[str, Any]:
+def payload_of(told: AuditAnswer) -> dict[str, Any]:
     """Return the JSON document; what there may be many of are iterators."""
     made = told.made
     found: dict[str, Any] = {
         "archive": made.archive,
         "known_at": made.known_at.isoformat(),
-        "files": _files(told),
+        "files": files_of(told),
         "summary": {"files": len(made.files), "grades": dict(made.grades), "undated": made.undated},
         "tests": _tests(told),
         "refused_records": [{"id": r.id, "rule": r.rule, "reason": r.reason} for r in made.refused],
@@ -67,90 +61,22 @@ def payload_of(told: Answer) -> dict[str, Any]:
     return found
 
 
-def _files(told: Answer) -> Iterator[dict[str, Any]]:
+def files_of(told: AuditAnswer) -> Iterator[dict[str, Any]]:
+    """Yield every file's result; with the reports of its test where reports were asked about."""
     for one in told.made.files.plain():
         if told.linked is not None:
             one["reports"] = told.linked.of_test(one["test"])
         yield one
 
 
-def _tests(told: Answer) -> Iterator[dict[str, Any]]:
+def _tests(told: AuditAnswer) -> Iterator[dict[str, Any]]:
     for one in told.made.tests:
         if told.linked is not None:
             one["reports"] = told.linked.of_test(one["test"])
         yield one
 
 
-def write_folder(out: Path, told: Answer, registry: Registry, template: Template | None) -> tuple[Path, ...]:
-    """Write the page for people, the lines for machines and, by a template, the summary; return them.
-
-    Raises
-    ------
-    OutputError
-        the folder cannot be written to
-    TemplateError, RenderError
-        the summary cannot be made; the page and the lines are there
-    """
-    from toolkit.audit.timeline import timelines
-    from toolkit.audit.traces import traces
-    from toolkit.cli.explain import rules_catalogue
-    from toolkit.files import atomic_path
-    from toolkit.recording.marks import GENERATOR, OWN_OUTPUT
-    from toolkit.report.audit.page import AuditView, write_page
-
-    with atomic_path(out / LINES) as temporary, temporary.open("wb") as lines:
-        head = {"generator": GENERATOR, "marks": OWN_OUTPUT, "schema": 1, "kind": "audit"}
-        lines.write(json.dumps({**head, "known_at": told.made.known_at.isoformat()}).encode() + b"\n")
-        linked = told.linked is not None
-        files = (json.dumps(one).encode() for one in _files(told)) if linked else told.made.files.raw()
-        lines.writelines(one + b"\n" for one in files)
-    view = AuditView(
-        made=told.made,
-        rules=rules_catalogue(),
-        timelines=timelines(told.made, registry),
-        traces=tuple(traces(told.made, registry, _WORST)),
-        linked=told.linked,
-        drift=told.drift,
-        drifted=told.drifted,
-        drifted_tests=told.drifted_tests,
-        uses=_uses(told, registry),
-    )
-    write_page(out / PAGE, view)
-    if template is None:
-        return out / PAGE, out / LINES
-    from toolkit.report.audit.content import build_audit_content
-    from toolkit.report.deliver import deliver
-    from toolkit.report.style import read_style, style_file
-
-    content = build_audit_content(view, read_style(style_file(template.path)))
-    done = deliver(template, content, out, name="audit")
-    return out / PAGE, out / LINES, done.docx, done.pdf
-
-
-def _uses(told: Answer, registry: Registry) -> tuple[CalibrationUse, ...]:
-    """Return the records in force by which the changes of the files were computed."""
-    from toolkit.calibration.records.use import CalibrationUse
-
-    wanted = {one["in_force"] for one in told.made.files.plain() if one["repair"] is not None}
-    records = [registry.load(one) for one in sorted(wanted)]
-    return tuple(CalibrationUse(id=r.id, sha256=r.sha256, unverified=not r.verified) for r in records)
-
-
-def write_table(target: Path, told: Answer) -> Path:
-    """Write the results of all files as a Parquet table; return it.
-
-    Raises
-    ------
-    ConfigError, OutputError
-        see `toolkit.audit.parquet.write_parquet`
-    """
-    from toolkit.audit.parquet import write_parquet
-
-    write_parquet(target, _files(told), known_at=told.made.known_at, reports=told.linked is not None)
-    return target
-
-
-def text_of(told: Answer) -> str:
+def text_of(told: AuditAnswer) -> str:
     """Return the answer for people."""
     from toolkit.reduction.physics import RULES
 
@@ -179,7 +105,7 @@ def text_of(told: Answer) -> str:
     return "\n".join([*lines, *_asked(told)])
 
 
-def _asked(told: Answer) -> Iterator[str]:
+def _asked(told: AuditAnswer) -> Iterator[str]:
     if told.linked is not None:
         yield ""
         for one in told.linked.reports:

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from toolkit.audit.linked import Linked, PastReport
-    from toolkit.cli.resolve import Resolved
     from toolkit.errors import ToolkitError
+    from toolkit.lab.resolve import Resolved
     from toolkit.report.deliver import Delivered, Job
 
 FOLDER = "reports"
@@ -56,9 +56,10 @@ def amend(
     TemplateError, RenderError
         the template cannot be used, or LibreOffice is missing
     """
-    from toolkit.cli.delivery import file_name, home_template
-    from toolkit.cli.resolve import resolve_test
     from toolkit.errors import ToolkitError
+    from toolkit.lab.answers import file_name
+    from toolkit.lab.home import home_template
+    from toolkit.lab.resolve import resolve_test
     from toolkit.report.deliver import deliver_all
     from toolkit.report.template.package import read_template
 
@@ -93,7 +94,7 @@ def _wanted(linked: Linked) -> Iterator[tuple[PastReport, str]]:
 
 
 def _job(past: PastReport, resolved: Resolved, test: Path, template: Any, out: Path) -> Job:
-    from toolkit.cli.handover import details_of, provenance
+    from toolkit.lab.handover import details_of, provenance
     from toolkit.report.build import build_content
     from toolkit.report.deliver import Job
     from toolkit.report.style import read_style, style_file

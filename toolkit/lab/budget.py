@@ -1,20 +1,20 @@
-"""`toolkit calibration budget`: the measurement uncertainty of a record's loads."""
+"""The uncertainty budget of a record's loads: at a load or at indications, over the range, by trials."""
 
 from __future__ import annotations
 
 import math
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
-import typer
-
-from toolkit.cli.console import Calibrations, Home, Json, Quiet, answer, exit_code, finding_lines, table
-from toolkit.cli.home import calibrations_folder
 from toolkit.errors import ConfigError, ToolkitError
 from toolkit.findings import Finding
+from toolkit.lab.answers import finding_lines, table
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from toolkit.calibration.records.record import CalibrationRecord, LoadFit
+    from toolkit.calibration.registry.registry import Registry
     from toolkit.calibration.session.table import Table
     from toolkit.calibration.uncertainty.conditions import Temperature
     from toolkit.calibration.uncertainty.model import Budget
@@ -23,46 +23,36 @@ if TYPE_CHECKING:
 RANGE_POINTS = 11
 
 
-def command(
-    record_id: Annotated[str, typer.Argument(help="Record id, such as m15-r2.")],
-    load: Annotated[str | None, typer.Option("--load", help="One load; default: all of them.")] = None,
-    at: Annotated[
-        str | None,
-        typer.Option("--at", help="Load value, with a unit or in the record's; default: full scale."),
-    ] = None,
-    indications: Annotated[
-        str | None, typer.Option("--indications", help="Predict from D51=..,D52=.. in the record's units.")
-    ] = None,
-    temperature_range: Annotated[
-        float | None, typer.Option("--temperature-range", help="Use within +- this many K of the session.")
-    ] = None,
-    temperature_coefficient: Annotated[
-        float | None,
-        typer.Option(
-            "--temperature-coefficient", help="Relative, a kelvin; default: what the session states."
-        ),
-    ] = None,
-    trials: Annotated[
-        int | None, typer.Option("--monte-carlo", help="Check by this many trials; 0: until settled.")
-    ] = None,
-    seed: Annotated[int, typer.Option("--seed", help="Of the trials.")] = 0,
-    digits: Annotated[int, typer.Option("--digits", min=1, max=2, help="Digits of u that count.")] = 2,
-    figure: Annotated[
-        Path | None, typer.Option("--figure", help="Draw shares and U over the range: .png, .svg or .pdf.")
-    ] = None,
-    calibrations: Calibrations = None,
-    home: Home = None,
-    as_json: Json = False,
-    quiet: Quiet = False,
-) -> int:
-    """Tell the uncertainty of a record's loads: components with shares, U with k, U over the range.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BudgetOrder:
+    """What a budget is asked for: one ``load`` or all, ``at`` a load value or at ``indications``.
 
-    Example: toolkit calibration budget m15-r2 --load FY --at 4000N
+    ``trials`` of Monte Carlo check it, 0 until they settle, None without; ``digits`` of u count then.
+    ``figure`` takes shares and U over the range.
     """
-    from toolkit.calibration.registry.registry import Registry
+
+    load: str | None = None
+    at: str | None = None
+    indications: str | None = None
+    temperature: Temperature | None = None
+    trials: int | None = None
+    seed: int = 0
+    digits: int = 2
+    figure: Path | None = None
+
+
+def budget_answer(
+    registry: Registry, record_id: str, order: BudgetOrder
+) -> tuple[dict[str, Any], str, list[Finding]]:
+    """Return the budgets of a record's loads as JSON, as text, and their findings.
+
+    Raises
+    ------
+    ToolkitError
+        the record has no data; the load, the value or the indications cannot be used
+    """
     from toolkit.calibration.registry.stored import stored_check, stored_loads
 
-    registry = Registry(calibrations_folder(calibrations, home))
     record = registry.load(record_id)
     rows, check = stored_loads(registry.folder, record), stored_check(registry.folder, record)
     if rows is None:
@@ -73,42 +63,44 @@ def command(
             "a record that was fitted from reference loads",
             "calibrate the instrument from a session",
         )
+    load, at, indications = order.load, order.at, order.indications
     if at is not None and (indications is not None or (load is None and len(record.loads) > 1)):
         raise _wrong("--at needs one load, and no --indications", "--at", at, "--load NAME --at VALUE")
-    temperature = _temperature(temperature_range, temperature_coefficient)
-    names = [load] if load is not None else [one.load for one in record.loads]
-    if figure is not None and len(names) > 1:
+    names = [load] if load is not None else [fit.load for fit in record.loads]
+    if order.figure is not None and len(names) > 1:
         raise _wrong("a figure shows one load", "--figure", ", ".join(names), "--load NAME")
-    found, findings = [], []
+    budgets = []
+    findings: list[Finding] = []
     for name in names:
-        budget, more = _one(record, rows, check, name, at, indications, temperature)
+        budget, more = _budget(record, rows, check, name, at, indications, order.temperature)
         result = None
-        if trials is not None:
+        if order.trials is not None:
             from toolkit.calibration.uncertainty.monte_carlo import monte_carlo
 
-            result = monte_carlo(record, rows, budget, trials=trials or None, seed=seed, digits=digits)
+            result = monte_carlo(
+                record, rows, budget, trials=order.trials or None, seed=order.seed, digits=order.digits
+            )
             more += _not_validated(record, budget, result)
-        found.append((budget, _over_range(record, rows, check, name, temperature), result))
+        budgets.append((budget, _over_range(record, rows, check, name, order.temperature), result))
         findings += more
     written = None
-    if figure is not None:
+    if order.figure is not None:
         from toolkit.report.calibration.uncertainty_figure import write_figure
 
-        written = write_figure(figure, found[0][0], found[0][1])
+        written = write_figure(order.figure, budgets[0][0], budgets[0][1])
     payload = {
         "record": record_id,
         "sha256": record.sha256,
-        "loads": {budget.load: _payload(budget, curve, result) for budget, curve, result in found},
+        "loads": {budget.load: _payload(budget, curve, result) for budget, curve, result in budgets},
         "figure": written,
-        "findings": [one.as_dict() for one in findings],
+        "findings": [finding.as_dict() for finding in findings],
     }
-    lines = [line for budget, curve, result in found for line in _lines(budget, curve, result)]
+    lines = [line for budget, curve, result in budgets for line in _lines(budget, curve, result)]
     lines += [*finding_lines(findings), *([f"written: {written}"] if written else [])]
-    answer(payload, "\n".join(lines), as_json=as_json, quiet=quiet)
-    return exit_code(findings)
+    return payload, "\n".join(lines), findings
 
 
-def _one(
+def _budget(
     record: CalibrationRecord,
     rows: Table,
     check: Table | None,
@@ -272,7 +264,8 @@ def _indications(text: str) -> dict[str, float]:
     return found
 
 
-def _temperature(span: float | None, coefficient: float | None) -> Temperature | None:
+def temperature_of(span: float | None, coefficient: float | None) -> Temperature | None:
+    """Return the temperature conditions of use, None where no range is given [K, 1/K]."""
     from toolkit.calibration.uncertainty.conditions import Temperature
 
     if span is None:

@@ -1,4 +1,4 @@
-"""From a test or a table and the names of models to their fits, findings and comparison."""
+"""Tire models fitted to a test or a table: their fits, findings, comparison and figures."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from toolkit.findings import Finding
 
 if TYPE_CHECKING:
     from toolkit.calibration.records.use import CalibrationUse
-    from toolkit.cli.resolve import Resolved
+    from toolkit.lab.resolve import Resolved
     from toolkit.tires.comparison import Comparison
     from toolkit.tires.global_data import Measured
     from toolkit.tires.global_model import GlobalModel
@@ -58,7 +58,7 @@ def fit_table_models(
     ToolkitError
         the table cannot be read; no curve of it can be fitted; a model cannot be fitted to it
     """
-    from toolkit.cli.fit_tir import STAND_IN_RADIUS
+    from toolkit.lab.tire_files import STAND_IN_RADIUS
     from toolkit.tires.global_data import of_table
     from toolkit.tires.plausibility import size_findings
     from toolkit.tires.table import read_table
@@ -108,7 +108,7 @@ def fit_test_models(
     ToolkitError
         the test cannot be resolved; a model cannot be fitted to it
     """
-    from toolkit.cli.resolve import resolve_test
+    from toolkit.lab.resolve import resolve_test
 
     if axes != "SAE":
         raise ConfigError(
@@ -145,7 +145,7 @@ def fit_resolved(
     import numpy as np
 
     from toolkit.characteristics.groups import group
-    from toolkit.cli.fit_tir import STAND_IN_RADIUS
+    from toolkit.lab.tire_files import STAND_IN_RADIUS
     from toolkit.reduction.averaging import free_radius_m
     from toolkit.tires.catalog import fit_model
     from toolkit.tires.fit import Curve, why_not
@@ -259,3 +259,59 @@ def _fitted(
         findings=findings,
         radius_m=radius_m,
     )
+
+
+def model_choice(given: Sequence[str]) -> tuple[str, ...]:
+    """Return the models named, ``all`` being every one.
+
+    Raises
+    ------
+    FitError
+        no model of a name is built: to be told before anything is read
+    """
+    from toolkit.tires.catalog import find, model_names
+
+    names = [name for one in given for name in (model_names() if one == "all" else (one,))]
+    for name in names:
+        find(name)
+    return tuple(dict.fromkeys(names))
+
+
+def fit_options(loss: str, weights: str, rated_load: float | None, radius: float | None) -> Loss:
+    """Return the loss that is named; refuse options that no fit can use.
+
+    Raises
+    ------
+    ConfigError
+        a loss or a weighting is unknown; a load [N] or a radius [m] is no positive number
+    """
+    import math
+
+    from toolkit.tires.global_fit import WEIGHTS
+    from toolkit.tires.model import LOSSES
+
+    for name, got, known in (("loss", loss, LOSSES), ("weights", weights, WEIGHTS)):
+        if got not in known:
+            raise ConfigError(
+                f"unknown {name} {got!r}", where=f"--{name}", got=got, expected=", ".join(known),
+                next_step="name one of those expected", rule=f"unknown-{name}",
+            )  # fmt: skip
+    for option, value, unit in (("--rated-load", rated_load, "N"), ("--radius", radius, "m")):
+        if value is not None and not (math.isfinite(value) and value > 0):
+            raise ConfigError(
+                f"{option} is no positive number", where=option, got=value,
+                expected=f"a number of {unit} above 0", next_step="mend the option", rule="wrong-value",
+            )  # fmt: skip
+    return "robust" if loss == "robust" else "linear"
+
+
+def write_figures(fitted: Fitted, folder: Path) -> list[str]:
+    """Write the figures of all fits into a folder; return their names."""
+    from toolkit.files import write_atomic
+    from toolkit.report.fit_figures import fit_figures
+
+    word = fitted.use.word if fitted.use else None
+    made = fit_figures(fitted.data, fitted.curves, fitted.globals, fitted.comparison, word)
+    for name, picture in made.items():
+        write_atomic(folder / name, picture)
+    return sorted(made)
