@@ -66,7 +66,7 @@ def command(
     wanted = template or (home_template("diagnosis.docx", home) if pdf else None)
     opened = None if wanted is None else read_template(wanted)
     diagnosed = diagnose_case(
-        case, out, model=model, calibrations=calibrations, home=home, budget_s=budget,
+        case, out=out, model=model, calibrations=calibrations, home=home, budget_s=budget,
         tell=_teller(show=not quiet and not json),
     )  # fmt: skip
     payload = write_diagnosis(diagnosed, out, timing=lambda: {"seconds": time.perf_counter() - started})

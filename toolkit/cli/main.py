@@ -9,9 +9,9 @@ from typing import Annotated, Any, NoReturn
 
 import typer
 
-from toolkit import __version__
 from toolkit.cli.console import print_error, print_usage_error
 from toolkit.errors import ToolkitError
+from toolkit.version import __version__
 
 # typer carries a copy of click whose exceptions it does not export: the root of its usage errors.
 _UsageError: type[Exception] = typer.BadParameter.__mro__[2]

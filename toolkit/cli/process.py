@@ -52,8 +52,8 @@ def command(
     Example: toolkit process tests/2019-06-04 --out test.xlsx
     """
     from toolkit.lab.answers import unit_choice
+    from toolkit.lab.process_answer import process_payload, process_text
     from toolkit.lab.resolve import resolve_test
-    from toolkit.lab.test_answer import test_payload, test_text
     from toolkit.recording.marks import refuse_original
     from toolkit.testfile import write_test_file
 
@@ -74,11 +74,11 @@ def command(
             step=step,
         )
     digest = write_test_file(out, resolved.result, dict(resolved.recordings)) if out else None
-    payload = test_payload(resolved)
+    payload = process_payload(resolved)
     payload |= {
         "out": out,
         "content_sha256": digest,
         "timing": {"seconds": time.perf_counter() - started},
     }
-    answer(payload, test_text(resolved, out, style), as_json=json, quiet=quiet)
+    answer(payload, process_text(resolved, out, style), as_json=json, quiet=quiet)
     return exit_code(resolved.findings)

@@ -20,36 +20,36 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Diagnosed:
-    """A case with its result. ``model`` is the text of the model file, None where nothing is named."""
+    """A case with its result, and how the calibration that it names stands."""
 
     case: Case
     result: Result
-    model: str | None
     use: CalibrationUse | None
 
-    def payload(self) -> dict[str, Any]:
-        """Return the JSON answer without its timing."""
-        from toolkit.diagnosis.answer.model_text import MODEL
-        from toolkit.diagnosis.answer.serial import as_json
+    def model(self, folder: Path) -> str | None:
+        """Return the model file for a folder; None where nothing is named that could go back into use."""
+        from toolkit.diagnosis.answer.model_text import model_text
 
-        marks = draft_keys(*([self.use] if self.use else []))
-        return as_json(self.result.diagnosis) | marks | {"model": None if self.model is None else MODEL}
+        if self.result.search is None:
+            return None
+        return model_text(self.case, self.result.search, self.result.diagnosis, folder)
 
 
 def diagnose_case(
     file: Path,
-    out: Path,
     *,
+    out: Path | None = None,
     model: Path | None = None,
     calibrations: Path | None = None,
     home: Path | None = None,
     budget_s: float = 600.0,
     tell: Callable[[str], None] = lambda _text: None,
 ) -> Diagnosed:
-    """Return the diagnosis of a case; ``out`` is where `write_diagnosis` will put it.
+    """Return the diagnosis of a case.
 
     Parameters
     ----------
+    out : where `write_diagnosis` will put it: judged before the search, not after it
     model : model file in place of the case's simulation
     tell : told what is searched
 
@@ -59,18 +59,24 @@ def diagnose_case(
         the case cannot be read or used, or the folder not written
     """
     from toolkit.diagnosis.answer.case_findings import calibration_use
-    from toolkit.diagnosis.answer.model_text import MODEL, model_text
     from toolkit.diagnosis.case.reader import read_case
     from toolkit.diagnosis.diagnose import diagnose
 
     case = read_case(file, model=model)
-    _writable(out)
-    _apart(model or case.model, out / MODEL)
+    if out is not None:
+        check_folder(out, model or case.model)
     registry = machine_registry(case.simulation.kind, calibrations, home)
     result = diagnose(case, registry, budget_s=budget_s, tell=tell)
     tell("")
-    text = None if result.search is None else model_text(case, result.search, result.diagnosis, out)
-    return Diagnosed(case=case, result=result, model=text, use=calibration_use(case, registry))
+    return Diagnosed(case=case, result=result, use=calibration_use(case, registry))
+
+
+def check_folder(out: Path, model: Path | None) -> None:
+    """Refuse a folder that cannot be written, or whose model file is the one that was started from."""
+    from toolkit.diagnosis.answer.model_text import MODEL
+
+    _writable(out)
+    _apart(model, out / MODEL)
 
 
 def machine_registry(kind: str, calibrations: Path | None, home: Path | None) -> Path | None:
@@ -86,16 +92,19 @@ def write_diagnosis(
 ) -> dict[str, Any]:
     """Write predictions, model file, page and answer; return the answer. ``timing`` is asked at its end."""
     from toolkit.diagnosis.answer.model_text import MODEL
+    from toolkit.diagnosis.answer.serial import as_json
     from toolkit.files import write_atomic
     from toolkit.report.diagnosis.page import page
 
-    payload = diagnosed.payload()
+    model = diagnosed.model(out)
+    marks = draft_keys(*([diagnosed.use] if diagnosed.use else []))
+    payload = as_json(diagnosed.result.diagnosis) | marks | {"model": None if model is None else MODEL}
     drawn = page(diagnosed.result, diagnosed.use)
     payload["timing"] = timing()
     text = json.dumps({"schema": 1, **payload}, ensure_ascii=False, indent=2, allow_nan=False) + "\n"
     for name, content in diagnosed.result.predictions:
         write_atomic(out / "predictions" / name, content)
-    _write_model(out / MODEL, diagnosed.model)
+    _write_model(out / MODEL, model)
     write_atomic(out / "diagnosis.html", drawn)
     write_atomic(out / "diagnosis.json", text)
     return payload
@@ -110,13 +119,14 @@ def write_document(diagnosed: Diagnosed, opened: Template, out: Path, *, by: str
     from toolkit.report.diagnosis.content import build_diagnosis_content
     from toolkit.report.style import read_style, style_file
 
+    model = diagnosed.model(out)
     content = build_diagnosis_content(
         diagnosed.case,
         diagnosed.result,
         read_style(style_file(opened.path)),
         issued=date.today(),  # noqa: DTZ011
         use=diagnosed.use,
-        model_sha256=None if diagnosed.model is None else sha256_bytes(diagnosed.model.encode()),
+        model_sha256=None if model is None else sha256_bytes(model.encode()),
         by=by,
     )
     return delivered_keys(deliver(opened, content, out, name="diagnosis"))

@@ -10,8 +10,8 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from toolkit import __version__
 from toolkit.recording.marks import OWN_OUTPUT
+from toolkit.version import __version__
 
 if TYPE_CHECKING:
     from toolkit.diagnosis.answer.answer import Diagnosis

@@ -8,7 +8,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from toolkit import __version__
 from toolkit.calibration.records.use import DRAFT, UNVERIFIED
 from toolkit.estimate import has_interval, plus_minus
 from toolkit.files import sha256_bytes
@@ -23,6 +22,7 @@ from toolkit.report.style import Style
 from toolkit.report.tables import build_tables, summary_load
 from toolkit.report.tags import FIGURES, catalogue, format_number
 from toolkit.report.words import say_plot, say_table, say_values
+from toolkit.version import __version__
 
 if TYPE_CHECKING:
     from toolkit.calibration.records.record import CalibrationRecord

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from toolkit import __version__
 from toolkit.errors import ConfigError
 from toolkit.estimate import round_to_uncertainty, round_uncertainty
 from toolkit.recording.marks import OWN_OUTPUT
@@ -18,6 +17,7 @@ from toolkit.report.certificate.dcc_units import dsi, dsi_of_term
 from toolkit.report.certificate.dcc_xml import Node, node, quantity, quantity_list, release, rich, text
 from toolkit.report.certificate.decision import RULES
 from toolkit.units import unit
+from toolkit.version import __version__
 
 if TYPE_CHECKING:
     from toolkit.report.certificate.model import Certificate, LoadResult

@@ -5,11 +5,11 @@ from __future__ import annotations
 import datetime as dt
 from typing import Any
 
-from toolkit import __version__
 from toolkit.calibration.records.use import DRAFT
 from toolkit.recording.marks import output_keywords
 from toolkit.report.content import ReportContent
 from toolkit.report.template.xml import clean
+from toolkit.version import __version__
 
 
 def set_properties(package: Any, content: ReportContent) -> None:

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from toolkit.report.style import Style
 
 
-def test_payload(resolved: Resolved) -> dict[str, Any]:
+def process_payload(resolved: Resolved) -> dict[str, Any]:
     """Return a reduced test as the JSON answer: SI units, SAE axes; names carry the units.
 
     ``u_FY_N`` and ``u_MZ_Nm`` of a condition hold every source of its budget, null where it is not used.
@@ -110,7 +110,7 @@ def _characteristic(one: Any) -> dict[str, Any]:
     return found
 
 
-def test_text(resolved: Resolved, out: Path | None, style: Style) -> str:
+def process_text(resolved: Resolved, out: Path | None, style: Style) -> str:
     """Return a reduced test for people: conditions, marks, the characteristics of each load, findings."""
     reduced = resolved.result.reduced
     mark = "  SIMULATED" if reduced.info.simulated else ""
