@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import doctest
 import re
 import shutil
 import subprocess
@@ -310,3 +311,12 @@ def test_a_face_says_itself_in_a_line_and_escapes_what_it_shows(
     with pytest.raises(ConfigError) as caught:
         hostile.plot()
     assert caught.value.rule == "no-figure"
+
+
+def test_the_guide_does_what_it_shows(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    guide = Path(toolkit.__file__).parents[1] / "docs" / "library.md"
+    monkeypatch.chdir(tmp_path)
+    flags = doctest.NORMALIZE_WHITESPACE | doctest.ELLIPSIS
+    failed, run = doctest.testfile(str(guide), module_relative=False, optionflags=flags)
+    assert run > 20
+    assert failed == 0
