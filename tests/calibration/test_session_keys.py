@@ -12,7 +12,7 @@ from toolkit.calibration.fit.session_fit import fit_session
 from toolkit.calibration.registry.approval import approve
 from toolkit.calibration.registry.candidate import calibrate
 from toolkit.calibration.registry.registry import Registry
-from toolkit.calibration.registry.stored_session import stored_session
+from toolkit.calibration.registry.stored import stored_session
 from toolkit.calibration.session import read
 from toolkit.calibration.session.keys import DATES, SESSION, TEXTS
 from toolkit.errors import ConfigError

@@ -3,26 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Literal, cast
+from dataclasses import replace
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from toolkit.channels import Rotation
-from toolkit.characteristics.direction import Direction
-from toolkit.characteristics.groups import Group, group
-from toolkit.characteristics.model import (
-    AtAngle,
-    Budget,
-    Characteristics,
-    DirectionFit,
-    Point,
-    Pull,
-    Stiffness,
-)
-from toolkit.characteristics.pull import NAMES as PULL
-from toolkit.characteristics.rows import BOTH, Row, directions_of, point_u, rows_of
+from toolkit.characteristics.groups import Direction, DirectionFit, Group, directions_of, group
+from toolkit.characteristics.model import Characteristics, Point, Row
+from toolkit.characteristics.rows import point_u, rows_of
 from toolkit.characteristics.shared import shared_of
-from toolkit.characteristics.stiffness import NAMES as STIFFNESS
 from toolkit.findings import Finding
 from toolkit.tires.evaluate import estimate_at
 from toolkit.tires.fit import fit_curves, why_not
@@ -47,52 +36,13 @@ def characterise(
     fits, findings = _fit(groups)
     directions = directions_of(reduced, fits)
     shared = shared_of(reduced, machine=machine, record=record)
-    rows = rows_of(directions, shared=shared)
-    found = {(row.name, row.load_N, row.rotation, row.SA_rad): row.number.estimate() for row in rows}
-    loads = sorted({d.group.load_N for d in directions})
     return Characteristics(
         fits=fits,
-        stiffness=tuple(
-            Stiffness(
-                load_N=g.load_N,
-                rotation=g.rotation,
-                **{name: found.get((name, g.load_N, g.rotation, None)) for name in STIFFNESS},
-            )
-            for g in groups
-        ),
-        pull=tuple(
-            Pull(load_N=load, **{name: found.get((name, load, BOTH, None)) for name in PULL})
-            for load in loads
-        ),
+        rows=tuple(replace(row, parts=()) for row in rows_of(directions, shared=shared)),
         findings=(*findings, *_line_findings(directions)),
-        at_angles=tuple(
-            AtAngle(
-                load_N=load,
-                rotation=rotation,
-                SA_rad=angle,
-                FY=found.get(("FY", load, rotation, angle)),
-                MZ=found.get(("MZ", load, rotation, angle)),
-            )
-            for load, rotation, angle in dict.fromkeys(
-                (row.load_N, cast("Rotation", row.rotation), row.SA_rad)
-                for row in rows
-                if row.SA_rad is not None
-            )
-        ),
         points=tuple(
             Point(file=file, first_row=row, u_FY=u["FY"], u_MZ=u["MZ"])
             for (file, row), u in point_u(directions, shared=shared).items()
-        ),
-        budgets=tuple(
-            Budget(
-                load_N=row.load_N,
-                rotation=row.rotation,
-                name=row.name,
-                unit=row.number.unit,
-                sources=row.number.by_source(),
-            )
-            for row in rows
-            if row.SA_rad is None
         ),
     )
 
@@ -104,11 +54,12 @@ def characteristic_rows(
     machine: Machine,
     record: CalibrationRecord | None,
 ) -> tuple[Row, ...]:
-    """Return the characteristics again as rows that know the parts of their uncertainty, to compare them."""
-    return rows_of(
+    """Return the rows that have a value, with the parts of their uncertainty, to compare them."""
+    rows = rows_of(
         directions_of(reduced, characteristics.fits),
         shared=shared_of(reduced, machine=machine, record=record),
     )
+    return tuple(row for row in rows if row.estimate is not None)
 
 
 def _curve(group: Group, channel: Literal["FY", "MZ"]) -> Curve:

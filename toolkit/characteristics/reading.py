@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolkit.characteristics.direction import CHANNELS, Channel, Direction
+from toolkit.characteristics.groups import CHANNELS, Channel, Direction
 from toolkit.characteristics.scatter import Scatter, weights_of
 from toolkit.characteristics.shared import Shared
 from toolkit.characteristics.uncertain import Part, Uncertain, merged
@@ -41,11 +41,14 @@ class Reader:
     """Reads one direction; what its conditions share is computed once.
 
     ``scatter`` is that of the conditions about all curves of the test; without it each curve's own
-    covariance stands for it, as for a table whose rows follow one another.
+    covariance stands for it, as for a table whose rows follow one another. ``stepped`` False says that the
+    data are no steps of a protocol: a secant is then that of the curve.
     """
 
-    def __init__(self, direction: Direction, *, shared: Shared, scatter: Scatter | None = None) -> None:
-        self.direction, self.shared, self.scatter = direction, shared, scatter
+    def __init__(
+        self, direction: Direction, *, shared: Shared, scatter: Scatter | None = None, stepped: bool = True
+    ) -> None:
+        self.direction, self.shared, self.scatter, self.stepped = direction, shared, scatter, stepped
         self.group = direction.group
         conditions = self.group.conditions
         self._calibration = {c: shared.calibration_rows(c, conditions) for c in CHANNELS}
@@ -59,16 +62,23 @@ class Reader:
                 "MZ": np.array([one.u_MZ_zero for one in conditions]),
             }
         self._pseudo: dict[Channel, NDArray[np.float64]] = {}
+        # Several characteristics are made of the values at SA = 0 and of MZ where FY is zero.
+        self._at_zero: dict[Channel, Uncertain | None] = {}
+        self._residual: list[Uncertain | None] = []
 
     def covers_zero(self) -> bool:
         """Tell whether slip angles lie on both sides of zero."""
-        SA = self.group.SA
-        return len(SA) > 1 and bool(SA[0] <= 0.0 <= SA[-1])
+        return self.group.covers_zero()
 
     def value(self, channel: Channel, SA: float) -> Uncertain | None:
         """Return the curve's value at a slip angle [rad]; None without a curve."""
+        if SA == 0.0 and channel in self._at_zero:
+            return self._at_zero[channel]
         reading = self._value(channel, SA)
-        return None if reading is None else self._read(reading, f"value at {SA:.9g}")
+        number = None if reading is None else self._read(reading, f"value at {SA:.9g}")
+        if SA == 0.0:
+            self._at_zero[channel] = number
+        return number
 
     def _value(self, channel: Channel, SA: float) -> _Reading | None:
         fit = self.direction.curve(channel)
@@ -102,8 +112,10 @@ class Reader:
 
         A steering zero moves both steps; each value is carried from its measured angle to the step's along
         the fitted curve, so that the secant is that of the definition. Without a curve the measured span
-        is used as it is. Repeats of a step count as their mean.
+        is used as it is. Repeats of a step count as their mean. Data without steps: off the curve alone.
         """
+        if not self.stepped:
+            return self._chord(channel)
         sides = (self.group.step(1.0), self.group.step(-1.0))
         if not all(sides):
             return None
@@ -135,8 +147,7 @@ class Reader:
         reading = _Reading(channel=channel, estimate=estimate, weights=weights / span, angle=tuple(parts))
         return self._read(reading, "secant")
 
-    def chord(self, channel: Channel) -> Uncertain | None:
-        """Return the +-1 deg secant [per rad] off the curve alone, for data without steps of a protocol."""
+    def _chord(self, channel: Channel) -> Uncertain | None:
         fit = self.direction.curve(channel)
         one = float(np.radians(1.0))
         SA = self.group.SA
@@ -160,6 +171,11 @@ class Reader:
         An error of FY moves the angle at which it is read, by dMZ/dFY along the curves; a zero of the slip
         angle moves both curves alike and cancels, as does the slip angle of a single block.
         """
+        if not self._residual:
+            self._residual.append(self._moment_without_force())
+        return self._residual[0]
+
+    def _moment_without_force(self) -> Uncertain | None:
         FY = self.direction.curve("FY")
         crossing = None if FY is None or not self.covers_zero() else zero_crossing(FY)
         if FY is None or crossing is None:

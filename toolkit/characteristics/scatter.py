@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolkit.characteristics.direction import CHANNELS, Channel, Direction
+from toolkit.characteristics.groups import CHANNELS, Channel, Direction
 from toolkit.reduction.common_load import at_one_angle, slopes
 from toolkit.tires.catalog import model
 from toolkit.tires.evaluate import slope_at, value_at

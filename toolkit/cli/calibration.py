@@ -281,7 +281,7 @@ def discard(
 
     Example: toolkit calibration discard m15-r3 --reason "cable of D52 was loose" --by "first person"
     """
-    from toolkit.calibration.registry.discard import discard as decide
+    from toolkit.calibration.registry.approval import discard as decide
 
     registry = _registry(calibrations, home)
     status = decide(registry, record_id, reason=reason, by=by)
@@ -305,7 +305,7 @@ def report(
     """
     from toolkit.calibration.fit.findings import session_findings
     from toolkit.calibration.fit.session_fit import fit_session
-    from toolkit.calibration.registry.stored_session import stored_session
+    from toolkit.calibration.registry.stored import stored_session
     from toolkit.lab.answers import finding_lines, refuse_unwritable
     from toolkit.lab.session_answer import fit_report
 

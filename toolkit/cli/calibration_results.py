@@ -110,7 +110,7 @@ def certificate(
     """
     from toolkit.lab.certificate import certificate_payload, certificate_text, deliver_certificate
     from toolkit.lab.home import home_template, open_registry
-    from toolkit.report.template.package import read_template
+    from toolkit.report.word.package import read_template
 
     started = time.perf_counter()
     opened = read_template(template or home_template("certificate.docx", home))

@@ -59,7 +59,7 @@ def command(
     _one_thread()
     from toolkit.lab.diagnosis import diagnose_case, diagnosis_text, write_diagnosis, write_document
     from toolkit.lab.home import home_template
-    from toolkit.report.template.package import read_template
+    from toolkit.report.word.package import read_template
 
     started = time.perf_counter()
     # The template is judged before anything is searched.

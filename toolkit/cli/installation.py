@@ -86,15 +86,16 @@ def explain(
     rule: Annotated[
         str | None,
         typer.Argument(
-            metavar="RULE", help="Rule id, or the name of an effect; without it, all rules and effects."
+            metavar="RULE",
+            help="Rule id, or the name of an effect or of a characteristic; without it, all of them.",
         ),
     ] = None,
     json: Json = False,
     quiet: Quiet = False,
 ) -> int:
-    """Explain a finding's rule and what to do, or an effect that a diagnosis names.
+    """Explain a finding's rule and what to do, an effect that a diagnosis names, or a characteristic.
 
-    Examples: toolkit explain no-tare, toolkit explain relaxation
+    Examples: toolkit explain no-tare, toolkit explain relaxation, toolkit explain PRAT
     """
     from toolkit.lab.rules import explained
 

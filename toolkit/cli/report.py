@@ -113,7 +113,7 @@ def command(
     from functools import partial
 
     from toolkit.report.drawer import Drawer
-    from toolkit.report.pdf import Office
+    from toolkit.report.word.office import Office
 
     chosen = choose_reader(reader)
     started = time.perf_counter()
@@ -125,7 +125,7 @@ def command(
         from toolkit.lab.home import home_template
         from toolkit.lab.reports import Options, attention, make_reports, report_text, reports_payload
         from toolkit.lab.resolve import resolve_test
-        from toolkit.report.template.package import read_template
+        from toolkit.report.word.package import read_template
 
         compared = model_choice(models) if models else ()
         shown = None if units is None else unit_choice(units)

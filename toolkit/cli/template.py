@@ -23,10 +23,10 @@ def check(
     Example: toolkit template check report_templates/org.docx
     """
     from toolkit.report.style import read_style, style_file
-    from toolkit.report.template.check import check_template
-    from toolkit.report.template.package import open_package, read_template
-    from toolkit.report.template.scan import scan
-    from toolkit.report.template.xml import stories
+    from toolkit.report.word.check import check_template
+    from toolkit.report.word.package import open_package, read_template
+    from toolkit.report.word.scan import scan
+    from toolkit.report.word.xml import stories
 
     template = read_template(file)
     found = check_template(template, read_style(style_file(file)))
@@ -69,12 +69,12 @@ def tags(
     """
     from toolkit.lab.answers import table
     from toolkit.report.audit.vocabulary import AUDIT
-    from toolkit.report.build import build_content
     from toolkit.report.certificate.vocabulary import CERTIFICATE
     from toolkit.report.comparison.vocabulary import COMPARISON
     from toolkit.report.diagnosis.vocabulary import DIAGNOSIS
     from toolkit.report.listing import list_tags
     from toolkit.report.style import read_style, style_file
+    from toolkit.report.test.content import build_content
     from toolkit.report.vocabulary import REPORT
 
     kinds = {one.name: one for one in (REPORT, CERTIFICATE, COMPARISON, DIAGNOSIS, AUDIT)}
@@ -119,12 +119,12 @@ def new(
     """
     from toolkit.errors import OutputError
     from toolkit.files import write_atomic
-    from toolkit.report.design.default import STYLE_FILE
-    from toolkit.report.design.files import packaged_templates
+    from toolkit.lab.home import packaged_home
+    from toolkit.report.style import style_file
 
-    known = packaged_templates()
-    if like not in known:
-        raise typer.BadParameter(", ".join(known), param_hint="--like")
+    sources = {path.stem: path for path in sorted((packaged_home() / "report_templates").glob("*.docx"))}
+    if like not in sources:
+        raise typer.BadParameter(", ".join(sources), param_hint="--like")
 
     if file.suffix.lower() != ".docx":
         raise OutputError(
@@ -146,7 +146,8 @@ def new(
                 next_step="choose another name, or overwrite with --force",
                 rule="not-empty",
             )
-    write_atomic(file, known[like].build())
-    write_atomic(style, known[like].style or STYLE_FILE)
+    source = sources[like]
+    write_atomic(file, source.read_bytes())
+    write_atomic(style, (style_file(source) or source.with_name("org.toml")).read_bytes())
     answer({"template": file, "style": style}, f"{file}\n{style}", as_json=json, quiet=quiet)
     return 0

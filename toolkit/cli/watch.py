@@ -75,8 +75,8 @@ def command(
     from toolkit.lab.reports import Options
     from toolkit.lab.resolve import resolve_test
     from toolkit.lab.watch import WatchAnswer, alone, watcher_of
-    from toolkit.report.pdf import find_soffice
-    from toolkit.report.template.package import read_template
+    from toolkit.report.word.office import find_soffice
+    from toolkit.report.word.package import read_template
 
     if not folder.is_dir():
         raise ConfigError(

@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from toolkit.characteristics.rows import Row
+from toolkit.characteristics.model import Row
 from toolkit.characteristics.uncertain import Part, Uncertain, weighted
 
 REACH = 0.05  # of the outermost load

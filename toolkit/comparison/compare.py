@@ -10,9 +10,8 @@ from typing import TYPE_CHECKING
 
 from toolkit.characteristics.characterise import characteristic_rows
 from toolkit.characteristics.shared import identity_of
-from toolkit.comparison.differences import differences
+from toolkit.comparison.differences import differences, pattern_effects
 from toolkit.comparison.model import MODES, Comparison, Entry, Mode, Repeats
-from toolkit.comparison.pattern import pattern_effect
 from toolkit.comparison.precision import repeats_of
 from toolkit.errors import ConfigError
 from toolkit.findings import Finding
@@ -124,7 +123,7 @@ def compare(
         level=level,
         differences=found,
         repeats=repeats,
-        pattern=pattern_effect(named),
+        pattern=pattern_effects(named),
         left_out=left_out,
         findings=tuple(_findings(named, chosen, repeats, stated=mode is not None)),
     )

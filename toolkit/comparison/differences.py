@@ -6,12 +6,12 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 
-from toolkit.characteristics.rows import Row
+from toolkit.characteristics.catalogue import compared
+from toolkit.characteristics.model import Row
 from toolkit.characteristics.uncertain import Uncertain, weighted
 from toolkit.comparison.at_load import at_load
-from toolkit.comparison.holm import holm
-from toolkit.comparison.model import PARTS, Difference, Entry, Part
-from toolkit.comparison.quantities import CHARACTERISTICS, CURVES
+from toolkit.comparison.model import PARTS, Difference, Entry, Part, PatternEffect
+from toolkit.comparison.significance import holm, two_sided_p
 from toolkit.units import in_both
 
 Series = tuple[str, str, float | None]
@@ -20,13 +20,12 @@ _SAME_ANGLE = 1e-6  # rad
 
 def series_of(rows: Sequence[Row]) -> dict[Series, list[Row]]:
     """Return the rows that are compared, by (name, rotation, slip angle)."""
-    names = {one.name for one in (*CHARACTERISTICS, *CURVES)}
-    found: dict[Series, list[Row]] = {}
+    series: dict[Series, list[Row]] = {}
     for row in rows:
-        if row.name in names:
+        if row.characteristic.compared:
             angle = None if row.SA_rad is None else round(row.SA_rad / _SAME_ANGLE) * _SAME_ANGLE
-            found.setdefault((row.name, row.rotation, angle), []).append(row)
-    return found
+            series.setdefault((row.name, row.rotation, angle), []).append(row)
+    return series
 
 
 def differences(entries: Sequence[Entry], *, level: float) -> tuple[tuple[Difference, ...], tuple[str, ...]]:
@@ -77,19 +76,6 @@ def _difference(series: Series, row: Row, number: Uncertain, label: str) -> Diff
     )
 
 
-def two_sided_p(value: float, u: float, dof: float) -> float | None:
-    """Return the two-sided p of a value that has standard uncertainty ``u`` being zero; None without one.
-
-    Student's t; normal for infinite degrees of freedom.
-    """
-    from scipy.special import ndtr, stdtr
-
-    if not u > 0 or math.isnan(dof):
-        return None
-    t = -abs(value) / u
-    return float(2 * (ndtr(t) if math.isinf(dof) else stdtr(dof, t)))
-
-
 def _decided(found: Sequence[Difference], part: Part, level: float) -> list[Difference]:
     mine = [one for one in found if one.part == part]
     adjusted = holm([one.p for one in mine])
@@ -111,3 +97,37 @@ def _left_out(label: str, lacking: dict[str, None], beyond: dict[float, None]) -
     if beyond:
         found.append(f"{label} does not reach the load {in_both(list(beyond), 'N', '.0f')}")
     return found
+
+
+def pattern_effects(entries: Sequence[Entry]) -> tuple[PatternEffect, ...]:
+    """Return the pattern effects of two prototypes whose belt cords mirror each other.
+
+        pattern effect = (PRAT_regular + PRAT_reversed)/2,   body effect = (PRAT_regular - PRAT_reversed)/2
+
+    The belt's part of PRAT changes its sign with the cords, the tread's does not (source document, 6.1.1). By
+    either definition of PRAT, at 0 deg and at FY = 0; empty without one regular and one reversed belt.
+    """
+    regular = [entry for entry in entries if entry.condition("belt") == "regular"]
+    turned = [entry for entry in entries if entry.condition("belt") == "reversed"]
+    if len(regular) != 1 or len(turned) != 1:
+        return ()
+    ours, theirs = series_of(regular[0].rows), series_of(turned[0].rows)
+    effects = []
+    for declared in compared():
+        series = (declared.name, "both", None)
+        if not declared.belt_sign or series not in theirs:
+            continue
+        for row in sorted(ours.get(series, ()), key=lambda row: row.load_N):
+            other = at_load(theirs[series], row.load_N, owner=turned[0].identity)
+            if other is not None:
+                effects.append(
+                    PatternEffect(
+                        name=declared.name,
+                        load_N=row.load_N,
+                        regular=row.number.estimate(),
+                        reversed=other.estimate(),
+                        pattern=weighted([(0.5, row.number), (0.5, other)]).estimate(),
+                        body=weighted([(0.5, row.number), (-0.5, other)]).estimate(),
+                    )
+                )
+    return tuple(effects)

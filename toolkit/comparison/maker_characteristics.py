@@ -2,8 +2,8 @@
 
     FZ [N],conicity [N],U_conicity [N],plysteer [N],secant_cornering [N/deg]
 
-One row a load; any of the names of `quantities`, each with its unit, and optionally its expanded uncertainty
-(k = 2) as ``U_<name>``. SAE axes that follow the travel; conicity and plysteer by symmetry.
+One row a load; any name of the catalogue that is compared, each with its unit, and optionally its expanded
+uncertainty (k = 2) as ``U_<name>``. SAE axes that follow the travel; conicity and plysteer by symmetry.
 """
 
 from __future__ import annotations
@@ -16,16 +16,18 @@ import re
 from pathlib import Path
 from typing import NoReturn
 
-from toolkit.characteristics.rows import BOTH, Row
+from toolkit.characteristics.catalogue import compared
+from toolkit.characteristics.characteristic import BOTH
+from toolkit.characteristics.model import Row
 from toolkit.characteristics.uncertain import Part, Uncertain
-from toolkit.comparison.quantities import CHARACTERISTICS
 from toolkit.errors import CellError, ColumnError, UnreadableError
 from toolkit.tires.plausibility import demand_possible
 from toolkit.units import unit
 
 _HEADER = re.compile(r"\s*([A-Za-z_]+)\s*\[([^\]]*)\]\s*")
-_SI = {"N": "N", "N*m": "N*m", "N/deg": "N/rad", "N*m/deg": "N*m/rad"}
-_NAMES = {one.name: _SI[one.unit] for one in CHARACTERISTICS}
+# The characteristics that a maker can state against load, by name, with their SI unit.
+_STATED = {one.name: one for one in compared() if one.scope != "angle"}
+_NAMES = {name: one.unit for name, one in _STATED.items()}
 
 
 def is_characteristics_table(path: Path) -> bool:
@@ -114,11 +116,11 @@ def _rows_of(values: dict[str, float | None], load: float, identity: str) -> lis
             else (Part(source="maker's statement", key=f"maker/{identity}/{name}/{load:.9g}", u=U / 2),)
         )
         found.append(
-            Row(
-                name=name,
+            Row.of(
+                name,
+                Uncertain(value=value, unit=si, parts=parts),
                 load_N=load,
-                rotation="forward" if name.startswith(("secant", "slope")) else BOTH,
-                number=Uncertain(value=value, unit=si, parts=parts),
+                rotation=BOTH if _STATED[name].scope == "load" else "forward",
             )
         )
     return found

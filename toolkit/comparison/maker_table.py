@@ -14,11 +14,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from toolkit.channels import signs
-from toolkit.characteristics.direction import CHANNELS, Direction
-from toolkit.characteristics.groups import Group
-from toolkit.characteristics.model import DirectionFit
+from toolkit.characteristics.catalogue import of_scope
+from toolkit.characteristics.groups import CHANNELS, Direction, DirectionFit, Group
+from toolkit.characteristics.model import Row
 from toolkit.characteristics.reading import Reader
-from toolkit.characteristics.rows import Row
+from toolkit.characteristics.rows import at_angles
 from toolkit.characteristics.shared import Shared
 from toolkit.errors import FitError
 from toolkit.findings import Finding
@@ -34,7 +34,6 @@ from toolkit.units import from_si
 if TYPE_CHECKING:
     from toolkit.tires.model import CurveFit
 
-_REACH_RAD = np.radians(0.5)
 # What a table may vary that a free-rolling, upright test does not.
 _ONE_VALUE = {"IA": ("deg", 0.1), "P": ("kPa", 5.0), "V": ("km/h", 5.0), "KAPPA": ("1", 0.005)}
 
@@ -78,7 +77,7 @@ def maker_rows(
         by_load.setdefault(curve.load_N or 0.0, {})[curve.channel] = (curve, fit)
     rows = []
     for load, channels in sorted(by_load.items()):
-        reader = Reader(_direction(load, channels, path), shared=_nothing_shared(identity))
+        reader = Reader(_direction(load, channels, path), shared=_nothing_shared(identity), stepped=False)
         rows += _rows(reader, load, angles_rad)
     sae = TireTable(path=path, axes="SAE", columns=())
     # Which parameters a curve leaves open is of no interest here: values and slopes are read off it.
@@ -91,19 +90,17 @@ def maker_rows(
 
 
 def _rows(reader: Reader, load: float, angles_rad: Sequence[float]) -> list[Row]:
-    found = []
-    SA = reader.group.SA
-    for channel, kind, sign in (("FY", "cornering", -1.0), ("MZ", "aligning", 1.0)):
-        assert channel in CHANNELS  # noqa: S101  tells the type
-        for way, number in (("secant", reader.chord(channel)), ("slope", reader.slope(channel))):
+    rows = []
+    for channel in CHANNELS:
+        for declared in of_scope("direction"):
+            number = declared.read(declared, reader) if declared.channel == channel else None
             if number is not None:
-                scaled = number.scaled(sign, number.unit)
-                found.append(Row(name=f"{way}_{kind}", load_N=load, rotation="forward", number=scaled))
-        for angle in angles_rad:
-            at = reader.value(channel, angle) if SA[0] - _REACH_RAD <= angle <= SA[-1] + _REACH_RAD else None
-            if at is not None:
-                found.append(Row(name=channel, load_N=load, rotation="forward", number=at, SA_rad=angle))
-    return found
+                rows.append(Row.of(declared.name, number, load_N=load, rotation="forward"))
+        at_angle = [declared for declared in of_scope("angle") if declared.channel == channel]
+        for (declared, _, _, angle), number in at_angles(reader, angles_rad, at_angle).items():
+            if number is not None:
+                rows.append(Row.of(declared.name, number, load_N=load, rotation="forward", SA_rad=angle))
+    return rows
 
 
 def _in_sae(curve: Curve) -> Curve:

@@ -23,8 +23,8 @@ from numpy.typing import NDArray
 
 from toolkit.comparison.at_load import at_load
 from toolkit.comparison.differences import Series, series_of
-from toolkit.comparison.holm import holm
 from toolkit.comparison.model import Entry, Factor, FactorSpread, Precision, Repeats, Spread
+from toolkit.comparison.significance import grubbs_p, holm
 
 FACTORS = ("day", "operator", "mounting", "calibration", "machine", "laboratory")
 
@@ -153,27 +153,6 @@ def factor_spread(values: NDArray[np.float64], levels: Sequence[Hashable], *, fa
         F=F,
         p=None if F is None else float(fdtrc(p - 1, dof, F)),
     )
-
-
-def grubbs_p(values: NDArray[np.float64]) -> float | None:
-    """Return the two-sided p of the value farthest from the mean (Grubbs, Technometrics 11, 1969, 1-21).
-
-    None for fewer than three values, or values that are all the same.
-
-    >>> round(grubbs_p(np.array([0.0, 0.1, -0.1, 0.05, 5.0])), 4) < 0.01
-    True
-    """
-    from scipy.special import stdtr
-
-    n, s = len(values), float(values.std(ddof=1)) if len(values) > 1 else 0.0
-    if n < 3 or s <= 0:
-        return None
-    G = float(np.max(np.abs(values - values.mean()))) / s
-    rest = (n - 1) ** 2 - n * G * G
-    if rest <= 0:
-        return 0.0
-    t = math.sqrt(n * (n - 2) * G * G / rest)
-    return min(1.0, 2 * n * float(stdtr(n - 2, -t)))
 
 
 def spread(s: float, dof: int) -> Spread:

@@ -61,7 +61,7 @@ def amend(
     from toolkit.lab.home import home_template
     from toolkit.lab.resolve import resolve_test
     from toolkit.report.deliver import deliver_all
-    from toolkit.report.template.package import read_template
+    from toolkit.report.word.package import read_template
 
     wanted = list(_wanted(linked))
     if not wanted:
@@ -95,9 +95,9 @@ def _wanted(linked: Linked) -> Iterator[tuple[PastReport, str]]:
 
 def _job(past: PastReport, resolved: Resolved, test: Path, template: Any, out: Path) -> Job:
     from toolkit.lab.handover import details_of, provenance
-    from toolkit.report.build import build_content
     from toolkit.report.deliver import Job
     from toolkit.report.style import read_style, style_file
+    from toolkit.report.test.content import build_content
 
     use = resolved.result.reduced.calibration
     why = (

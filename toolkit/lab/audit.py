@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from toolkit.calibration.records.use import CalibrationUse
     from toolkit.calibration.registry.registry import Registry
     from toolkit.lab.amended import Amended
-    from toolkit.report.template.package import Template
+    from toolkit.report.word.package import Template
 
     # Opens a stage of so many steps, None where nobody knows: yields what is told each step.
     Stage = Callable[[int | None, str], AbstractContextManager[Callable[[str], None]]]
@@ -78,7 +78,7 @@ def audit(order: AuditOrder, *, stage: Stage | None = None) -> tuple[AuditAnswer
         check_parquet(order.parquet)
     opened = None
     if order.template is not None:
-        from toolkit.report.template.package import read_template
+        from toolkit.report.word.package import read_template
 
         opened = read_template(order.template)
     with stage(len(names), "audit") as step:

@@ -16,8 +16,7 @@ if TYPE_CHECKING:
     from toolkit.calibration.records.record import CalibrationRecord, LoadFit
     from toolkit.calibration.registry.registry import Registry
     from toolkit.calibration.session.table import Table
-    from toolkit.calibration.uncertainty.conditions import Temperature
-    from toolkit.calibration.uncertainty.model import Budget
+    from toolkit.calibration.uncertainty.model import Budget, Temperature
     from toolkit.calibration.uncertainty.monte_carlo import MonteCarlo
 
 RANGE_POINTS = 11
@@ -85,7 +84,7 @@ def budget_answer(
         findings += more
     written = None
     if order.figure is not None:
-        from toolkit.report.calibration.uncertainty_figure import write_figure
+        from toolkit.report.calibration.chart_figures import write_figure
 
         written = write_figure(order.figure, budgets[0][0], budgets[0][1])
     payload = {
@@ -266,7 +265,7 @@ def _indications(text: str) -> dict[str, float]:
 
 def temperature_of(span: float | None, coefficient: float | None) -> Temperature | None:
     """Return the temperature conditions of use, None where no range is given [K, 1/K]."""
-    from toolkit.calibration.uncertainty.conditions import Temperature
+    from toolkit.calibration.uncertainty.model import Temperature
 
     if span is None:
         if coefficient is not None:

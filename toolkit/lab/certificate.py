@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from toolkit.calibration.registry.registry import Registry
     from toolkit.report.certificate.model import Certificate
     from toolkit.report.deliver import Delivered
-    from toolkit.report.template.package import Template
+    from toolkit.report.word.package import Template
 
 
 def deliver_certificate(

@@ -13,14 +13,14 @@ if TYPE_CHECKING:
     from toolkit.findings import Finding
     from toolkit.report.deliver import Delivered
     from toolkit.report.style import Style
-    from toolkit.report.template.package import Template
+    from toolkit.report.word.package import Template
 
 
 def comparison_template(template: Path | None, out: Path | None, home: Path | None) -> Template | None:
     """Return the template of a comparison's document, judged before anything is read; None without one."""
     from toolkit.errors import ConfigError
     from toolkit.lab.home import home_template
-    from toolkit.report.template.package import read_template
+    from toolkit.report.word.package import read_template
 
     if out is None:
         if template is not None:

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from toolkit.diagnosis.answer.answer import Diagnosis
     from toolkit.diagnosis.case.case import Case
     from toolkit.diagnosis.diagnose import Result
-    from toolkit.report.template.package import Template
+    from toolkit.report.word.package import Template
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -178,7 +178,7 @@ def _writable(out: Path) -> None:
 def diagnosis_text(made: Diagnosis, out: Path) -> str:
     """Return a diagnosis for people."""
     from toolkit.diagnosis.answer.answer import cut_short
-    from toolkit.report.diagnosis.chance import chance
+    from toolkit.report.diagnosis.numbers import chance
 
     cut = made.verdict == "unknown" and cut_short(made.skipped)
     lines = [f"{made.title}: {_CUT if cut else _VERDICTS[made.verdict]}"]

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from toolkit.findings import Finding
     from toolkit.lab.fit_models import Fitted
     from toolkit.tires.comparison import Comparison
-    from toolkit.tires.global_result import GlobalFit
+    from toolkit.tires.global_model import GlobalFit
     from toolkit.tires.model import CurveFit
 
 _PER_DEGREE = 3.141592653589793 / 180

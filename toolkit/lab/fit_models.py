@@ -17,8 +17,7 @@ if TYPE_CHECKING:
     from toolkit.lab.resolve import Resolved
     from toolkit.tires.comparison import Comparison
     from toolkit.tires.global_data import Measured
-    from toolkit.tires.global_model import GlobalModel
-    from toolkit.tires.global_result import ModelFit
+    from toolkit.tires.global_model import GlobalModel, ModelFit
     from toolkit.tires.model import CurveFit, Loss, TireModel
 
 
@@ -215,9 +214,8 @@ def _global(
     where: str,
     seconds: dict[str, float],
 ) -> tuple[tuple[ModelFit, ...], tuple[Finding, ...], tuple[CurveFit, ...]]:
-    from toolkit.tires.global_checks import why_not_global
     from toolkit.tires.global_fit import fit_global, global_findings, not_varied
-    from toolkit.tires.global_seeds import seeds_of
+    from toolkit.tires.global_seeds import seeds_of, why_not_global
 
     if not models:
         return (), (), ()
@@ -308,7 +306,7 @@ def fit_options(loss: str, weights: str, rated_load: float | None, radius: float
 def write_figures(fitted: Fitted, folder: Path) -> list[str]:
     """Write the figures of all fits into a folder; return their names."""
     from toolkit.files import write_atomic
-    from toolkit.report.fit_figures import fit_figures
+    from toolkit.report.test.fit_figures import fit_figures
 
     word = fitted.use.word if fitted.use else None
     made = fit_figures(fitted.data, fitted.curves, fitted.globals, fitted.comparison, word)

@@ -6,6 +6,7 @@ import math
 from typing import TYPE_CHECKING, Any
 
 from toolkit.channels import CHANNELS
+from toolkit.characteristics.characteristic import BOTH
 from toolkit.estimate import plus_minus
 from toolkit.lab.answers import draft_keys, estimate_keys, finding_lines, mark_words, table
 
@@ -22,6 +23,8 @@ def process_payload(resolved: Resolved) -> dict[str, Any]:
 
     ``u_FY_N`` and ``u_MZ_Nm`` of a condition hold every source of its budget, null where it is not used.
     """
+    from toolkit.characteristics.model import answer_lists
+
     reduced, characteristics = resolved.result.reduced, resolved.result.characteristics
     points = {(p.file, p.first_row): p for p in characteristics.points}
     return {
@@ -79,18 +82,20 @@ def process_payload(resolved: Resolved) -> dict[str, Any]:
             for c in reduced.conditions
         ],
         "characteristics": {
-            "stiffness": [_characteristic(s) for s in characteristics.stiffness],
-            "pull": [_characteristic(p) for p in characteristics.pull],
-            "at_angles": [_characteristic(a) for a in characteristics.at_angles],
+            **{
+                name: [_entry(entry) for entry in entries]
+                for name, entries in answer_lists(characteristics.rows).items()
+            },
             "budgets": [
                 {
-                    "load_N": b.load_N,
-                    "rotation": b.rotation,
-                    "name": b.name,
-                    "unit": b.unit,
-                    "standard_uncertainty": dict(b.sources),
+                    "load_N": row.load_N,
+                    "rotation": row.rotation,
+                    "name": row.name,
+                    "unit": row.estimate.unit,
+                    "standard_uncertainty": dict(row.sources),
                 }
-                for b in characteristics.budgets
+                for row in characteristics.rows
+                if row.estimate is not None and row.SA_rad is None
             ],
         },
         "impossible": [finding.as_dict() for finding in reduced.impossible],
@@ -98,16 +103,12 @@ def process_payload(resolved: Resolved) -> dict[str, Any]:
     }
 
 
-def _characteristic(one: Any) -> dict[str, Any]:
-    import dataclasses
-
+def _entry(entry: dict[str, Any]) -> dict[str, Any]:
     from toolkit.estimate import Estimate
 
-    found: dict[str, Any] = {}
-    for field in dataclasses.fields(one):
-        value = getattr(one, field.name)
-        found[field.name] = estimate_keys(value) if isinstance(value, Estimate) else value
-    return found
+    return {
+        key: estimate_keys(value) if isinstance(value, Estimate) else value for key, value in entry.items()
+    }
 
 
 def process_text(resolved: Resolved, out: Path | None, style: Style) -> str:
@@ -124,7 +125,7 @@ def process_text(resolved: Resolved, out: Path | None, style: Style) -> str:
         f"tare: {reduced.tare.source}",
         *(["reversed runs: the tire turned round on the hub"] if reduced.info.reversal == "tire" else []),
         "",
-        _pull_table(resolved, style),
+        _characteristics_table(resolved, style),
     ]
     if resolved.findings:
         lines += ["", f"findings: {len(resolved.findings)} (toolkit explain RULE tells more)"]
@@ -136,41 +137,27 @@ def process_text(resolved: Resolved, out: Path | None, style: Style) -> str:
     return "\n".join(lines)
 
 
-def _pull_table(resolved: Resolved, style: Style) -> str:
+def _characteristics_table(resolved: Resolved, style: Style) -> str:
+    """Return the printed characteristics, one row a load; those of a direction with the drum forward."""
+    from toolkit.characteristics.catalogue import columns, tables
     from toolkit.units import from_si
 
-    (force, per_N), (moment, per_Nm) = style.unit("N"), style.unit("N*m")
-    moment = str(moment).replace("*", "·")
-    stiffness = {(s.load_N, s.rotation): s for s in resolved.result.characteristics.stiffness}
-    per_degree = math.pi / 180
-    rows = []
-    for pull in resolved.result.characteristics.pull:
-        one = stiffness.get((pull.load_N, "forward")) or stiffness.get((pull.load_N, "reverse"))
-        rows.append(
-            [
-                f"{pull.load_N:.0f}",
-                f"{float(from_si(pull.load_N, 'lbf')):.0f}",
-                _shown(one.slope_cornering if one else None, per_degree * per_N, 1),
-                _shown(one.slope_aligning if one else None, per_degree * per_Nm, 2),
-                _shown(pull.conicity, per_N, 1),
-                _shown(pull.plysteer, per_N, 1),
-                _shown(pull.CRAT, per_Nm, 2),
-                _shown(pull.PRAT, per_Nm, 2),
-                _shown(pull.PRAT_at_FY_zero, per_Nm, 2),
-            ]
-        )
-    head = [
-        "FZ [N]",
-        "FZ [lbf]",
-        f"slope C_FY [{force}/deg]",
-        f"slope C_MZ [{moment}/deg]",
-        f"conicity [{force}]",
-        f"plysteer [{force}]",
-        f"CRAT [{moment}]",
-        f"PRAT [{moment}]",
-        f"PRAT at FY = 0 [{moment}]",
-    ]
-    return table(head, rows, align=">" * 9)
+    printed = [one for table in tables() for one in columns(table) if one.console_heading is not None]
+    units = {one.name: style.unit(one.printed_unit) for one in printed}
+    characteristics = resolved.result.characteristics
+    lines = []
+    for load in characteristics.loads_N:
+        rotations = {row.rotation for row in characteristics.rows if row.load_N == load}
+        direction = "forward" if "forward" in rotations else "reverse"
+        cells = [f"{load:.0f}", f"{float(from_si(load, 'lbf')):.0f}"]
+        for one in printed:
+            row = characteristics.at(one.name, load, BOTH if one.scope == "load" else direction)
+            factor = one.factor * units[one.name][1]
+            cells.append(_shown(row.estimate if row is not None else None, factor, one.digits))
+        lines.append(cells)
+    head = ["FZ [N]", "FZ [lbf]"]
+    head += [f"{one.console_heading} [{str(units[one.name][0]).replace('*', '·')}]" for one in printed]
+    return table(head, lines, align=">" * len(head))
 
 
 def _shown(estimate: Estimate | None, factor: float, digits: int) -> str:

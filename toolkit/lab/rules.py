@@ -1,4 +1,4 @@
-"""The rules of findings and the effects of a diagnosis, in plain words: what `toolkit explain` tells."""
+"""What `explain` tells in plain words: rules of findings, effects of a diagnosis, characteristics."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from toolkit.characteristics.characteristic import Characteristic
     from toolkit.effects.effect import Effect, EffectParameter
 
 RULES_FILE = Path(__file__).with_name("rules.toml")
@@ -20,41 +21,61 @@ def rules_catalogue() -> dict[str, dict[str, str]]:
 
 
 def explained(name: str | None) -> tuple[dict[str, Any], str]:
-    """Return a rule or an effect as JSON values and as text; of no name, all of them.
+    """Return a rule, an effect or a characteristic as JSON values and as text; of no name, all of them.
 
     Raises
     ------
     ConfigError
-        ``unknown-rule``: neither has this name; the nearest are named
+        ``unknown-rule``: none has this name; the nearest are named
     """
     import difflib
 
+    from toolkit.characteristics.catalogue import characteristics
     from toolkit.effects.catalogue import effects
     from toolkit.errors import ConfigError
 
     rules, known = rules_catalogue(), effects()
+    declared = {characteristic.name: characteristic for characteristic in characteristics()}
     if name is None:
         lines = [f"{rule:<24}{entry['means']}" for rule, entry in rules.items()]
         lines += ["", "effects that a diagnosis names:", ""]
         lines += [f"{key:<24}{effect.statement}" for key, effect in sorted(known.items())]
+        lines += ["", "characteristics of a test:", ""]
+        lines += [f"{key:<24}{characteristic.definition}" for key, characteristic in declared.items()]
         answer = {
             "rules": [{"rule": rule, **entry} for rule, entry in rules.items()],
             "effects": [effect_keys(effect) for _, effect in sorted(known.items())],
+            "characteristics": [
+                {"name": key, **characteristic.facts()} for key, characteristic in declared.items()
+            ],
         }
         return answer, "\n".join(lines)
-    if name in known:
-        return effect_keys(known[name]), effect_text(known[name])
+    # Conicity and plysteer are effects of a simulated tire and characteristics of a test: both are told.
+    if name in known or name in declared:
+        keys = effect_keys(known[name]) if name in known else {}
+        texts = [effect_text(known[name])] if name in known else []
+        if name in declared:
+            keys |= {"characteristic": {"name": name, **declared[name].facts()}}
+            texts.append(_characteristic_text(declared[name]))
+        return keys, "\n\n".join(texts)
     if name not in rules:
-        near = difflib.get_close_matches(name, [*rules, *known], n=3, cutoff=0.4)
+        near = difflib.get_close_matches(name, [*rules, *known, *declared], n=3, cutoff=0.4)
         raise ConfigError(
             f"unknown rule {name!r}",
             got=name,
-            expected=", ".join(near) if near else "a rule id as findings print it, or an effect's name",
+            expected=", ".join(near)
+            if near
+            else "a rule id as findings print it, or the name of an effect or a characteristic",
             next_step="'toolkit explain' lists them all",
             rule="unknown-rule",
         )
     entry = rules[name]
     return {"rule": name, **entry}, f"{name}\n  means: {entry['means']}\n  do:    {entry['do']}"
+
+
+def _characteristic_text(characteristic: Characteristic) -> str:
+    facts = (f"  {name + ':':<13}{text}" for name, text in characteristic.facts().items())
+    return "\n".join([f"{characteristic.name}, a characteristic of a test", *facts])
 
 
 def effect_text(effect: Effect) -> str:

@@ -227,7 +227,7 @@ class ProcessedTest(Face):
         }
 
     def _plots(self) -> Mapping[str, Plot]:
-        from toolkit.report.build import build_content
+        from toolkit.report.test.content import build_content
 
         return build_content(self.result.result, self.result.record, findings=self.findings).plots
 
@@ -344,7 +344,7 @@ def write_report(
     from toolkit.lab.fit_models import model_choice
     from toolkit.lab.home import home_template
     from toolkit.lab.reports import Options, make_reports
-    from toolkit.report.template.package import read_template
+    from toolkit.report.word.package import read_template
 
     options = Options(
         template=read_template(Path(template) if template else home_template("org.docx")),

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from toolkit.calibration.records.use import CalibrationUse
     from toolkit.reduction.model import ReducedTest
     from toolkit.tires.global_data import Measured
-    from toolkit.tires.global_result import ModelFit
+    from toolkit.tires.global_model import ModelFit
 
 STAND_IN_RADIUS = 0.3  # m; the forces of a tire file do not depend on it, only how QDZ is written
 

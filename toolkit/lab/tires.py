@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from toolkit.lab.quantities import Columns
     from toolkit.lab.resolve import Resolved
     from toolkit.report.content import Plot
-    from toolkit.tires.global_result import GlobalFit
+    from toolkit.tires.global_model import GlobalFit
     from toolkit.tires.model import CurveFit, Loss
     from toolkit.tires.slip import Angles
     from toolkit.tires.tir import TirFile
@@ -111,7 +111,7 @@ class TireFit(Face):
     def _plots(self) -> Mapping[str, Plot]:
         from dataclasses import replace
 
-        from toolkit.report.fit_figures import fit_plots
+        from toolkit.report.test.fit_figures import fit_plots
 
         fitted = self.result
         word = fitted.use.word if fitted.use else None

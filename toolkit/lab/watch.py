@@ -139,7 +139,7 @@ def _report(
     from toolkit.errors import ToolkitError
     from toolkit.lab.reports import MadeReport, make_reports
     from toolkit.report.drawer import Drawer
-    from toolkit.report.pdf import Office
+    from toolkit.report.word.office import Office
 
     tests = list(resolved)
     own = replace(options, resolve=resolved.__getitem__)

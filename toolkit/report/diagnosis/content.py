@@ -11,8 +11,7 @@ import math
 from typing import TYPE_CHECKING
 
 from toolkit.report.content import Cell, ReportContent, Table, Value
-from toolkit.report.diagnosis.chance import chance
-from toolkit.report.diagnosis.numbers import few, over
+from toolkit.report.diagnosis.numbers import chance, few, over
 from toolkit.report.diagnosis.page import headline
 from toolkit.report.diagnosis.plots import diagnosis_plots
 from toolkit.report.diagnosis.vocabulary import DIAGNOSIS, TABLES
