@@ -80,12 +80,12 @@ def command(
         template=template, parquet=parquet, draft=draft, calibrations=calibrations, home=home,
     )  # fmt: skip
     began = time.perf_counter()
-    told, written = audit(order, stage=partial(progress, show=not quiet and not json))
+    result, written = audit(order, stage=partial(progress, show=not quiet and not json))
     if json:
         seconds = time.perf_counter() - began
-        rate = len(told.made.files) / seconds if seconds else None
-        timing = {"seconds": seconds, "files_per_second": rate, "reused": told.made.reused}
-        stream({**payload_of(told), "written": [str(path) for path in written], "timing": timing})
+        rate = len(result.made.files) / seconds if seconds else None
+        timing = {"seconds": seconds, "files_per_second": rate, "reused": result.made.reused}
+        stream({**payload_of(result), "written": [str(path) for path in written], "timing": timing})
     elif not quiet:
-        typer.echo("\n".join([text_of(told), *(str(path) for path in written)]))
-    return 0 if told.made.clean else 1
+        typer.echo("\n".join([text_of(result), *(str(path) for path in written)]))
+    return 0 if result.made.clean else 1

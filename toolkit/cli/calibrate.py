@@ -81,20 +81,20 @@ def command(
             rule="usage",
         )
     refuse_unwritable(figures)
-    made = (rehearse if dry_run else calibrate)(session, registry, machine=machine, again=again)
-    status = NOT_ENTERED if dry_run and not made.existing else registry.status(made.record.id).state
-    payload, text = candidate_payload(made, status), candidate_text(made, status)
+    candidate = (rehearse if dry_run else calibrate)(session, registry, machine=machine, again=again)
+    status = NOT_ENTERED if dry_run and not candidate.existing else registry.status(candidate.record.id).state
+    payload, text = candidate_payload(candidate, status), candidate_text(candidate, status)
     if status == "candidate":
-        text += f"\n\nnext: {next_step(registry, made.record, machine)}"
+        text += f"\n\nnext: {next_step(registry, candidate.record, machine)}"
     payload["dry_run"] = dry_run
     if full or as_json or figures is not None:
         from toolkit.calibration.standards.evaluation import evaluations
 
-        payload["standards"] = [row.as_dict() for row in evaluations(made.fit)]
-        report = fit_report(made.fit, title=made.record.id, full=full, figures=figures)
+        payload["standards"] = [row.as_dict() for row in evaluations(candidate.fit)]
+        report = fit_report(candidate.fit, title=candidate.record.id, full=full, figures=figures)
         for name, load in report.loads.items():
             payload["loads"][name]["report"] = load
         payload |= report.payload
         text += report.text
     answer(payload, text, as_json=as_json, quiet=quiet)
-    return 0 if made.existing else exit_code(made.findings)
+    return 0 if candidate.existing else exit_code(candidate.findings)

@@ -236,8 +236,10 @@ def withdraw(
     from toolkit.lab.registry_answer import void_day
 
     registry = _registry(calibrations, home)
-    known = _day(on, "--on") or dt.date.max
-    status = decide(registry, record_id, on=known, void_from=_day(void_from, "--from"), reason=reason, by=by)
+    known_on = _day(on, "--on") or dt.date.max
+    status = decide(
+        registry, record_id, on=known_on, void_from=_day(void_from, "--from"), reason=reason, by=by
+    )
     void = void_day(status)
     text = f"{record_id}  withdrawn, void " + ("on every day" if status.void_always else f"from {void}")
     payload = {"id": record_id, "status": status.state, "void_from": void, "void_always": status.void_always}

@@ -115,14 +115,14 @@ def certificate(
     started = time.perf_counter()
     opened = read_template(template or home_template("certificate.docx", home))
     with progress(None, "certificate", show=not (json or quiet)) as step:
-        made, delivered = deliver_certificate(
+        issued, delivered = deliver_certificate(
             open_registry(calibrations, home), record_id, opened,
             out or Path.cwd() / f"certificate-{record_id}", issued=day(known_at), draft=draft,
             replaces=replaces, amendment=amendment_reason, dcc=dcc, keep=keep, step=step,
         )  # fmt: skip
-    payload = certificate_payload(made, delivered) | {"timing": {"seconds": time.perf_counter() - started}}
-    answer(payload, certificate_text(made, delivered), as_json=json, quiet=quiet)
-    return 1 if delivered.warnings else exit_code(made.findings)
+    payload = certificate_payload(issued, delivered) | {"timing": {"seconds": time.perf_counter() - started}}
+    answer(payload, certificate_text(issued, delivered), as_json=json, quiet=quiet)
+    return 1 if delivered.warnings else exit_code(issued.findings)
 
 
 def standard(
@@ -161,7 +161,7 @@ def standard(
             "no such standard", where="--standard", got=name, expected="e74 or iso376",
             next_step="name one of them", rule="usage",
         )  # fmt: skip
-    found = evaluate_record(
+    evaluations = evaluate_record(
         open_registry(calibrations, home), record_id,
         standard="e74" if name == "e74" else "iso376",
         load=load, indication=indication, degree=degree, preloads=preloads,
@@ -169,9 +169,9 @@ def standard(
     payload = {
         "id": record_id,
         "standard": name,
-        "evaluations": [evaluation.as_dict() for evaluation in found],
+        "evaluations": [evaluation.as_dict() for evaluation in evaluations],
     }
-    answer(payload, "\n\n".join(map(evaluation_text, found)), as_json=as_json, quiet=quiet)
+    answer(payload, "\n\n".join(map(evaluation_text, evaluations)), as_json=as_json, quiet=quiet)
     return 0
 
 

@@ -107,23 +107,27 @@ def command(
             sources, axes=axes, protocol=protocol, known_at=day(known_at), calibrations=calibrations,
             home=home, draft=draft, reader=chosen, step=step,
         )  # fmt: skip
-    found = compare(entries, mode=cast("Mode | None", mode), level=level, reproducibility=reproducibility)
-    drawn = write_figures(found, style, figures) if figures else {}
-    every = [*findings, *found.findings]
-    made = (
+    comparison = compare(
+        entries, mode=cast("Mode | None", mode), level=level, reproducibility=reproducibility
+    )
+    drawn = write_figures(comparison, style, figures) if figures else {}
+    attention = [*findings, *comparison.findings]
+    document = (
         None
         if opened is None or out is None
-        else deliver_comparison(found, opened, out, every, day(known_at), None if units is None else style)
+        else deliver_comparison(
+            comparison, opened, out, attention, day(known_at), None if units is None else style
+        )
     )
-    payload: dict[str, Any] = comparison_payload(found) | {
+    payload: dict[str, Any] = comparison_payload(comparison) | {
         "figures": drawn,
-        "document": None if made is None else delivered_keys(made),
-        "findings": [finding.as_dict() for finding in every],
+        "document": None if document is None else delivered_keys(document),
+        "findings": [finding.as_dict() for finding in attention],
         "timing": {"seconds": time.perf_counter() - started},
     }
-    text = comparison_text(found, style, every, drawn)
-    if made is not None:
-        text += f"\n\n{made.pdf}\n{made.docx}\n{made.pages} pages, verified"
-        text += "".join(f"\n  warning {one}" for one in made.warnings)
+    text = comparison_text(comparison, style, attention, drawn)
+    if document is not None:
+        text += f"\n\n{document.pdf}\n{document.docx}\n{document.pages} pages, verified"
+        text += "".join(f"\n  warning {warning}" for warning in document.warnings)
     answer(payload, text, as_json=json, quiet=quiet)
-    return 1 if made is not None and made.warnings else exit_code(every)
+    return 1 if document is not None and document.warnings else exit_code(attention)

@@ -63,8 +63,8 @@ def command(
 
     started = time.perf_counter()
     # The template is judged before anything is searched.
-    wanted = template or (home_template("diagnosis.docx", home) if pdf else None)
-    opened = None if wanted is None else read_template(wanted)
+    chosen = template or (home_template("diagnosis.docx", home) if pdf else None)
+    opened = None if chosen is None else read_template(chosen)
     diagnosed = diagnose_case(
         case, out=out, model=model, calibrations=calibrations, home=home, budget_s=budget,
         tell=_teller(show=not quiet and not json),
@@ -94,9 +94,9 @@ def _teller(*, show: bool) -> Any:
 
     started = time.monotonic()
 
-    def tell(what: str) -> None:
+    def tell(step: str) -> None:
         if show and sys.stderr.isatty():
-            text = f"{time.monotonic() - started:5.0f} s  {what}" if what else ""
+            text = f"{time.monotonic() - started:5.0f} s  {step}" if step else ""
             sys.stderr.write(f"\r\x1b[K{text[:110]}")
             sys.stderr.flush()
 

@@ -57,7 +57,7 @@ def command(
     failed = False
     for path in files:
         try:
-            found = inspect_file(path, registry, machine=machine, known_at=day(known_at))
+            inspection = inspect_file(path, registry, machine=machine, known_at=day(known_at))
         except ToolkitError as error:
             if len(files) == 1:
                 raise
@@ -66,10 +66,10 @@ def command(
             payloads.append({"file": path, "error": error.as_dict()})
             texts.append(f"{path}\n  error: {error}")
             continue
-        intervals = intervals_of(found) if prove else ()
-        payloads.append(inspection_payload(found, intervals))
-        texts.append(inspection_text(found, intervals))
-        findings += found.findings
+        intervals = intervals_of(inspection) if prove else ()
+        payloads.append(inspection_payload(inspection, intervals))
+        texts.append(inspection_text(inspection, intervals))
+        findings += inspection.findings
     payload: dict[str, Any] = {"files": payloads, "findings": [f.as_dict() for f in findings]}
     if len(payloads) == 1:  # one file: its keys stand at the top too
         payload = {**payloads[0], **payload}

@@ -43,13 +43,15 @@ def doctor(json: Json = False, quiet: Quiet = False) -> int:
     from toolkit.lab.answers import table
     from toolkit.lab.doctor import checks, mending_command
 
-    every = checks()
-    mend = None if all(check.ok for check in every) else mending_command()
-    rows = [["ok" if c.ok else "MISSING", c.name, c.found, c.needed_for] for c in every]
+    looked_for = checks()
+    mend = None if all(check.ok for check in looked_for) else mending_command()
+    rows = [["ok" if c.ok else "MISSING", c.name, c.found, c.needed_for] for c in looked_for]
     text = table(["", "what", "found", "needed for"], rows, align="<<<<")
     text += f"\n\nmend it with:\n  {mend}" if mend else "\n\nnothing is missing"
     payload = {
-        "checks": [{"name": c.name, "ok": c.ok, "found": c.found, "needed_for": c.needed_for} for c in every],
+        "checks": [
+            {"name": c.name, "ok": c.ok, "found": c.found, "needed_for": c.needed_for} for c in looked_for
+        ],
         "mend": mend,
     }
     answer(payload, text, as_json=json, quiet=quiet)

@@ -129,7 +129,7 @@ def command(
 
         compared = model_choice(models) if models else ()
         shown = None if units is None else unit_choice(units)
-        told = diagnosis_of(diagnosis, by, tests)
+        answer_and_file = diagnosis_of(diagnosis, by, tests)
         # The template is judged before anything is read: its error must not wait for a long reduction.
         opened = read_template(template or home_template("org.docx", home))
         options = Options(
@@ -151,14 +151,14 @@ def command(
             tir=tir or hand_over,
             models=compared,
             units=shown,
-            diagnosis=told,
+            diagnosis=answer_and_file,
             allow_missing=allow_missing,
             keep=keep,
         )
-        made = make_reports(tests, options, out, office=office, drawer=drawer, step=step)
-    payload = reports_payload(made) | {"timing": {"seconds": time.perf_counter() - started}}
-    answer(payload, "\n\n".join(report_text(report) for report in made), as_json=json, quiet=quiet)
+        delivered = make_reports(tests, options, out, office=office, drawer=drawer, step=step)
+    payload = reports_payload(delivered) | {"timing": {"seconds": time.perf_counter() - started}}
+    answer(payload, "\n\n".join(report_text(report) for report in delivered), as_json=json, quiet=quiet)
     return max(
         2 if report.resolved is None or isinstance(report.outcome, Exception) else int(attention(report))
-        for report in made
+        for report in delivered
     )

@@ -87,11 +87,11 @@ def command(
     return exit_code(findings)
 
 
-def _refuse_options(given: dict[str, object]) -> None:
+def _refuse_options(options: dict[str, object]) -> None:
     """Refuse options of a plan beside a model file."""
     from toolkit.errors import ConfigError
 
-    for name, value in given.items():
+    for name, value in options.items():
         if value is not None and value != []:
             raise ConfigError(
                 "a model file is run on inputs alone", where=name, got=name,

@@ -29,17 +29,20 @@ def check(
     from toolkit.report.word.xml import stories
 
     template = read_template(file)
-    found = check_template(template, read_style(style_file(file)))
+    findings = check_template(template, read_style(style_file(file)))
     tags = len({str(site.tag) for site in scan(stories(open_package(template)))})
-    text = "\n".join(f"{one.level:<8}{one.rule:<18}{one.part}, {one.place}: {one.message}" for one in found)
+    text = "\n".join(
+        f"{finding.level:<8}{finding.rule:<18}{finding.part}, {finding.place}: {finding.message}"
+        for finding in findings
+    )
     payload = {
         "template_sha256": template.sha256,
         "tag_count": tags,
-        "findings": [one.as_dict() for one in found],
+        "findings": [finding.as_dict() for finding in findings],
     }
     # Their number tells a template that another program has robbed of its controls.
     answer(payload, text or f"{file}: no findings; {tags} different tags", as_json=json, quiet=quiet)
-    return 1 if found else 0
+    return 1 if findings else 0
 
 
 @app.command("tags")
@@ -77,7 +80,9 @@ def tags(
     from toolkit.report.test.content import build_content
     from toolkit.report.vocabulary import REPORT
 
-    kinds = {one.name: one for one in (REPORT, CERTIFICATE, COMPARISON, DIAGNOSIS, AUDIT)}
+    kinds = {
+        vocabulary.name: vocabulary for vocabulary in (REPORT, CERTIFICATE, COMPARISON, DIAGNOSIS, AUDIT)
+    }
     if kind not in kinds or (kind != "report" and test is not None):
         raise typer.BadParameter(f"{', '.join(kinds)}; only report with --test", param_hint="--kind")
     style = read_style(style_file(template)) if template else read_style(None)

@@ -93,19 +93,19 @@ def command(
     )
     target = out or folder / "reports"
     say = (lambda _text: None) if json or quiet else typer.echo
-    told = WatchAnswer(keep=json)
+    watched = WatchAnswer(keep=json)
     with alone(target), _stopping() as stop:
         watcher = watcher_of(
             folder, target, options, settle_s=settle, patience_s=patience, units=units,
             calibrations=calibrations, home=home,
         )  # fmt: skip
         while not stop:
-            found = watcher.look()
-            told.add(found, say)
-            if once and not any(one.reason == "files are arriving" for one in found.waiting):
+            look = watcher.look()
+            watched.add(look, say)
+            if once and not any(waits.reason == "files are arriving" for waits in look.waiting):
                 break
             _sleep(interval, stop)
-    payload = told.payload()
+    payload = watched.payload()
     answer(payload, "", as_json=json, quiet=quiet)
     return 1 if payload["waiting"] or payload["set_aside"] or payload["attention"] else 0
 
@@ -115,8 +115,8 @@ def _stopping() -> Iterator[list[int]]:
     """Yield a list that is no longer empty once the command was asked to end."""
     asked: list[int] = []
     old = {
-        one: signal.signal(one, lambda number, _frame: asked.append(number))
-        for one in (signal.SIGTERM, signal.SIGINT)
+        request: signal.signal(request, lambda number, _frame: asked.append(number))
+        for request in (signal.SIGTERM, signal.SIGINT)
     }
     try:
         yield asked
@@ -127,5 +127,5 @@ def _stopping() -> Iterator[list[int]]:
 
 def _sleep(seconds: float, stop: list[int]) -> None:
     end = time.monotonic() + seconds
-    while not stop and (left := end - time.monotonic()) > 0:
-        time.sleep(min(left, 0.2))
+    while not stop and (remaining := end - time.monotonic()) > 0:
+        time.sleep(min(remaining, 0.2))

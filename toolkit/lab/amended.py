@@ -29,11 +29,11 @@ class Amended:
         """Return the report under the keys of the answer."""
         from toolkit.errors import ToolkitError
 
-        done = self.outcome
-        told: dict[str, Any] = {"replaces": self.replaces, "test": self.test}
-        if isinstance(done, ToolkitError):
-            return told | {"docx": None, "pdf": None, "error": done.as_dict()}
-        return told | {"docx": done.docx, "pdf": done.pdf, "error": None}
+        outcome = self.outcome
+        keys: dict[str, Any] = {"replaces": self.replaces, "test": self.test}
+        if isinstance(outcome, ToolkitError):
+            return keys | {"docx": None, "pdf": None, "error": outcome.as_dict()}
+        return keys | {"docx": outcome.docx, "pdf": outcome.pdf, "error": None}
 
 
 def amend(
@@ -63,13 +63,13 @@ def amend(
     from toolkit.report.deliver import deliver_all
     from toolkit.report.word.package import read_template
 
-    wanted = list(_wanted(linked))
-    if not wanted:
+    pairs = list(_wanted(linked))
+    if not pairs:
         return ()
     template = read_template(home_template("org.docx", home))
     jobs: list[Job] = []
     failed: dict[int, ToolkitError] = {}
-    for index, (past, test) in enumerate(wanted):
+    for index, (past, test) in enumerate(pairs):
         try:
             resolved = resolve_test(
                 archive / test, calibrations=calibrations, home=home, known_at=known_at, draft=draft
@@ -80,10 +80,12 @@ def amend(
             failed[index] = error
         step(past.report)
     # A test of past years may lack what today's template asks for: it prints a visible mark.
-    done = iter(deliver_all(jobs, allow_missing=True))
+    outcomes = iter(deliver_all(jobs, allow_missing=True))
     return tuple(
-        Amended(replaces=past.id or past.report, test=test, outcome=failed[i] if i in failed else next(done))
-        for i, (past, test) in enumerate(wanted)
+        Amended(
+            replaces=past.id or past.report, test=test, outcome=failed[i] if i in failed else next(outcomes)
+        )
+        for i, (past, test) in enumerate(pairs)
     )
 
 

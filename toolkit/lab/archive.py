@@ -52,12 +52,12 @@ class Audit(Face):
         return pd.DataFrame(rows)
 
     def _facts(self) -> Facts:
-        made = self.result.made
+        audit = self.result.made
         return {
-            "archive": made.archive,
-            "files": f"{len(made.files)} files",
-            "grades": ", ".join(f"{count} {grade}" for grade, count in made.grades.items() if count),
-            "known at": f"known at {made.known_at.isoformat()}",
+            "archive": audit.archive,
+            "files": f"{len(audit.files)} files",
+            "grades": ", ".join(f"{count} {grade}" for grade, count in audit.grades.items() if count),
+            "known at": f"known at {audit.known_at.isoformat()}",
         }
 
     def _plots(self) -> Mapping[str, Plot]:
@@ -69,10 +69,10 @@ class Audit(Face):
             label="files", x=tuple(map(float, range(len(counts)))), y=tuple(map(float, counts.values())),
             style="bars", notes=tuple(map(str, counts.values())),
         )  # fmt: skip
-        said = ", ".join(f"{count} {grade}" for grade, count in counts.items())
+        counted = ", ".join(f"{count} {grade}" for grade, count in counts.items())
         grades = Plot(
             name="grades", x_label="", y_label="files", curves=(bars,), names=tuple(counts),
-            caption="Files by grade.", alt=f"Files by grade: {said}.",
+            caption="Files by grade.", alt=f"Files by grade: {counted}.",
         )  # fmt: skip
         return {"grades": grades} | audit_plots(self.result.made)
 

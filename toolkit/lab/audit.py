@@ -127,7 +127,7 @@ def _silent(_total: int | None, _title: str) -> Iterator[Callable[[str], None]]:
 
 
 def write_folder(
-    out: Path, told: AuditAnswer, registry: Registry, template: Template | None
+    out: Path, answer: AuditAnswer, registry: Registry, template: Template | None
 ) -> tuple[Path, ...]:
     """Write the page for people, the lines for machines and, by a template, the summary; return them.
 
@@ -147,20 +147,20 @@ def write_folder(
 
     with atomic_path(out / LINES) as temporary, temporary.open("wb") as lines:
         head = {"generator": GENERATOR, "marks": OWN_OUTPUT, "schema": 1, "kind": "audit"}
-        lines.write(json.dumps({**head, "known_at": told.made.known_at.isoformat()}).encode() + b"\n")
-        linked = told.linked is not None
-        files = (json.dumps(one).encode() for one in files_of(told)) if linked else told.made.files.raw()
+        lines.write(json.dumps({**head, "known_at": answer.made.known_at.isoformat()}).encode() + b"\n")
+        linked = answer.linked is not None
+        files = (json.dumps(one).encode() for one in files_of(answer)) if linked else answer.made.files.raw()
         lines.writelines(one + b"\n" for one in files)
     view = AuditView(
-        made=told.made,
+        made=answer.made,
         rules=rules_catalogue(),
-        timelines=timelines(told.made, registry),
-        traces=tuple(traces(told.made, registry, _WORST)),
-        linked=told.linked,
-        drift=told.drift,
-        drifted=told.drifted,
-        drifted_tests=told.drifted_tests,
-        uses=_uses(told, registry),
+        timelines=timelines(answer.made, registry),
+        traces=tuple(traces(answer.made, registry, _WORST)),
+        linked=answer.linked,
+        drift=answer.drift,
+        drifted=answer.drifted,
+        drifted_tests=answer.drifted_tests,
+        uses=_uses(answer, registry),
     )
     write_page(out / PAGE, view)
     if template is None:
@@ -170,14 +170,14 @@ def write_folder(
     from toolkit.report.style import read_style, style_file
 
     content = build_audit_content(view, read_style(style_file(template.path)))
-    done = deliver(template, content, out, name="audit")
-    return out / PAGE, out / LINES, done.docx, done.pdf
+    summary = deliver(template, content, out, name="audit")
+    return out / PAGE, out / LINES, summary.docx, summary.pdf
 
 
-def _uses(told: AuditAnswer, registry: Registry) -> tuple[CalibrationUse, ...]:
+def _uses(answer: AuditAnswer, registry: Registry) -> tuple[CalibrationUse, ...]:
     """Return the records in force by which the changes of the files were computed."""
     from toolkit.calibration.records.use import CalibrationUse
 
-    wanted = {one["in_force"] for one in told.made.files.plain() if one["repair"] is not None}
-    records = [registry.load(one) for one in sorted(wanted)]
+    ids = {file["in_force"] for file in answer.made.files.plain() if file["repair"] is not None}
+    records = [registry.load(record_id) for record_id in sorted(ids)]
     return tuple(CalibrationUse(id=r.id, sha256=r.sha256, unverified=not r.verified) for r in records)

@@ -71,7 +71,7 @@ def budget_answer(
     budgets = []
     findings: list[Finding] = []
     for name in names:
-        budget, more = _budget(record, rows, check, name, at, indications, order.temperature)
+        budget, own_findings = _budget(record, rows, check, name, at, indications, order.temperature)
         result = None
         if order.trials is not None:
             from toolkit.calibration.uncertainty.monte_carlo import monte_carlo
@@ -79,9 +79,9 @@ def budget_answer(
             result = monte_carlo(
                 record, rows, budget, trials=order.trials or None, seed=order.seed, digits=order.digits
             )
-            more += _not_validated(record, budget, result)
+            own_findings += _not_validated(record, budget, result)
         budgets.append((budget, _over_range(record, rows, check, name, order.temperature), result))
-        findings += more
+        findings += own_findings
     written = None
     if order.figure is not None:
         from toolkit.report.calibration.chart_figures import write_figure
@@ -113,13 +113,13 @@ def _budget(
     if indications is None:
         value = None if at is None else _value(at, record.load(name))
         return calibration_budget(record, rows, check, name, value, temperature=temperature), []
-    made = predict(record, rows, check, name, _indications(indications), temperature=temperature)
+    prediction = predict(record, rows, check, name, _indications(indications), temperature=temperature)
     findings = [
         Finding(rule="beyond-range", where=f"{record.id}, {cell}",
                 message="the indication lies beyond those of the calibration: the record extrapolates")
-        for cell in made.beyond
+        for cell in prediction.beyond
     ]  # fmt: skip
-    return made.budget, findings
+    return prediction.budget, findings
 
 
 def _over_range(
@@ -127,8 +127,8 @@ def _over_range(
 ) -> tuple[Budget, ...]:
     from toolkit.calibration.uncertainty.budget import calibration_budget
 
-    one = record.load(name)
-    low, high = min(one.minimum or 0.0, 0.0), max(one.maximum or 0.0, 0.0)
+    fit = record.load(name)
+    low, high = min(fit.minimum or 0.0, 0.0), max(fit.maximum or 0.0, 0.0)
     # The ends as they are: a rounded one could lie outside the range.
     steps = [low + (high - low) * i / (RANGE_POINTS - 1) for i in range(RANGE_POINTS - 1)] + [high]
     return tuple(calibration_budget(record, rows, check, name, x, temperature=temperature) for x in steps)
@@ -153,11 +153,12 @@ def _payload(budget: Budget, curve: tuple[Budget, ...], result: MonteCarlo | Non
         "indications": list(budget.indications),
         "components": [
             {
-                "name": one.name, "description": one.description, "type": one.type,
-                "distribution": one.distribution, "u": one.u, "dof": one.dof, "share": budget.share(one),
-                "source": one.source, "stated": one.stated,
+                "name": component.name, "description": component.description, "type": component.type,
+                "distribution": component.distribution, "u": component.u, "dof": component.dof,
+                "share": budget.share(component),
+                "source": component.source, "stated": component.stated,
             }
-            for one in budget.components
+            for component in budget.components
         ],
         "u": budget.u,
         "dof": budget.dof,
@@ -166,7 +167,7 @@ def _payload(budget: Budget, curve: tuple[Budget, ...], result: MonteCarlo | Non
         "U_rounded": round_uncertainty(budget.U),
         "probability": budget.probability,
         "not_stated": list(budget.not_stated),
-        "range": [{"value": one.at, "u": one.u, "k": one.k, "U": one.U} for one in curve],
+        "range": [{"value": point.at, "u": point.u, "k": point.k, "U": point.U} for point in curve],
         "monte_carlo": None if result is None else {
             "trials": result.trials, "seed": result.seed, "value": result.value, "u": result.u,
             "low": result.low, "high": result.high, "budget_low": result.budget_low,
@@ -181,17 +182,18 @@ def _lines(budget: Budget, curve: tuple[Budget, ...], result: MonteCarlo | None)
     from toolkit.estimate import round_to_uncertainty, round_uncertainty
 
     unit = budget.unit
-    stated = [one for one in budget.components if one.stated]
-    largest = max((one.u for one in budget.components), default=0.0)
+    stated = [component for component in budget.components if component.stated]
+    largest = max((component.u for component in budget.components), default=0.0)
     lines = [
         f"{budget.record}  {budget.load} = {round_to_uncertainty(budget.at, budget.U)} {unit}",
         "",
         table(
             ["component", "type", "distribution", f"u [{unit}]", "dof", "share", "", "from"],
             [
-                [one.name, one.type, one.distribution, f"{one.u:.3g}", _dof(one.dof),
-                 f"{100 * budget.share(one):.1f} %", _bar(one.u, largest), one.description]
-                for one in stated
+                [component.name, component.type, component.distribution, f"{component.u:.3g}",
+                 _dof(component.dof), f"{100 * budget.share(component):.1f} %", _bar(component.u, largest),
+                 component.description]
+                for component in stated
             ],
             align="<<<>>><<",
         ),
@@ -201,12 +203,12 @@ def _lines(budget: Budget, curve: tuple[Budget, ...], result: MonteCarlo | None)
         f"expanded uncertainty           U = {round_uncertainty(budget.U)} {unit}, k = {budget.k:.2f}, "
         f"coverage probability {100 * budget.probability:.0f} %",
     ]  # fmt: skip
-    silent = [one for one in budget.components if not one.stated]
+    silent = [component for component in budget.components if not component.stated]
     if silent:
         lines += ["", "not stated, and therefore not in U:"]
-        lines += [f"  {one.name:<16}{one.description}" for one in silent]
+        lines += [f"  {component.name:<16}{component.description}" for component in silent]
     if result is not None:
-        said = "validated" if result.validated else "NOT VALIDATED"
+        verdict = "validated" if result.validated else "NOT VALIDATED"
         lines += [
             "",
             f"Monte Carlo, {result.trials} trials, seed {result.seed}: "
@@ -214,10 +216,11 @@ def _lines(budget: Budget, curve: tuple[Budget, ...], result: MonteCarlo | None)
             f"  interval {result.low:.7g} to {result.high:.7g}, budget {result.budget_low:.7g} to "
             f"{result.budget_high:.7g}",
             f"  ends differ by {result.low_difference:.2g} and {result.high_difference:.2g}, tolerance "
-            f"{result.delta:g} ({result.digits} digits of u): {said}",
+            f"{result.delta:g} ({result.digits} digits of u): {verdict}",
         ]
     over = [
-        [f"{one.at:.6g}", round_uncertainty(one.u), f"{one.k:.2f}", round_uncertainty(one.U)] for one in curve
+        [f"{point.at:.6g}", round_uncertainty(point.u), f"{point.k:.2f}", round_uncertainty(point.U)]
+        for point in curve
     ]
     head = [f"{budget.load} [{unit}]", "u", "k", f"U [{unit}]"]
     return [*lines, "", "over the range:", table(head, over, align=">>>>"), ""]
@@ -231,7 +234,7 @@ def _dof(dof: float) -> str:
     return "inf" if math.isinf(dof) else f"{dof:.3g}" if dof < 1000 else f"{dof:.0f}"
 
 
-def _value(text: str, one: LoadFit) -> float:
+def _value(text: str, fit: LoadFit) -> float:
     """Read ``VALUE`` or ``VALUEunit`` into the load's unit."""
     import re
 
@@ -240,27 +243,27 @@ def _value(text: str, one: LoadFit) -> float:
     match = re.fullmatch(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(\S.*)?", text)
     if match is None:
         raise _wrong(
-            "a load value cannot be read", "--at", text, f"a number, or one with a unit: 500{one.unit}"
+            "a load value cannot be read", "--at", text, f"a number, or one with a unit: 500{fit.unit}"
         )
     value = float(match[1])
     if match[2] is None:
         return value
-    found = unit(one.unit)
-    return value * si_scale(match[2].strip(), found.dimension, where="--at") / found.factor
+    load_unit = unit(fit.unit)
+    return value * si_scale(match[2].strip(), load_unit.dimension, where="--at") / load_unit.factor
 
 
 def _indications(text: str) -> dict[str, float]:
-    found: dict[str, float] = {}
+    indications: dict[str, float] = {}
     for part in text.split(","):
         name, _, number = part.partition("=")
         try:
             value = float(number)
         except ValueError as error:
             raise _wrong("an indication cannot be read", "--indications", part, "NAME=NUMBER,...") from error
-        if name.strip() in found:
+        if name.strip() in indications:
             raise _wrong("an indication is given twice", "--indications", name.strip(), "each of them once")
-        found[name.strip()] = value
-    return found
+        indications[name.strip()] = value
+    return indications
 
 
 def temperature_of(span: float | None, coefficient: float | None) -> Temperature | None:

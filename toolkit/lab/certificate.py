@@ -61,50 +61,54 @@ def deliver_certificate(
     return certificate, delivered
 
 
-def certificate_payload(made: Certificate, done: Delivered) -> dict[str, Any]:
+def certificate_payload(certificate: Certificate, delivered: Delivered) -> dict[str, Any]:
     """Return a delivered certificate as the JSON answer."""
     return {
-        "certificate": made.id,
-        "record": {"id": made.record, "sha256": made.record_sha256, "status": made.status},
-        "head": made.ledger_head,
-        "issued": made.issued.isoformat(),
-        "draft": made.draft,
-        "draft_reasons": list(made.draft_reasons),
-        "withdrawn": made.withdrawn,
-        "replaces": made.replaces,
-        **delivered_keys(done),
-        "dcc": done.companions[0] if done.companions else None,
-        "decision_rule": made.rule,
-        "loads": {one.load: _load(one) for one in made.loads},
-        "unverifiable": [f"{load}: {term}" for load, term in made.unverifiable],
-        "not_stated": list(made.gaps),
-        "manifest": [entry.as_dict() for entry in done.filled.manifest],
-        "findings": [finding.as_dict() for finding in made.findings],
+        "certificate": certificate.id,
+        "record": {
+            "id": certificate.record,
+            "sha256": certificate.record_sha256,
+            "status": certificate.status,
+        },
+        "head": certificate.ledger_head,
+        "issued": certificate.issued.isoformat(),
+        "draft": certificate.draft,
+        "draft_reasons": list(certificate.draft_reasons),
+        "withdrawn": certificate.withdrawn,
+        "replaces": certificate.replaces,
+        **delivered_keys(delivered),
+        "dcc": delivered.companions[0] if delivered.companions else None,
+        "decision_rule": certificate.rule,
+        "loads": {load.load: _load(load) for load in certificate.loads},
+        "unverifiable": [f"{load}: {term}" for load, term in certificate.unverifiable],
+        "not_stated": list(certificate.gaps),
+        "manifest": [entry.as_dict() for entry in delivered.filled.manifest],
+        "findings": [finding.as_dict() for finding in certificate.findings],
     }
 
 
-def _load(one: Any) -> dict[str, Any]:
-    full = one.full_scale
+def _load(load: Any) -> dict[str, Any]:
+    full = load.full_scale
     return {
-        "unit": one.unit,
+        "unit": load.unit,
         "full_scale": full.at,
         "U": full.U,
         "k": full.k,
         "probability": full.probability,
         "dof": full.dof,
-        "tolerance": one.tolerance,
-        "verdict": one.verdict,
+        "tolerance": load.tolerance,
+        "verdict": load.verdict,
     }
 
 
-def certificate_text(made: Certificate, done: Delivered) -> str:
+def certificate_text(certificate: Certificate, delivered: Delivered) -> str:
     """Return a delivered certificate for people."""
-    marks = "  DRAFT" if made.draft else "  WITHDRAWN" if made.withdrawn else ""
+    marks = "  DRAFT" if certificate.draft else "  WITHDRAWN" if certificate.withdrawn else ""
     lines = [
-        f"certificate {made.id} of {made.record}{marks}",
-        *(f"{path}" for path in (done.pdf, done.docx, *done.companions)),
-        f"{done.pages} pages, {len(done.filled.manifest)} values verified",
-        *(f"  warning {one}" for one in done.warnings),
-        *finding_lines(made.findings),
+        f"certificate {certificate.id} of {certificate.record}{marks}",
+        *(f"{path}" for path in (delivered.pdf, delivered.docx, *delivered.companions)),
+        f"{delivered.pages} pages, {len(delivered.filled.manifest)} values verified",
+        *(f"  warning {warning}" for warning in delivered.warnings),
+        *finding_lines(certificate.findings),
     ]
     return "\n".join(lines)

@@ -33,7 +33,7 @@ def comparison_template(template: Path | None, out: Path | None, home: Path | No
 
 
 def deliver_comparison(
-    found: Comparison,
+    comparison: Comparison,
     opened: Template,
     out: Path,
     findings: Sequence[Finding],
@@ -50,7 +50,7 @@ def deliver_comparison(
     style = read_style(style_file(opened.path))
     if units is not None:
         style = style.in_units_of(units)
-    content = build_comparison_content(found, style, findings, issued=known_at or date.today())  # noqa: DTZ011
+    content = build_comparison_content(comparison, style, findings, issued=known_at or date.today())  # noqa: DTZ011
     return deliver(opened, content, out, name="comparison")
 
 
@@ -58,20 +58,20 @@ def read_entries(sources: Sequence[Path], *, axes: str, **options: Any) -> tuple
     """Return what is compared, tests first read so that tables are read at their slip angles."""
     from toolkit.comparison.compare import DEFAULT_ANGLES
 
-    found: dict[int, Entry] = {}
+    entries: dict[int, Entry] = {}
     findings: list[Finding] = []
     tables = [i for i, path in enumerate(sources) if path.suffix.lower() == ".csv" and not path.is_dir()]
     for place, path in enumerate(sources):
         if place not in tables:
-            found[place], more = _test(path, **options)
-            findings += more
+            entries[place], own_findings = _test(path, **options)
+            findings += own_findings
     angles = sorted(
-        {row.SA_rad for one in found.values() for row in one.rows if row.SA_rad is not None}
+        {row.SA_rad for entry in entries.values() for row in entry.rows if row.SA_rad is not None}
     ) or list(DEFAULT_ANGLES)
     for place in tables:
-        found[place], more = _table(sources[place], axes=axes, angles=angles)
-        findings += more
-    return [found[place] for place in range(len(sources))], findings
+        entries[place], own_findings = _table(sources[place], axes=axes, angles=angles)
+        findings += own_findings
+    return [entries[place] for place in range(len(sources))], findings
 
 
 def _test(path: Path, **options: Any) -> tuple[Entry, list[Finding]]:
@@ -90,7 +90,7 @@ def _test(path: Path, **options: Any) -> tuple[Entry, list[Finding]]:
         record=resolved.record,
         source=str(path),
     )
-    return entry, [replace(one, where=f"{entry.label}: {one.where}") for one in resolved.findings]
+    return entry, [replace(finding, where=f"{entry.label}: {finding.where}") for finding in resolved.findings]
 
 
 def _table(path: Path, *, axes: str, angles: Sequence[float]) -> tuple[Entry, list[Finding]]:
@@ -113,14 +113,14 @@ def _table(path: Path, *, axes: str, angles: Sequence[float]) -> tuple[Entry, li
     )
 
 
-def write_figures(found: Comparison, style: Style, folder: Path) -> dict[str, Path]:
+def write_figures(comparison: Comparison, style: Style, folder: Path) -> dict[str, Path]:
     """Write the figures of a comparison into a folder; return their paths by name."""
     from toolkit.files import write_atomic
     from toolkit.report.comparison.plots import comparison_plots
     from toolkit.report.figures import draw
 
     drawn = {}
-    for name, plot in comparison_plots(found, style).items():
+    for name, plot in comparison_plots(comparison, style).items():
         path = folder / f"{name}.png"
         write_atomic(path, draw(plot).png)
         drawn[name] = path

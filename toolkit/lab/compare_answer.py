@@ -14,160 +14,168 @@ if TYPE_CHECKING:
     from toolkit.report.style import Style
 
 
-def comparison_payload(found: Comparison) -> dict[str, Any]:
+def comparison_payload(comparison: Comparison) -> dict[str, Any]:
     """Return a comparison as the JSON answer, in SI (angles in rad, stiffness per rad) and SAE axes."""
     return {
-        "mode": found.mode,
+        "mode": comparison.mode,
         "axes": "SAE",
-        "level": found.level,
-        "reference": found.reference.label,
-        **draft_keys(*found.uses),
-        "entries": [_entry(one) for one in found.entries],
-        "differences": [_difference(one) for one in found.differences],
-        "significant": sum(one.significant for one in found.differences),
-        "repeats": None if found.repeats is None else _repeats(found),
+        "level": comparison.level,
+        "reference": comparison.reference.label,
+        **draft_keys(*comparison.uses),
+        "entries": [_entry(entry) for entry in comparison.entries],
+        "differences": [_difference(difference) for difference in comparison.differences],
+        "significant": sum(difference.significant for difference in comparison.differences),
+        "repeats": None if comparison.repeats is None else _repeats(comparison),
         "pattern_effect": [
             {
-                "quantity": one.name,
-                "load_N": one.load_N,
-                "regular": estimate_keys(one.regular),
-                "reversed": estimate_keys(one.reversed),
-                "pattern": estimate_keys(one.pattern),
-                "body": estimate_keys(one.body),
+                "quantity": effect.name,
+                "load_N": effect.load_N,
+                "regular": estimate_keys(effect.regular),
+                "reversed": estimate_keys(effect.reversed),
+                "pattern": estimate_keys(effect.pattern),
+                "body": estimate_keys(effect.body),
             }
-            for one in found.pattern
+            for effect in comparison.pattern
         ],
-        "left_out": list(found.left_out),
+        "left_out": list(comparison.left_out),
     }
 
 
-def _entry(one: Entry) -> dict[str, Any]:
+def _entry(entry: Entry) -> dict[str, Any]:
     return {
-        "label": one.label,
-        "kind": one.kind,
-        "source": one.source,
-        "simulated": one.simulated,
-        "calibration": one.calibration and one.calibration.as_dict(),
-        "unverified": one.calibration is not None and one.calibration.unverified,
-        "conditions": dict(one.conditions),
+        "label": entry.label,
+        "kind": entry.kind,
+        "source": entry.source,
+        "simulated": entry.simulated,
+        "calibration": entry.calibration and entry.calibration.as_dict(),
+        "unverified": entry.calibration is not None and entry.calibration.unverified,
+        "conditions": dict(entry.conditions),
     }
 
 
-def _difference(one: Difference) -> dict[str, Any]:
-    base = one.reference.value
+def _difference(difference: Difference) -> dict[str, Any]:
+    base = difference.reference.value
     return {
-        "table": one.part,
-        "quantity": one.name,
-        "rotation": one.rotation,
-        "SA_rad": one.SA_rad,
-        "load_N": one.load_N,
-        "label": one.label,
-        "reference": estimate_keys(one.reference),
-        "other": estimate_keys(one.other),
-        "difference": estimate_keys(one.difference),
-        "difference_percent": 100 * one.difference.value / abs(base) if base else None,
-        "standard_uncertainty_if_nothing_were_shared": one.u_apart,
-        "p": one.p,
-        "p_holm": one.p_holm,
-        "significant": one.significant,
+        "table": difference.part,
+        "quantity": difference.name,
+        "rotation": difference.rotation,
+        "SA_rad": difference.SA_rad,
+        "load_N": difference.load_N,
+        "label": difference.label,
+        "reference": estimate_keys(difference.reference),
+        "other": estimate_keys(difference.other),
+        "difference": estimate_keys(difference.difference),
+        "difference_percent": 100 * difference.difference.value / abs(base) if base else None,
+        "standard_uncertainty_if_nothing_were_shared": difference.u_apart,
+        "p": difference.p,
+        "p_holm": difference.p_holm,
+        "significant": difference.significant,
     }
 
 
-def _repeats(found: Comparison) -> dict[str, Any]:
-    repeats = found.repeats
+def _repeats(comparison: Comparison) -> dict[str, Any]:
+    repeats = comparison.repeats
     assert repeats is not None  # noqa: S101  asked before
     return {
         "factors": [
             {
-                "factor": one.name,
-                "levels": list(one.levels),
-                "varied": one.varied,
-                "same_as": list(one.same_as),
-                "note": one.note,
+                "factor": factor.name,
+                "levels": list(factor.levels),
+                "varied": factor.varied,
+                "same_as": list(factor.same_as),
+                "note": factor.note,
             }
-            for one in repeats.factors
+            for factor in repeats.factors
         ],
         "reproducibility": repeats.reproducibility,
         "reproducibility_note": repeats.reproducibility_note,
         "precision": [
             {
-                "quantity": one.name,
-                "rotation": one.rotation,
-                "load_N": one.load_N,
-                "n": one.n,
-                "mean": one.mean,
-                "s": _spread(one.total),
-                "repeatability_s_r": None if one.repeatability is None else _spread(one.repeatability),
-                "repeatability_limit_r": one.limit_r,
-                "intermediate": [_factor(factor) for factor in one.factors],
-                "farthest": one.farthest,
-                "grubbs_p": one.outlier_p,
-                "grubbs_p_holm": one.outlier_p_holm,
-                "outlier": one.outlier,
+                "quantity": precision.name,
+                "rotation": precision.rotation,
+                "load_N": precision.load_N,
+                "n": precision.n,
+                "mean": precision.mean,
+                "s": _spread(precision.total),
+                "repeatability_s_r": None
+                if precision.repeatability is None
+                else _spread(precision.repeatability),
+                "repeatability_limit_r": precision.limit_r,
+                "intermediate": [_factor(factor) for factor in precision.factors],
+                "farthest": precision.farthest,
+                "grubbs_p": precision.outlier_p,
+                "grubbs_p_holm": precision.outlier_p_holm,
+                "outlier": precision.outlier,
             }
-            for one in repeats.precisions
+            for precision in repeats.precisions
         ],
     }
 
 
-def _spread(one: Spread) -> dict[str, Any]:
-    return {"value": one.value, "dof": one.dof, "low": one.low, "high": one.high}
+def _spread(spread: Spread) -> dict[str, Any]:
+    return {"value": spread.value, "dof": spread.dof, "low": spread.low, "high": spread.high}
 
 
-def _factor(one: FactorSpread) -> dict[str, Any]:
+def _factor(factor: FactorSpread) -> dict[str, Any]:
     return {
-        "factor": one.factor,
-        "levels": one.levels,
-        "s_I": one.s,
-        "s_between": one.s_between,
-        "F": one.F,
-        "p": one.p,
-        "p_holm": one.p_holm,
-        "significant": one.significant,
+        "factor": factor.factor,
+        "levels": factor.levels,
+        "s_I": factor.s,
+        "s_between": factor.s_between,
+        "F": factor.F,
+        "p": factor.p,
+        "p_holm": factor.p_holm,
+        "significant": factor.significant,
     }
 
 
 def comparison_text(
-    found: Comparison, style: Style, findings: Sequence[Finding], drawn: Mapping[str, Path]
+    comparison: Comparison, style: Style, findings: Sequence[Finding], drawn: Mapping[str, Path]
 ) -> str:
     """Return a comparison for people."""
     from toolkit.comparison.model import PARTS
     from toolkit.report.comparison.cells import conclusion, shown_rows
 
-    simulated = "  SIMULATED" if any(one.simulated for one in found.entries) else ""
-    marks = simulated + mark_words(*found.uses)
-    parts = [f"comparison of {found.mode}, reference {found.reference.label}{marks}"]
-    parts += [_conditions(found), conclusion(found)]
+    simulated = "  SIMULATED" if any(entry.simulated for entry in comparison.entries) else ""
+    marks = simulated + mark_words(*comparison.uses)
+    parts = [f"comparison of {comparison.mode}, reference {comparison.reference.label}{marks}"]
+    parts += [_conditions(comparison), conclusion(comparison)]
     for part in PARTS:
-        rows, which = shown_rows(found, part)
-        if any(one.part == part for one in found.differences):
+        rows, which = shown_rows(comparison, part)
+        if any(difference.part == part for difference in comparison.differences):
             parts.append(f"{part}: {which}; * marks what is significant")
             parts.append(_table(rows, style))
-    if found.repeats is not None:
-        parts += [_factors(found), _precision(found, style), found.repeats.reproducibility_note]
-    if found.pattern:
-        parts.append(_pattern(found, style))
-    if found.left_out:
-        parts.append("\n".join(f"not compared: {one}" for one in found.left_out))
+    if comparison.repeats is not None:
+        parts += [
+            _factors(comparison),
+            _precision(comparison, style),
+            comparison.repeats.reproducibility_note,
+        ]
+    if comparison.pattern:
+        parts.append(_pattern(comparison, style))
+    if comparison.left_out:
+        parts.append("\n".join(f"not compared: {reason}" for reason in comparison.left_out))
     if drawn:
         parts.append("\n".join(str(path) for path in drawn.values()))
     if findings:
         lines = finding_lines(findings)
         parts.append("\n".join([f"findings: {len(findings)} (toolkit explain RULE tells more)", *lines]))
-    return "\n\n".join(one for one in parts if one)
+    return "\n\n".join(part_text for part_text in parts if part_text)
 
 
-def _conditions(found: Comparison) -> str:
+def _conditions(comparison: Comparison) -> str:
     """Return what the entries state: what differs as a table, what is the same in one line each."""
-    names = dict.fromkeys(name for one in found.entries for name, value in one.conditions if value)
+    names = dict.fromkeys(name for entry in comparison.entries for name, value in entry.conditions if value)
     rows, same = [], []
     for name in names:
-        values = [one.condition(name) for one in found.entries]
+        values = [entry.condition(name) for entry in comparison.entries]
         if len(set(values)) == 1:
             same.append(f"{name}: {values[0]}")
         else:
             rows.append([name, *(str(value or "-") for value in values)])
-    head = table(["", *(one.label for one in found.entries)], rows, align="<" * (len(found.entries) + 1))
+    head = table(
+        ["", *(entry.label for entry in comparison.entries)], rows, align="<" * (len(comparison.entries) + 1)
+    )
     return "\n".join(
         one for one in (head, "the same in all:" if same else "", *(f"  {s}" for s in same)) if one
     )
@@ -178,55 +186,55 @@ def _table(rows: Sequence[Difference], style: Style) -> str:
 
     load_unit, load_factor = style.unit("N")
     shown = []
-    for one in rows:
-        unit, factor = shown_unit(one.name, style)
+    for row in rows:
+        unit, factor = shown_unit(row.name, style)
         shown.append(
             [
-                named(one.name, one.rotation, one.SA_rad),
-                f"{one.load_N * load_factor:.0f}",
+                named(row.name, row.rotation, row.SA_rad),
+                f"{row.load_N * load_factor:.0f}",
                 unit,
-                with_U(one.reference, factor, style),
-                one.label,
-                with_U(one.other, factor, style),
-                with_U(one.difference, factor, style),
-                p_text(one.p_holm, style),
-                "*" if one.significant else "",
+                with_U(row.reference, factor, style),
+                row.label,
+                with_U(row.other, factor, style),
+                with_U(row.difference, factor, style),
+                p_text(row.p_holm, style),
+                "*" if row.significant else "",
             ]
         )
     head = ["quantity", f"FZ [{load_unit}]", "unit", "reference", "other", "value", "difference", "p (Holm)"]
     return table([*head, ""], shown, align="<><><>>><")
 
 
-def _factors(found: Comparison) -> str:
-    assert found.repeats is not None  # noqa: S101  asked before
+def _factors(comparison: Comparison) -> str:
+    assert comparison.repeats is not None  # noqa: S101  asked before
     rows = [
-        [one.name, ", ".join(str(level or "-") for level in one.levels), one.note or "told apart"]
-        for one in found.repeats.factors
+        [factor.name, ", ".join(str(level or "-") for level in factor.levels), factor.note or "told apart"]
+        for factor in comparison.repeats.factors
     ]
     return table(["factor", "in the tests", ""], rows, align="<<<")
 
 
-def _precision(found: Comparison, style: Style) -> str:
-    assert found.repeats is not None  # noqa: S101  asked before
+def _precision(comparison: Comparison, style: Style) -> str:
+    assert comparison.repeats is not None  # noqa: S101  asked before
     load_unit, load_factor = style.unit("N")
     from toolkit.report.comparison.cells import factor_text, named, shown_unit
 
-    names = [one.name for one in found.repeats.factors if one.varied]
+    names = [factor.name for factor in comparison.repeats.factors if factor.varied]
     rows = []
-    for one in found.repeats.precisions:
-        unit, factor = shown_unit(one.name, style)
+    for precision in comparison.repeats.precisions:
+        unit, factor = shown_unit(precision.name, style)
         rows.append(
             [
-                named(one.name, one.rotation),
-                f"{one.load_N * load_factor:.0f}",
+                named(precision.name, precision.rotation),
+                f"{precision.load_N * load_factor:.0f}",
                 unit,
-                str(one.n),
-                f"{one.mean * factor:.4g}",
-                f"{one.total.value * factor:.3g}",
-                "-" if one.repeatability is None else f"{one.repeatability.value * factor:.3g}",
-                "-" if one.limit_r is None else f"{one.limit_r * factor:.3g}",
+                str(precision.n),
+                f"{precision.mean * factor:.4g}",
+                f"{precision.total.value * factor:.3g}",
+                "-" if precision.repeatability is None else f"{precision.repeatability.value * factor:.3g}",
+                "-" if precision.limit_r is None else f"{precision.limit_r * factor:.3g}",
                 *(
-                    factor_text(next(f for f in one.factors if f.factor == name), factor, style)
+                    factor_text(next(f for f in precision.factors if f.factor == name), factor, style)
                     for name in names
                 ),
             ]
@@ -235,16 +243,19 @@ def _precision(found: Comparison, style: Style) -> str:
     return table([*head, *(f"s_I({name})" for name in names)], rows, align="<><>" + ">" * (4 + len(names)))
 
 
-def _pattern(found: Comparison, style: Style) -> str:
+def _pattern(comparison: Comparison, style: Style) -> str:
     from toolkit.report.comparison.cells import shown_unit, with_U
 
     load_unit, load_factor = style.unit("N")
     rows = []
-    for one in found.pattern:
-        unit, factor = shown_unit(one.name, style)
+    for effect in comparison.pattern:
+        unit, factor = shown_unit(effect.name, style)
         rows.append(
-            [one.name, f"{one.load_N * load_factor:.0f}", unit]
-            + [with_U(e, factor, style) for e in (one.regular, one.reversed, one.pattern, one.body)]
+            [effect.name, f"{effect.load_N * load_factor:.0f}", unit]
+            + [
+                with_U(e, factor, style)
+                for e in (effect.regular, effect.reversed, effect.pattern, effect.body)
+            ]
         )
     head = ["pattern effect", f"FZ [{load_unit}]", "unit", "regular belt", "reversed belt", "pattern", "body"]
     return table(head, rows, align="<><>>>>")

@@ -62,18 +62,18 @@ def chart_answer(
         write_atomic(out, draw_chart(chart, kind or "png"))
     text = [table(
         ["load", "check load", "points", "centre", "lower", "upper", "newest", "unit", "rules broken"],
-        [_row(one) for one in chart.series], align="<<>>>>><<",
+        [_row(series) for series in chart.series], align="<<>>>>><<",
     )]  # fmt: skip
     text += [f"left out: {record_id}: {why}" for record_id, why in chart.left_out]
-    if any(one.limits is None for one in chart.series):
+    if any(series.limits is None for series in chart.series):
         text.append("no limits: at least 4 sessions before the newest, which do not all agree, are needed")
-    elif any(one.limits is not None and one.limits.provisional for one in chart.series):
+    elif any(series.limits is not None and series.limits.provisional for series in chart.series):
         text.append("limits of fewer than 20 sessions are provisional")
     text += ["findings:", *finding_lines(findings)] if findings else []
     text += [f"picture: {out}"] if out else []
     payload = {
         "instrument": instrument,
-        "series": [_series(one) for one in chart.series],
+        "series": [_series(series) for series in chart.series],
         "left_out": [{"id": record_id, "reason": why} for record_id, why in chart.left_out],
         "findings": [finding.as_dict() for finding in findings],
         "picture": out,
@@ -106,14 +106,14 @@ def due_answer(registry: Registry, instrument: str | None, date: dt.date) -> Ans
             )
             continue
         findings += due_findings(due)
-        more = due.recommendation
+        advice = due.recommendation
         rows.append({
             "instrument": name, "record": due.record, "session_date": due.session_date.isoformat(),
             "recall": due.recall, "due": due.due and due.due.isoformat(), "days_left": due.days_left,
             "overdue": due.overdue,
             "recommended": {
-                "days": more.days, "drift_per_year": more.drift_per_year, "results": more.results,
-                "reason": more.reason,
+                "days": advice.days, "drift_per_year": advice.drift_per_year, "results": advice.results,
+                "reason": advice.reason,
             },
         })  # fmt: skip
     lines = [
@@ -131,22 +131,24 @@ def due_answer(registry: Registry, instrument: str | None, date: dt.date) -> Ans
     return payload, "\n".join(lines), findings
 
 
-def _row(one: Series) -> list[str]:
-    limits = [f"{v:+.4g}" for v in (one.limits.centre, one.limits.lower, one.limits.upper)] if (
-        one.limits
+def _row(series: Series) -> list[str]:
+    limits = [f"{v:+.4g}" for v in (series.limits.centre, series.limits.lower, series.limits.upper)] if (
+        series.limits
     ) else ["-"] * 3  # fmt: skip
-    broken = ", ".join(f"{b.rule.number} ({one.points[b.index].date.isoformat()})" for b in one.breaks)
-    return [one.load, str(one.check_load), str(len(one.points)), *limits, f"{one.points[-1].error:+.4g}",
-            one.unit, broken]  # fmt: skip
+    broken = ", ".join(f"{b.rule.number} ({series.points[b.index].date.isoformat()})" for b in series.breaks)
+    newest = f"{series.points[-1].error:+.4g}"
+    return [
+        series.load, str(series.check_load), str(len(series.points)), *limits, newest, series.unit, broken
+    ]  # fmt: skip
 
 
-def _series(one: Series) -> dict[str, Any]:
-    limits = one.limits
+def _series(series: Series) -> dict[str, Any]:
+    limits = series.limits
     return {
-        "load": one.load,
-        "unit": one.unit,
-        "check_load": [{"load": n, "value": v, "unit": u} for n, v, u in one.check_load.loads],
-        "tolerance": one.tolerance,
+        "load": series.load,
+        "unit": series.unit,
+        "check_load": [{"load": n, "value": v, "unit": u} for n, v, u in series.check_load.loads],
+        "tolerance": series.tolerance,
         "limits": None if limits is None else {
             "centre": limits.centre, "sigma": limits.sigma, "lower": limits.lower, "upper": limits.upper,
             "mean_range": limits.mean_range, "upper_range": limits.upper_range, "points": limits.points,
@@ -155,71 +157,71 @@ def _series(one: Series) -> dict[str, Any]:
         "points": [
             {"session": p.session_record, "date": p.date.isoformat(), "record": p.record, "error": p.error,
              "rows": p.rows}
-            for p in one.points
+            for p in series.points
         ],
-        "moving_ranges": list(one.ranges),
+        "moving_ranges": list(series.ranges),
         "breaks": [
-            {"rule": b.rule.number, "text": b.rule.text, "session": one.points[b.index].session_record}
-            for b in one.breaks
+            {"rule": b.rule.number, "text": b.rule.text, "session": series.points[b.index].session_record}
+            for b in series.breaks
         ],
     }  # fmt: skip
 
 
-def evaluation_text(one: Evaluation) -> str:
+def evaluation_text(evaluation: Evaluation) -> str:
     """Return an evaluation by a standard for people."""
     from toolkit.calibration.standards.e74 import E74Result
 
-    title = "ASTM E74" if one.standard == "e74" else "ISO 376"
-    sense = {"up": ", increasing", "down": ", decreasing"}.get(one.direction or "", "")
+    title = "ASTM E74" if evaluation.standard == "e74" else "ISO 376"
+    sense = {"up": ", increasing", "down": ", decreasing"}.get(evaluation.direction or "", "")
     lines = [
-        f"{title}: {one.indication} [{one.indication_unit}] under {one.load} [{one.load_unit}], "
-        f"{one.sense} force{sense}",
-        f"class {one.class_name}" if one.class_name else "no class",
+        f"{title}: {evaluation.indication} [{evaluation.indication_unit}] under "
+        f"{evaluation.load} [{evaluation.load_unit}], {evaluation.sense} force{sense}",
+        f"class {evaluation.class_name}" if evaluation.class_name else "no class",
     ]
-    if isinstance(one.result, E74Result):
-        lines += _e74(one.result, one.load_unit, one.indication_unit or "")
-    elif one.result is not None:
-        lines += _iso376(one.result, one.load_unit, one.indication_unit or "")
-    if one.all_reasons:
-        lines += ["not better because", *(f"  {reason}" for reason in one.all_reasons)]
-    if one.left_out:
-        lines.append(f"{one.left_out} rows are left out: another load acts")
+    if isinstance(evaluation.result, E74Result):
+        lines += _e74(evaluation.result, evaluation.load_unit, evaluation.indication_unit or "")
+    elif evaluation.result is not None:
+        lines += _iso376(evaluation.result, evaluation.load_unit, evaluation.indication_unit or "")
+    if evaluation.all_reasons:
+        lines += ["not better because", *(f"  {reason}" for reason in evaluation.all_reasons)]
+    if evaluation.left_out:
+        lines.append(f"{evaluation.left_out} rows are left out: another load acts")
     return "\n".join(lines)
 
 
-def _e74(found: E74Result, force: str, reading: str) -> list[str]:
+def _e74(result: E74Result, force: str, reading: str) -> list[str]:
     rows = [
-        [str(c.degree) + (" *" if c.degree == found.degree else ""),
+        [str(c.degree) + (" *" if c.degree == result.degree else ""),
          f"{c.s_m:.6g}", f"{c.llf:.6g}", str(c.dof),
          "-" if c.lack_of_fit is None else f"{c.lack_of_fit.F:.4g}",
          "-" if c.lack_of_fit is None else f"{c.lack_of_fit.p:.3g}"]
-        for c in found.curves
+        for c in result.curves
     ]  # fmt: skip
-    chosen = "as asked for" if found.requested else "by the annex"
+    chosen = "as asked for" if result.requested else "by the annex"
     return [
-        f"{found.points} points at {found.levels} forces in {found.runs} runs; "
-        f"degree {found.degree} {chosen}",
+        f"{result.points} points at {result.levels} forces in {result.runs} runs; "
+        f"degree {result.degree} {chosen}",
         table(["degree", f"s_m [{reading}]", f"LLF [{force}]", "dof", "lack of fit F", "p"], rows),
-        f"lower limit factor {found.llf:.6g} {force}",
+        f"lower limit factor {result.llf:.6g} {force}",
         *(
             f"class {c.name}: {c.lower_limit:.6g} to {c.upper_limit:.6g} {force}"
             + ("" if c.granted else "  (not granted)")
-            for c in found.classes
+            for c in result.classes
         ),
     ]
 
 
-def _iso376(found: Iso376Result, force: str, reading: str) -> list[str]:
+def _iso376(result: Iso376Result, force: str, reading: str) -> list[str]:
     rows = [
         [f"{r.force:g}", f"{r.deflection:.6g}", _percent(r.b), _percent(r.b_same), _percent(r.fc),
-         _percent(r.v), (r.class_name or "none") if not found.procedure else "-"]
-        for r in found.forces
+         _percent(r.v), (r.class_name or "none") if not result.procedure else "-"]
+        for r in result.forces
     ]  # fmt: skip
     return [
         table([f"force [{force}]", f"deflection [{reading}]", "b %", "b' %", "fc %", "v %", "class"], rows,
               align=">>>>>>>"),
-        f"zero f0 {_percent(found.f0)} %, creep c {_percent(found.c)} %",
-        *(f"class {r.class_name}: {r.lower:g} to {r.upper:g} {force}" for r in found.ranges),
+        f"zero f0 {_percent(result.f0)} %, creep c {_percent(result.c)} %",
+        *(f"class {r.class_name}: {r.lower:g} to {r.upper:g} {force}" for r in result.ranges),
     ]  # fmt: skip
 
 

@@ -69,8 +69,8 @@ def convert(source: Path, target: Path, *, axes: str, resolve: Callable[[Path], 
             marks = (use.mark,) if use is not None and use.mark else ()
         else:
             columns, read_in, lost, marks = _read(source, kinds[0], axes)
-        text, more = _written(columns, read_in, kinds[1], axes, source, marks)
-        findings = (*lost, *more)
+        text, target_findings = _written(columns, read_in, kinds[1], axes, source, marks)
+        findings = (*lost, *target_findings)
     write_atomic(target, text)
     return Converted(kinds=kinds, findings=findings, use=use)
 
@@ -128,8 +128,12 @@ def _read(source: Path, kind: str, axes: str) -> tuple[Columns, Axes, tuple[Find
         from toolkit.tires.tydex import read_tydex
 
         file = read_tydex(source)
-        columns = {one.symbol: (one.unit, one.values) for one in file.channels if one.symbol is not None}
-        out = [one.name for one in file.channels if one.symbol is None] + [
+        columns = {
+            channel.symbol: (channel.unit, channel.values)
+            for channel in file.channels
+            if channel.symbol is not None
+        }
+        out = [channel.name for channel in file.channels if channel.symbol is None] + [
             name for name in file.other if name != "RELEASE"
         ]
         note = Finding(
@@ -160,26 +164,28 @@ def _of_test(source: Path, resolved: Resolved) -> tuple[Columns, Axes, tuple[Fin
 
     from toolkit.findings import Finding
 
-    every = resolved.result.reduced.conditions
+    all_conditions = resolved.result.reduced.conditions
     use = resolved.result.reduced.calibration
-    conditions = [one for one in every if one.used]
-    reverse = sum(one.rotation == "reverse" for one in conditions)
+    conditions = [condition for condition in all_conditions if condition.used]
+    reverse = sum(condition.rotation == "reverse" for condition in conditions)
     columns = {
-        "SA": ("deg", np.degrees([one.SA for one in conditions])),
-        "FZ": ("N", np.array([one.FZ for one in conditions])),
-        "FY": ("N", np.array([one.FY for one in conditions])),
-        "MZ": ("N*m", np.array([one.MZ for one in conditions])),
+        "SA": ("deg", np.degrees([condition.SA for condition in conditions])),
+        "FZ": ("N", np.array([condition.FZ for condition in conditions])),
+        "FY": ("N", np.array([condition.FY for condition in conditions])),
+        "MZ": ("N*m", np.array([condition.MZ for condition in conditions])),
     }
     text = "the uncertainties and the provenance of the reduced test"
     if reverse:
         text += f", and which {reverse} of {len(conditions)} rows ran in reverse"
-    if len(every) > len(conditions):
-        text += f", and {len(every) - len(conditions)} blocks that the reduction does not use"
+    if len(all_conditions) > len(conditions):
+        text += f", and {len(all_conditions) - len(conditions)} blocks that the reduction does not use"
     note = Finding(
         rule="not-converted", where=str(source), message=f"the target has no place for {text}", level="note"
     )
-    own = [one for one in resolved.findings if one.where == use.id]  # how its record stands
-    return columns, "SAE", (*own, note)
+    record_findings = [
+        finding for finding in resolved.findings if finding.where == use.id
+    ]  # how its record stands
+    return columns, "SAE", (*record_findings, note)
 
 
 def _written(

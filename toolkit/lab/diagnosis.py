@@ -175,33 +175,36 @@ def _writable(out: Path) -> None:
         )
 
 
-def diagnosis_text(made: Diagnosis, out: Path) -> str:
+def diagnosis_text(answer: Diagnosis, out: Path) -> str:
     """Return a diagnosis for people."""
     from toolkit.diagnosis.answer.answer import cut_short
     from toolkit.report.diagnosis.numbers import chance
 
-    cut = made.verdict == "unknown" and cut_short(made.skipped)
-    lines = [f"{made.title}: {_CUT if cut else _VERDICTS[made.verdict]}"]
-    for one in made.effects:
-        channel = f" on {one.channel}" if one.channel else ""
-        lines += ["", f"{one.name}{channel} ({one.stage}): {one.statement}", f"  {one.equation}"]
-        for each in one.parameters:
-            if isinstance(each.value, str):
-                lines.append(f"  {each.name} = {each.value}")
+    cut = answer.verdict == "unknown" and cut_short(answer.skipped)
+    lines = [f"{answer.title}: {_CUT if cut else _VERDICTS[answer.verdict]}"]
+    for effect in answer.effects:
+        channel = f" on {effect.channel}" if effect.channel else ""
+        lines += ["", f"{effect.name}{channel} ({effect.stage}): {effect.statement}", f"  {effect.equation}"]
+        for parameter in effect.parameters:
+            if isinstance(parameter.value, str):
+                lines.append(f"  {parameter.name} = {parameter.value}")
                 continue
-            reach = "" if each.ci95 is None else f"  [{each.ci95[0]:.4g}, {each.ci95[1]:.4g}] 95 %"
-            lines.append(f"  {each.name} = {each.value:.4g} {each.unit}{reach}")
-        runs = next((each.runs for each in one.parameters if each.runs is not None), None)
+            reach = (
+                "" if parameter.ci95 is None else f"  [{parameter.ci95[0]:.4g}, {parameter.ci95[1]:.4g}] 95 %"
+            )
+            lines.append(f"  {parameter.name} = {parameter.value:.4g} {parameter.unit}{reach}")
+        runs = next((parameter.runs for parameter in effect.parameters if parameter.runs is not None), None)
         if runs is not None:
             lines.append(f"  in {', '.join(runs)} alone")
-        if one.equivalent_to:
-            lines.append(f"  this recording cannot tell it from: {', '.join(one.equivalent_to)}")
+        if effect.equivalent_to:
+            lines.append(f"  this recording cannot tell it from: {', '.join(effect.equivalent_to)}")
         lines.append(
-            f"  held-out log score +{one.held_out_log_score_gain:.1f}, {chance(one.p_value)} in the search"
+            f"  held-out log score +{effect.held_out_log_score_gain:.1f}, "
+            f"{chance(effect.p_value)} in the search"
         )
-    for channel, names in made.depends_on:
+    for channel, names in answer.depends_on:
         lines.append(f"{channel}: structure that no named effect explains, over {' and '.join(names)}")
-    for place in made.mismatch:
+    for place in answer.mismatch:
         for at in place.where[:1]:
             much = "over all of" if at.whole else "mostly where"
             lines.append(
@@ -214,24 +217,27 @@ def diagnosis_text(made: Diagnosis, out: Path) -> str:
             o.unit,
             *(f"{v:.4g}" for v in (o.nominal_rmse, o.refitted_rmse, o.augmented_rmse, o.noise_floor)),
         ]
-        for o in made.held_out
+        for o in answer.held_out
     ]
     if rows:
-        lines += ["", f"error on held-out rows (by {made.held_out_by}):"]
+        lines += ["", f"error on held-out rows (by {answer.held_out_by}):"]
         lines.append(
             table(["output", "unit", "nominal", "refitted", "augmented", "noise"], rows, align="<<>>>>")
         )
-    moved = [one for one in made.nominal_parameters if one.prior_sd]
+    moved = [parameter for parameter in answer.nominal_parameters if parameter.prior_sd]
     if moved:
         cells = [
             [o.name, o.unit, f"{o.before:.5g}", f"{o.after:.5g}", f"{o.shift_in_sd or 0:+.1f}"] for o in moved
         ]
         lines += ["", table(["parameter", "unit", "before", "after", "shift/sd"], cells, align="<<>>>")]
-    lines += ["", *made.next_measurements] if made.next_measurements else []
-    if not made.complete:
-        lines += ["", f"incomplete: the budget was spent before {made.skipped[0]}; a larger --budget goes on"]
-    if made.findings:
-        lines += ["", "findings (toolkit explain RULE tells more):", *finding_lines(made.findings)]
+    lines += ["", *answer.next_measurements] if answer.next_measurements else []
+    if not answer.complete:
+        lines += [
+            "",
+            f"incomplete: the budget was spent before {answer.skipped[0]}; a larger --budget goes on",
+        ]
+    if answer.findings:
+        lines += ["", "findings (toolkit explain RULE tells more):", *finding_lines(answer.findings)]
     return "\n".join([*lines, "", f"written to {out}"])
 
 

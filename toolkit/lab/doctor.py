@@ -41,7 +41,7 @@ def _python() -> Check:
 
 
 def _programs() -> list[Check]:
-    found = []
+    programs = []
     for program, needed_for in (
         ("soffice", "reports as PDF"),
         ("pdftotext", "verifying PDFs"),
@@ -49,10 +49,10 @@ def _programs() -> list[Check]:
         ("pdfinfo", "verifying PDFs"),
     ):
         path = shutil.which(program)
-        found.append(
+        programs.append(
             Check(name=program, ok=path is not None, found=path or "not found", needed_for=needed_for)
         )
-    return found
+    return programs
 
 
 def _fonts() -> list[Check]:

@@ -27,7 +27,7 @@ def evaluate_grid(
     mark = file.comment(DRAFT_MARK)
     turn = signs(table.axes, "ISO-W")
     optional = {name: column for name in ("IA", "KAPPA", "P", "V") if (column := table.get(name)) is not None}
-    made, findings = evaluate_tir(
+    forces, findings = evaluate_tir(
         file, SA=turn["SA"] * table["SA"], FZ=table["FZ"], angles=angles, **optional
     )
     if mark is not None:
@@ -40,9 +40,9 @@ def evaluate_grid(
             Finding(rule="grid-columns", where=str(table.path), message=text, level="note"),
         )
     values = {
-        "FX": made.FX.tolist(),
-        "FY": (turn["FY"] * made.FY).tolist(),
-        "MZ": (turn["MZ"] * made.MZ).tolist(),
+        "FX": forces.FX.tolist(),
+        "FY": (turn["FY"] * forces.FY).tolist(),
+        "MZ": (turn["MZ"] * forces.MZ).tolist(),
     }
     return values, findings
 
@@ -89,7 +89,7 @@ def refuse_output(out: Path, originals: tuple[Path, ...]) -> None:
             "the output is a table", where="--out", got=out.name, expected="a name that ends in .csv",
             next_step="choose such a name", rule="output-name",
         )  # fmt: skip
-    if any(out.resolve() == one.resolve() for one in originals):
+    if any(out.resolve() == original.resolve() for original in originals):
         raise OutputError(
             "the output would replace an input", where="--out", got=out, expected="another name",
             next_step="choose another name", rule="original",

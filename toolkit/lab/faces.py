@@ -67,8 +67,8 @@ class Face:
         return figure_of(plots[chosen])
 
     def __repr__(self) -> str:
-        said = [_text(value) for value in self._facts().values()]
-        return f"<{type(self).__name__} {' | '.join(text for text in said if text)}>"
+        texts = [_text(value) for value in self._facts().values()]
+        return f"<{type(self).__name__} {' | '.join(text for text in texts if text)}>"
 
     def _repr_html_(self) -> str:
         rows = "".join(

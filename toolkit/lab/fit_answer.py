@@ -24,11 +24,11 @@ _WORDS = {"pure": "Pure", "combined": "Combined"}
 
 def fit_payload(fitted: Fitted) -> dict[str, Any]:
     """Return fits and comparison as JSON."""
-    every = [one for fit in fitted.globals for one in fit.fits]
+    global_fits = [channel_fit for fit in fitted.globals for channel_fit in fit.fits]
     return {
         "fits": [
             *(curve_payload(fit, turn) for fit, turn in zip(fitted.curves, fitted.rotations, strict=True)),
-            *(global_payload(fit) for fit in every),
+            *(global_payload(fit) for fit in global_fits),
         ],
         "comparison": fitted.comparison.as_dict(),
         **({"calibration": fitted.use.as_dict(), **draft_keys(fitted.use)} if fitted.use else {}),
@@ -48,13 +48,13 @@ def global_payload(fit: GlobalFit) -> dict[str, Any]:
     """Return a channel of a model over all loads; the contract's keys, and what is said of each load."""
     loads = [
         {
-            "load_N": one.load_N,
-            "n": one.n,
-            "error_percent": one.error_percent,
-            "prediction_error_percent": one.prediction_error_percent,
-            "stiffness": _estimate(one.stiffness, fit),
+            "load_N": load.load_N,
+            "n": load.n,
+            "error_percent": load.error_percent,
+            "prediction_error_percent": load.prediction_error_percent,
+            "stiffness": _estimate(load.stiffness, fit),
         }
-        for one in fit.loads
+        for load in fit.loads
     ]
     return {
         **_common(fit, None),
@@ -125,7 +125,7 @@ def fit_text(fitted: Fitted, findings: Sequence[Finding]) -> str:
             f"axes {axes}; parameters in SI (B 1/rad, Sh rad, D and Sv in N or N·m); "
             "± is one standard error, (value) is not determined by the data"
         )
-    parts += [_global_text(one) for fit in fitted.globals for one in fit.fits]
+    parts += [_global_text(channel_fit) for fit in fitted.globals for channel_fit in fit.fits]
     if len(fitted.comparison.models) > 1:
         parts.append(comparison_text(fitted.comparison))
     if findings:
@@ -133,12 +133,12 @@ def fit_text(fitted: Fitted, findings: Sequence[Finding]) -> str:
     return "\n\n".join(parts)
 
 
-def comparison_text(one: Comparison) -> str:
+def comparison_text(comparison: Comparison) -> str:
     """Return the table of all models in the form of the thesis's table 3.1: errors in percent."""
-    floors = dict(one.floors)
+    floors = dict(comparison.floors)
     lines = []
-    for condition, channel in one.conditions:
-        entries = [one.get(model, condition, channel) for model in one.models]
+    for condition, channel in comparison.conditions:
+        entries = [comparison.get(model, condition, channel) for model in comparison.models]
         floor = floors.get(channel)
         label = f"{_WORDS[condition]} {channel}"
         errors = ["-" if entry is None else f"{entry.error_percent:.2f}" for entry in entries]
@@ -147,10 +147,10 @@ def comparison_text(one: Comparison) -> str:
         if any(value is not None for value in away):
             shown = ["-" if value is None else f"{value:.2f}" for value in away]
             lines.append([f"  {channel}, load left out", *shown, ""])
-    if seconds := dict(one.seconds):
-        shown = [f"{seconds[model]:.2f}" if model in seconds else "-" for model in one.models]
+    if seconds := dict(comparison.seconds):
+        shown = [f"{seconds[model]:.2f}" if model in seconds else "-" for model in comparison.models]
         lines.append(["time / s", *shown, ""])
-    header = ["error in %", *one.models, "floor"]
+    header = ["error in %", *comparison.models, "floor"]
     note = (
         "100 sqrt(sum (model - measured)^2 / sum measured^2) over the rows fitted; floor: the rows about\n"
         "their mean in bins of 0.25 deg and load; load left out: every load predicted by a fit without it"
@@ -159,7 +159,7 @@ def comparison_text(one: Comparison) -> str:
 
 
 def _global_text(fit: GlobalFit) -> str:
-    told = [
+    parameters = [
         [
             p.name,
             *_value_and_error(p.value, p.standard_error),
@@ -181,7 +181,9 @@ def _global_text(fit: GlobalFit) -> str:
         unit = "N" if fit.channel == "FY" else "N·m"
         slope = _stiffness(fit.slope_at_zero, fit)
         head += f"\nC_{fit.channel} at {fit.nominal_load_N:.0f} N: {slope} {unit}/deg"
-    shown = f"\n{table(['parameter', 'value', '±', 'unit', ''], told, align='<>><<')}" if told else ""
+    shown = (
+        f"\n{table(['parameter', 'value', '±', 'unit', ''], parameters, align='<>><<')}" if parameters else ""
+    )
     return f"{head}{shown}" + (f"\n{fit.message}" if fit.message else "")
 
 

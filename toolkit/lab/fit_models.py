@@ -65,24 +65,24 @@ def fit_table_models(
 
     measured = read_table(table, axes=axes)
     data = of_table(measured, rated_load_N=rated_load_N, radius_m=radius_m or STAND_IN_RADIUS)
-    single, every = _split(names)
+    single, over_loads = _split(names)
     curves: tuple[CurveFit, ...] = ()
     findings: tuple[Finding, ...] = (*measured.mark_findings, *repeat_findings(measured))
     seconds: dict[str, float] = {}
-    for one in single:
+    for model in single:
         started = time.perf_counter()
-        result = fit_table(measured, (one,), loss=loss)
-        seconds[one.name] = time.perf_counter() - started
+        result = fit_table(measured, (model,), loss=loss)
+        seconds[model.name] = time.perf_counter() - started
         curves += result.fits
         findings += tuple(finding for finding in result.findings if finding not in findings)
-    made, more, found = _global(data, every, loss, weights, str(table), seconds)
+    fits, fit_findings, seeds = _global(data, over_loads, loss, weights, str(table), seconds)
     if not single:
         findings += (
             *row_findings(measured),
-            *axes_findings(measured, found),
-            *size_findings(found, table.name),
+            *axes_findings(measured, seeds),
+            *size_findings(seeds, table.name),
         )
-    return _fitted(data, curves, (None,) * len(curves), made, (*findings, *more), radius_m, seconds)
+    return _fitted(data, curves, (None,) * len(curves), fits, (*findings, *fit_findings), radius_m, seconds)
 
 
 def fit_test_models(
@@ -152,21 +152,21 @@ def fit_resolved(
     from toolkit.tires.table_fit import fit_findings
 
     groups = group(resolved.result.reduced)
-    single, every = _split(names)
+    single, over_loads = _split(names)
     rows: list[tuple[CurveFit, str]] = []
     seconds: dict[str, float] = {}
-    for one in single:
-        made = [
+    for model in single:
+        curves = [
             (Curve(SA=g.SA, y=g.values(channel), channel=channel, load_N=g.load_N), g.rotation)
             for g in groups
             for channel in ("FY", "MZ")
         ]
-        made = [(curve, rotation) for curve, rotation in made if why_not(curve) is None]
+        curves = [(curve, rotation) for curve, rotation in curves if why_not(curve) is None]
         started = time.perf_counter()
-        fits = fit_model(one, [curve for curve, _ in made], loss=loss)
-        seconds[one.name] = time.perf_counter() - started
-        rows += list(zip(fits, [rotation for _, rotation in made], strict=True))
-    own = [finding for finding in fit_findings([fit for fit, _ in rows]) if finding.level == "note"]
+        fits = fit_model(model, [curve for curve, _ in curves], loss=loss)
+        seconds[model.name] = time.perf_counter() - started
+        rows += list(zip(fits, [rotation for _, rotation in curves], strict=True))
+    notes = [finding for finding in fit_findings([fit for fit, _ in rows]) if finding.level == "note"]
     info = resolved.result.reduced.info
     radius = radius_m or free_radius_m(info.tire_size)
     run = [
@@ -188,8 +188,8 @@ def fit_resolved(
         columns, axes="SAE", rated_load_N=rated_load_N or info.rated_load_N,
         unloaded_radius_m=radius or STAND_IN_RADIUS,
     )  # fmt: skip
-    fits_all, more, _ = _global(data, every, loss, weights, where, seconds)
-    findings = (*resolved.findings, *own, *more)
+    fits_all, global_findings, _ = _global(data, over_loads, loss, weights, where, seconds)
+    findings = (*resolved.findings, *notes, *global_findings)
     fitted = _fitted(
         data, tuple(fit for fit, _ in rows), tuple(turn for _, turn in rows), fits_all, findings, radius,
         seconds,
@@ -201,9 +201,9 @@ def _split(names: Sequence[str]) -> tuple[tuple[TireModel, ...], tuple[GlobalMod
     from toolkit.tires.catalog import find
     from toolkit.tires.global_model import GlobalModel
 
-    found = [find(name) for name in names]
-    every = tuple(one for one in found if isinstance(one, GlobalModel))
-    return tuple(one for one in found if not isinstance(one, GlobalModel)), every
+    models = [find(name) for name in names]
+    over_loads = tuple(model for model in models if isinstance(model, GlobalModel))
+    return tuple(model for model in models if not isinstance(model, GlobalModel)), over_loads
 
 
 def _global(
@@ -225,15 +225,15 @@ def _global(
                 problem.what, where=f"{where}, {problem.where}", got=problem.got, expected=problem.expected,
                 next_step=problem.next_step, rule=problem.rule,
             )  # fmt: skip
-    found = seeds_of(data)
-    made = []
+    seeds = seeds_of(data)
+    model_fits = []
     for model in models:
         started = time.perf_counter()
-        made.append(fit_global(model, data, loss=loss, weights=weights, seeds=found.seeds))
+        model_fits.append(fit_global(model, data, loss=loss, weights=weights, seeds=seeds.seeds))
         seconds[model.name] = time.perf_counter() - started
-    fits = tuple(made)
+    fits = tuple(model_fits)
     findings = [finding for fit in fits for finding in global_findings(fit)]
-    return fits, (*not_varied(fits, where), *findings), found.fits
+    return fits, (*not_varied(fits, where), *findings), seeds.fits
 
 
 def _fitted(
@@ -259,7 +259,7 @@ def _fitted(
     )
 
 
-def model_choice(given: Sequence[str]) -> tuple[str, ...]:
+def model_choice(choices: Sequence[str]) -> tuple[str, ...]:
     """Return the models named, ``all`` being every one.
 
     Raises
@@ -269,7 +269,7 @@ def model_choice(given: Sequence[str]) -> tuple[str, ...]:
     """
     from toolkit.tires.catalog import find, model_names
 
-    names = [name for one in given for name in (model_names() if one == "all" else (one,))]
+    names = [name for choice in choices for name in (model_names() if choice == "all" else (choice,))]
     for name in names:
         find(name)
     return tuple(dict.fromkeys(names))
@@ -288,10 +288,10 @@ def fit_options(loss: str, weights: str, rated_load: float | None, radius: float
     from toolkit.tires.global_fit import WEIGHTS
     from toolkit.tires.model import LOSSES
 
-    for name, got, known in (("loss", loss, LOSSES), ("weights", weights, WEIGHTS)):
-        if got not in known:
+    for name, choice, choices in (("loss", loss, LOSSES), ("weights", weights, WEIGHTS)):
+        if choice not in choices:
             raise ConfigError(
-                f"unknown {name} {got!r}", where=f"--{name}", got=got, expected=", ".join(known),
+                f"unknown {name} {choice!r}", where=f"--{name}", got=choice, expected=", ".join(choices),
                 next_step="name one of those expected", rule=f"unknown-{name}",
             )  # fmt: skip
     for option, value, unit in (("--rated-load", rated_load, "N"), ("--radius", radius, "m")):
@@ -309,7 +309,7 @@ def write_figures(fitted: Fitted, folder: Path) -> list[str]:
     from toolkit.report.test.fit_figures import fit_figures
 
     word = fitted.use.word if fitted.use else None
-    made = fit_figures(fitted.data, fitted.curves, fitted.globals, fitted.comparison, word)
-    for name, picture in made.items():
+    pictures = fit_figures(fitted.data, fitted.curves, fitted.globals, fitted.comparison, word)
+    for name, picture in pictures.items():
         write_atomic(folder / name, picture)
-    return sorted(made)
+    return sorted(pictures)

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 WHOLE, TYDEX, TIR = "test.xlsx", "test.tdx", "tire.tir"
 
 
-def details_of(test: Path, given: Path | None) -> ReportDetails:
+def details_of(test: Path, file: Path | None) -> ReportDetails:
     """Return ``[report]`` of a folder's ``test.toml``, or what a file says in its place.
 
     Raises
@@ -35,9 +35,9 @@ def details_of(test: Path, given: Path | None) -> ReportDetails:
     from toolkit.recording.details import ReportDetails, read_details
     from toolkit.recording.folder import TEST_FILE
 
-    if given is not None:
-        table = read_toml(given)
-        return read_details(table.get("report", table), where=given)
+    if file is not None:
+        table = read_toml(file)
+        return read_details(table.get("report", table), where=file)
     toml = test / TEST_FILE
     return read_details(read_toml(toml).get("report", {}), where=toml) if toml.is_file() else ReportDetails()
 
@@ -46,17 +46,17 @@ def writers(
     resolved: Resolved, test: Path, *, xlsx: bool, tydex: bool, tir: bool
 ) -> dict[str, Callable[[Path], object]]:
     """Return the functions that write the files asked for, by name."""
-    made: dict[str, Callable[[Path], object]] = {}
+    files: dict[str, Callable[[Path], object]] = {}
     if xlsx:
-        made[WHOLE] = partial(_whole, resolved, test)
+        files[WHOLE] = partial(_whole, resolved, test)
     if tydex:
-        made[TYDEX] = partial(_tydex, resolved)
+        files[TYDEX] = partial(_tydex, resolved)
     if tir:
-        made[TIR] = partial(_tir, resolved)
-    return made
+        files[TIR] = partial(_tir, resolved)
+    return files
 
 
-def diagnosis_of(given: Path | None, by: str | None, tests: Sequence[Path]) -> tuple[Told, Path] | None:
+def diagnosis_of(source: Path | None, by: str | None, tests: Sequence[Path]) -> tuple[Told, Path] | None:
     """Return the answer that a report tells, and its file.
 
     Raises
@@ -64,13 +64,13 @@ def diagnosis_of(given: Path | None, by: str | None, tests: Sequence[Path]) -> t
     ConfigError
         it is no answer; it is given for several tests; a name releases what is not given
     """
-    if given is None and by is None:
+    if source is None and by is None:
         return None
     from toolkit.diagnosis.answer.reader import read_answer
     from toolkit.errors import ConfigError
     from toolkit.report.diagnosis.in_report import Told
 
-    if given is None:
+    if source is None:
         raise ConfigError(
             "there is no diagnosis to release", where="--by", got=by,
             expected="--diagnosis DIR_OR_JSON beside it", next_step="name the diagnosis, or leave --by away",
@@ -82,7 +82,7 @@ def diagnosis_of(given: Path | None, by: str | None, tests: Sequence[Path]) -> t
             expected="one test", next_step="make the report of the test that was diagnosed by itself",
             rule="diagnosis-of-one-test",
         )  # fmt: skip
-    answer, file = read_answer(given)
+    answer, file = read_answer(source)
     return Told(answer=answer, by=by), file
 
 
@@ -109,28 +109,28 @@ def diagnosis_findings(answer: Diagnosis, resolved: Resolved, test: Path) -> tup
                 "version; run 'toolkit diagnose' again",
             ),
         )  # fmt: skip
-    own = {one["sha256"] for one in provenance(resolved, test)["inputs"]}
-    others = [one for one in answer.recordings if one.sha256 not in own]
-    tables = [one.name for one in others if not one.own]
-    foreign = [one.name for one in others if one.own]
+    hashes = {entry["sha256"] for entry in provenance(resolved, test)["inputs"]}
+    others = [recording for recording in answer.recordings if recording.sha256 not in hashes]
+    tables = [recording.name for recording in others if not recording.own]
+    foreign = [recording.name for recording in others if recording.own]
     if foreign and len(others) == len(answer.recordings):
         raise ConfigError(
             "the diagnosis is of other recordings than the test",
             where=where,
-            got=_listed([one.name for one in others]),
+            got=_listed([recording.name for recording in others]),
             expected=f"recordings of {resolved.result.reduced.info.name}, by their SHA-256",
             next_step="give the diagnosis of this test, or diagnose its recordings",
             rule="diagnosis-of-other-recordings",
         )
-    found = []
+    messages = []
     if foreign:
-        found.append(f"the diagnosis also rests on recordings of another test: {_listed(foreign)}")
+        messages.append(f"the diagnosis also rests on recordings of another test: {_listed(foreign)}")
     if tables:
-        found.append(
+        messages.append(
             f"the diagnosis rests on tables made for it ({_listed(tables)}): from the files "
             "nobody can tell that they are of this test"
         )
-    return tuple(Finding(rule="diagnosis-not-tied", where=where, message=text) for text in found)
+    return tuple(Finding(rule="diagnosis-not-tied", where=where, message=text) for text in messages)
 
 
 def _listed(names: Sequence[str]) -> str:
@@ -146,9 +146,9 @@ def provenance(resolved: Resolved, test: Path, *, diagnosis: Path | None = None)
     from toolkit.recording.folder import TEST_FILE, read_test_folder
 
     reduced = resolved.result.reduced
-    inputs = {one.file: one.file_sha256 for one in reduced.conditions}
-    named = [test / TEST_FILE, read_test_folder(test).tare_file] if test.is_dir() else [test]
-    inputs |= {one.name: sha256_file(one) for one in named if one is not None and one.is_file()}
+    inputs = {condition.file: condition.file_sha256 for condition in reduced.conditions}
+    files = [test / TEST_FILE, read_test_folder(test).tare_file] if test.is_dir() else [test]
+    inputs |= {file.name: sha256_file(file) for file in files if file is not None and file.is_file()}
     if diagnosis is not None:
         inputs[diagnosis.name] = sha256_file(diagnosis)
     return {
@@ -186,15 +186,15 @@ def _tydex(resolved: Resolved, path: Path) -> None:
     used = resolved.result.reduced.used()
     turn = signs("SAE", "ISO-W")
     columns = {
-        "SA": ("deg", np.degrees([one.SA for one in used])),
-        "FZ": ("N", np.array([one.FZ for one in used])),
-        "FY": ("N", np.array([one.FY for one in used])),
-        "MZ": ("N*m", np.array([one.MZ for one in used])),
+        "SA": ("deg", np.degrees([condition.SA for condition in used])),
+        "FZ": ("N", np.array([condition.FZ for condition in used])),
+        "FY": ("N", np.array([condition.FY for condition in used])),
+        "MZ": ("N*m", np.array([condition.MZ for condition in used])),
     }
     info = resolved.result.reduced.info
-    for symbol, unit, one in (("V", "m/s", info.speed_m_s), ("P", "Pa", info.pressure_Pa)):
-        if one is not None:
-            columns[symbol] = (unit, np.full(len(used), one))
+    for symbol, unit, value in (("V", "m/s", info.speed_m_s), ("P", "Pa", info.pressure_Pa)):
+        if value is not None:
+            columns[symbol] = (unit, np.full(len(used), value))
     turned = {symbol: (unit, turn.get(symbol, 1) * values) for symbol, (unit, values) in columns.items()}
     text, _ = tydex_text(turned, comments=[*_comments(resolved), _directions([c.rotation for c in used])])
     path.write_text(text, encoding="utf-8")
@@ -219,10 +219,10 @@ def _tir(resolved: Resolved, path: Path) -> None:
 def _comments(resolved: Resolved) -> list[str]:
     reduced = resolved.result.reduced
     use = reduced.calibration
-    said = [
+    comments = [
         f"{OWN_OUTPUT}: toolkit {__version__}, test {' '.join(reduced.info.name.split())}",
         f"calibration {use.id} {use.sha256}",
     ]
     if use.mark is not None:
-        said.append(use.mark)
-    return [*said, *(["SIMULATED DATA"] if reduced.info.simulated else [])]
+        comments.append(use.mark)
+    return [*comments, *(["SIMULATED DATA"] if reduced.info.simulated else [])]

@@ -22,7 +22,7 @@ def packaged_home() -> Path:
     return inside if inside.is_dir() else _PACKAGE.parent
 
 
-def find_home(given: Path | None = None) -> Path:
+def find_home(home: Path | None = None) -> Path:
     """Return the laboratory's home: ``--home``, ``TOOLKIT_HOME``, or the nearest folder upward.
 
     Raises
@@ -30,16 +30,16 @@ def find_home(given: Path | None = None) -> Path:
     ConfigError
         there is none; the message names ``toolkit init``
     """
-    named = given or (Path(os.environ["TOOLKIT_HOME"]) if os.environ.get("TOOLKIT_HOME") else None)
-    if named is not None:
-        if not (named / "calibrations").is_dir():
-            raise _no_home(named)
-        return named.resolve()
-    here = Path.cwd().resolve()
-    for folder in (here, *here.parents):
+    stated = home or (Path(os.environ["TOOLKIT_HOME"]) if os.environ.get("TOOLKIT_HOME") else None)
+    if stated is not None:
+        if not (stated / "calibrations").is_dir():
+            raise _no_home(stated)
+        return stated.resolve()
+    cwd = Path.cwd().resolve()
+    for folder in (cwd, *cwd.parents):
         if (folder / "calibrations").is_dir():
             return folder
-    raise _no_home(here)
+    raise _no_home(cwd)
 
 
 def calibrations_folder(calibrations: Path | None = None, home: Path | None = None) -> Path:
@@ -95,12 +95,12 @@ def home_template(name: str, home: Path | None = None) -> Path:
     """
     packaged = packaged_home() / TEMPLATES / name
     try:
-        own = find_home(home) / TEMPLATES / name
+        own_template = find_home(home) / TEMPLATES / name
     except ConfigError:
         if home is not None:
             raise
         return packaged
-    return own if own.is_file() else packaged
+    return own_template if own_template.is_file() else packaged
 
 
 def make_home(folder: Path) -> tuple[str, ...]:

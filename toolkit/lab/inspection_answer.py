@@ -14,16 +14,20 @@ if TYPE_CHECKING:
 _SIGNS = {1: "+", -1: "-", 0: "open"}
 
 
-def intervals_of(found: Inspection) -> tuple[Interval, ...]:
+def intervals_of(inspection: Inspection) -> tuple[Interval, ...]:
     """Return what the printed digits allow each coefficient of each load."""
     from toolkit.audit.intervals import coefficient_intervals
 
-    return tuple(one for load in found.columns.loads for one in coefficient_intervals(found.columns, load))
+    return tuple(
+        interval
+        for load in inspection.columns.loads
+        for interval in coefficient_intervals(inspection.columns, load)
+    )
 
 
-def inspection_payload(found: Inspection, intervals: tuple[Interval, ...]) -> dict[str, Any]:
+def inspection_payload(inspection: Inspection, intervals: tuple[Interval, ...]) -> dict[str, Any]:
     """Return what a recording holds as the JSON answer."""
-    recording, context = found.recording, found.context
+    recording, context = inspection.recording, inspection.context
     return {
         "file": recording.path,
         "sha256": recording.sha256,
@@ -36,22 +40,22 @@ def inspection_payload(found: Inspection, intervals: tuple[Interval, ...]) -> di
         "channels": [
             {"symbol": s.symbol, "header": s.header, "unit": s.unit, "role": s.role} for s in recording.series
         ],
-        "blocks": [_block(block) for block in found.blocks],
-        "slip_angle_deg": math.degrees(found.slip_angle_rad),
-        "calibration": _calibration(found),
-        "corrected_by": found.corrected_by,
-        "unverified": found.unverified,
+        "blocks": [_block(block) for block in inspection.blocks],
+        "slip_angle_deg": math.degrees(inspection.slip_angle_rad),
+        "calibration": _calibration(inspection),
+        "corrected_by": inspection.corrected_by,
+        "unverified": inspection.unverified,
         "corrected_tared": False,
-        "corrected": [_values(block) for block in found.blocks],
-        "corrected_first_row": _values(found.first_row),
+        "corrected": [_values(block) for block in inspection.blocks],
+        "corrected_first_row": _values(inspection.first_row),
         "intervals": [
             {"load": i.load, "name": i.name, "low": i.low, "high": i.high, "sign": i.sign} for i in intervals
         ],
         "refused_records": [
             {"id": one.id, "rule": one.rule, "reason": one.reason}
-            for one in (found.choice.refused if found.choice else ())
+            for one in (inspection.choice.refused if inspection.choice else ())
         ],
-        "findings": [finding.as_dict() for finding in found.findings],
+        "findings": [finding.as_dict() for finding in inspection.findings],
     }
 
 
@@ -82,21 +86,21 @@ def _values(block: LoadBlock) -> dict[str, Any]:
     }
 
 
-def _calibration(found: Inspection) -> dict[str, Any] | None:
+def _calibration(inspection: Inspection) -> dict[str, Any] | None:
     from toolkit.audit.inspection import withdrawal, wrong_signs
 
-    one = found.identification
-    if one is None:
+    identified = inspection.identification
+    if identified is None:
         return None
-    withdrawn = withdrawal(found)
+    withdrawn = withdrawal(inspection)
     return {
-        "grade": one.grade,
-        "record": one.record,
-        "variant": one.variant,
-        "issued_digits": one.issued,
-        "candidates": one.candidates,
+        "grade": identified.grade,
+        "record": identified.record,
+        "variant": identified.variant,
+        "issued_digits": identified.issued,
+        "candidates": identified.candidates,
         "withdrawn": None if withdrawn is None else withdrawn.reason,
-        "against_corrected_by": wrong_signs(found),
+        "against_corrected_by": wrong_signs(inspection),
         "void_always": None if withdrawn is None else withdrawn.void_always,
         "segments": [
             {
@@ -107,19 +111,22 @@ def _calibration(found: Inspection) -> dict[str, Any] | None:
                 "grade": s.grade,
                 **({"candidates": s.candidates} if s.candidates else {}),
             }
-            for s in one.segments
+            for s in identified.segments
         ],
-        "in_force": one.in_force,
+        "in_force": identified.in_force,
         "repair": None
-        if one.repair is None
-        else {"FY_max_abs_N": one.repair.FY_max_abs_N, "MZ_max_abs_Nm": one.repair.MZ_max_abs_Nm},
-        "skipped": [{"id": s.id, "reason": s.reason} for s in one.skipped],
+        if identified.repair is None
+        else {
+            "FY_max_abs_N": identified.repair.FY_max_abs_N,
+            "MZ_max_abs_Nm": identified.repair.MZ_max_abs_Nm,
+        },
+        "skipped": [{"id": s.id, "reason": s.reason} for s in identified.skipped],
     }
 
 
-def inspection_text(found: Inspection, intervals: tuple[Interval, ...]) -> str:
+def inspection_text(inspection: Inspection, intervals: tuple[Interval, ...]) -> str:
     """Return what a recording holds for people."""
-    recording, context = found.recording, found.context
+    recording, context = inspection.recording, inspection.context
     by = {"option": "--machine", "test.toml": "test.toml", "file": "its own properties", "default": "default"}
     lines = [
         f"{recording.path}" + ("  SIMULATED" if recording.simulated else ""),
@@ -128,21 +135,21 @@ def inspection_text(found: Inspection, intervals: tuple[Interval, ...]) -> str:
         f"  test date  {context.date.isoformat() if context.date else 'unknown'}",
         f"  channels   {len(recording.series)}, {recording.rows} rows: "
         + ", ".join(f"{s.symbol} [{s.unit}]" for s in recording.series),
-        f"  slip angle {math.degrees(found.slip_angle_rad):+.2f} deg, measured",
+        f"  slip angle {math.degrees(inspection.slip_angle_rad):+.2f} deg, measured",
         "",
-        _indented(_block_table(found)),
+        _indented(_block_table(inspection)),
         "",
-        *_calibration_lines(found),
+        *_calibration_lines(inspection),
         *_interval_lines(intervals),
     ]
-    others = [finding for finding in found.findings if not finding.rule.startswith("identified-")]
+    others = [finding for finding in inspection.findings if not finding.rule.startswith("identified-")]
     return "\n".join([*lines, *finding_lines(others)]).rstrip()
 
 
-def _block_table(found: Inspection) -> str:
+def _block_table(inspection: Inspection) -> str:
     head = ["load block", "FZ [lbf]", "FZ [N]", "SA [deg]", "Fy file [lbf]", "corrected", "Mz file [lbf·ft]"]
     rows = []
-    for name, block in [("first row", found.first_row), *((_rows(b), b) for b in found.blocks)]:
+    for name, block in [("first row", inspection.first_row), *((_rows(b), b) for b in inspection.blocks)]:
         rows.append(
             [
                 name,
@@ -158,26 +165,30 @@ def _block_table(found: Inspection) -> str:
     return table([*head, "corrected"], rows)
 
 
-def _calibration_lines(found: Inspection) -> list[str]:
+def _calibration_lines(inspection: Inspection) -> list[str]:
     import textwrap
 
     from toolkit.audit.inspection import withdrawal, wrong_signs
     from toolkit.audit.model import TELLS
 
-    one = found.identification
-    if one is None:
-        why = "no registry" if found.choice is None else "the file has no own Fy and Mz"
+    identified = inspection.identification
+    if identified is None:
+        why = "no registry" if inspection.choice is None else "the file has no own Fy and Mz"
         return [f"  calibration not identified: {why}"]
-    record = f"{one.record}{', ' + one.variant if one.variant else ''}" if one.record else "-"
-    if one.candidates:
-        record = " or ".join(one.candidates)
-    withdrawn, signs = withdrawal(found), wrong_signs(found)
-    how = TELLS[one.grade]
-    if one.grade == "stale" and withdrawn is not None:
+    record = (
+        f"{identified.record}{', ' + identified.variant if identified.variant else ''}"
+        if identified.record
+        else "-"
+    )
+    if identified.candidates:
+        record = " or ".join(identified.candidates)
+    withdrawn, signs = withdrawal(inspection), wrong_signs(inspection)
+    how = TELLS[identified.grade]
+    if identified.grade == "stale" and withdrawn is not None:
         how = "by a withdrawn calibration"
     if signs is not None:
-        how += f": {signs} against {found.corrected_by}"
-    lines = [f"  Fy and Mz  computed {how}", f"    record   {record}", f"    grade    {one.grade}"]
+        how += f": {signs} against {inspection.corrected_by}"
+    lines = [f"  Fy and Mz  computed {how}", f"    record   {record}", f"    grade    {identified.grade}"]
     if withdrawn is not None:
         void = "void on every day" if withdrawn.void_always else f"void from {withdrawn.void_from}"
         lines += textwrap.wrap(
@@ -186,18 +197,18 @@ def _calibration_lines(found: Inspection) -> list[str]:
             initial_indent="    ",
             subsequent_indent="      ",
         )
-    if len(one.segments) > 1:
+    if len(identified.segments) > 1:
         lines += [
             f"    rows {s.first_row}-{s.last_row}: {s.record or '-'}"
             f"{', ' + s.variant if s.variant else ''} ({s.grade})"
-            for s in one.segments
+            for s in identified.segments
         ]
-    if found.corrected_by is not None:
-        first = found.first_row
-        when = "in force on the test's date" if one.in_force else "in force today"
-        tare = "; tare not subtracted ('toolkit process' does)" if found.context.tare else ""
-        mark = "  UNVERIFIED" if found.unverified else ""
-        lines.append(f"    corrected by {found.corrected_by}, {when}{tare}{mark}")
+    if inspection.corrected_by is not None:
+        first = inspection.first_row
+        when = "in force on the test's date" if identified.in_force else "in force today"
+        tare = "; tare not subtracted ('toolkit process' does)" if inspection.context.tare else ""
+        mark = "  UNVERIFIED" if inspection.unverified else ""
+        lines.append(f"    corrected by {inspection.corrected_by}, {when}{tare}{mark}")
         if first.FY_N is not None and first.FY_file_N is not None:
             lines.append(
                 f"    first row: Fy {_lbf(first.FY_N):.2f} lbf where the file has {_lbf(first.FY_file_N):.2f}"

@@ -173,11 +173,11 @@ def open_laboratory(home: str | Path | None = None, *, calibrations: str | Path 
     >>> [record.id for record in laboratory.records]
     ['m15-r1', 'm15-r2', 'm15-virtual-r1']
     """
-    named = None if home is None else Path(home)
+    folder = None if home is None else Path(home)
     if calibrations is not None:
-        return Laboratory(home=named, calibrations=calibrations_folder(Path(calibrations)))
-    found = find_home(named)
-    return Laboratory(home=found, calibrations=found / "calibrations")
+        return Laboratory(home=folder, calibrations=calibrations_folder(Path(calibrations)))
+    nearest = find_home(folder)
+    return Laboratory(home=nearest, calibrations=nearest / "calibrations")
 
 
 def example(name: str) -> Path:

@@ -44,15 +44,15 @@ def process_payload(resolved: Resolved) -> dict[str, Any]:
         },
         "stated": [
             {
-                "symbol": one.symbol,
-                "u": one.u,
-                "unit": CHANNELS[one.symbol].si if one.symbol in CHANNELS else "1",
-                "relative": one.relative,
-                "effect": one.effect,
-                "common": one.common,
-                "source": one.source,
+                "symbol": component.symbol,
+                "u": component.u,
+                "unit": CHANNELS[component.symbol].si if component.symbol in CHANNELS else "1",
+                "relative": component.relative,
+                "effect": component.effect,
+                "common": component.common,
+                "source": component.source,
             }
-            for one in reduced.stated
+            for component in reduced.stated
         ],
         "conditions": [
             {
@@ -143,7 +143,7 @@ def _characteristics_table(resolved: Resolved, style: Style) -> str:
     from toolkit.units import from_si
 
     printed = [one for table in tables() for one in columns(table) if one.console_heading is not None]
-    units = {one.name: style.unit(one.printed_unit) for one in printed}
+    units = {characteristic.name: style.unit(characteristic.printed_unit) for characteristic in printed}
     characteristics = resolved.result.characteristics
     lines = []
     for load in characteristics.loads_N:
@@ -156,7 +156,10 @@ def _characteristics_table(resolved: Resolved, style: Style) -> str:
             cells.append(_shown(row.estimate if row is not None else None, factor, one.digits))
         lines.append(cells)
     head = ["FZ [N]", "FZ [lbf]"]
-    head += [f"{one.console_heading} [{str(units[one.name][0]).replace('*', '·')}]" for one in printed]
+    head += [
+        f"{characteristic.console_heading} [{str(units[characteristic.name][0]).replace('*', '·')}]"
+        for characteristic in printed
+    ]
     return table(head, lines, align=">" * len(head))
 
 

@@ -22,7 +22,7 @@ def qualification_payload(record: QualificationRecord) -> dict[str, Any]:
         "date": record.date.isoformat(),
         "numbers_sha256": record.numbers_sha256,
         "checks": [dataclasses.asdict(check) for check in record.checks],
-        "not_covered": [dataclasses.asdict(one) for one in record.not_covered],
+        "not_covered": [dataclasses.asdict(gap) for gap in record.not_covered],
     }
 
 
@@ -39,47 +39,55 @@ def qualification_text(record: QualificationRecord) -> str:
         "",
     ]
     rows = [
-        [_verdict(one), one.group, one.name, one.quantity, one.measure, _required(one), _digits(one.reached)]
-        for one in record.checks
-        if one.measure != "rules"
+        [
+            _verdict(check),
+            check.group,
+            check.name,
+            check.quantity,
+            check.measure,
+            _required(check),
+            _digits(check.reached),
+        ]
+        for check in record.checks
+        if check.measure != "rules"
     ]
     head = ["", "group", "name", "quantity", "measure", "required", "reached"]
     lines += [table(head, rows, align="<<<<<>>"), ""]
     rows = [
-        [_verdict(one), one.name, one.quantity, _required(one), _digits(one.reached)]
-        for one in record.checks
-        if one.measure == "rules"
+        [_verdict(check), check.name, check.quantity, _required(check), _digits(check.reached)]
+        for check in record.checks
+        if check.measure == "rules"
     ]
     lines.append(
         table(["", "refusal shown", "at", "must be refused by", "was refused by"], rows, align="<" * 5)
     )
-    for title, told in (
-        ("failed", [_reason(one) for one in record.failed]),
+    for title, notes in (
+        ("failed", [_reason(check) for check in record.failed]),
         ("asked for less than public QR solvers reach",
-         [f"{one.name}, {one.quantity}: {one.note}" for one in record.checks
-          if one.measure == "correct digits" and "more than" in one.note]),
-        ("not covered", [f"{one.name}: {one.reason}" for one in record.not_covered]),
+         [f"{check.name}, {check.quantity}: {check.note}" for check in record.checks
+          if check.measure == "correct digits" and "more than" in check.note]),
+        ("not covered", [f"{gap.name}: {gap.reason}" for gap in record.not_covered]),
     ):  # fmt: skip
-        if told:
-            lines += ["", f"{title}:", *(f"  {line}" for line in told)]
+        if notes:
+            lines += ["", f"{title}:", *(f"  {line}" for line in notes)]
     verdict = f"{failed} FAILED" if failed else "all passed"
     lines += ["", f"{len(record.checks)} checks, {verdict}"]
     return "\n".join(lines)
 
 
-def _verdict(one: Check) -> str:
-    return "pass" if one.passed else "FAIL"
+def _verdict(check: Check) -> str:
+    return "pass" if check.passed else "FAIL"
 
 
-def _reason(one: Check) -> str:
-    what = ", ".join(part for part in (one.group, one.name, one.quantity) if part)
-    numbers = f"required {_required(one)}, reached {_digits(one.reached)}"
-    return f"{what}: {numbers}" + (f"; {one.note}" if one.note else "")
+def _reason(check: Check) -> str:
+    place = ", ".join(part for part in (check.group, check.name, check.quantity) if part)
+    numbers = f"required {_required(check)}, reached {_digits(check.reached)}"
+    return f"{place}: {numbers}" + (f"; {check.note}" if check.note else "")
 
 
-def _required(one: Check) -> str:
-    sign = {"correct digits": ">= ", "text": "", "rules": ""}.get(one.measure, "<= ")
-    return sign + _digits(one.required)
+def _required(check: Check) -> str:
+    sign = {"correct digits": ">= ", "text": "", "rules": ""}.get(check.measure, "<= ")
+    return sign + _digits(check.required)
 
 
 def _digits(value: float | str | None) -> str:

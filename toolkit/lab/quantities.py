@@ -41,16 +41,16 @@ class Column:
         UnitError
             a unit is unknown, or of another dimension
         """
-        own, target = unit(self.unit, where=where), unit(other, where=where)
-        if own.dimension != target.dimension:
+        source, target = unit(self.unit, where=where), unit(other, where=where)
+        if source.dimension != target.dimension:
             raise UnitError(
                 f"the unit of {where} is of another dimension", where=where,
-                got=f"{self.unit} ({own.dimension})", expected=f"{other} ({target.dimension})",
+                got=f"{self.unit} ({source.dimension})", expected=f"{other} ({target.dimension})",
                 next_step="correct the unit of the column", rule="unit-dimension",
             )  # fmt: skip
-        if (own.factor, own.offset) == (target.factor, target.offset):
+        if (source.factor, source.offset) == (target.factor, target.offset):
             return self.numbers
-        return (self.numbers * own.factor + own.offset - target.offset) / target.factor
+        return (self.numbers * source.factor + source.offset - target.offset) / target.factor
 
 
 def columns_of(
@@ -76,12 +76,12 @@ def columns_of(
     UnitError
         a column has no unit, or two that differ
     """
-    needed, wanted = tuple(names), {*names, *optional}
+    needed, known_names = tuple(names), {*names, *optional}
     columns: dict[str, Column] = {}
     for header in map(str, data):
         parts = _HEADER.fullmatch(header)
         name = parts["name"] if parts else header
-        if name not in wanted:
+        if name not in known_names:
             continue
         if name in columns:
             raise _refused(f"the column {name} stands twice", header, f"one {name}", "leave one of them out")
@@ -105,8 +105,8 @@ def value_of(name: str, value: Any, plain: str) -> Column:
 
 
 def _column(name: str, values: Any, stated: list[str]) -> Column:
-    magnitudes, own = _magnitudes(values)
-    texts = [*stated, *([] if own is None else [own])]
+    magnitudes, from_values = _magnitudes(values)
+    texts = [*stated, *([] if from_values is None else [from_values])]
     if not texts:
         raise UnitError(
             f"the column {name} has no unit", where=name, got="plain numbers", rule="no-unit",
@@ -114,7 +114,7 @@ def _column(name: str, values: Any, stated: list[str]) -> Column:
             next_step="state its unit; none is guessed",
         )  # fmt: skip
     read = [unit(text, where=name) for text in texts]
-    if len({(one.factor, one.offset, one.dimension) for one in read}) > 1:
+    if len({(unit_read.factor, unit_read.offset, unit_read.dimension) for unit_read in read}) > 1:
         raise UnitError(
             f"the column {name} has two units", where=name, got=" and ".join(texts), expected="one",
             next_step="leave one of them out", rule="two-units",
@@ -136,7 +136,7 @@ def _magnitudes(values: Any) -> tuple[Any, str | None]:
         return quantity.magnitude, _text(quantity)
     if str(getattr(values, "dtype", "")) == "object" and len(values) and _is_quantity(next(iter(values))):
         first = next(iter(values))
-        return [one.m_as(first.units) if _is_quantity(one) else one for one in values], _text(first)
+        return [value.m_as(first.units) if _is_quantity(value) else value for value in values], _text(first)
     return values, None
 
 

@@ -31,9 +31,9 @@ def listed(
         heads[name] = {"count": len(ledger.entries), "sha256": ledger.head, "damage": ledger.damage}
         good, refused = registry.usable(name)
         bad += len(refused) + (ledger.damage is not None)
-        every = [record_row(record, registry.status(record.id, known_at=known_at)) for record in good]
-        shown = [row for row in every if everything or row["status"] != "discarded"]
-        hidden += len(every) - len(shown)
+        all_rows = [record_row(record, registry.status(record.id, known_at=known_at)) for record in good]
+        shown = [row for row in all_rows if everything or row["status"] != "discarded"]
+        hidden += len(all_rows) - len(shown)
         rows += shown
         rows += [
             {"id": record.id, "status": "refused", "rule": record.rule, "reason": record.reason}
@@ -48,9 +48,9 @@ def listed(
         ],
         align="<" * 7,
     )  # fmt: skip
-    more = [f"discarded and not shown: {hidden} (--all)"] if hidden else []
+    hidden_line = [f"discarded and not shown: {hidden} (--all)"] if hidden else []
     heads_text = [f"head of {n}: {h['sha256']}" for n, h in heads.items()]
-    text = "\n".join([lines or "no records", *more, "", *heads_text])
+    text = "\n".join([lines or "no records", *hidden_line, "", *heads_text])
     return {"records": rows, "heads": heads, "hidden": hidden}, text, not bad
 
 
@@ -59,9 +59,9 @@ def shown(registry: Registry, record_id: str, *, known_at: dt.date | None) -> tu
     record = registry.load(record_id)
     row = record_row(record, registry.status(record_id, known_at=known_at))
     lines = [f"{key:<14}{_plainly(value)}" for key, value in row.items() if value not in (None, "", [])]
-    content, more = _described(record, registry.folder)
+    content, content_lines = _described(record, registry.folder)
     head = registry.head(record.instrument)
-    lines += [f"{'ledger head':<14}{head}", *more]
+    lines += [f"{'ledger head':<14}{head}", *content_lines]
     return {"record": row, "head": head, **content}, "\n".join(lines)
 
 
@@ -177,34 +177,34 @@ def _described(record: CalibrationRecord, registry: Path) -> tuple[dict[str, Any
     lines = ["", table(["indication", "unit", "serial", "range"], rows, align="<<<<")]
     misses = _check_misses(record, registry)
     loads: dict[str, Any] = {}
-    for one in record.loads:
-        errors = one.standard_errors or (None,) * len(one.terms)
-        loads[one.load] = {
-            "unit": one.unit,
-            "coefficients": dict(zip(one.terms, one.coefficients, strict=True)),
-            "issued": dict(zip(one.terms, one.issued, strict=True)),
-            "standard_errors": dict(zip(one.terms, errors, strict=True)) if one.covariance else None,
-            "covariance_model": one.covariance_model,
-            "scatter": None if one.scatter is None else dataclasses.asdict(one.scatter),
-            "residual_sd": one.residual_sd,
-            "dof": one.dof,
-            "n": one.n,
-            "method": one.method,
-            "minimum": one.minimum,
-            "maximum": one.maximum,
-            "check_tolerance": one.tolerance,
-            "check_max": misses.get(one.load),
+    for load in record.loads:
+        errors = load.standard_errors or (None,) * len(load.terms)
+        loads[load.load] = {
+            "unit": load.unit,
+            "coefficients": dict(zip(load.terms, load.coefficients, strict=True)),
+            "issued": dict(zip(load.terms, load.issued, strict=True)),
+            "standard_errors": dict(zip(load.terms, errors, strict=True)) if load.covariance else None,
+            "covariance_model": load.covariance_model,
+            "scatter": None if load.scatter is None else dataclasses.asdict(load.scatter),
+            "residual_sd": load.residual_sd,
+            "dof": load.dof,
+            "n": load.n,
+            "method": load.method,
+            "minimum": load.minimum,
+            "maximum": load.maximum,
+            "check_tolerance": load.tolerance,
+            "check_max": misses.get(load.load),
         }
         terms = [
             [term, repr(c), repr(i), "-" if u is None else round_uncertainty(u)]
-            for term, c, i, u in zip(one.terms, one.coefficients, one.issued, errors, strict=True)
+            for term, c, i, u in zip(load.terms, load.coefficients, load.issued, errors, strict=True)
         ]
         lines += [
             "",
-            f"{one.load} [{one.unit}]",
+            f"{load.load} [{load.unit}]",
             table(["term", "coefficient", "issued", "std error"], terms),
         ]
-        lines += _figures(one, misses.get(one.load))
+        lines += _figures(load, misses.get(load.load))
     data = [{"role": d.role, "file": d.file, "sha256": d.sha256} for d in record.data]
     lines += ["", *(f"{d.role:<9}{d.file}  {d.sha256[:12]}" for d in record.data)]
     payload = {
@@ -217,19 +217,19 @@ def _described(record: CalibrationRecord, registry: Path) -> tuple[dict[str, Any
     return payload, lines
 
 
-def _figures(one: LoadFit, miss: float | None) -> list[str]:
-    if one.n is None or one.residual_sd is None:
+def _figures(fit: LoadFit, miss: float | None) -> list[str]:
+    if fit.n is None or fit.residual_sd is None:
         return ["a legacy import: no data, no residuals, no range"]
     lines = [
-        f"{one.method}, {one.n} rows, {one.dof} degrees of freedom, "
-        f"range {_range(one.minimum, one.maximum, one.unit)}, residual sd {one.residual_sd:.4g} {one.unit}"
+        f"{fit.method}, {fit.n} rows, {fit.dof} degrees of freedom, "
+        f"range {_range(fit.minimum, fit.maximum, fit.unit)}, residual sd {fit.residual_sd:.4g} {fit.unit}"
     ]
-    lines.append(f"standard errors by: {one.covariance_model}")
-    if one.scatter_words is not None:
-        lines.append(one.scatter_words)
-    if one.tolerance is not None:
-        told = "no check loads" if miss is None else f"check loads off by at most {miss:.4g} {one.unit}"
-        lines.append(f"{told}, tolerance {one.tolerance:.4g} {one.unit}")
+    lines.append(f"standard errors by: {fit.covariance_model}")
+    if fit.scatter_words is not None:
+        lines.append(fit.scatter_words)
+    if fit.tolerance is not None:
+        checked = "no check loads" if miss is None else f"check loads off by at most {miss:.4g} {fit.unit}"
+        lines.append(f"{checked}, tolerance {fit.tolerance:.4g} {fit.unit}")
     return lines
 
 
@@ -242,10 +242,10 @@ def _check_misses(record: CalibrationRecord, registry: Path) -> dict[str, float]
         return {}
     columns = check.columns(record.indications)
     return {
-        one.load: float(
-            abs(term_matrix(one.terms, columns) @ one.coefficients - check.column(one.load)).max()
+        load.load: float(
+            abs(term_matrix(load.terms, columns) @ load.coefficients - check.column(load.load)).max()
         )
-        for one in record.loads
+        for load in record.loads
     }
 
 

@@ -94,8 +94,8 @@ def make_reports(
                 step(f"{test.name}: tire models")
             result, comparison = _compared(test, result, options.models)
             if options.diagnosis:
-                more = diagnosis_findings(options.diagnosis[0].answer, result, test)
-                result = replace(result, findings=(*result.findings, *more))
+                tie_findings = diagnosis_findings(options.diagnosis[0].answer, result, test)
+                result = replace(result, findings=(*result.findings, *tie_findings))
             jobs.append(_job(test, result, folder, options, comparison))
             resolved.append(result)
         except ToolkitError as error:
@@ -112,15 +112,15 @@ def make_reports(
             step=step,
         )
     )
-    made = [
+    reports = [
         MadeReport(test=test, resolved=None, outcome=result)
         if isinstance(result, ToolkitError)
         else MadeReport(test=test, resolved=result, outcome=next(outcomes))
         for test, result in zip(tests, resolved, strict=True)
     ]
-    if len(made) == 1 and isinstance(made[0].outcome, ToolkitError):
-        raise made[0].outcome
-    return made
+    if len(reports) == 1 and isinstance(reports[0].outcome, ToolkitError):
+        raise reports[0].outcome
+    return reports
 
 
 def _folder(resolved: Resolved, out: Path | None, *, alone: bool, taken: set[Path]) -> Path:
@@ -148,8 +148,10 @@ def _compared(test: Path, resolved: Resolved, models: tuple[str, ...]) -> tuple[
     if not models:
         return resolved, None
     fitted = fit_resolved(resolved, models, where=str(test))
-    more = [one for one in fitted.findings if one.level != "note" and one not in resolved.findings]
-    return replace(resolved, findings=(*resolved.findings, *more)), fitted.comparison
+    fit_findings = [
+        finding for finding in fitted.findings if finding.level != "note" and finding not in resolved.findings
+    ]
+    return replace(resolved, findings=(*resolved.findings, *fit_findings)), fitted.comparison
 
 
 def _job(
@@ -181,46 +183,46 @@ def _job(
     )
 
 
-def attention(made: MadeReport) -> bool:
+def attention(report: MadeReport) -> bool:
     """Tell whether a delivered report asks for a person: its findings, its record or its template."""
-    if made.resolved is None or isinstance(made.outcome, Exception):
+    if report.resolved is None or isinstance(report.outcome, Exception):
         return True
-    marked = made.resolved.result.reduced.calibration.mark is not None
-    return bool(made.outcome.warnings) or marked or needs_attention(made.resolved.findings)
+    marked = report.resolved.result.reduced.calibration.mark is not None
+    return bool(report.outcome.warnings) or marked or needs_attention(report.resolved.findings)
 
 
-def report_payload(made: MadeReport) -> dict[str, Any]:
+def report_payload(report: MadeReport) -> dict[str, Any]:
     """Return a delivered report as the JSON answer."""
-    resolved, done = made.resolved, made.outcome
-    if resolved is None or isinstance(done, Exception):
-        return {"verified": False, "error": done.as_dict() if isinstance(done, Exception) else None}
+    resolved, delivered = report.resolved, report.outcome
+    if resolved is None or isinstance(delivered, Exception):
+        return {"verified": False, "error": delivered.as_dict() if isinstance(delivered, Exception) else None}
     use = resolved.result.reduced.calibration
     return {
-        **delivered_keys(done),
+        **delivered_keys(delivered),
         "calibrations": [use.as_dict()],
         **draft_keys(use),
-        "units": dict(zip(("force", "moment"), done.units, strict=True)),
-        "manifest": [entry.as_dict() for entry in done.filled.manifest],
-        "manifest_file": done.manifest,
-        "handed_over": list(done.extras),
+        "units": dict(zip(("force", "moment"), delivered.units, strict=True)),
+        "manifest": [entry.as_dict() for entry in delivered.filled.manifest],
+        "manifest_file": delivered.manifest,
+        "handed_over": list(delivered.extras),
         "simulated": resolved.result.reduced.info.simulated,
         "impossible": [finding.as_dict() for finding in resolved.result.reduced.impossible],
         "findings": [finding.as_dict() for finding in resolved.findings],
     }
 
 
-def reports_payload(made: Sequence[MadeReport]) -> dict[str, Any]:
+def reports_payload(reports: Sequence[MadeReport]) -> dict[str, Any]:
     """Return the JSON answer of a command: the one report, or a list that names the tests."""
-    if len(made) == 1:
-        return report_payload(made[0])
-    return {"reports": [{"test": report.test, **report_payload(report)} for report in made]}
+    if len(reports) == 1:
+        return report_payload(reports[0])
+    return {"reports": [{"test": report.test, **report_payload(report)} for report in reports]}
 
 
-def report_text(made: MadeReport) -> str:
+def report_text(report: MadeReport) -> str:
     """Return a report for people: its files, what was verified, its findings."""
-    resolved, done = made.resolved, made.outcome
-    if resolved is None or isinstance(done, Exception):
-        return f"{made.test}: no report\n{done}"
+    resolved, delivered = report.resolved, report.outcome
+    if resolved is None or isinstance(delivered, Exception):
+        return f"{report.test}: no report\n{delivered}"
     use = resolved.result.reduced.calibration
     marks = (
         ("  SIMULATED" if resolved.result.reduced.info.simulated else "")
@@ -228,12 +230,16 @@ def report_text(made: MadeReport) -> str:
         + ("  IMPOSSIBLE VALUES" if resolved.result.reduced.impossible else "")
     )
     lines = [
-        *(f"{path}" for path in (done.pdf, done.docx, done.manifest, *done.extras) if path is not None),
-        f"{done.pages} pages, {len(done.filled.figures)} figures, "
-        f"{len(done.filled.manifest)} values verified{marks}",
+        *(
+            f"{path}"
+            for path in (delivered.pdf, delivered.docx, delivered.manifest, *delivered.extras)
+            if path is not None
+        ),
+        f"{delivered.pages} pages, {len(delivered.filled.figures)} figures, "
+        f"{len(delivered.filled.manifest)} values verified{marks}",
         f"calibration {use.id} ({use.sha256[:12]}...)",
-        f"content {done.content_sha256[:12]}...",
-        *(f"  warning {one}" for one in done.warnings),
+        f"content {delivered.content_sha256[:12]}...",
+        *(f"  warning {warning}" for warning in delivered.warnings),
         *finding_lines(resolved.findings),
     ]
     return "\n".join(lines)

@@ -110,15 +110,17 @@ def _from_folder(
             next_step="write the test's date into test.toml, or make a draft with --calibration ID --draft",
             rule="no-date",
         )
-    found = standing(registry, machine.name, on=on, known_at=known_at, named=calibration)
-    use = found.use(draft=draft, where=test)
+    stands = standing(registry, machine.name, on=on, known_at=known_at, named=calibration)
+    use = stands.use(draft=draft, where=test)
     recordings = read_test(folder, reader=reader, step=step)
-    result = process(folder, recordings, found.record, protocol=plan, use=use)
+    result = process(folder, recordings, stands.record, protocol=plan, use=use)
     return Resolved(
         result=result,
-        record=found.record,
+        record=stands.record,
         findings=(*_findings(use), *result.findings),
-        recordings=tuple((one.path.relative_to(test).as_posix(), one) for one in recordings),
+        recordings=tuple(
+            (recording.path.relative_to(test).as_posix(), recording) for recording in recordings
+        ),
     )
 
 
@@ -127,8 +129,8 @@ def _findings(use: CalibrationUse) -> list[Finding]:
     from toolkit.findings import Finding
 
     return [
-        *(Finding(rule="draft", where=use.id, message=one, level="error") for one in use.draft_reasons),
-        *(Finding(rule="known-since", where=use.id, message=one) for one in use.since),
+        *(Finding(rule="draft", where=use.id, message=reason, level="error") for reason in use.draft_reasons),
+        *(Finding(rule="known-since", where=use.id, message=text) for text in use.since),
     ]
 
 
@@ -165,27 +167,27 @@ def _from_file(
     result = replace(result, reduced=checked(result.reduced))
     used = result.reduced.calibration
     record = registry.load(used.id)
-    wanted = record if calibration in (None, used.id) else registry.load(calibration)
-    if wanted.sha256 != used.sha256:
+    chosen = record if calibration in (None, used.id) else registry.load(calibration)
+    if chosen.sha256 != used.sha256:
         raise RecordError(
             "the reduced test was made with another calibration record",
             where=test,
             got=f"{used.id}, {used.sha256[:16]}...",
-            expected=f"{wanted.id}, {wanted.sha256[:16]}...",
+            expected=f"{chosen.id}, {chosen.sha256[:16]}...",
             next_step="process the recordings again with the record that is wanted",
             rule="record-differs",
         )
     info = result.reduced.info
     on = date.fromisoformat(info.date) if info.date else None
     # That a record is of another machine was told when the file was made, and stays with it.
-    found = standing(registry, record.instrument, on=on, known_at=known_at, named=record.id)
+    stands = standing(registry, record.instrument, on=on, known_at=known_at, named=record.id)
     # What the file was made with stays with it: a draft is issued by processing the recordings again.
-    own = tuple(
+    own_reasons = tuple(
         Reason(text=one, next_step="process the recordings again with a record in force")
         for one in used.draft_reasons
-        if one not in {reason.text for reason in found.reasons}
+        if one not in {reason.text for reason in stands.reasons}
     )
-    use = replace(found, reasons=(*own, *found.reasons)).use(draft=draft, where=test)
+    use = replace(stands, reasons=(*own_reasons, *stands.reasons)).use(draft=draft, where=test)
     later = dict.fromkeys(one for one in (*used.since, *use.since) if one not in use.draft_reasons)
     use = replace(use, since=tuple(later))
     if use != used:

@@ -34,32 +34,32 @@ def explained(name: str | None) -> tuple[dict[str, Any], str]:
     from toolkit.effects.catalogue import effects
     from toolkit.errors import ConfigError
 
-    rules, known = rules_catalogue(), effects()
+    rules, effects_by_name = rules_catalogue(), effects()
     declared = {characteristic.name: characteristic for characteristic in characteristics()}
     if name is None:
         lines = [f"{rule:<24}{entry['means']}" for rule, entry in rules.items()]
         lines += ["", "effects that a diagnosis names:", ""]
-        lines += [f"{key:<24}{effect.statement}" for key, effect in sorted(known.items())]
+        lines += [f"{key:<24}{effect.statement}" for key, effect in sorted(effects_by_name.items())]
         lines += ["", "characteristics of a test:", ""]
         lines += [f"{key:<24}{characteristic.definition}" for key, characteristic in declared.items()]
         answer = {
             "rules": [{"rule": rule, **entry} for rule, entry in rules.items()],
-            "effects": [effect_keys(effect) for _, effect in sorted(known.items())],
+            "effects": [effect_keys(effect) for _, effect in sorted(effects_by_name.items())],
             "characteristics": [
                 {"name": key, **characteristic.facts()} for key, characteristic in declared.items()
             ],
         }
         return answer, "\n".join(lines)
     # Conicity and plysteer are effects of a simulated tire and characteristics of a test: both are told.
-    if name in known or name in declared:
-        keys = effect_keys(known[name]) if name in known else {}
-        texts = [effect_text(known[name])] if name in known else []
+    if name in effects_by_name or name in declared:
+        keys = effect_keys(effects_by_name[name]) if name in effects_by_name else {}
+        texts = [effect_text(effects_by_name[name])] if name in effects_by_name else []
         if name in declared:
             keys |= {"characteristic": {"name": name, **declared[name].facts()}}
             texts.append(_characteristic_text(declared[name]))
         return keys, "\n\n".join(texts)
     if name not in rules:
-        near = difflib.get_close_matches(name, [*rules, *known, *declared], n=3, cutoff=0.4)
+        near = difflib.get_close_matches(name, [*rules, *effects_by_name, *declared], n=3, cutoff=0.4)
         raise ConfigError(
             f"unknown rule {name!r}",
             got=name,

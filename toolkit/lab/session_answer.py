@@ -42,7 +42,7 @@ def fit_report(fit: SessionFit, *, title: str, full: bool, figures: Path | None)
     from toolkit.report.calibration.text import balance_dict, balance_text, report_dict, report_text
 
     reports = report_session(fit)
-    blocks = [report_text(one) for one in reports] if full else []
+    blocks = [report_text(report) for report in reports] if full else []
     payload: dict[str, Any] = {}
     if fit.session.model == "balance":
         try:
@@ -58,7 +58,7 @@ def fit_report(fit: SessionFit, *, title: str, full: bool, figures: Path | None)
         payload["figures"] = _write(fit, title, figures)
         blocks.append(f"{len(payload['figures'])} figures in {figures}")
     return FitReport(
-        loads={one.load: report_dict(one, rows=full) for one in reports},
+        loads={report.load: report_dict(report, rows=full) for report in reports},
         payload=payload,
         text="".join(f"\n\n{block}" for block in blocks),
     )
@@ -69,94 +69,97 @@ def _write(fit: SessionFit, title: str, folder: Path) -> list[str]:
     from toolkit.files import write_atomic
     from toolkit.report.calibration.figures import report_figures
 
-    made: dict[str, bytes] = {}
-    for one in report_session(fit):
-        made |= report_figures(one, title=title)
-    for name, data in made.items():
+    pictures: dict[str, bytes] = {}
+    for report in report_session(fit):
+        pictures |= report_figures(report, title=title)
+    for name, data in pictures.items():
         write_atomic(folder / name, data)
-    return sorted(made)
+    return sorted(pictures)
 
 
-def candidate_payload(made: Candidate, status: str) -> dict[str, Any]:
+def candidate_payload(candidate: Candidate, status: str) -> dict[str, Any]:
     """Return a session's record and fit as the JSON answer."""
     from toolkit.calibration.fit.readings import readings_json
     from toolkit.calibration.fit.session_fit import residual_correlation
 
-    record = made.record
-    names = [one.setting.name for one in made.fit.loads]
+    record = candidate.record
+    names = [load.setting.name for load in candidate.fit.loads]
 
     def by_load(values: list[Any]) -> dict[str, Any]:
         return dict(zip(names, values, strict=True))
 
     loads = {}
-    for one in made.fit.loads:
+    for load in candidate.fit.loads:
         # Of a session that is recorded already the record's own figures hold, whatever a fit gives today.
-        fit, more, kept = one.fit, one.diagnostics, record.load(one.setting.name)
-        loads[one.setting.name] = {
-            "unit": one.setting.unit,
+        fit, diagnostics, stored = load.fit, load.diagnostics, record.load(load.setting.name)
+        loads[load.setting.name] = {
+            "unit": load.setting.unit,
             "indication_units": dict(zip(record.indications, record.indication_units, strict=True)),
             "coefficients": dict(zip(fit.terms, fit.coefficients, strict=True)),
-            "issued": dict(zip(fit.terms, kept.issued, strict=True)),
-            "standard_errors": dict(zip(fit.terms, kept.standard_errors, strict=True)),
-            "covariance_model": kept.covariance_model,
-            "scatter": None if kept.scatter is None else asdict(kept.scatter),
+            "issued": dict(zip(fit.terms, stored.issued, strict=True)),
+            "standard_errors": dict(zip(fit.terms, stored.standard_errors, strict=True)),
+            "covariance_model": stored.covariance_model,
+            "scatter": None if stored.scatter is None else asdict(stored.scatter),
             "residual_sd": fit.residual_sd,
             "dof": fit.dof,
-            "condition_number": made.fit.condition_number,
-            "condition_number_terms": made.fit.condition_number_terms,
-            "vif": dict(zip(record.indications, made.fit.vif, strict=True)),
-            "llf": one.llf,
-            "check_max_percent_fs": one.check_max_percent_fs,
-            "press": more.press,
-            "reversibility": more.reversibility,
-            "outlier_rows": list(more.outliers),
+            "condition_number": candidate.fit.condition_number,
+            "condition_number_terms": candidate.fit.condition_number_terms,
+            "vif": dict(zip(record.indications, candidate.fit.vif, strict=True)),
+            "llf": load.llf,
+            "check_max_percent_fs": load.check_max_percent_fs,
+            "press": diagnostics.press,
+            "reversibility": diagnostics.reversibility,
+            "outlier_rows": list(diagnostics.outliers),
         }
     return {
         "record": {
             "id": record.id,
             "sha256": record.sha256,
             "status": status,
-            "existing": made.existing,
-            "path": str(made.path),
+            "existing": candidate.existing,
+            "path": str(candidate.path),
         },
-        "findings": [finding.as_dict() for finding in made.findings],
-        "readings": readings_json(made.readings),
-        "residual_correlation": by_load([by_load(row) for row in residual_correlation(made.fit).tolist()]),
+        "findings": [finding.as_dict() for finding in candidate.findings],
+        "readings": readings_json(candidate.readings),
+        "residual_correlation": by_load(
+            [by_load(row) for row in residual_correlation(candidate.fit).tolist()]
+        ),
         "loads": loads,
     }
 
 
-def candidate_text(made: Candidate, status: str) -> str:
+def candidate_text(candidate: Candidate, status: str) -> str:
     """Return a session's record and fit for people."""
-    record = made.record
+    record = candidate.record
     lines = [
-        f"{record.id}  {status}" + ("  (already recorded; nothing was written)" if made.existing else ""),
+        f"{record.id}  {status}"
+        + ("  (already recorded; nothing was written)" if candidate.existing else ""),
         f"sha256 {record.sha256}",
-        f"file   {made.path}" + ("  (not written: a dry run)" if status == NOT_ENTERED else ""),
+        f"file   {candidate.path}" + ("  (not written: a dry run)" if status == NOT_ENTERED else ""),
     ]
-    for one in made.fit.loads:
-        kept = record.load(one.setting.name)
+    for load in candidate.fit.loads:
+        stored = record.load(load.setting.name)
         units = dict(zip(record.indications, record.indication_units, strict=True))
         rows = [
-            [term, f"{c:.10g}", f"{i:.8g}", round_uncertainty(u), _per(term, one.setting.unit, units)]
+            [term, f"{c:.10g}", f"{i:.8g}", round_uncertainty(u), _per(term, load.setting.unit, units)]
             for term, c, i, u in zip(
-                one.fit.terms, one.fit.coefficients, kept.issued, kept.standard_errors, strict=True
+                load.fit.terms, load.fit.coefficients, stored.issued, stored.standard_errors, strict=True
             )
         ]
-        check = "no check loads" if one.check_max_percent_fs is None else (
-            f"check loads within {one.check_max_percent_fs:.3g} % of full scale"
+        check = "no check loads" if load.check_max_percent_fs is None else (
+            f"check loads within {load.check_max_percent_fs:.3g} % of full scale"
         )  # fmt: skip
         lines += [
             "",
-            f"{one.setting.name} [{one.setting.unit}]",
+            f"{load.setting.name} [{load.setting.unit}]",
             table(["term", "coefficient", "issued", "std error", "unit"], rows, align="<>>><"),
-            f"residual sd {one.fit.residual_sd:.3g} {one.setting.unit}, {one.fit.dof} degrees of freedom, "
-            f"lower limit factor {one.llf:.3g} {one.setting.unit}; {check}",
-            *([kept.scatter_words] if kept.scatter_words else []),
+            f"residual sd {load.fit.residual_sd:.3g} {load.setting.unit}, {load.fit.dof} degrees of freedom, "
+            f"lower limit factor {load.llf:.3g} {load.setting.unit}; {check}",
+            *([stored.scatter_words] if stored.scatter_words else []),
         ]
-    lines += ["", f"condition number of the indications {made.fit.condition_number:.3g}"]
-    if made.findings:
-        lines += ["findings:", *finding_lines(made.findings)]
+    lines += ["", f"condition number of the indications {candidate.fit.condition_number:.3g}"]
+    if candidate.findings:
+        lines += ["findings:", *finding_lines(candidate.findings)]
     return "\n".join(lines)
 
 
@@ -169,14 +172,14 @@ def next_step(registry: Registry, record: CalibrationRecord, machine: str | None
         failed = failed_gates(registry, record, machine=machine_of(record.instrument, machine))
     except ToolkitError as error:
         return f"what an approval would be refused for: {error.what} ({error.where}); {error.next_step}"
-    blocks = [one for one in failed if one.effect == "blocks"]
+    blocks = [check for check in failed if check.effect == "blocks"]
     if blocks:
         return (
             f"settle what 'calibration approve' would refuse: {gate_words(blocks)} (toolkit explain RULE "
             f"tells more); where the session is wrong, correct it, calibrate again and discard {record.id}"
         )
     words = f"toolkit calibration approve {record.id} --in-force-from {record.date} --checked-by NAME"
-    asked = {one.rule for one in failed}
+    asked = {check.rule for check in failed}
     words += f" --machine {machine}" if machine else ""
     words += " --reason TEXT" if "replacement" in asked else ""
     words += " --polarity FILE" if "polarity-reading" in asked else ""

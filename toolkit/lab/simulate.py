@@ -148,23 +148,23 @@ def _common(plan: Plan, out: Path, files: tuple[Path, ...]) -> dict[str, Any]:
         "machine": plan.machine.name,
         "date": plan.date,
         "seed": plan.seed,
-        "effects": [one.as_dict() for one in plan.effects],
+        "effects": [effect.as_dict() for effect in plan.effects],
         "files": [path.name for path in files],
     }
 
 
 def _effects(plan: Plan) -> str:
-    return "".join(f"\n  effect       {_effect(one)}" for one in plan.effects)
+    return "".join(f"\n  effect       {_effect(effect)}" for effect in plan.effects)
 
 
-def _effect(one: Switched) -> str:
-    place = "" if one.channel is None else f" on {one.channel}"
-    place += "" if one.source is None else f" with {one.source}"
-    units = dict(one.units)
-    said = [f"{name} = {value:g} {units[name]}" for name, value in one.values]
-    said += [] if one.record is None else [f"record {one.record}"]
-    said += [] if one.only is None else [f"where {one.only[0]} is {' or '.join(one.only[1])}"]
-    return f"{one.effect.name}{place}{': ' if said else ''}{', '.join(said)}"
+def _effect(effect: Switched) -> str:
+    place = "" if effect.channel is None else f" on {effect.channel}"
+    place += "" if effect.source is None else f" with {effect.source}"
+    units = dict(effect.units)
+    settings = [f"{name} = {value:g} {units[name]}" for name, value in effect.values]
+    settings += [] if effect.record is None else [f"record {effect.record}"]
+    settings += [] if effect.only is None else [f"where {effect.only[0]} is {' or '.join(effect.only[1])}"]
+    return f"{effect.effect.name}{place}{': ' if settings else ''}{', '.join(settings)}"
 
 
 def _program(plan: Plan, registry: Registry | None) -> OwnProgram | None:
@@ -199,7 +199,7 @@ def is_model_file(path: Path) -> bool:
 def model_answer(
     path: Path,
     inputs: Sequence[Path],
-    given: Sequence[str],
+    conditions: Sequence[str],
     out: Path,
     calibrations: Path | None,
     home: Path | None,
@@ -213,9 +213,9 @@ def model_answer(
 
     model = read_model(path)
     registry = machine_registry(model.kind, calibrations, home)
-    made, findings = simulate_model(model, inputs, registry, conditions=_conditions(given))
-    check_folder(out, {name for name, _ in made})
-    for name, content in made:
+    outputs, findings = simulate_model(model, inputs, registry, conditions=_conditions(conditions))
+    check_folder(out, {name for name, _ in outputs})
+    for name, content in outputs:
         write_atomic(out / name, content)
     payload = {
         "out": out,
@@ -223,25 +223,25 @@ def model_answer(
         "kind": "model",
         "model_sha256": model.sha256,
         "case_sha256": model.case_sha256,
-        "effects": [one.label for one in model.effects],
-        "files": [name for name, _ in made],
-        "findings": [one.as_dict() for one in findings],
+        "effects": [effect.label for effect in model.effects],
+        "files": [name for name, _ in outputs],
+        "findings": [finding.as_dict() for finding in findings],
     }
-    lines = [f"{model.title}: {len(made)} files of outputs in {out}  SIMULATED"]
-    lines += [f"  effect       {one.label}" for one in model.effects]
+    lines = [f"{model.title}: {len(outputs)} files of outputs in {out}  SIMULATED"]
+    lines += [f"  effect       {effect.label}" for effect in model.effects]
     return payload, "\n".join([*lines, *finding_lines(findings)])
 
 
-def _conditions(given: Sequence[str]) -> dict[str, str]:
+def _conditions(texts: Sequence[str]) -> dict[str, str]:
     from toolkit.errors import ConfigError
 
-    made = {}
-    for one in given:
-        key, equals, value = one.partition("=")
+    conditions = {}
+    for text in texts:
+        key, equals, value = text.partition("=")
         if not key.strip() or not equals or not value.strip() or key.strip() == "file":
             raise ConfigError(
-                "a condition is not whole", where="--condition", got=one, expected="KEY=VALUE",
+                "a condition is not whole", where="--condition", got=text, expected="KEY=VALUE",
                 next_step="write for example --condition rotation=reverse", rule="wrong-value",
             )  # fmt: skip
-        made[key.strip()] = value.strip()
-    return made
+        conditions[key.strip()] = value.strip()
+    return conditions

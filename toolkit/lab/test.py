@@ -131,9 +131,9 @@ class Test(Face):
 
         return pd.DataFrame(
             [
-                {"file": one.result.name, "rows": one.result.rows,
-                 "channels": ", ".join(f"{s} [{u}]" for s, u in one.channels.items())}
-                for one in self.recordings
+                {"file": recording.result.name, "rows": recording.result.rows,
+                 "channels": ", ".join(f"{s} [{u}]" for s, u in recording.channels.items())}
+                for recording in self.recordings
             ]
         )  # fmt: skip
 

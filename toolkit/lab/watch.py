@@ -54,32 +54,34 @@ class WatchAnswer:
         self.attention = 0
         self.last: Round | None = None
 
-    def add(self, found: Round, say: Callable[[str], None]) -> None:
+    def add(self, look: Round, say: Callable[[str], None]) -> None:
         """Say what is new in a look."""
         from toolkit.lab.reports import attention, report_payload
 
-        for report in found.made:
+        for report in look.made:
             self.attention += attention(report)
             if self.keep:
                 self.made.append({"test": report.test, **report_payload(report)})
             if not isinstance(report.outcome, Exception):
                 say(f"{report.test}: {report.outcome.pdf}, {report.outcome.pages} pages")
         before = self.last or Round(made=(), waiting=(), set_aside=())
-        for fault in found.set_aside:
+        for fault in look.set_aside:
             if fault not in before.set_aside:
                 say(f"{fault.test}: set aside, {fault.rule}: {fault.reason.partition(chr(10))[0]}")
-        for waits in found.waiting:
+        for waits in look.waiting:
             if waits not in before.waiting:
                 say(f"{waits.test}: waiting, {waits.reason}")
-        self.last = replace(found, made=())
+        self.last = replace(look, made=())
 
     def payload(self) -> dict[str, Any]:
         """Return the answer: what was made, and what waits or stands aside at the end."""
         waiting, aside = (self.last.waiting, self.last.set_aside) if self.last else ((), ())
         return {
             "made": self.made,
-            "waiting": [{"test": one.test, "reason": one.reason} for one in waiting],
-            "set_aside": [{"test": one.test, "rule": one.rule, "reason": one.reason} for one in aside],
+            "waiting": [{"test": waits.test, "reason": waits.reason} for waits in waiting],
+            "set_aside": [
+                {"test": fault.test, "rule": fault.rule, "reason": fault.reason} for fault in aside
+            ],
             "attention": self.attention,
         }
 
@@ -106,8 +108,8 @@ def alone(out: Path) -> Iterator[None]:
                 expected="one watch for each output folder",
                 next_step="end the other one, or choose another --out", rule="watch-running",
             ) from error  # fmt: skip
-        for left in [*out.glob(".report-*"), *out.glob("*/.report-*")]:
-            shutil.rmtree(left, ignore_errors=True)
+        for remnant in [*out.glob(".report-*"), *out.glob("*/.report-*")]:
+            shutil.rmtree(remnant, ignore_errors=True)
         yield
 
 
@@ -118,7 +120,7 @@ def _registry(calibrations: Path | None, home: Path | None) -> str:
     from toolkit.lab.home import open_registry
 
     registry = open_registry(calibrations, home)
-    heads = [f"{one} {registry.head(one)}" for one in registry.instruments()]
+    heads = [f"{name} {registry.head(name)}" for name in registry.instruments()]
     return sha256_bytes("\n".join([today().isoformat(), *heads]).encode())
 
 
@@ -142,10 +144,10 @@ def _report(
     from toolkit.report.word.office import Office
 
     tests = list(resolved)
-    own = replace(options, resolve=resolved.__getitem__)
+    options = replace(options, resolve=resolved.__getitem__)
     with Office() as office, Drawer() as drawer:
         try:
-            return make_reports(tests, own, out, folders=folders, office=office, drawer=drawer)
+            return make_reports(tests, options, out, folders=folders, office=office, drawer=drawer)
         except ToolkitError as error:
             # One alone raises its error.
             return [MadeReport(test=tests[0], resolved=resolved[tests[0]], outcome=error)]

@@ -130,27 +130,27 @@ class Watcher:
                 if before_that.get("state") == SET_ASIDE:
                     aside.append(_stands_aside(name, before_that))
                 continue
-            known = self.waited.get(name)
-            if known is not None and known[0] == content and age < self.patience_s:
-                waiting.append(Waiting(test=name, reason=known[1]))
+            waited = self.waited.get(name)
+            if waited is not None and waited[0] == content and age < self.patience_s:
+                waiting.append(Waiting(test=name, reason=waited[1]))
                 continue
             contents[test] = content
-            found = self._read(test, age)
+            judged = self._read(test, age)
             if self._listing(test) != listing:
                 # Files came or grew while the test was read: what was read is not what was hashed.
                 waiting.append(Waiting(test=name, reason="files are arriving"))
                 continue
-            if isinstance(found, Waiting):
-                self.waited[name] = (content, found.reason)
-                waiting.append(found)
-            elif isinstance(found, Aside):
-                aside.append(found)
-                self._set_aside(found, content)
+            if isinstance(judged, Waiting):
+                self.waited[name] = (content, judged.reason)
+                waiting.append(judged)
+            elif isinstance(judged, Aside):
+                aside.append(judged)
+                self._set_aside(judged, content)
             else:
-                ready[test] = found
-        made = self._make(ready, contents, waiting, aside)
+                ready[test] = judged
+        reports = self._make(ready, contents, waiting, aside)
         waiting += [Waiting(test=path.name, reason=why) for path, (_, why) in self.unwritten.items()]
-        return Round(made=tuple(made), waiting=tuple(waiting), set_aside=tuple(aside))
+        return Round(made=tuple(reports), waiting=tuple(waiting), set_aside=tuple(aside))
 
     def _read(self, test: Path, age: float) -> Resolved | Waiting | Aside:
         name = self._name(test)
@@ -164,7 +164,7 @@ class Watcher:
             if error.rule in _PARTIAL and age < self.patience_s:
                 return Waiting(test=name, reason=f"{error.rule}: {error.what} ({error.where})")
             return Aside(test=name, rule=error.rule or "error", reason=str(error))
-        missing = [one for one in resolved.findings if one.rule in _MISSING]
+        missing = [finding for finding in resolved.findings if finding.rule in _MISSING]
         if missing and age < self.patience_s:
             return Waiting(test=name, reason="; ".join(f"{one.where}: {one.message}" for one in missing[:3]))
         return resolved
@@ -179,54 +179,54 @@ class Watcher:
         if not ready:
             return []
         delivered = []
-        for one in self.report(ready, [self.out / self._name(test) for test in ready]):
-            name = self._name(one.test)
-            if isinstance(one.outcome, OutputError):
+        for report in self.report(ready, [self.out / self._name(test) for test in ready]):
+            name = self._name(report.test)
+            if isinstance(report.outcome, OutputError):
                 # A full disk is no fault of the test: the next look tries again.
-                waiting.append(Waiting(test=name, reason=str(one.outcome)))
-            elif isinstance(one.outcome, ToolkitError):
-                fault = Aside(test=name, rule=one.outcome.rule or "error", reason=str(one.outcome))
+                waiting.append(Waiting(test=name, reason=str(report.outcome)))
+            elif isinstance(report.outcome, ToolkitError):
+                fault = Aside(test=name, rule=report.outcome.rule or "error", reason=str(report.outcome))
                 aside.append(fault)
-                self._set_aside(fault, contents[one.test], by=self.settings)
+                self._set_aside(fault, contents[report.test], by=self.settings)
             else:
-                delivered.append(one)
+                delivered.append(report)
                 self.unwritten.pop(self._note(name), None)
                 self._note(name).unlink(missing_ok=True)
                 self.state[name] = {
                     "state": "made",
-                    "content": contents[one.test],
-                    "report": str(one.outcome.pdf),
-                    "content_sha256": one.outcome.content_sha256,
-                    "units": list(one.outcome.units),
+                    "content": contents[report.test],
+                    "report": str(report.outcome.pdf),
+                    "content_sha256": report.outcome.content_sha256,
+                    "units": list(report.outcome.units),
                 }
         self._save()
         return delivered
 
     def _tests(self) -> list[Path]:
-        found = []
+        tests = []
         for base, folders, files in os.walk(self.folder):
             here = Path(base)
-            folders[:] = sorted(one for one in folders if not self._skipped(here / one))
+            folders[:] = sorted(folder for folder in folders if not self._skipped(here / folder))
             if "test.toml" in files:
-                found.append(here)
-        return found
+                tests.append(here)
+        return tests
 
     def _skipped(self, folder: Path) -> bool:
         return folder.name.startswith(".") or folder.resolve() == self.out.resolve()
 
     def _listing(self, test: Path) -> Listing:
         """Return (path, size, time of change) of a test's files: what tells that one is still growing."""
-        found = []
+        listing = []
         for base, folders, files in os.walk(test):
-            folders[:] = [one for one in folders if not self._skipped(Path(base) / one)]
+            folders[:] = [folder for folder in folders if not self._skipped(Path(base) / folder)]
             for name in files:
                 path = Path(base) / name
                 if name.startswith((".", "~$")) or path.is_symlink():
                     continue
                 with contextlib.suppress(OSError):
                     status = path.stat()
-                    found.append((path.relative_to(test).as_posix(), status.st_size, status.st_mtime_ns))
-        return tuple(sorted(found))
+                    listing.append((path.relative_to(test).as_posix(), status.st_size, status.st_mtime_ns))
+        return tuple(sorted(listing))
 
     def _name(self, test: Path) -> str:
         relative = test.relative_to(self.folder).as_posix()
@@ -234,21 +234,21 @@ class Watcher:
 
     def _note(self, name: str) -> Path:
         # Two tests never share a note: year/one and year_one are different tests.
-        told = name.replace("%", "%25").replace("/", "%2F")
-        if len(told.encode()) > _LONGEST:
-            told = f"{told[:40]}-{sha256_bytes(name.encode())[:16]}"
-        return self.out / SET_ASIDE / f"{told}.txt"
+        file_name = name.replace("%", "%25").replace("/", "%2F")
+        if len(file_name.encode()) > _LONGEST:
+            file_name = f"{file_name[:40]}-{sha256_bytes(name.encode())[:16]}"
+        return self.out / SET_ASIDE / f"{file_name}.txt"
 
-    def _refused_otherwise(self, told: dict[str, Any]) -> bool:
+    def _refused_otherwise(self, entry: dict[str, Any]) -> bool:
         """Tell whether a test was refused by another toolkit or under other settings.
 
         Nothing may be wrong with it then. A state of before versions were noted is an older toolkit's.
         """
-        if told.get("state") != SET_ASIDE:
+        if entry.get("state") != SET_ASIDE:
             return False
-        if told.get("rule") in _NOT_IN_FORCE and told.get("registry") != self.registry():
+        if entry.get("rule") in _NOT_IN_FORCE and entry.get("registry") != self.registry():
             return True
-        return told.get("version") != self.version or told.get("settings", self.settings) != self.settings
+        return entry.get("version") != self.version or entry.get("settings", self.settings) != self.settings
 
     def _set_aside(self, fault: Aside, content: str, *, by: str | None = None) -> None:
         from toolkit.recording.marks import OWN_OUTPUT
@@ -270,9 +270,11 @@ class Watcher:
         if not path.is_file():
             return {}
         try:
-            told = json.loads(path.read_text(encoding="utf-8"))
-            tests = told["tests"]
-            if told["generator"] != "toolkit" or not all(isinstance(one, dict) for one in tests.values()):
+            state = json.loads(path.read_text(encoding="utf-8"))
+            tests = state["tests"]
+            if state["generator"] != "toolkit" or not all(
+                isinstance(entry, dict) for entry in tests.values()
+            ):
                 raise ValueError("not a state of toolkit watch")  # noqa: TRY301  one message for every fault
         except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
             raise OutputError(
@@ -286,8 +288,8 @@ class Watcher:
         return dict(tests)
 
     def _save(self) -> None:
-        told = {"generator": "toolkit", "schema": 1, "tests": dict(sorted(self.state.items()))}
-        self._write(self.out / STATE, json.dumps(told, ensure_ascii=False, indent=2) + "\n")
+        document = {"generator": "toolkit", "schema": 1, "tests": dict(sorted(self.state.items()))}
+        self._write(self.out / STATE, json.dumps(document, ensure_ascii=False, indent=2) + "\n")
 
     def _write(self, path: Path, text: str) -> None:
         """Write a file of the watch's own; on a full disk it is written at a later look, and said to wait."""
@@ -300,8 +302,8 @@ class Watcher:
             self.unwritten[path] = (text, str(error))
 
 
-def _stands_aside(name: str, told: dict[str, Any]) -> Aside:
-    return Aside(test=name, rule=str(told.get("rule", "error")), reason=str(told.get("reason", "")))
+def _stands_aside(name: str, entry: dict[str, Any]) -> Aside:
+    return Aside(test=name, rule=str(entry.get("rule", "error")), reason=str(entry.get("reason", "")))
 
 
 def _content(test: Path, listing: Listing) -> str:
