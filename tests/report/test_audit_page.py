@@ -19,7 +19,7 @@ from toolkit.audit.linked import PastReport, link
 from toolkit.audit.timeline import timelines
 from toolkit.audit.traces import traces, worst_files
 from toolkit.calibration.registry.registry import Registry
-from toolkit.cli.explain import rules_catalogue
+from toolkit.lab.rules import rules_catalogue
 from toolkit.recording.marks import own_output
 from toolkit.report.audit.content import build_audit_content
 from toolkit.report.audit.page import AuditView, _largest, page, write_page

@@ -7,7 +7,6 @@ import re
 from collections.abc import Iterable
 from dataclasses import replace
 
-from toolkit import __version__
 from toolkit.estimate import round_to_uncertainty, round_uncertainty
 from toolkit.report.certificate.model import VERDICTS, Certificate, LoadResult
 from toolkit.report.certificate.plots import build_plots
@@ -15,6 +14,7 @@ from toolkit.report.certificate.statements import RULES
 from toolkit.report.certificate.vocabulary import CERTIFICATE, TABLES
 from toolkit.report.content import Cell, ReportContent, Table, Value
 from toolkit.report.style import Style
+from toolkit.version import __version__
 
 GAP = "NOT STATED"
 _PERCENT = re.compile(r"\d+\.\d+(?= %)")

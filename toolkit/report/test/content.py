@@ -8,7 +8,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from toolkit import __version__
 from toolkit.calibration.records.use import DRAFT, UNVERIFIED
 from toolkit.characteristics.catalogue import columns
 from toolkit.characteristics.layout import PULL, STIFFNESS
@@ -26,6 +25,7 @@ from toolkit.report.test.figures import TURNED, build_plots, load_groups
 from toolkit.report.test.models import model_plots
 from toolkit.report.test.tables import build_tables
 from toolkit.report.words import say_plot, say_table, say_values
+from toolkit.version import __version__
 
 if TYPE_CHECKING:
     from toolkit.calibration.records.record import CalibrationRecord
