@@ -124,7 +124,7 @@ def test_a_quantity_is_a_float_that_remembers() -> None:
         ('symbol = "SA"', 'symbol = "sa"', "wrong-value", "channel[2].symbol", "[A-Z]"),
         ('unit = "deg"\nrole', 'unit = "degg"\nrole', "unknown-unit", "channel[2].unit", "deg"),
         ('unit = "deg"\nrole', 'unit = "kg"\nrole', "unit-dimension", "channel[2].unit", "force or angle"),
-        ('role = "angle"', 'role = "angel"', "wrong-value", "channel[2].role", "load, angle"),
+        ('role = "angle"', 'role = "angel"', "wrong-value", "channel[2].role", "load or angle"),
         ("[cells.D51]", "[cells.D52]", "unknown-key", "cells.D52", "D51"),
         ("gain = 2.5", "", "missing-key", "cells.D51.gain", "a positive number"),
         ('u = 15\nunit = "lbf"', "u = 15", "no-unit", "cells.D51.unit", "a unit such as N"),

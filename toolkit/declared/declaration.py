@@ -33,6 +33,7 @@ from toolkit.declared.marks import (
     Format,
     Keyed,
     Names,
+    Short,
     Size,
     Text,
     Unit,
@@ -132,7 +133,8 @@ def kind_of(annotation: Any, marks: Marks = ()) -> tuple[Kind, bool]:
         return _SINGLE[annotation](entry, marks), False
     if dataclasses.is_dataclass(annotation) and isinstance(annotation, type):
         table = table_of(annotation)
-        return dataclasses.replace(table, entry=entry), False
+        short = _mark(marks, Short)
+        return dataclasses.replace(table, entry=entry, short=short.key if short else None), False
     if origin in (tuple, list) or (origin is not None and issubclass(origin, Mapping)):
         return _several(origin, arguments, entry, marks), False
     raise TypeError(f"{annotation!r} declares no entry of a file")
@@ -170,8 +172,8 @@ def _number(entry: Entry, marks: Marks, *, whole: bool) -> Kind:
 
 
 def _text(entry: Entry, marks: Marks) -> Kind:
-    if _mark(marks, Day) is not None:
-        return DateKind(entry=entry, text=True)
+    if (day := _mark(marks, Day)) is not None:
+        return DateKind(entry=entry, text=True, moment=day.moment)
     if (unit := _mark(marks, UnitName)) is not None:
         return UnitKind(entry=entry, mark=unit)
     return TextKind(entry=entry, text=_mark(marks, Text) or Text(), names=_mark(marks, Names))
@@ -188,9 +190,11 @@ _SINGLE: dict[Any, Any] = {
 
 
 def _form(annotation: Any, marks: Marks) -> Kind:
-    """Return the kind of one of several forms; what its field says is said of all of them."""
-    own = _bare(annotation)[1]
-    return kind_of(annotation, (*own, *(mark for mark in marks if not isinstance(mark, Entry))))[0]
+    """Return the kind of one of several forms; of single values all say what the field expects."""
+    annotation, own = _bare(annotation)
+    several = dataclasses.is_dataclass(annotation) or get_origin(annotation) is not None
+    inner = tuple(mark for mark in marks if not (several and isinstance(mark, Entry)))
+    return kind_of(annotation, (*own, *inner))[0]
 
 
 def _tag(kinds: tuple[Kind, ...]) -> str | None:

@@ -123,7 +123,11 @@ def reference(cls: type) -> str:
 def _reference_row(declared: Field) -> str:
     default = "required" if declared.required else _default(declared) or "none"
     former = "".join(f"; formerly `{key}`" for key in declared.kind.entry.old)
-    cells = (f"`{declared.key}`", declared.kind.expected, default, declared.kind.entry.help + former)
+    holds = declared.kind.expected
+    if _inner_table(declared.kind) is not None and declared.kind.entry.expected is None:
+        tables = {ListKind: "tables below, [[...]]", KeyedKind: "tables below, by name"}
+        holds = tables.get(type(declared.kind), "the table below")
+    cells = (f"`{declared.key}`", holds, default, declared.kind.entry.help + former)
     return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
 
 

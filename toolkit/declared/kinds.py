@@ -277,9 +277,7 @@ class ChoiceKind(Kind):
 
     def form(self) -> str:
         """Return what may stand there."""
-        if all(isinstance(choice, int) for choice in self.choices):
-            return " or ".join(map(str, self.choices))
-        return ", ".join(map(str, self.choices))
+        return (" or " if len(self.choices) <= 2 else ", ").join(map(str, self.choices))
 
     def read(self, value: Any, place: Place) -> Any:
         """Return the choice."""
@@ -309,6 +307,7 @@ class DateKind(Kind):
 
     shape = (dt.date, str)
     text: bool = False
+    moment: bool = False
 
     def form(self) -> str:
         """Return what may stand there."""
@@ -317,6 +316,8 @@ class DateKind(Kind):
     def read(self, value: Any, place: Place) -> Any:
         """Return the date."""
         day = value if type(value) is dt.date else None
+        if self.moment and isinstance(value, dt.datetime):
+            day = value.date()
         if isinstance(value, str) and len(value) == len("2026-03-31"):
             try:
                 day = dt.date.fromisoformat(value)

@@ -40,7 +40,9 @@ class ListKind(Kind):
         """Tell whether a value is a list, or a table with one of numbers."""
         if self.shared_unit and isinstance(value, dict):
             return isinstance(value.get("value"), list)
-        return isinstance(value, list)
+        return isinstance(value, list) and not (
+            self.of_tables and not all(self.item.suits(table) for table in value)
+        )
 
     def form(self) -> str:
         """Return what may stand there."""
@@ -66,7 +68,7 @@ class ListKind(Kind):
                 return place.refuse(value, self.expected, rule="no-unit", what="the list has no unit")
         elif self.shared_unit:
             items = None
-        if not isinstance(items, list) or (self.of_tables and not all(isinstance(t, dict) for t in items)):
+        if not isinstance(items, list) or not self.suits(value):
             return self.wrong(value, place)
         most = len(self.fixed) if self.fixed else self.size.most
         if len(items) < (len(self.fixed) or self.size.least) or (most is not None and len(items) > most):

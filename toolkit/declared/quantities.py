@@ -27,7 +27,7 @@ class QuantityKind(Kind):
             return self.number.expected
         written = f'{{ value = NUMBER, unit = "{self.unit.units[0] if self.unit.units else "..."}" }}'
         limits = f" {self.number.range()} {self.name}" if self.number.limits else ""
-        plain = f", or a number in {self.name}" if self.unit.plain else ""
+        plain = ", or a number" + f" in {self.name}" * bool(self.name) if self.unit.plain else ""
         return f"{written}{limits}{plain}"
 
     @property
@@ -55,7 +55,7 @@ class QuantityKind(Kind):
                     return None
             if "value" in value and isinstance(value.get("unit"), str):
                 return value["value"], value["unit"]
-        elif self.unit.plain and is_number(value):
+        elif self.unit.plain and self.number.suits(value):
             return value, self.name
         place.refuse(
             value, self.expected, rule="no-unit", what=f"{shown(value)} has no unit" if value else None

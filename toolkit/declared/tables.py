@@ -50,6 +50,7 @@ class TableKind(Kind):
     fields_of: Callable[[type], tuple[Field, ...]]
     form_of: Format | None = None
     named_by: str | None = None
+    short: str | None = None
 
     @property
     def fields(self) -> tuple[Field, ...]:
@@ -79,6 +80,8 @@ class TableKind(Kind):
 
     def read(self, value: Any, place: Place, stated: Mapping[str, Any] | None = None) -> Any:
         """Return an object of the class; ``stated`` are fields that no entry holds."""
+        if self.short is not None and not isinstance(value, dict):
+            value = {self.short: value}
         if not isinstance(value, dict):
             path = ".".join(part for part in place.path if isinstance(part, str))
             return place.refuse(
@@ -87,6 +90,11 @@ class TableKind(Kind):
             )  # fmt: skip
         if self.form_of is not None:
             place = replace(place, form=self.form_of)
+            value = _of_newest(value, self.form_of, place)
+            if value is None:
+                return REFUSED
+            if not place.path:
+                place = replace(place, root=value)
         fields = self.fields
         held, meant, before = dict(stated or {}), set(), len(place.faults)
         by_key = {key: field for field in fields for key in (field.key, *field.kind.entry.old)}
@@ -115,6 +123,10 @@ class TableKind(Kind):
             place.faults.append(replace(fault, key=key, form=place.form))
         return made if len(place.faults) == before else REFUSED
 
+    def suits(self, value: Any) -> bool:
+        """Tell whether a value is a table, or stands for one."""
+        return isinstance(value, dict) or self.short is not None
+
     def holds(self, value: Any) -> bool:
         """Tell whether it is an object of the class."""
         return type(value) is self.cls
@@ -122,8 +134,6 @@ class TableKind(Kind):
     def write(self, value: Any) -> Any:
         """Return the table; what is None, or an empty list by default, is left out."""
         table: dict[str, Any] = {}
-        if self.form_of is not None and self.form_of.schema is not None:
-            table["schema"] = self.form_of.schema
         for declared in self.fields_of(type(value)):
             entry = getattr(value, declared.name)
             if declared.name == self.named_by or entry is None or (entry == () and declared.default == ()):
@@ -144,6 +154,29 @@ class TableKind(Kind):
         if self.entry.example is not None:
             return self.entry.example
         return {field.key: field.kind.example() for field in self.fields if field.required}
+
+
+def _of_newest(table: dict[str, Any], form: Format, place: Place) -> dict[str, Any] | None:
+    """Return the entries in the newest form; None where their schema is not known."""
+    if form.schema is None:
+        return table
+    stated = table.get("schema", None if form.schema_required else form.schema)
+    if stated is None:
+        place.at("schema").refuse(None, f"schema = {form.schema}", kind="missing")
+        return None
+    older = dict(form.older or {})
+    if type(stated) is not int or (stated != form.schema and stated not in older):
+        newer = type(stated) is int and stated > form.schema
+        place.at("schema").refuse(
+            stated,
+            " or ".join(map(str, sorted({form.schema, *older}))),
+            what=f"this {form.title} was written by a newer version of the toolkit" if newer else None,
+        )
+        return None
+    while stated != form.schema:
+        table = {**older[stated](table), "schema": stated + 1}
+        stated += 1
+    return table
 
 
 def _with_unit_beside(declared: Field, table: Mapping[str, Any], place: Place) -> Any:

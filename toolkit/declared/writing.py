@@ -23,8 +23,10 @@ def plain(made: Any) -> dict[str, Any]:
 
     Quantities keep the unit in which they were read; what is None is left out.
     """
-    table: dict[str, Any] = table_of(type(made)).write(made)
-    return table
+    kind = table_of(type(made))
+    schema = {} if kind.form_of is None or kind.form_of.schema is None else {"schema": kind.form_of.schema}
+    table: dict[str, Any] = kind.write(made)
+    return schema | table
 
 
 def toml_text(made: Any) -> str:
