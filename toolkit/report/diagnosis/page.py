@@ -10,9 +10,8 @@ from typing import TYPE_CHECKING
 
 from toolkit.files import write_atomic
 from toolkit.report.diagnosis import figures
-from toolkit.report.diagnosis.chance import chance
 from toolkit.report.diagnosis.maps import size_maps
-from toolkit.report.diagnosis.numbers import few, over
+from toolkit.report.diagnosis.numbers import chance, few, over
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
