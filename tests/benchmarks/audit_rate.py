@@ -157,10 +157,9 @@ class _Reader:
         self.folder, self.machine = folder, load_machine("m15")
 
     def __call__(self, name: str) -> int:
-        from toolkit.recording.safe_open import gate
-
         from toolkit.errors import ToolkitError
         from toolkit.recording.columns import header_of
+        from toolkit.recording.safe_open import gate
         from toolkit.recording.xlsx import read_sheet
 
         try:

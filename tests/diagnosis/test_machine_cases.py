@@ -5,12 +5,12 @@ import hashlib
 import numpy as np
 import pandas as pd
 import pytest
-from toolkit.diagnosis.answer.answer import Recorded
-from toolkit.diagnosis.answer.case_findings import calibration_findings, case_findings
 
 from tests.conftest import EXAMPLES
 from tests.diagnosis.cases import write_case
 from tests.diagnosis.tire_case import TIR, sweep, toml
+from toolkit.diagnosis.answer.answer import Recorded
+from toolkit.diagnosis.answer.case_findings import calibration_findings, case_findings
 from toolkit.diagnosis.case.reader import read_case
 from toolkit.diagnosis.diagnose import diagnose
 from toolkit.diagnosis.fit.problem import problem_of

@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 import pytest
-from toolkit.diagnosis.fit.predict import _spread_to, prediction_csv, prediction_names
 
 from tests.diagnosis.cases import HEAD, TWO, carriage, write_case
 from toolkit.diagnosis.case.reader import read_case
 from toolkit.diagnosis.diagnose import diagnose
+from toolkit.diagnosis.fit.predict import _spread_to, prediction_csv, prediction_names
 from toolkit.diagnosis.fit.problem import problem_of
 from toolkit.diagnosis.simulators.build_simulator import model_of
 from toolkit.diagnosis.simulators.simulator import Active

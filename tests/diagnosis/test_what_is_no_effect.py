@@ -3,15 +3,15 @@
 import numpy as np
 import pandas as pd
 import pytest
-from toolkit.diagnosis.fit.fit import fit, replace_effects
-from toolkit.diagnosis.fit.noise import fit_noise, layout
-from toolkit.diagnosis.search.forward_step import Step
-from toolkit.diagnosis.search.search import _with_a_size
 
 from tests.diagnosis.cases import HEAD, TWO, write_case
 from toolkit.diagnosis.case.reader import read_case
 from toolkit.diagnosis.diagnose import diagnose
+from toolkit.diagnosis.fit.fit import fit, replace_effects
+from toolkit.diagnosis.fit.noise import fit_noise, layout
 from toolkit.diagnosis.fit.problem import problem_of
+from toolkit.diagnosis.search.forward_step import Step
+from toolkit.diagnosis.search.search import _with_a_size
 from toolkit.diagnosis.simulators.build_simulator import model_of
 from toolkit.diagnosis.simulators.simulator import Active
 from toolkit.effects.catalogue import effects

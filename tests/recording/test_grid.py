@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from toolkit.recording.safe_open import gate
 from workbook_factory import (
     DATA,
     HEADERS,
@@ -31,6 +30,7 @@ from toolkit.recording import read_recording
 from toolkit.recording.cells import _parse, find_cells
 from toolkit.recording.columns import header_of
 from toolkit.recording.grid import find_grid
+from toolkit.recording.safe_open import gate
 from toolkit.recording.table import read_table
 from toolkit.recording.xlsx import read_sheet
 

@@ -12,9 +12,8 @@ from tests.diagnosis.cases import carriage, write_case
 from toolkit.diagnosis.case.reader import read_case
 from toolkit.diagnosis.diagnose import diagnose
 from toolkit.report.diagnosis import figures
-from toolkit.report.diagnosis.chance import chance
 from toolkit.report.diagnosis.maps import size_maps, variables
-from toolkit.report.diagnosis.numbers import few, over
+from toolkit.report.diagnosis.numbers import chance, few, over
 from toolkit.report.diagnosis.page import HEADLINES, condition, headline, page
 
 

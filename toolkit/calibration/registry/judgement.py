@@ -14,11 +14,10 @@ from typing import TYPE_CHECKING
 
 from toolkit.calibration.registry.gates import GateResult, check_loads
 from toolkit.calibration.registry.history import NO_HISTORY, History, agreeing, compared, history_of
-from toolkit.calibration.registry.plausible import plausible
+from toolkit.calibration.registry.plausible import plausible, tare_claim
 from toolkit.calibration.registry.polarity import machine_polarity, reading_polarity, unconfirmed
 from toolkit.calibration.registry.status import status_of
 from toolkit.calibration.registry.stored import stored_check, stored_loads
-from toolkit.calibration.registry.tare_claim import tare_claim
 from toolkit.calibration.session.polarity import PolarityReading, polarity_readings
 from toolkit.calibration.session.statements import scope_of, statements_of
 from toolkit.errors import ConfigError
@@ -45,12 +44,12 @@ class Judgement:
     @property
     def failed(self) -> tuple[GateResult, ...]:
         """What keeps the record from being approved."""
-        return tuple(one for one in self.results if one.effect != "tells")
+        return tuple(result for result in self.results if result.effect != "tells")
 
     @property
     def told(self) -> tuple[GateResult, ...]:
         """What does not, and is written down with the approval."""
-        return tuple(one for one in self.results if one.effect == "tells")
+        return tuple(result for result in self.results if result.effect == "tells")
 
 
 def judge(
@@ -93,7 +92,7 @@ def judge(
         # What has the wrong sign by one of them is not asked for: it is answered.
         pairs = {
             *agreeing(record, history, results), *stated.pairs,
-            *(tuple(one.where.split(", ")) for one in results if one.rule in ("sign", "polarity")),
+            *(tuple(result.where.split(", ")) for result in results if result.rule in ("sign", "polarity")),
         }  # fmt: skip
         results += unconfirmed(
             record,
@@ -102,7 +101,7 @@ def judge(
         )
     if loads is not None:
         u = statements_of(record).reference
-        results += tare_claim(record, tables, u_reference=[u.u(one.load) for one in record.loads])
+        results += tare_claim(record, tables, u_reference=[u.u(load.load) for load in record.loads])
     if check is not None:
         results += check_loads(record, check)
     return Judgement(results=tuple(results), evidence=(*stated.evidence, *read.evidence))

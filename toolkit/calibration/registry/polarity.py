@@ -54,13 +54,17 @@ def machine_polarity(
             sign = None if stated is None else stated.sign(one.load)
             if stated is None or sign is None or machine is None:
                 continue
-            found = response(record, one, cell)
-            limit = 3 * found.u if found.extent is None else max(tolerance(one) / found.extent, 3 * found.u)
+            sensitivity = response(record, one, cell)
+            limit = (
+                3 * sensitivity.u
+                if sensitivity.extent is None
+                else max(tolerance(one) / sensitivity.extent, 3 * sensitivity.u)
+            )
             where = f"{one.load}, {cell.name}"
-            said = f"machine {machine.name} states a {_WORD[sign]} one ({stated.source})"
-            if found.value * sign <= 0 or abs(found.value) <= limit:
-                shown = "no sign of it shows" if abs(found.value) <= limit else f"it is {found}"
-                message = f"the response has not the machine's sign: {shown}, {said}"
+            statement = f"machine {machine.name} states a {_WORD[sign]} one ({stated.source})"
+            if sensitivity.value * sign <= 0 or abs(sensitivity.value) <= limit:
+                shown = "no sign of it shows" if abs(sensitivity.value) <= limit else f"it is {sensitivity}"
+                message = f"the response has not the machine's sign: {shown}, {statement}"
                 failed.append(GateResult(rule="polarity", where=where, message=message))
             else:
                 pairs.add((one.load, cell.name))
@@ -87,33 +91,38 @@ def reading_polarity(
     loads: set[str] = set()
     indications: set[str] = set()
     evidence: list[str] = []
-    for one in readings:
-        largest = largest_load(record.load(one.load)) / si_scale(one.unit)
-        predicted = _predicted(record, one)
-        limit = one.tolerance * abs(one.value)
-        told = f"{predicted:.5g} {one.unit} by the record where {one.value:.5g} {one.unit} were applied"
-        if abs(one.value) < SMALLEST * largest:
+    for reading in readings:
+        largest = largest_load(record.load(reading.load)) / si_scale(reading.unit)
+        predicted = _predicted(record, reading)
+        limit = reading.tolerance * abs(reading.value)
+        unit = reading.unit
+        comparison = f"{predicted:.5g} {unit} by the record where {reading.value:.5g} {unit} were applied"
+        if abs(reading.value) < SMALLEST * largest:
             message = (
-                f"a load of {abs(one.value):.4g} {one.unit} is too small to tell a direction: at least "
-                f"{SMALLEST * largest:.4g} {one.unit}"
+                f"a load of {abs(reading.value):.4g} {unit} is too small to tell a direction: at least "
+                f"{SMALLEST * largest:.4g} {unit}"
             )
-        elif any(_in_rows(one, table) for table in tables):
+        elif any(_in_rows(reading, table) for table in tables):
             message = "the reading equals a row of the session: it must be one taken apart from it"
-        elif predicted * one.value < 0:
-            message = f"the record has the wrong sign: {told}"
-        elif abs(predicted - one.value) > limit:
-            message = f"the record misses the reading by more than {100 * one.tolerance:.3g} %: {told}"
+        elif predicted * reading.value < 0:
+            message = f"the record has the wrong sign: {comparison}"
+        elif abs(predicted - reading.value) > limit:
+            message = (
+                f"the record misses the reading by more than {100 * reading.tolerance:.3g} %: {comparison}"
+            )
         else:
-            loads.add(one.load)
+            loads.add(reading.load)
             shown = {
                 name
                 for name in record.indications
-                if abs(_predicted(record, one, turned=name) - one.value) > limit
+                if abs(_predicted(record, reading, turned=name) - reading.value) > limit
             }
             indications |= shown
-            evidence.append(f"polarity reading: {told}; it shows {', '.join(sorted(shown)) or 'no cell'}")
+            evidence.append(
+                f"polarity reading: {comparison}; it shows {', '.join(sorted(shown)) or 'no cell'}"
+            )
             continue
-        failed.append(GateResult(rule="polarity-reading", where=one.place, message=message))
+        failed.append(GateResult(rule="polarity-reading", where=reading.place, message=message))
     return tuple(failed), Confirmed(
         pairs=frozenset(), loads=frozenset(loads), indications=frozenset(indications),
         evidence=tuple(evidence),
@@ -124,8 +133,8 @@ def unconfirmed(
     record: CalibrationRecord, *, loads: Collection[str], indications: Collection[str]
 ) -> tuple[GateResult, ...]:
     """Return what no history, machine or reading has confirmed: every load, and each main indication."""
-    mains = dict.fromkeys(name for one in record.loads for name in main_indications(record, one))
-    lacking = [f"load {one.load}" for one in record.loads if one.load not in loads]
+    mains = dict.fromkeys(name for load in record.loads for name in main_indications(record, load))
+    lacking = [f"load {load.load}" for load in record.loads if load.load not in loads]
     lacking += [f"indication {name}" for name in mains if name not in indications]
     if not lacking:
         return ()
@@ -137,24 +146,24 @@ def unconfirmed(
     return (GateResult(rule="polarity-reading", where=record.instrument, message=message, effect="asks"),)
 
 
-def _predicted(record: CalibrationRecord, one: PolarityReading, turned: str = "") -> float:
-    zero = dict(one.zero)
+def _predicted(record: CalibrationRecord, reading: PolarityReading, turned: str = "") -> float:
+    zero = dict(reading.zero)
     values = {}
-    for name, value in one.indications:
-        rest = zero.get(name, 0.0)
-        values[name] = np.array([2 * rest - value if name == turned else value])
-    found = apply_record(
+    for name, value in reading.indications:
+        at_zero = zero.get(name, 0.0)
+        values[name] = np.array([2 * at_zero - value if name == turned else value])
+    applied = apply_record(
         record,
         values,
         units=dict(zip(record.indications, record.indication_units, strict=True)),
         tare={name: zero.get(name, 0.0) for name in record.indications} if zero else None,
-        only=(one.load,),
+        only=(reading.load,),
     )
-    return float(found[one.load][0]) / si_scale(one.unit)
+    return float(applied[reading.load][0]) / si_scale(reading.unit)
 
 
-def _in_rows(one: PolarityReading, table: Table) -> bool:
-    names, values = zip(*one.indications, (one.load, one.value), strict=True)
+def _in_rows(reading: PolarityReading, table: Table) -> bool:
+    names, values = zip(*reading.indications, (reading.load, reading.value), strict=True)
     rows = table.matrix(names)
     scale = np.abs(rows).max(axis=0)
     return bool((np.abs(rows - np.array(values)) <= _EQUAL * scale).all(axis=1).any())

@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from toolkit.tires import mf52, mf61
-from toolkit.tires.mf_versions import FOREIGN
 from toolkit.tires.slip import state
-from toolkit.tires.tir import TirFile
+from toolkit.tires.tir import FOREIGN, TirFile
 from toolkit.tires.tir_units import si_number
 
 if TYPE_CHECKING:

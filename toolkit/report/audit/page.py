@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from toolkit.audit.since_good import DriftedFile, DriftedTest
 from toolkit.calibration.records.use import mark_of
+from toolkit.characteristics.catalogue import summary
 from toolkit.files import atomic_path
 from toolkit.recording.marks import OWN_OUTPUT
 from toolkit.report.audit.svg import rows_of, timeline
@@ -43,10 +44,6 @@ _FILES = (
     Column(title="ΔMz max [N·m]", kind="number"),
     Column(title="reports"),
 )
-_EFFECTS = {
-    "cornering_stiffness": "cornering stiffness [%]", "aligning_stiffness": "aligning stiffness [%]",
-    "conicity": "conicity [N]", "plysteer": "plysteer [N]", "CRAT": "CRAT [N·m]", "PRAT": "PRAT [N·m]",
-}  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -164,24 +161,28 @@ def _tests(audit: ArchiveAudit) -> Table | None:
     worst = heapq.nlargest(_TESTS, changed, key=lambda test: float(test["FY_max_abs_N"]))
     if not worst:
         return None
+    # A stiffness changes by a share of itself; what is near zero by nature, in its unit.
+    characteristics = [
+        (str(entry.summary), None if entry.scope == "direction" else entry.printed_unit.replace("*", "·"))
+        for entry in summary()
+    ]
     rows = [
         (
             test["test"],
             test["date"],
             f"{test['not_clean']} of {test['files']}",
-            *(_largest(test["effects"], name) for name in _EFFECTS),
+            *(_largest(test["effects"], name, percent=unit is None) for name, unit in characteristics),
         )
         for test in worst
     ]
-    titles = ("test", "date", "files not right", *_EFFECTS.values())
+    names = (f"{name.replace('_', ' ')} [{unit or '%'}]" for name, unit in characteristics)
+    titles = ("test", "date", "files not right", *names)
     return table(titles, rows, numbers=range(2, len(titles)), dates=(1,))
 
 
-def _largest(effects: Sequence[Mapping[str, Any]], name: str) -> str:
+def _largest(effects: Sequence[Mapping[str, Any]], name: str, *, percent: bool = False) -> str:
     changes = [
-        100 * effect["change"] / abs(effect["old"])
-        if name.endswith("stiffness") and effect["old"]
-        else effect["change"]
+        100 * effect["change"] / abs(effect["old"]) if percent and effect["old"] else effect["change"]
         for effect in effects
         if effect["name"] == name
     ]

@@ -7,9 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from toolkit.report.diagnosis import figures
-from toolkit.report.diagnosis.chance import chance
 from toolkit.report.diagnosis.maps import size_maps
-from toolkit.report.diagnosis.numbers import few, over
+from toolkit.report.diagnosis.numbers import chance, few, over
 from toolkit.report.pages.kit import Figure, Table, number, page_parts, table
 
 if TYPE_CHECKING:
