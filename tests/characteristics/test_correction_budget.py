@@ -9,20 +9,15 @@ import pytest
 from tire_factory import LOAD, M15, reduced_test
 
 from toolkit.characteristics.characterise import characterise, characteristic_rows
-from toolkit.effects.applied import AppliedEffect
-from toolkit.effects.catalogue import effects
 from toolkit.machine import Correction
 from toolkit.machine.definition import Machine
 
 
-def corrected(name: str, unit: str, u: float, **place: str) -> Machine:
-    effect = effects()[name]
-    applied = AppliedEffect(
-        effect=effect, values={effect.names[0]: 0.0}, units={effect.names[0]: unit}, **place
-    )
+def corrected(effect: str, unit: str, u: float, **place: str) -> Machine:
     told = Correction(
-        applied=applied, u=u, reason="measured apart", by="a tester", date="2026-04-01",
-        answer_sha256="a" * 64, case_sha256="b" * 64, code_version="0",
+        effect=effect, channel=place.get("channel"), source=place.get("source"), parameter="", value=0.0,
+        unit=unit, u=u, reason="measured apart", by="a tester", date="2026-04-01", answer_sha256="a" * 64,
+        case_sha256="b" * 64, code_version="0",
     )  # fmt: skip
     return dataclasses.replace(M15, version=2, corrections=(told,))
 

@@ -14,7 +14,7 @@ from toolkit.calibration.registry.registry import Registry
 from toolkit.calibration.uncertainty.propagation import record_covariance
 from toolkit.characteristics.characterise import characterise
 from toolkit.characteristics.shared import Shared
-from toolkit.cli.home import packaged_home
+from toolkit.lab.home import packaged_home
 from toolkit.machine import TypeB, load_machine
 from toolkit.pipeline import TestResult, process, read_test
 from toolkit.recording.folder import read_test_folder
@@ -139,12 +139,11 @@ def test_every_characteristic_holds_what_is_stated(fitted: CalibrationRecord, re
         characterise(result.reduced, machine=MACHINE, record=stating(fitted, **settings))
         for settings in ({}, STATED)
     )
-    for before, after in zip((*few.pull, *few.stiffness), (*many.pull, *many.stiffness), strict=True):
-        for name in before.__dataclass_fields__:
-            one, other = getattr(before, name), getattr(after, name)
-            if hasattr(one, "u"):
-                assert other.value == one.value
-                assert other.u > one.u, name
+    for before, after in zip(few.rows, many.rows, strict=True):
+        if before.estimate is not None:
+            assert after.estimate is not None
+            assert after.estimate.value == before.estimate.value
+            assert after.estimate.u > before.estimate.u, before.name
 
 
 def test_the_residual_torque_moves_as_its_curves_do(fitted: CalibrationRecord, result: TestResult) -> None:
@@ -168,13 +167,13 @@ def test_the_residual_torque_moves_as_its_curves_do(fitted: CalibrationRecord, r
         only = dataclasses.replace(load, covariance=tuple(map(tuple, cov.tolist())))
         record = dataclasses.replace(stating(fitted), loads=(only, *others))
         wide = characterise(result.reduced, machine=MACHINE, record=record)
-        for one, other, u in zip(base.pull, after.pull, wide.pull, strict=True):
-            assert one.residual_forward is not None
-            assert other.residual_forward is not None
-            assert u.residual_forward is not None
-            extra = np.sqrt(u.residual_forward.u**2 - one.residual_forward.u**2)
-            difference = abs(other.residual_forward.value - one.residual_forward.value)
-            assert extra == pytest.approx(difference, rel=0.06)
+        name = "residual_forward"
+        for rows in zip(base.of(name), after.of(name), wide.of(name), strict=True):
+            one, other, u = (row.estimate for row in rows)
+            assert one is not None
+            assert other is not None
+            assert u is not None
+            assert np.sqrt(u.u**2 - one.u**2) == pytest.approx(abs(other.value - one.value), rel=0.06)
 
 
 def _groups(result: TestResult) -> Any:

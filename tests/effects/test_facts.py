@@ -28,10 +28,10 @@ class Case:
     cells = frozenset({"D51", "D52", "E5"})
     nominal_load_N = 4000.0
     rows, row_time, minutes, longest_run = 500, 0.02, 0.4, 12.0
+    integrates, way = True, (1.0, 0.01)
     motion = MotionSizes(
-        force=5.0, velocity=0.5, position=0.2, farthest_velocity=1.2, farthest_position=0.6, highest=0.4,
-        way=1.0, row_way=0.01, integrated=True, has_position=True,
-    )  # fmt: skip
+        force=5.0, speed=0.5, place=0.2, fastest=1.2, farthest=0.6, level=0.4, has_position=True
+    )
 
     def spread(self, name):
         return 1.0 if name is None else 700.0

@@ -23,8 +23,6 @@ CATALOGUE = ROOT / "effects" / "catalogue"
 PULL = {"conicity", "plysteer"}
 OTHER_MEANINGS = {
     "characteristics": (PULL, "characteristics of a tire that a test has as results"),
-    "comparison": (PULL, "characteristics of a tire that a test has as results"),
-    "audit": (PULL, "characteristics of a tire that a test has as results"),
     "report": (PULL, "characteristics of a tire that a test has as results"),
     "calibration": ({"creep"}, "a statement on a cell in the file of a session, by the word of its standard"),
     "simulation/plan_sections.py": (

@@ -10,12 +10,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from toolkit.effects.applied import AppliedEffect
-from toolkit.effects.catalogue import effects
 from toolkit.errors import ConfigError, ToolkitError
-from toolkit.files import parse_toml, sha256_file
+from toolkit.files import sha256_file
 from toolkit.machine import Correction, load_machine
-from toolkit.machine.definition import build_machine, machine_file
+from toolkit.machine.definition import machine_file, machine_of_text
 from toolkit.machine.next_version import next_version
 from toolkit.pipeline import process, read_test
 from toolkit.recording.folder import read_test_folder
@@ -42,13 +40,10 @@ code_version = "0"
 
 
 def correction(effect="steer_offset", value=0.3, unit="deg", u=0.01, **more):
-    parameter = effects()[effect].names[0]
-    place = {key: more.pop(key) for key in ("channel", "source") if key in more}
+    parameter = {"steer_offset": "offset", "steer_compliance": "compliance", "crosstalk": "coefficient"}
     told = {
-        "applied": AppliedEffect(
-            effect=effects()[effect], values={parameter: value}, units={parameter: unit}, **place
-        ),
-        "u": u, "reason": "measured apart", "by": "a tester", "date": "2026-04-01",
+        "effect": effect, "channel": None, "source": None, "parameter": parameter[effect], "value": value,
+        "unit": unit, "u": u, "reason": "measured apart", "by": "a tester", "date": "2026-04-01",
         "answer_sha256": "a" * 64, "case_sha256": "b" * 64, "code_version": "0",
     }  # fmt: skip
     return Correction(**(told | more))
@@ -178,7 +173,7 @@ def test_the_next_version_keeps_the_old_text_and_says_what_it_was_made_from(tmp_
     )
     assert third.version == 3
     assert third.supersedes == sha256_file(tmp_path / "b.toml")
-    assert [one.applied.effect.name for one in third.corrections] == ["steer_offset", "crosstalk"]
+    assert [one.effect for one in third.corrections] == ["steer_offset", "crosstalk"]
     assert again.count("supersedes =") == again.count("version =") - again.count("code_version =") == 1
 
 
@@ -226,6 +221,6 @@ def test_a_correction_that_cannot_be_is_refused_with_its_place(tmp_path, change)
     text = 'name = "m15-x"\nextends = "m15"\n' + BLOCK.replace(*change)
     path = tmp_path / "bad.toml"
     with pytest.raises(ToolkitError) as caught:
-        build_machine(parse_toml(text.encode(), where=path), path)
+        machine_of_text(text.encode(), path)
     assert "correction" in str(caught.value.where)
     assert caught.value.next_step

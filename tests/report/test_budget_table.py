@@ -8,20 +8,25 @@ import math
 import pytest
 from report_factory import make_result
 
-from toolkit.characteristics.model import AtAngle, Budget
+from toolkit.characteristics.model import Row
 from toolkit.estimate import Estimate
 from toolkit.machine import TypeB
 from toolkit.pipeline import TestResult
 from toolkit.report.style import Style
-from toolkit.report.tables import build_tables, summary_load
+from toolkit.report.test.characteristics import summary_load
+from toolkit.report.test.tables import build_tables
 
 
 def with_budget(load: float, name: str, **sources: float) -> TestResult:
     result = make_result()
     named = tuple((key.replace("_", " "), u) for key, u in sources.items())
     unit = "N/rad" if name.startswith("slope") else "N"
-    budget = Budget(load_N=load, rotation="both", name=name, unit=unit, sources=named)
-    chars = dataclasses.replace(result.characteristics, budgets=(budget,))
+    estimate = Estimate(value=1.0, u=math.hypot(*sources.values()), unit=unit)
+    rotation = "forward" if name.startswith("slope") else "both"
+    row = Row(name=name, load_N=load, rotation=rotation, estimate=estimate, sources=named)
+    # The load of the summary is that of the whole test, whatever else it has.
+    rest = tuple(dataclasses.replace(one, estimate=None) for one in result.characteristics.rows)
+    chars = dataclasses.replace(result.characteristics, rows=(*rest, row))
     return dataclasses.replace(result, characteristics=chars)
 
 
@@ -63,11 +68,12 @@ def test_other_loads_are_left_to_the_whole_test_file() -> None:
 
 def test_values_at_slip_angles_have_their_uncertainty() -> None:
     result = make_result()
-    at = AtAngle(
-        load_N=4000.0, rotation="forward", SA_rad=-0.0349065850398866,
-        FY=Estimate(value=2000.0, u=10.0, unit="N"), MZ=None,
+    at = Row(
+        name="FY", load_N=4000.0, rotation="forward", SA_rad=-0.0349065850398866,
+        estimate=Estimate(value=2000.0, u=10.0, unit="N"),
     )  # fmt: skip
-    chars = dataclasses.replace(result.characteristics, at_angles=(at,))
+    lacking = dataclasses.replace(at, name="MZ", estimate=None, lacking="no fitted curve of MZ")
+    chars = dataclasses.replace(result.characteristics, rows=(at, lacking))
     made = build_tables(dataclasses.replace(result, characteristics=chars), None, (), Style())["at_angles"]
     row = dict(zip([c.name for c in made.columns], made.rows[0], strict=True))
     assert row["SA"] == pytest.approx(-2.0)

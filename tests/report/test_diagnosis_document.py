@@ -16,12 +16,10 @@ from toolkit.diagnosis.diagnose import diagnose
 from toolkit.report.diagnosis.content import build_diagnosis_content
 from toolkit.report.diagnosis.page import page
 from toolkit.report.diagnosis.plots import diagnosis_plots
-from toolkit.report.diagnosis.template import build_diagnosis
 from toolkit.report.diagnosis.vocabulary import DIAGNOSIS, TABLES
 from toolkit.report.style import Style
-from toolkit.report.template.check import check_template
-from toolkit.report.template.fill import fill
-from toolkit.report.template.package import read_template
+from toolkit.report.word.fill import fill
+from toolkit.report.word.package import read_template
 
 CHECKOUT = Path(__file__).resolve().parents[2]
 DAY = dt.date(2026, 4, 1)
@@ -45,12 +43,6 @@ def clean(tmp_path_factory: pytest.TempPathFactory) -> tuple[Any, Any]:
 
 def content(made: tuple[Any, Any], style: Style | None = None, **more: Any) -> Any:
     return build_diagnosis_content(*made, style or Style(), issued=DAY, **more)
-
-
-def test_the_packaged_template_is_the_built_one() -> None:
-    packaged = CHECKOUT / "report_templates" / "diagnosis.docx"
-    assert packaged.read_bytes() == build_diagnosis()
-    assert check_template(read_template(packaged), Style()) == ()
 
 
 def test_every_table_has_the_columns_of_its_vocabulary(dragged: Any) -> None:

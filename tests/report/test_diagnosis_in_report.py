@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 from report_factory import make_record, make_result
-from template_factory import opened, p, texts
+from template_factory import FOLDER, grey_png, opened, p, texts
 
 from toolkit.diagnosis.answer.answer import (
     Diagnosis,
@@ -20,22 +20,20 @@ from toolkit.diagnosis.answer.answer import (
 )
 from toolkit.effects.applied import EffectKey
 from toolkit.findings import Finding
-from toolkit.report.build import build_content
 from toolkit.report.content import ReportContent
-from toolkit.report.design.blocks import placeholder_png
-from toolkit.report.design.files import packaged_templates
 from toolkit.report.diagnosis.entries import REPORT_FIGURES, REPORT_TABLES, REPORT_VALUES
 from toolkit.report.diagnosis.in_report import Told
 from toolkit.report.diagnosis.vocabulary import DIAGNOSIS
 from toolkit.report.figures import Picture, _figure
 from toolkit.report.listing import list_tags
 from toolkit.report.style import Style
-from toolkit.report.template.check import check_template, vocabulary_of
-from toolkit.report.template.fill import Filled, fill
-from toolkit.report.template.package import open_package, read_template
-from toolkit.report.template.scan import scan
-from toolkit.report.template.xml import stories
+from toolkit.report.test.content import build_content
 from toolkit.report.vocabulary import REPORT
+from toolkit.report.word.check import check_template, vocabulary_of
+from toolkit.report.word.fill import Filled, fill
+from toolkit.report.word.package import open_package, read_template
+from toolkit.report.word.scan import scan
+from toolkit.report.word.xml import stories
 
 EFFECT = FoundEffect(
     key=EffectKey("quadratic_drag", "F"), stage="dynamics", statement="Drag is missing.",
@@ -64,11 +62,11 @@ def content(told: Told | None) -> ReportContent:
 
 
 def made(name: str, told: Told | None, folder: Path) -> Filled:
-    path = folder / f"{name}.docx"
-    path.write_bytes(packaged_templates()[name].build())
     found = content(told)
-    picture = Picture(png=placeholder_png(63, 37), width_px=63, height_px=37)
-    return fill(read_template(path), found, dict.fromkeys(found.plots, picture), allow_missing=True)
+    picture = Picture(png=grey_png(63, 37), width_px=63, height_px=37)
+    return fill(
+        read_template(FOLDER / f"{name}.docx"), found, dict.fromkeys(found.plots, picture), allow_missing=True
+    )
 
 
 @pytest.mark.parametrize(

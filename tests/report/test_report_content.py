@@ -11,12 +11,12 @@ from hypothesis import strategies as st
 from report_factory import COMPARISON, LOADS_N, formula, make_record, make_result, shape
 
 from toolkit.errors import ConfigError, TemplateError
-from toolkit.report.build import build_content, report_id
 from toolkit.report.columns import TABLES
 from toolkit.report.diagnosis.entries import REPORT_TABLES
 from toolkit.report.figures import draw
 from toolkit.report.style import Style, read_style
 from toolkit.report.tags import catalogue, format_number, format_problem, parse_tag
+from toolkit.report.test.content import build_content, report_id
 from toolkit.report.vocabulary import REPORT
 
 DAY = dt.date(2026, 11, 21)

@@ -13,25 +13,20 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MotionSizes:
-    """Sizes of the equation of motion that an effect enters, in the units of its state and of its rate.
+    """Sizes of the motion that a force-like term enters, in the units of its equation.
 
-    ``force`` is the largest rate, ``velocity`` and ``position`` are spreads (``position`` that of the state
-    itself where it has no position); ``farthest_velocity`` and ``farthest_position`` are the largest
-    magnitudes, ``highest`` the largest value of the state. ``way`` is the longest way of a run over the
-    position and ``row_way`` the usual one from row to row. ``integrated`` says that the equation itself is
-    integrated and not only its outputs are known, ``has_position`` that a state of it is the position.
+    ``force``, ``speed`` and ``place`` are what terms are scaled by; ``fastest`` and ``farthest`` the largest
+    magnitudes of speed and position, ``level`` the largest value that may run over. ``has_position`` tells
+    whether the equation has the position itself, or only its rate.
     """
 
-    force: float = 1.0
-    velocity: float = 1.0
-    position: float = 1.0
-    farthest_velocity: float = 1.0
-    farthest_position: float = 1.0
-    highest: float = 0.0
-    way: float = 0.0
-    row_way: float = 0.0
-    integrated: bool = False
-    has_position: bool = False
+    force: float
+    speed: float
+    place: float
+    fastest: float
+    farthest: float
+    level: float
+    has_position: bool
 
 
 class Surroundings(Protocol):
@@ -88,8 +83,18 @@ class Surroundings(Protocol):
         ...
 
     @property
+    def integrates(self) -> bool:
+        """The simulation integrates its own equation of motion."""
+        ...
+
+    @property
     def motion(self) -> MotionSizes:
-        """Sizes of the equation of motion that the place belongs to."""
+        """Sizes of the motion that the place belongs to."""
+        ...
+
+    @property
+    def way(self) -> tuple[float, float]:
+        """Longest way of a run over the position, the usual one from row to row; zero if nothing moves."""
         ...
 
     def spread(self, name: str | None) -> float:
@@ -133,4 +138,4 @@ def of_force(case: Surroundings) -> float:
 
 def of_position(case: Surroundings) -> float:
     """Return the spread of the position."""
-    return case.motion.position
+    return case.motion.place

@@ -40,7 +40,7 @@ def u_SA(machine: Machine, MZ: NDArray[np.float64]) -> float:
     for correction in machine.corrections:
         way = correction.applied.effect.correctable
         if way is not None and way.u_slip is not None:
-            parts.append(way.u_slip(correction.u_SI, largest))
+            parts.append(way.u_slip(correction.u * correction.factor, largest))
     return math.hypot(*parts)
 
 

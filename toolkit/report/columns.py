@@ -5,6 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Literal
 
+from toolkit.characteristics.budget import COLUMNS as BUDGET
+from toolkit.characteristics.catalogue import columns, tables
+
+# Quantities whose unit an organisation chooses, and the unit where it does not.
 UNITS = {"force": "N", "moment": "N*m", "force/angle": "N/deg", "moment/angle": "N*m/deg"}
 
 
@@ -51,13 +55,43 @@ def _number(
     )
 
 
-def _with_u(name: str, description: str, spec: str, quantity: str) -> list[Column]:
+def _with_u(name: str, description: str, spec: str, unit: str) -> list[Column]:
     return [
-        _number(name, description, spec, quantity=quantity, U=f"U_{name}"),
-        _number(
-            f"U_{name}", f"expanded uncertainty (95 %) of {name}", spec, quantity=quantity, U=f"U_{name}"
-        ),
+        replace(_number(one, text, spec, unit=unit, U=f"U_{name}"), quantity=_QUANTITIES.get(unit))
+        for one, text in ((name, description), (f"U_{name}", f"expanded uncertainty (95 %) of {name}"))
     ]
+
+
+_QUANTITIES = {unit: quantity for quantity, unit in UNITS.items()}
+
+
+def _wide_tables() -> dict[str, tuple[str, tuple[Column, ...]]]:
+    """Return the tables of the catalogue of characteristics that have a column for each."""
+    load, rotation = (
+        _number("load", "load", ".0f", quantity="force"),
+        _text("rotation", "direction of rotation"),
+    )
+    heads = {
+        "load": (load,),
+        "direction": (load, rotation),
+        "angle": (rotation, load, _number("SA", "slip angle", ".0f", unit="deg")),
+    }
+    return {
+        table.name: (
+            table.text,
+            (
+                *heads[table.scope],
+                *(
+                    column
+                    for one in columns(table)
+                    for column in _with_u(
+                        one.column_name, one.column_text, f".{one.digits}f", one.printed_unit
+                    )
+                ),
+            ),
+        )
+        for table in tables()
+    }
 
 
 def _model_columns() -> list[Column]:
@@ -113,55 +147,7 @@ TABLES: dict[str, tuple[str, tuple[Column, ...]]] = {
             _text("file", "recording"),
         ),
     ),
-    "stiffness": (
-        "cornering and aligning stiffness, one row a load and direction",
-        (
-            _number("load", "load", ".0f", quantity="force"),
-            _text("rotation", "direction of rotation"),
-            *_with_u("cornering_secant", "cornering stiffness, +-1 deg secant", ".1f", "force/angle"),
-            *_with_u(
-                "cornering_slope", "cornering stiffness, slope of the curve at 0 deg", ".1f", "force/angle"
-            ),
-            *_with_u("aligning_secant", "aligning stiffness, +-1 deg secant", ".2f", "moment/angle"),
-            *_with_u(
-                "aligning_slope", "aligning stiffness, slope of the curve at 0 deg", ".2f", "moment/angle"
-            ),
-        ),
-    ),
-    "pull": (
-        "pull characteristics by symmetry, one row a load",
-        (
-            _number("load", "load", ".0f", quantity="force"),
-            *_with_u("conicity", "conicity", ".1f", "force"),
-            *_with_u("plysteer", "plysteer", ".1f", "force"),
-            *_with_u("CRAT", "conicity residual aligning torque", ".2f", "moment"),
-            *_with_u("PRAT", "plysteer residual aligning torque at 0 deg", ".2f", "moment"),
-            *_with_u("PRAT_at_FY_zero", "the same at FY = 0", ".2f", "moment"),
-        ),
-    ),
-    "pull_thesis": (
-        "the same by the thesis's formulas, and the single-direction residual moments",
-        (
-            _number("load", "load", ".0f", quantity="force"),
-            *_with_u("thesis_CRAT", "CRAT by the thesis's formula", ".2f", "moment"),
-            *_with_u("thesis_PRAT", "PRAT by the thesis's formula", ".2f", "moment"),
-            *_with_u(
-                "thesis_PRAT_at_FY_zero", "PRAT by the thesis's formula on MZ at FY = 0", ".2f", "moment"
-            ),
-            *_with_u("residual_forward", "residual aligning torque, forward, MZ at FY = 0", ".2f", "moment"),
-            *_with_u("residual_reverse", "residual aligning torque, reverse, MZ at FY = 0", ".2f", "moment"),
-        ),
-    ),
-    "at_angles": (
-        "FY and MZ off the curves at the slip angles of the protocol, one row a load, direction and angle",
-        (
-            _text("rotation", "direction of rotation"),
-            _number("load", "load", ".0f", quantity="force"),
-            _number("SA", "slip angle", ".0f", unit="deg"),
-            *_with_u("FY", "lateral force", ".1f", "force"),
-            *_with_u("MZ", "aligning moment", ".2f", "moment"),
-        ),
-    ),
+    **_wide_tables(),
     "budget": (
         "standard uncertainties of each characteristic at the summary's load by their source, to two digits "
         "of their sum; a dash below its last place",
@@ -169,14 +155,7 @@ TABLES: dict[str, tuple[str, tuple[Column, ...]]] = {
             _text("quantity", "name of the characteristic"),
             _text("rotation", "direction of rotation, or both"),
             _text("unit", "unit of the row"),
-            _text("calibration", "calibration record: fit and what its session stated"),
-            _text("zero", "zero of the cells: an open one, or the scatter of the tare"),
-            _text("SA_zero", "zero of the slip angle"),
-            _text("SA_scale", "scale of the slip angle"),
-            _text("load_cell", "load"),
-            _text("pressure", "inflation pressure"),
-            _text("repeatability", "scatter of the rows within each block"),
-            _text("fit", "scatter of the blocks about the curves beyond that of their rows"),
+            *(_text(one.name, one.text) for one in BUDGET),
             _text("u", "standard uncertainty of all"),
         ),
     ),

@@ -10,8 +10,8 @@ from typing import Any
 from toolkit.files import sha256_bytes, sha256_file
 from toolkit.recording.marks import GENERATOR
 from toolkit.report.content import ReportContent
-from toolkit.report.template.filled import Filled
-from toolkit.report.template.package import Template
+from toolkit.report.word.filled import Filled
+from toolkit.report.word.package import Template
 
 MANIFEST = "manifest.json"
 _OF_THE_DAY = ("tk:report.date",)

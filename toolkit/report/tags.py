@@ -10,8 +10,9 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
+from toolkit.characteristics.catalogue import figures, summary
 from toolkit.errors import TemplateError
-from toolkit.report.columns import TABLES, UNITS
+from toolkit.report.columns import TABLES
 from toolkit.report.diagnosis.entries import REPORT_FIGURES, REPORT_TABLES, REPORT_VALUES
 from toolkit.report.entries import Spec, Tables, catalogue_of, conditions_of
 
@@ -135,13 +136,8 @@ _VALUES = (
 )
 
 _SUMMARY = (
-    ("load", "force", ".0f", "load of the summary: nearest to the rated load, else the middle one"),
-    ("cornering_stiffness", "force/angle", ".1f", "cornering stiffness there, +-1 deg secant, forward"),
-    ("aligning_stiffness", "moment/angle", ".2f", "aligning stiffness there, +-1 deg secant, forward"),
-    ("conicity", "force", ".1f", "conicity there"),
-    ("plysteer", "force", ".1f", "plysteer there"),
-    ("CRAT", "moment", ".2f", "conicity residual aligning torque there"),
-    ("PRAT", "moment", ".2f", "plysteer residual aligning torque there, at 0 deg"),
+    ("load", "N", ".0f", "load of the summary: nearest to the rated load, else the middle one"),
+    *((str(one.summary), one.printed_unit, f".{one.digits}f", one.summary_text) for one in summary()),
 )
 
 
@@ -151,12 +147,7 @@ FIGURES = {
     "fy_vs_load": "lateral force against load at constant slip angles",
     "mz_vs_load": "aligning moment against load at constant slip angles",
     "gough": "Gough plot: lateral force against aligning moment",
-    "conicity": "conicity against load",
-    "plysteer": "plysteer against load",
-    "crat": "conicity residual aligning torque against load",
-    "prat": "plysteer residual aligning torque against load, both definitions",
-    "cornering_stiffness": "cornering stiffness against load, secant and slope",
-    "aligning_stiffness": "aligning stiffness against load, secant and slope",
+    **{figure.name: figure.text for figure in figures()},
     "models_fy": "error of each tire model in lateral force, fitted and with each load left out",
     "models_mz": "error of each tire model in aligning moment, fitted and with each load left out",
     **REPORT_FIGURES,
@@ -195,8 +186,8 @@ def catalogue() -> tuple[Spec, ...]:
         for term in ("D51", "D52", "E5", "intercept")
     ]
     summary = [
-        Spec(path=f"summary.{name}", kind="number", unit=UNITS[quantity], spec=spec, description=text)
-        for name, quantity, spec, text in _SUMMARY
+        Spec(path=f"summary.{name}", kind="number", unit=unit, spec=spec, description=text)
+        for name, unit, spec, text in _SUMMARY
     ] + [
         Spec(
             path=f"summary.{name}.with_U",

@@ -8,6 +8,7 @@ from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from toolkit.characteristics.characteristic import BOTH
 from toolkit.errors import OutputError
 from toolkit.estimate import Estimate
 from toolkit.files import write_atomic
@@ -209,20 +210,16 @@ def _characteristics(result: TestResult) -> Rows:
     yield ("load_N", "rotation", "name", "value", "u", "dof", "unit")
     for direction in result.characteristics.fits:
         yield (direction.load_N, direction.rotation, "group", None, None, None, None)
-    for stiffness in result.characteristics.stiffness:
-        for field in dataclasses.fields(stiffness)[2:]:
-            estimate = getattr(stiffness, field.name)
-            yield (stiffness.load_N, stiffness.rotation, field.name, *_parts(estimate))
-    for pull in result.characteristics.pull:
-        for field in dataclasses.fields(pull)[1:]:
-            yield (pull.load_N, "both", field.name, *_parts(getattr(pull, field.name)))
+    rows = [row for row in result.characteristics.rows if row.SA_rad is None]
+    for row in sorted(rows, key=lambda row: row.rotation == BOTH):
+        yield (row.load_N, row.rotation, row.name, *_parts(row.estimate))
 
 
 def _at_angles(result: TestResult) -> Rows:
     yield ("load_N", "rotation", "SA_rad", "name", "value", "u", "dof", "unit")
-    for one in result.characteristics.at_angles:
-        for name in ("FY", "MZ"):
-            yield (one.load_N, one.rotation, one.SA_rad, name, *_parts(getattr(one, name)))
+    for row in result.characteristics.rows:
+        if row.SA_rad is not None:
+            yield (row.load_N, row.rotation, row.SA_rad, row.name, *_parts(row.estimate))
 
 
 def _points(result: TestResult) -> Rows:
@@ -233,9 +230,10 @@ def _points(result: TestResult) -> Rows:
 
 def _budgets(result: TestResult) -> Rows:
     yield ("load_N", "rotation", "name", "source", "u", "unit")
-    for one in result.characteristics.budgets:
-        for source, u in one.sources or (("", None),):
-            yield (one.load_N, one.rotation, one.name, source, u, one.unit)
+    for row in result.characteristics.rows:
+        if row.SA_rad is None and row.estimate is not None:
+            for source, u in row.sources or (("", None),):
+                yield (row.load_N, row.rotation, row.name, source, u, row.estimate.unit)
 
 
 def _findings(findings: Sequence[Finding]) -> Rows:

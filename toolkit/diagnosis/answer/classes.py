@@ -6,17 +6,16 @@ from dataclasses import replace
 
 from toolkit.diagnosis.answer.answer import FoundEffect
 from toolkit.diagnosis.fit.problem import Problem
+from toolkit.diagnosis.policy import VERDICT
 from toolkit.diagnosis.search.case_view import CaseView
 from toolkit.diagnosis.search.forward_step import Step
 from toolkit.effects.applied import AppliedEffect
 from toolkit.effects.catalogue import effects as catalogue
 
-_CLOSE = 3.0  # log-likelihood within which the data prefer neither
-
 
 def equivalent_to(problem: Problem, step: Step) -> tuple[str, ...]:
     """Return the other names that explain a step as well, without the step's own."""
-    names = [one.active.effect.name for one in step.rivals if one.difference > -_CLOSE]
+    names = [one.active.effect.name for one in step.rivals if one.difference > -VERDICT.close]
     names += _always(problem, step.active)
     own = step.active.effect.name
     return tuple(dict.fromkeys(name for name in names if name != own))
@@ -32,16 +31,18 @@ def apart(found: FoundEffect) -> str:
 
 def parted(found: FoundEffect) -> str:
     """Return the sentence that says what would tell an effect from its class, or from what is like it."""
-    others = found.equivalent_to or tuple(name for name in _akin(found.name) if name != found.name)
+    others = found.equivalent_to or _akin(found.name)
     if not others:
         return ""
     return f"To tell {found.name} from {', '.join(others)}: {apart(replace(found, equivalent_to=others))}."
 
 
 def _akin(name: str) -> tuple[str, ...]:
-    """Return the effects for which one may always be taken, however the recording parts them."""
+    """Return the other effects for which one may always be taken, however the recording parts them."""
     akin = catalogue()[name].akin
-    return tuple(effect.name for effect in catalogue().values() if akin and effect.akin == akin)
+    return tuple(
+        effect.name for effect in catalogue().values() if akin and effect.akin == akin and effect.name != name
+    )
 
 
 def _always(problem: Problem, active: AppliedEffect) -> list[str]:

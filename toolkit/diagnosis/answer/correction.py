@@ -57,8 +57,14 @@ def correction_of(model: ModelFile, effect: str, *, reason: str, by: str, date: 
                 "find out what was different in those runs",
             )  # fmt: skip
         sized, u = _sized(model, one, listed[effect])
+        parameter = sized.effect.names[0]
         return Correction(
-            applied=sized,
+            effect=effect,
+            channel=sized.channel,
+            source=sized.source,
+            parameter=parameter,
+            value=sized.values[parameter],
+            unit=sized.units[parameter],
             u=u,
             reason=reason.strip(),
             by=by.strip(),

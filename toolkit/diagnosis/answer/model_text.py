@@ -9,12 +9,12 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from toolkit import __version__
 from toolkit.diagnosis.simulators.built_in import parameter_names
-from toolkit.diagnosis.simulators.channel_units import unit_of
+from toolkit.diagnosis.simulators.parameter_units import unit_of
 from toolkit.diagnosis.simulators.setting import nominal_load
 from toolkit.files import sha256_file
 from toolkit.simulation.model_file import CONTENT, FittedEffect, effect_lines, toml_key, toml_lines
+from toolkit.version import __version__
 
 if TYPE_CHECKING:
     from toolkit.diagnosis.answer.answer import Diagnosis
@@ -44,7 +44,7 @@ def model_text(case: Case, found: Search, made: Diagnosis, folder: Path) -> str 
     ]
     time = next((one.name for one in case.channels if one.role == "time"), None)
     lines += toml_lines({} if time is None else {"time": time})
-    load = getattr(found.problem.model, "nominal_load_N", None) or nominal_load(case)
+    load = found.problem.model.capability.nominal_load_N or nominal_load(case)
     lines += toml_lines({"nominal_load_N": load})
     lines += [
         "",

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from toolkit.diagnosis.fit.nuisance import INPUT_NOISE
+from toolkit.diagnosis.policy import STARTS
 from toolkit.diagnosis.search.case_view import CaseView
 from toolkit.effects.applied import AppliedEffect, EffectKey
 from toolkit.effects.catalogue import effects
@@ -17,9 +18,6 @@ if TYPE_CHECKING:
     from toolkit.diagnosis.fit.problem import Problem
     from toolkit.effects.effect import Effect, EffectParameter
     from toolkit.effects.surroundings import Surroundings
-
-_SUBSETS = 8
-_LATE = (1, 4, 12)  # rows
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -62,7 +60,7 @@ class Start:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Candidate:
+class CandidateEffect:
     """An effect at a place, and how a search may start."""
 
     active: AppliedEffect
@@ -89,7 +87,7 @@ class Candidate:
         return self.active.effect.name
 
 
-def candidates(problem: Problem) -> tuple[Candidate, ...]:
+def candidates(problem: Problem) -> tuple[CandidateEffect, ...]:
     """Return every candidate of a case."""
     listed = []
     for effect in (*effects().values(), INPUT_NOISE):
@@ -102,7 +100,7 @@ def candidates(problem: Problem) -> tuple[Candidate, ...]:
             starts = _starts(case, confined)
             for runs in subsets if starts else ():
                 active = AppliedEffect(effect=confined, channel=channel, source=source, runs=runs)
-                listed.append(Candidate(active=active, starts=starts))
+                listed.append(CandidateEffect(active=active, starts=starts))
     return tuple(listed)
 
 
@@ -140,7 +138,7 @@ def _starts(case: Surroundings, effect: Effect) -> tuple[Start, ...]:
                 values = fixed | {amplitude.name: size}
                 starts.append(Start(values=values, directions=(values,), amplitudes=(amplitude.name,)))
             continue
-        shares = effect.term.shares if effect.term is not None and case.motion.integrated else (1.0,)
+        shares = effect.term.shares if effect.term is not None and case.integrates else (1.0,)
         for share in shares:
             sizes = {
                 parameter.name: share * _middle(parameter) * scales[parameter.name]
@@ -174,7 +172,7 @@ def _amplitudes(case: Surroundings, amplitude: EffectParameter, scale: float) ->
     starts = amplitude.starts
     if amplitude.unit == "s":
         # Of a plant whose rows are far apart, some rows: so far off the response is no straight line.
-        far = [rows * case.row_time for rows in _LATE]
+        far = [rows * case.row_time for rows in STARTS.late]
         far = [time for time in far if time > max(map(abs, starts))]
         starts = (*starts, *far, *(-time for time in far if min(starts) < 0))
     return [value * scale for value in starts]
@@ -201,7 +199,7 @@ def _subsets(problem: Problem, effect: Effect) -> list[frozenset[str]]:
         ordered = _in_order(list(levels))
         groups: list[Sequence[str]] = [[level] for level in ordered]
         groups += [ordered[:k] for k in range(2, len(ordered))]
-        for group in groups[:_SUBSETS]:
+        for group in groups[: STARTS.subsets]:
             runs = frozenset(itertools.chain.from_iterable(levels[level] for level in group))
             if runs not in subsets and runs != names:
                 subsets.append(runs)

@@ -7,9 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolkit.diagnosis.simulators.channel_units import channel_unit
-from toolkit.diagnosis.simulators.ode import OdeModel
-from toolkit.diagnosis.simulators.simulator import Moving
+from toolkit.diagnosis.simulators.parameter_units import channel_unit
 from toolkit.effects.surroundings import MotionSizes
 from toolkit.errors import UnitError
 from toolkit.units import unit
@@ -39,17 +37,13 @@ class CaseView:
 
     @property
     def cells(self) -> frozenset[str]:
-        """Load cells from which loads are computed, as outputs' sources or as inputs."""
-        cells = getattr(self._problem.model, "cells", None)
-        record = getattr(self._problem.model, "record", None)
-        beside = () if cells is None else cells.names
-        return frozenset(beside or (() if record is None else record.indications))
+        """Load cells from which loads are computed."""
+        return frozenset(self._problem.model.capability.cells)
 
     @property
     def nominal_load_N(self) -> float | None:
         """Nominal load that the simulation itself states [N]."""
-        load: float | None = getattr(self._problem.model, "nominal_load_N", None)
-        return load
+        return self._problem.model.capability.nominal_load_N
 
     @property
     def rows(self) -> int:
@@ -72,35 +66,28 @@ class CaseView:
         """Duration of the longest run [s]."""
         return max((float(run.t[-1] - run.t[0]) for run in self._problem.runs if run.rows), default=0.0)
 
+    @property
+    def integrates(self) -> bool:
+        """The simulation integrates its own equation of motion."""
+        moving = self._problem.model.capability.motion
+        return moving is not None and moving.integrates
+
     @cached_property
     def motion(self) -> MotionSizes:
-        """Sizes of the equation of motion that the place belongs to."""
-        model = self._problem.model
-        way, row_way = model.way(self.channel) if isinstance(model, Moving) else (0.0, 0.0)
-        if isinstance(model, OdeModel):
-            state = str(self.channel)
-            rate, own = model.scale[state]
-            position = model.position_of(state)
-            place = own if position is None else model.scale[position][1]
-            reach = model.reach.get(state, (own, place))
-            return MotionSizes(
-                force=rate, velocity=own, position=place, farthest_velocity=reach[0],
-                farthest_position=reach[1], highest=model.largest[state], way=way, row_way=row_way,
-                integrated=True, has_position=position is not None,
-            )  # fmt: skip
-        motion = getattr(model, "motion", None)
-        force = self.spread(self.channel)
-        speed = place = 1.0
-        if motion is not None:
-            if motion.kind == "force":
-                speed = self.spread(motion.velocity) if motion.velocity else 1.0
-                place = self.spread(motion.position) if motion.position else 1.0
-            else:
-                force, speed, place = motion.scales()
+        """Sizes of the motion that the place belongs to; of nothing that moves, the channel's own."""
+        moving = self._problem.model.capability.motion
+        if moving is not None:
+            return moving.sizes(self.channel, self.spread)
         return MotionSizes(
-            force=force, velocity=speed, position=place, farthest_velocity=speed, farthest_position=place,
-            way=way, row_way=row_way,
+            force=self.spread(self.channel), speed=1.0, place=1.0, fastest=1.0, farthest=1.0, level=1.0,
+            has_position=False,
         )  # fmt: skip
+
+    @property
+    def way(self) -> tuple[float, float]:
+        """Longest way of a run over the position and the usual one from row to row."""
+        moving = self._problem.model.capability.motion
+        return (0.0, 0.0) if moving is None else moving.way(self.channel)
 
     def spread(self, name: str | None) -> float:
         """Return the largest magnitude of a channel over all runs, 1 where nothing was recorded of it."""

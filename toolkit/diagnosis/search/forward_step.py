@@ -11,17 +11,10 @@ import numpy as np
 from toolkit.diagnosis.fit.fit import Fit, fit
 from toolkit.diagnosis.fit.folds import Folds, HeldOut, beyond_form, hold_out, matters
 from toolkit.diagnosis.fit.problem import Problem
+from toolkit.diagnosis.policy import STEP
 from toolkit.diagnosis.search.screen import Scored
 from toolkit.effects.applied import AppliedEffect, EffectKey
 from toolkit.errors import FitError
-
-_FAR_BEHIND = 0.25  # of the best gain: a candidate below cannot win a joint fit
-_MOST = 0.5  # of the held-out mean square: what a candidate far behind must take away
-_REFINED = 8  # candidates that are fitted jointly, of those that screening ranks first
-_TRIED = 3  # of the joint fits
-_BOUND = 1e-3
-_SIGNAL = 0.5  # of an output in its right unit: what else it may have in it
-LEAST_GAIN = 1.5  # of the held-out log score
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -63,12 +56,12 @@ def step_groups(
     """
     if not ranked:
         return []
-    near = min(_FAR_BEHIND * ranked[0].gain, ranked[0].gain - 40)
-    first = [one for one in ranked if one.gain > near][:_REFINED]
+    near = min(STEP.far_behind * ranked[0].gain, ranked[0].gain - STEP.near)
+    first = [one for one in ranked if one.gain > near][: STEP.refined]
     # What the refit may have absorbed is fitted with the first, however small it looks from there.
     first += [one for one in ranked if one.candidate.key in hidden and all(one is not each for each in first)]
-    behind = [one for one in ranked if all(one is not each for each in first)][:_REFINED]
-    return [(first, least), *([(behind, _MOST)] if behind else [])]
+    behind = [one for one in ranked if all(one is not each for each in first)][: STEP.refined]
+    return [(first, least), *([(behind, STEP.least_behind)] if behind else [])]
 
 
 def joint_fits(problem: Problem, base: Fit, promising: Sequence[Scored]) -> tuple[Joint, ...]:
@@ -103,14 +96,14 @@ def best_step(
     refitted : the held-out rows without any effect
     """
     form = max((one.effect.form_error for one in base.active), default=0.0)
-    for one in joint[:_TRIED]:
+    for one in joint[: STEP.judged]:
         made = one.fit
         try:
             held = hold_out(problem, folds, made.active, made)
         except FitError:
             continue
         gain = held.total - held_base.total
-        if gain < LEAST_GAIN or one.score - base.log_posterior < LEAST_GAIN:
+        if gain < STEP.least_gain or one.score - base.log_posterior < STEP.least_gain:
             continue
         # One that a later effect drives to its bound is no better than one that starts there.
         if any(at_bound(each) for each in made.active) or not matters(problem, held_base, held, least):
@@ -138,7 +131,7 @@ def _shows(problem: Problem, held: HeldOut, one: AppliedEffect) -> bool:
     kept = problem.kept[name]
     simulated = held.simulated[name][kept]
     left = problem.observed[name][kept] - simulated
-    return float(np.mean(left**2)) < _SIGNAL**2 * float(np.mean(simulated**2))
+    return float(np.mean(left**2)) < STEP.signal**2 * float(np.mean(simulated**2))
 
 
 def rivals(problem: Problem, chosen: Joint, joint: Sequence[Joint]) -> tuple[Rival, ...]:
@@ -191,6 +184,6 @@ def at_bound(one: AppliedEffect) -> bool:
             continue
         value = one.values[parameter.name]
         for bound in parameter.bounds:
-            if math.isfinite(bound) and bound != 0 and abs(value - bound) < _BOUND * abs(bound):
+            if math.isfinite(bound) and bound != 0 and abs(value - bound) < STEP.bound * abs(bound):
                 return True
     return False

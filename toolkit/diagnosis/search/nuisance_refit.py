@@ -10,18 +10,17 @@ from typing import TYPE_CHECKING
 
 from toolkit.diagnosis.fit.fit import Fit, fit
 from toolkit.diagnosis.fit.folds import Folds, HeldOut, hold_out
+from toolkit.diagnosis.policy import STEP
 from toolkit.errors import FitError
 
 if TYPE_CHECKING:
     from toolkit.diagnosis.fit.problem import Problem
-    from toolkit.diagnosis.search.candidates import Candidate
+    from toolkit.diagnosis.search.candidates import CandidateEffect
     from toolkit.effects.applied import AppliedEffect
-
-_BETTER = 2.0  # of the log posterior: noise that goes through a band is taken for more likely
 
 
 def refined(
-    problem: Problem, folds: Folds, base: Fit, held: HeldOut, listed: Sequence[Candidate]
+    problem: Problem, folds: Folds, base: Fit, held: HeldOut, listed: Sequence[CandidateEffect]
 ) -> tuple[Fit, HeldOut]:
     """Return the hypothesis that a search found with what its effects' sizes depend on.
 
@@ -42,7 +41,7 @@ def refined(
     # Rows inside a band have no noise, so that a fold's noise, and its score, hang on which rows it has: the
     # noise before a band is for the band's width alone, and the score stays that of the sharp one.
     for one in base.active:
-        base = _better(problem, base, _with_noise(base, one), _BETTER)
+        base = _better(problem, base, _with_noise(base, one), STEP.band_noise)
     return base, held
 
 
@@ -67,7 +66,7 @@ def _better(problem: Problem, base: Fit, active: tuple[AppliedEffect, ...] | Non
     return made if made.log_posterior >= base.log_posterior + least else base
 
 
-def _with_zeros(base: Fit, listed: Sequence[Candidate]) -> tuple[AppliedEffect, ...] | None:
+def _with_zeros(base: Fit, listed: Sequence[CandidateEffect]) -> tuple[AppliedEffect, ...] | None:
     there = {one.channel for one in base.active if one.effect.is_zero}
     wanted = {one.channel for one in base.active if one.effect.frees_zero} - there
     zeros = tuple(

@@ -83,27 +83,27 @@ def _bristle_of(values: Values) -> tuple[float, float]:
 
 
 def _smoothing(case: Surroundings) -> dict[str, float]:
-    speed = case.motion.velocity
+    speed = case.motion.speed
     return {"smooth": 1e-3 * speed, LEAST_REACH: 1e-3 * speed * case.row_time}
 
 
 def _way_of_a_row(case: Surroundings) -> float:
-    return case.motion.velocity * case.row_time
+    return case.motion.speed * case.row_time
 
 
 def _distances(case: Surroundings) -> tuple[float, ...]:
     # The longest bristle of an equation that turns at every row is a spring.
-    starts = _STARTS[:2] if case.motion.integrated else _STARTS
+    starts = _STARTS[:2] if case.integrates else _STARTS
     return tuple(start * _way_of_a_row(case) for start in starts)
 
 
 def _longest(case: Surroundings) -> float | None:
     # A bristle as long as the way itself is a spring: over a fall from rest it grows as drag does.
-    motion = case.motion
-    if not motion.integrated:
+    if not case.integrates:
         return None
-    way = motion.position if motion.has_position else motion.velocity * case.longest_run
-    return max(_SHORT * way, motion.velocity * case.row_time)
+    motion = case.motion
+    way = motion.place if motion.has_position else motion.speed * case.longest_run
+    return max(_SHORT * way, motion.speed * case.row_time)
 
 
 EFFECT = Effect(

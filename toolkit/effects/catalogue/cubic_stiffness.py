@@ -13,7 +13,7 @@ def _resisting(position: float, velocity: float, values: Values) -> float:
 
 def _at_the_farthest(case: Surroundings) -> float:
     # Not at its spread: the cube of three of them would be another motion.
-    return case.motion.force / case.motion.farthest_position**3
+    return case.motion.force / case.motion.farthest**3
 
 
 EFFECT = Effect(

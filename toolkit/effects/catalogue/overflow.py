@@ -14,8 +14,7 @@ def _stopped(state: float, spread: float, values: Values) -> float:
 
 
 def _highest(case: Surroundings) -> float:
-    # A state that starts at zero and only falls has no level to run over.
-    return case.motion.highest or case.motion.position
+    return case.motion.level
 
 
 EFFECT = Effect(

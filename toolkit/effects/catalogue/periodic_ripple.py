@@ -37,12 +37,12 @@ def _waves(x: NDArray[np.float64], starts: Sequence[Values]) -> NDArray[np.float
 
 def _longest(case: Surroundings) -> float:
     # Of which the way sees less than two periods does not repeat: it is a stiffness, linear and cubic.
-    return float(case.motion.way / _FEWEST)
+    return float(case.way[0] / _FEWEST)
 
 
 def _periods(case: Surroundings) -> tuple[float, ...]:
     """Return the periods to try, the longest first; none where nothing moves."""
-    way, step = case.motion.way, case.motion.row_way
+    way, step = case.way
     if not way > 0:
         return ()
     # Two rows to a period at the usual speed; where the motion is slower, shorter ones would still be seen.

@@ -12,7 +12,7 @@ def _resisting(position: float, velocity: float, values: Values) -> float:
 
 
 def _at_the_fastest(case: Surroundings) -> float:
-    return case.motion.force / case.motion.farthest_velocity
+    return case.motion.force / case.motion.fastest
 
 
 EFFECT = Effect(

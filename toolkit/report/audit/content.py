@@ -6,14 +6,15 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from toolkit import __version__
 from toolkit.audit.model import TELLS, Grade
 from toolkit.files import sha256_bytes
 from toolkit.report.audit.vocabulary import AUDIT, TABLES
 from toolkit.report.content import Cell, Curve, Plot, ReportContent, Table, Value
 from toolkit.report.style import Style
+from toolkit.version import __version__
 
 if TYPE_CHECKING:
+    from toolkit.audit.archive import ArchiveAudit
     from toolkit.report.audit.page import AuditView
 
 _RIGHT = ("exact", "rounding")
@@ -24,7 +25,7 @@ def build_audit_content(view: AuditView, style: Style | None = None) -> ReportCo
     """Return what the template of an audit's summary can ask for."""
     style = style or Style()
     made = view.made
-    totals = _totals(view)
+    totals = _totals(made)
     tables = _tables(view)
     plots = _plots(totals["years"], style)
     values = {f"audit.{name}": Value(kind="text", value=text) for name, text in _texts(view, totals).items()}
@@ -56,12 +57,17 @@ def build_audit_content(view: AuditView, style: Style | None = None) -> ReportCo
     )
 
 
-def _totals(view: AuditView) -> dict[str, Any]:
+def audit_plots(made: ArchiveAudit, style: Style | None = None) -> dict[str, Plot]:
+    """Return the figures of an audit by name; none where the files are of one year."""
+    return _plots(_totals(made)["years"], style or Style())
+
+
+def _totals(made: ArchiveAudit) -> dict[str, Any]:
     # One pass over the files: what the texts and the picture need of them.
     FY = MZ = 0.0
     right = wrong = repaired = 0
     years: dict[int, list[int]] = {}
-    for one in view.made.files.plain():
+    for one in made.files.plain():
         ok = one["grade"] in _RIGHT
         right += ok
         wrong += not ok and one["grade"] != "unreadable"

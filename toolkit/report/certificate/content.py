@@ -7,14 +7,14 @@ import re
 from collections.abc import Iterable
 from dataclasses import replace
 
-from toolkit import __version__
 from toolkit.estimate import round_to_uncertainty, round_uncertainty
-from toolkit.report.certificate.decision import RULES
 from toolkit.report.certificate.model import VERDICTS, Certificate, LoadResult
 from toolkit.report.certificate.plots import build_plots
+from toolkit.report.certificate.statements import RULES
 from toolkit.report.certificate.vocabulary import CERTIFICATE, TABLES
 from toolkit.report.content import Cell, ReportContent, Table, Value
 from toolkit.report.style import Style
+from toolkit.version import __version__
 
 GAP = "NOT STATED"
 _PERCENT = re.compile(r"\d+\.\d+(?= %)")

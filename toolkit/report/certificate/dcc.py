@@ -9,15 +9,24 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from toolkit import __version__
 from toolkit.errors import ConfigError
 from toolkit.estimate import round_to_uncertainty, round_uncertainty
 from toolkit.recording.marks import OWN_OUTPUT
 from toolkit.report.certificate import content as words
-from toolkit.report.certificate.dcc_units import dsi, dsi_of_term
-from toolkit.report.certificate.dcc_xml import Node, node, quantity, quantity_list, release, rich, text
-from toolkit.report.certificate.decision import RULES
+from toolkit.report.certificate.dcc_xml import (
+    Node,
+    dsi,
+    dsi_of_term,
+    node,
+    quantity,
+    quantity_list,
+    release,
+    rich,
+    text,
+)
+from toolkit.report.certificate.statements import RULES
 from toolkit.units import unit
+from toolkit.version import __version__
 
 if TYPE_CHECKING:
     from toolkit.report.certificate.model import Certificate, LoadResult

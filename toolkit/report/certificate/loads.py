@@ -9,8 +9,8 @@ import numpy as np
 
 from toolkit.calibration.terms import INTERCEPT, parse_term, term_matrix
 from toolkit.calibration.uncertainty.budget import calibration_budget, predict
-from toolkit.report.certificate.decision import decide
 from toolkit.report.certificate.model import Adjustment, CheckLine, Expanded, LoadResult, Part, TermLine
+from toolkit.report.certificate.statements import decide
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

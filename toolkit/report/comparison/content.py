@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from toolkit import __version__
 from toolkit.comparison.model import Comparison, Difference, Entry
 from toolkit.files import sha256_bytes
 from toolkit.report.comparison.cells import (
@@ -23,6 +22,7 @@ from toolkit.report.comparison.cells import (
 from toolkit.report.comparison.plots import comparison_plots
 from toolkit.report.comparison.vocabulary import COMPARISON, TABLES
 from toolkit.report.content import Cell, Plot, ReportContent, Table, Value
+from toolkit.version import __version__
 
 if TYPE_CHECKING:
     from toolkit.calibration.records.use import CalibrationUse

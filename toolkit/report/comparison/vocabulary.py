@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from toolkit.report.comparison.plots import FIGURES as DRAWN
+from toolkit.characteristics.catalogue import comparison_figures
 from toolkit.report.entries import Tables, catalogue_of, conditions_of, text_columns, values_of
 from toolkit.report.vocabulary import Vocabulary
 
-FIGURES = {f"compared_{one.name}": f"{one.title} against load, a series an entry" for one in DRAWN}
+FIGURES = {
+    f"compared_{one.name}": f"{one.title} against load, a series an entry" for one in comparison_figures()
+}
 
 _VALUES = values_of(
     "comparison",

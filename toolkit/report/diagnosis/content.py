@@ -10,13 +10,12 @@ import datetime as dt
 import math
 from typing import TYPE_CHECKING
 
-from toolkit import __version__
 from toolkit.report.content import Cell, ReportContent, Table, Value
-from toolkit.report.diagnosis.chance import chance
-from toolkit.report.diagnosis.numbers import few, over
+from toolkit.report.diagnosis.numbers import chance, few, over
 from toolkit.report.diagnosis.page import headline
 from toolkit.report.diagnosis.plots import diagnosis_plots
 from toolkit.report.diagnosis.vocabulary import DIAGNOSIS, TABLES
+from toolkit.version import __version__
 
 if TYPE_CHECKING:
     from toolkit.calibration.records.use import CalibrationUse

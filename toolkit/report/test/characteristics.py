@@ -1,0 +1,133 @@
+"""A test's characteristics as rows of the report's tables, and as the values of its summary."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from toolkit.characteristics.budget import COLUMNS as BUDGET
+from toolkit.characteristics.catalogue import columns, summary, tables
+from toolkit.estimate import round_to_uncertainty
+
+if TYPE_CHECKING:
+    from toolkit.characteristics.characteristic import WideTable
+    from toolkit.characteristics.model import Row
+    from toolkit.estimate import Estimate
+    from toolkit.pipeline import TestResult
+    from toolkit.report.content import Cell
+    from toolkit.report.style import Style
+
+    Cells = dict[str, Cell]
+
+# Loads within this part of a summary's load are its load.
+_SAME_LOAD = 0.04
+
+
+def put(cells: dict[str, Cell], name: str, estimate: Estimate | None, factor: float = 1.0) -> None:
+    """Write an estimate and its expanded uncertainty, times an exact factor, into the cells of a row."""
+    cells[name] = None if estimate is None else estimate.value * factor
+    U = math.nan if estimate is None else estimate.expanded()[0] * factor
+    cells[f"U_{name}"] = U if math.isfinite(U) else None
+
+
+def wide_rows(result: TestResult, table: WideTable) -> list[Cells]:
+    """Return the rows of a table with a column for each characteristic.
+
+    A load without any of them is left out; a direction is not.
+    """
+    declared = {one.name: one for one in columns(table)}
+    lines: dict[tuple[float, str, float | None], Cells] = {}
+    for row in result.characteristics.rows:
+        if row.name not in declared:
+            continue
+        cells: Cells = {"load": row.load_N, "rotation": row.rotation}
+        if row.SA_rad is not None:
+            cells["SA"] = row.SA_rad / (math.pi / 180)
+        cells = lines.setdefault((row.load_N, row.rotation, row.SA_rad), cells)
+        one = declared[row.name]
+        put(cells, one.column_name, row.estimate, one.factor)
+    names = [one.column_name for one in declared.values()]
+    return [
+        cells
+        for cells in lines.values()
+        if table.scope != "load" or any(cells.get(name) is not None for name in names)
+    ]
+
+
+def long_rows(result: TestResult, style: Style) -> list[Cells]:
+    """Return every characteristic that has a value, one row each, but for those at slip angles."""
+    lines: list[Cells] = []
+    for one in (one for table in tables() if table.scope != "angle" for one in columns(table)):
+        unit, factor = style.unit(one.printed_unit)
+        scale = factor * one.factor
+        for row in result.characteristics.of(one.name):
+            if row.estimate is None:
+                continue
+            U, k = row.estimate.expanded()
+            lines.append(
+                {
+                    "quantity": one.title,
+                    "rotation": row.rotation,
+                    "load": row.load_N,
+                    "value": row.estimate.value * scale,
+                    "U": U * scale if math.isfinite(U) else None,
+                    "k": k if math.isfinite(k) else None,
+                    "unit": str(unit).replace("*", "·"),
+                }
+            )
+    return lines
+
+
+def budget_rows(result: TestResult, style: Style) -> list[Cells]:
+    """Return the budget of each characteristic at the load of the summary."""
+    load = summary_load(result)
+    return [
+        _budget(row, style)
+        for row in result.characteristics.rows
+        if row.load_N == load and row.estimate is not None and row.SA_rad is None
+    ]
+
+
+def _budget(row: Row, style: Style) -> Cells:
+    one, sources = row.characteristic, dict(row.sources)
+    unit, factor = style.unit(one.printed_unit)
+    factor *= one.factor
+    cells: Cells = {"quantity": one.title, "rotation": row.rotation, "unit": str(unit).replace("*", "·")}
+    total = math.hypot(*sources.values()) * factor
+    for column in BUDGET:
+        part = math.hypot(*(sources.get(name, 0.0) for name in column.sources)) * factor
+        cells[column.name] = _to_place(part, total, style)
+    cells["u"] = _to_place(total, total, style)
+    return cells
+
+
+def _to_place(value: float, total: float, style: Style) -> str:
+    """Return a part of a budget to the place of the second digit of its total; a dash below it."""
+    if not total > 0:
+        return "-"
+    text = round_to_uncertainty(value, total)
+    if not float(text):
+        return "-"
+    return text.replace(".", ",") if style.decimal_comma else text
+
+
+def summary_load(result: TestResult) -> float | None:
+    """Return the load [N] of a report's summary: the one nearest the rated load, else the middle one."""
+    loads, rated = result.characteristics.loads_N, result.reduced.info.rated_load_N
+    if not loads:
+        return None
+    return min(loads, key=lambda load: abs(load - rated)) if rated else loads[len(loads) // 2]
+
+
+def summary_estimates(result: TestResult) -> dict[str, Estimate | None]:
+    """Return the values of the summary by their names, in printed units; of directions the forward run."""
+    load = summary_load(result)
+    estimates: dict[str, Estimate | None] = {}
+    for one in summary():
+        rotation = "forward" if one.scope == "direction" else None
+        rows = result.characteristics.of(one.name, rotation=rotation)
+        near = (row for row in rows if load is not None and abs(row.load_N - load) <= _SAME_LOAD * load)
+        row = next(near, None)
+        estimate = None if row is None else row.estimate
+        estimates[str(one.summary)] = None if estimate is None else estimate.scaled(one.factor, "")
+    return estimates
