@@ -9,8 +9,7 @@ from collections.abc import Container, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
-from toolkit.declared.lines import Path, lines_of
-from toolkit.declared.marks import Format, Quantity
+from toolkit.declared.marks import Format, Path, Quantity
 from toolkit.errors import ConfigError
 
 LIKE = 0.5  # of `difflib`: what is less alike was not meant
@@ -143,6 +142,8 @@ class Source:
         """Return the source and the line of an entry, or of the nearest table above it."""
         if self.base is not None and any(path[:size] in self.inherited for size in range(1, len(path) + 1)):
             return self.base.place(path)
+        from toolkit.declared.lines import lines_of
+
         lines = {} if self.text is None else lines_of(self.text)
         while path:
             if path in lines:

@@ -14,8 +14,7 @@ from pathlib import Path as FilePath
 from typing import Any, ClassVar
 
 from toolkit.declared.faults import Fault, display, nearest
-from toolkit.declared.lines import Path
-from toolkit.declared.marks import Above, AtLeast, AtMost, Below, Entry, Format, Names, Text
+from toolkit.declared.marks import Above, AtLeast, AtMost, Below, Entry, Format, Names, Path, Text
 from toolkit.files import is_number
 
 
@@ -27,7 +26,7 @@ REFUSED = _Refused.REFUSED
 Limit = Above | AtLeast | Below | AtMost
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Place:
     """Where a value is read: the path of its keys, the format in force, the file's faults and its root."""
 
@@ -50,7 +49,7 @@ class Place:
         return REFUSED
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Kind:
     """What one entry holds. ``entry`` is what its field says of it."""
 
@@ -143,7 +142,7 @@ class BoolKind(Kind):
         return bool(self.entry.example)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class NumberKind(Kind):
     """A finite number inside its limits; ``whole``: without a decimal part."""
 
@@ -205,7 +204,7 @@ class NumberKind(Kind):
         return int(number) if self.integer else float(number)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class TextKind(Kind):
     """A text; ``names`` are those that may stand there."""
 
@@ -268,7 +267,7 @@ class TextKind(Kind):
         return self.names.fixed[0] if self.names is not None and self.names.fixed else "..."
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class ChoiceKind(Kind):
     """One of a few words or whole numbers."""
 
@@ -301,7 +300,7 @@ class ChoiceKind(Kind):
         return self.choices[0] if self.entry.example is None else self.entry.example
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class DateKind(Kind):
     """A day, as a TOML date or as ISO 8601 text; held as a date, or as text where ``text`` is set."""
 

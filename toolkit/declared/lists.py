@@ -13,7 +13,7 @@ from toolkit.declared.quantities import QuantityKind
 from toolkit.declared.tables import TableKind
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class ListKind(Kind):
     """A list, held as a tuple; of quantities ``{ value = [..], unit = ".." }``, of tables ``[[name]]``.
 
@@ -160,7 +160,7 @@ class ListKind(Kind):
         return [self.item.example()] * count
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class KeyedKind(Kind):
     """A table whose keys are names; held as pairs, a mapping, or classes with the name in ``by``."""
 

@@ -13,7 +13,7 @@ from toolkit.errors import UnitError
 from toolkit.files import is_number
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class QuantityKind(Kind):
     """A number with its unit, held in SI as a `Quantity`; limits are in the mark's first unit."""
 
@@ -164,7 +164,7 @@ class QuantityKind(Kind):
         return number if self.unit.beside is not None else {"value": number, "unit": self.name or "N"}
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class UnitKind(Kind):
     """The name of a unit, held in its one spelling."""
 

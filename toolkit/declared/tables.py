@@ -15,7 +15,7 @@ from toolkit.files import is_number
 MISSING: Any = object()
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Field:
     """One field of a declared class: its name, the key of its entry, its kind, and its default."""
 
@@ -41,7 +41,7 @@ class Field:
         return self.kind.unit.beside if isinstance(self.kind, QuantityKind) else None
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class TableKind(Kind):
     """A table that a dataclass declares. Fields are looked up when first needed: classes may nest."""
 
@@ -206,7 +206,7 @@ def _in_unit(kind: QuantityKind, si: float, text: str) -> float:
     return (float(si) - (0.0 if kind.unit.difference else si_unit.offset)) / si_unit.factor
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class FormsKind(Kind):
     """One of several forms: told apart by shape (a text or a table), tables by the word in ``tag``."""
 
