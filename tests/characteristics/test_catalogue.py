@@ -201,7 +201,7 @@ import json, sys
 from pathlib import Path
 import toolkit.characteristics.catalogue as catalogue
 catalogue.__path__.append(sys.argv[1])
-from toolkit.report.build import build_content
+from toolkit.report.test.content import build_content
 from toolkit.testfile import read_test_file
 content = build_content(read_test_file(Path(sys.argv[2])))
 table = content.tables["stiffness"]

@@ -44,7 +44,7 @@ _NO_PIVOT = 1e-14
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Shared:
+class SharedErrors:
     """What every row of a test has in common.
 
     ``record`` computed the rows (None where it is not at hand: its share is then zero); ``machine_axes``
@@ -197,12 +197,14 @@ class Shared:
         return Part(source="pressure", key=f"P/{self.owner(self.P)}", u=value * self.P.effect * relative)
 
 
-def shared_of(reduced: ReducedTest, *, machine: Machine, record: CalibrationRecord | None) -> Shared:
+def shared_errors_of(
+    reduced: ReducedTest, *, machine: Machine, record: CalibrationRecord | None
+) -> SharedErrors:
     """Return what the rows of a reduced test have in common."""
     own_tares = reduced.tare.source == "block"  # a tare of each file is no shift of all rows
     SA = machine.stated_uncertainty("SA")
     u_uncorrected = u_SA(machine, np.array([condition.MZ for condition in reduced.conditions]))
-    return Shared(
+    return SharedErrors(
         record=record,
         machine_axes=machine.axes,
         tared=reduced.tare.source != "none",

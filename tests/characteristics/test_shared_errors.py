@@ -13,7 +13,7 @@ from weighted_sums import calibration_u
 from toolkit.calibration.registry.registry import Registry
 from toolkit.calibration.uncertainty.propagation import record_covariance
 from toolkit.characteristics.characterise import characterise
-from toolkit.characteristics.shared import Shared
+from toolkit.characteristics.shared_errors import SharedErrors
 from toolkit.lab.home import packaged_home
 from toolkit.machine import TypeB, load_machine
 from toolkit.pipeline import TestResult, process, read_test
@@ -49,12 +49,12 @@ def result(virtual_test: Path, fitted: CalibrationRecord) -> TestResult:
     return process(test, read_test(test), fitted)
 
 
-def shared_of(record: CalibrationRecord) -> Shared:
+def shared_errors_of(record: CalibrationRecord) -> SharedErrors:
     none = {
         name: TypeB(symbol=name, u=0.0, relative=0.0, source="")
         for name in ("SA", "SA_scale", "FZ", "P", "zero")
     }
-    return Shared(record=record, machine_axes=MACHINE.axes, tared=True, **none)
+    return SharedErrors(record=record, machine_axes=MACHINE.axes, tared=True, **none)
 
 
 def weights_at_zero(group: Group) -> list[tuple[Condition, float]]:
@@ -102,7 +102,9 @@ def test_a_weighted_sum_against_trials(channel: str, fitted: CalibrationRecord, 
 
     sign = np.array([signs(MACHINE.axes, "SAE", one.rotation)[channel] for one in conditions])
     sums = (loads * scale[:, None]) @ (weights * sign) * factor
-    found = calibration_u(shared_of(record), channel, list(zip(conditions, weights.tolist(), strict=True)))
+    found = calibration_u(
+        shared_errors_of(record), channel, list(zip(conditions, weights.tolist(), strict=True))
+    )
     assert found == pytest.approx(float(sums.std(ddof=1)), rel=0.02)
 
 
@@ -114,7 +116,7 @@ def test_a_scale_error_stays_in_proportion(fitted: CalibrationRecord, result: Te
     for group in groups_of.values():
         parts = slope_weights(group)
         value = sum(w * c.FY for c, w in parts)
-        both, alone = (calibration_u(shared_of(r), "FY", parts) for r in (record, bare))
+        both, alone = (calibration_u(shared_errors_of(r), "FY", parts) for r in (record, bare))
         relative = 2.0 / record.load("FY").largest
         assert np.sqrt(both**2 - alone**2) == pytest.approx(abs(value) * relative, rel=1e-3)
 
@@ -127,10 +129,10 @@ def test_a_shift_cancels_in_a_slope_and_is_whole_at_zero(
     shift = 4.4482216152605 * float(np.hypot.reduce([c[0] * 1e-4, c[1] * 2e-4, c[2] * 1e-4]))
     group = _groups(result)[0]
     slope, zero = slope_weights(group), weights_at_zero(group)
-    assert calibration_u(shared_of(record), "FY", slope) == pytest.approx(
-        calibration_u(shared_of(bare), "FY", slope), rel=1e-9
+    assert calibration_u(shared_errors_of(record), "FY", slope) == pytest.approx(
+        calibration_u(shared_errors_of(bare), "FY", slope), rel=1e-9
     )
-    both, alone = (calibration_u(shared_of(r), "FY", zero) for r in (record, bare))
+    both, alone = (calibration_u(shared_errors_of(r), "FY", zero) for r in (record, bare))
     assert np.sqrt(both**2 - alone**2) == pytest.approx(shift, rel=1e-6)
 
 
