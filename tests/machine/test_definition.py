@@ -21,7 +21,7 @@ def test_the_m15_as_the_source_document_prints_it() -> None:
     assert m15.drum.speed_m_s == pytest.approx(2.128, abs=5e-4)
     # physics.md: one drum revolution takes 3.995 s.
     assert m15.drum.circumference_m / m15.drum.speed_m_s == pytest.approx(3.995, abs=5e-4)
-    assert m15.cell_pitch_diameter_m == 0.2
+    assert m15.layout.pitch_diameter_m == 0.2
     assert not m15.simulated
 
 
@@ -35,8 +35,8 @@ def test_the_virtual_machine_differs_in_its_indications_only() -> None:
 
 def test_levers_of_the_drawing() -> None:
     # Equilateral triangle on a 200 mm pitch circle: apex 100 mm and base 50 mm from the centre.
-    lever = dict(load_machine("m15").overturning_lever_m)
-    radius = load_machine("m15").cell_pitch_diameter_m / 2
+    lever = dict(load_machine("m15").layout.overturning_lever_m)
+    radius = load_machine("m15").layout.pitch_diameter_m / 2
     assert lever["E5"] == pytest.approx(-radius)
     assert lever["D51"] == pytest.approx(radius * math.sin(math.pi / 6))
     assert sum(lever.values()) == pytest.approx(0.0)
