@@ -94,9 +94,9 @@ def _wanted(linked: Linked) -> Iterator[tuple[PastReport, str]]:
 
 def _job(past: PastReport, resolved: Resolved, test: Path, template: Any, out: Path) -> Job:
     from toolkit.cli.handover import details_of, provenance
-    from toolkit.report.test.content import build_content
     from toolkit.report.deliver import Job
     from toolkit.report.style import read_style, style_file
+    from toolkit.report.test.content import build_content
 
     use = resolved.result.reduced.calibration
     why = (

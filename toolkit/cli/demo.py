@@ -298,9 +298,9 @@ def _tire_file(resolved: Resolved, path: Path) -> str:
 
 
 def _figures(resolved: Resolved, stage: Path) -> list[str]:
-    from toolkit.report.test.content import build_content
     from toolkit.report.figures import draw
     from toolkit.report.style import read_style, style_file
+    from toolkit.report.test.content import build_content
 
     style = read_style(style_file(stage / "home" / "report_templates" / "org.docx"))
     content = build_content(resolved.result, resolved.record, findings=resolved.findings, style=style)

@@ -166,7 +166,7 @@ def _options(loss: str, weights: str, rated_load: float | None, radius: float | 
 
 def _draw(fitted: Fitted, folder: Path) -> list[str]:
     from toolkit.files import write_atomic
-    from toolkit.report.test.fit_figures import fit_figures
+    from toolkit.report.fit_figures import fit_figures
 
     word = fitted.use.word if fitted.use else None
     made = fit_figures(fitted.data, fitted.curves, fitted.globals, fitted.comparison, word)

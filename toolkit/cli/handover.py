@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from toolkit.diagnosis.answer.answer import Diagnosis
     from toolkit.findings import Finding
     from toolkit.recording.details import ReportDetails
-    from toolkit.report.diagnosis.in_report import Told
+    from toolkit.report.diagnosis.answer import Told
 
 WHOLE, TYDEX, TIR = "test.xlsx", "test.tdx", "tire.tir"
 
@@ -68,7 +68,7 @@ def diagnosis_of(given: Path | None, by: str | None, tests: Sequence[Path]) -> t
         return None
     from toolkit.diagnosis.answer.reader import read_answer
     from toolkit.errors import ConfigError
-    from toolkit.report.diagnosis.in_report import Told
+    from toolkit.report.diagnosis.answer import Told
 
     if given is None:
         raise ConfigError(

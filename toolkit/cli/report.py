@@ -34,10 +34,10 @@ if TYPE_CHECKING:
     from toolkit.cli.resolve import Resolved
     from toolkit.errors import ToolkitError
     from toolkit.report.deliver import Delivered, Job
-    from toolkit.report.diagnosis.in_report import Told
+    from toolkit.report.diagnosis.answer import Told
     from toolkit.report.drawer import Drawer
-    from toolkit.report.word.office import Office
     from toolkit.report.style import Style
+    from toolkit.report.word.office import Office
     from toolkit.report.word.package import Template
     from toolkit.tires.comparison import Comparison
 
@@ -307,9 +307,9 @@ def _job(
     test: Path, resolved: Resolved, folder: Path, options: Options, comparison: Comparison | None
 ) -> Job:
     from toolkit.cli.handover import details_of, provenance, writers
-    from toolkit.report.test.content import build_content
     from toolkit.report.deliver import Job
     from toolkit.report.style import read_style, style_file
+    from toolkit.report.test.content import build_content
 
     style = read_style(style_file(options.template.path))
     if options.units is not None:

@@ -5,9 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from toolkit.findings import Finding
-from toolkit.report.certificate.model import LoadResult
+from toolkit.report.certificate.model import MOST_FIGURES, LoadResult
 from toolkit.report.certificate.statements import Stated
-from toolkit.report.certificate.vocabulary import MOST_FIGURES
 
 if TYPE_CHECKING:
     from toolkit.calibration.records.record import CalibrationRecord

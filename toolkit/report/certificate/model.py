@@ -15,6 +15,9 @@ from toolkit.calibration.records.record import DataFile, Indication
 from toolkit.calibration.records.use import CalibrationUse
 from toolkit.findings import Finding
 
+# Loads of a certificate that have a picture.
+MOST_FIGURES = 6
+
 Verdict = Literal["pass", "conditionalPass", "conditionalFail", "fail"]
 VERDICTS: dict[str, str] = {
     "pass": "pass",

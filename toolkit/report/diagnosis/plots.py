@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,32 +13,26 @@ from toolkit.diagnosis.answer.locate import time_unit
 from toolkit.report.content import Curve, Plot
 from toolkit.report.diagnosis.figures import binned, variable_of, worst_run
 from toolkit.report.diagnosis.numbers import few
-from toolkit.report.diagnosis.vocabulary import WHERE
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from toolkit.diagnosis.answer.answer import Diagnosis, Mismatch
-    from toolkit.diagnosis.diagnose import Result
     from toolkit.diagnosis.search.search import Search
     from toolkit.report.style import Style
 
+WHERE = 3  # figures of places at most
 _STEPS = ("as declared", "refitted", "with the effects")
 _MOST = 300  # points of a curve in print
 
 
-def diagnosis_plots(result: Result, style: Style) -> dict[str, Plot]:
-    """Return the figures by name; none where nothing was searched."""
-    found, made = result.search, result.diagnosis
-    if found is None:
-        return {}
-    plots = [errors_plot(made, style)] if made.held_out else []
-    wheres = (_where(found, one, made, style) for one in made.mismatch)
-    for i, plot in enumerate([one for one in wheres if one is not None][:WHERE], start=1):
-        plots.append(_named(plot, f"diagnosis_where_{i}"))
+def search_plots(found: Search, made: Diagnosis, style: Style) -> Iterator[Plot]:
+    """Return where the mismatch of each output is, and the run with the largest one."""
+    wheres = (_where(found, mismatch, made, style) for mismatch in made.mismatch)
+    for i, plot in enumerate([plot for plot in wheres if plot is not None][:WHERE], start=1):
+        yield replace(plot, name=f"diagnosis_where_{i}")
     if made.mismatch:
-        plots.append(_run(found, made, style))
-    return {plot.name: plot for plot in plots}
+        yield _run(found, made, style)
 
 
 def errors_plot(made: Diagnosis, style: Style) -> Plot:
@@ -147,12 +143,6 @@ def _run(found: Search, made: Diagnosis, style: Style) -> Plot:
         legend_title="simulation",
         decimal_comma=style.decimal_comma,
     )
-
-
-def _named(plot: Plot, name: str) -> Plot:
-    from dataclasses import replace
-
-    return replace(plot, name=name)
 
 
 def _unit(found: Search, channel: str) -> str:

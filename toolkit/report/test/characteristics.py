@@ -1,4 +1,4 @@
-"""A test's characteristics as rows of the report's tables, and as the values of its summary."""
+"""A test's characteristics: the tables that the catalogue has columns of, and the values of the summary."""
 
 from __future__ import annotations
 
@@ -8,17 +8,19 @@ from typing import TYPE_CHECKING
 from toolkit.characteristics.budget import COLUMNS as BUDGET
 from toolkit.characteristics.catalogue import columns, summary, tables
 from toolkit.estimate import round_to_uncertainty
+from toolkit.report.content import Cell
+from toolkit.report.document import DeclaredTable, Rows
+from toolkit.report.style import Style
+from toolkit.report.test.content import REPORT, ReportedTest
+from toolkit.report.vocabulary import QUANTITIES
 
 if TYPE_CHECKING:
     from toolkit.characteristics.characteristic import WideTable
     from toolkit.characteristics.model import Row
     from toolkit.estimate import Estimate
     from toolkit.pipeline import TestResult
-    from toolkit.report.content import Cell
-    from toolkit.report.style import Style
 
-    Cells = dict[str, Cell]
-
+Cells = dict[str, Cell]
 # Loads within this part of a summary's load are its load.
 _SAME_LOAD = 0.04
 
@@ -28,6 +30,25 @@ def put(cells: dict[str, Cell], name: str, estimate: Estimate | None, factor: fl
     cells[name] = None if estimate is None else estimate.value * factor
     U = math.nan if estimate is None else estimate.expanded()[0] * factor
     cells[f"U_{name}"] = U if math.isfinite(U) else None
+
+
+_HEADS = {
+    "load": "load|load|force|.0f",
+    "direction": "load|load|force|.0f\nrotation|direction of rotation",
+    "angle": "rotation|direction of rotation\nload|load|force|.0f\nSA|slip angle|deg|.0f",
+}
+
+
+def wide_table(table: WideTable) -> DeclaredTable[ReportedTest]:
+    """Return the declaration of a table with a column for each characteristic, and for its uncertainty."""
+    lines = [
+        f"{one.column_name} ±|{one.column_text}|{unit}|.{one.digits}f"
+        for one in columns(table)
+        for unit in [QUANTITIES.get(one.printed_unit, one.printed_unit)]
+    ]
+    return REPORT.table(table.name, table.text, "\n".join([_HEADS[table.scope], *lines]))(
+        lambda report, _: wide_rows(report.result, table)
+    )
 
 
 def wide_rows(result: TestResult, table: WideTable) -> list[Cells]:
@@ -54,9 +75,22 @@ def wide_rows(result: TestResult, table: WideTable) -> list[Cells]:
     ]
 
 
-def long_rows(result: TestResult, style: Style) -> list[Cells]:
+@REPORT.table(
+    "characteristics",
+    "every characteristic, one row each",
+    """
+    quantity|name of the characteristic
+    rotation|direction of rotation, or both
+    load|load|force|.0f
+    value|value in the row's unit||.2f|U of U
+    U|expanded uncertainty (95 %) in the row's unit||.2f|U of U
+    k|coverage factor|1|.2f
+    unit|unit of the row
+    """,
+)
+def long_rows(report: ReportedTest, style: Style) -> Rows:
     """Return every characteristic that has a value, one row each, but for those at slip angles."""
-    lines: list[Cells] = []
+    result, lines = report.result, list[Cells]()
     for one in (one for table in tables() if table.scope != "angle" for one in columns(table)):
         unit, factor = style.unit(one.printed_unit)
         scale = factor * one.factor
@@ -78,8 +112,23 @@ def long_rows(result: TestResult, style: Style) -> list[Cells]:
     return lines
 
 
-def budget_rows(result: TestResult, style: Style) -> list[Cells]:
+@REPORT.table(
+    "budget",
+    "standard uncertainties of each characteristic at the summary's load by their source, to two digits of "
+    "their sum; a dash below its last place",
+    "\n".join(
+        [
+            "quantity|name of the characteristic",
+            "rotation|direction of rotation, or both",
+            "unit|unit of the row",
+            *(f"{one.name}|{one.text}" for one in BUDGET),
+            "u|standard uncertainty of all",
+        ]
+    ),
+)
+def budget_rows(report: ReportedTest, style: Style) -> Rows:
     """Return the budget of each characteristic at the load of the summary."""
+    result = report.result
     load = summary_load(result)
     return [
         _budget(row, style)
@@ -131,3 +180,6 @@ def summary_estimates(result: TestResult) -> dict[str, Estimate | None]:
         estimate = None if row is None else row.estimate
         estimates[str(one.summary)] = None if estimate is None else estimate.scaled(one.factor, "")
     return estimates
+
+
+WIDE_TABLES = tuple(wide_table(table) for table in tables())

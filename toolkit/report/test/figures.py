@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -13,6 +13,7 @@ from toolkit.estimate import plus_minus
 from toolkit.report.content import Curve, Plot
 from toolkit.report.style import Style
 from toolkit.report.tags import format_number
+from toolkit.report.test.content import REPORT, ReportedTest
 
 if TYPE_CHECKING:
     from toolkit.characteristics.characteristic import Characteristic, Figure
@@ -48,10 +49,20 @@ def load_groups(conditions: Sequence[Condition]) -> list[tuple[float, tuple[Cond
     return [(float(np.mean([c.FZ_common for c in group])), tuple(group)) for group in groups]
 
 
-def build_plots(result: TestResult, style: Style, watermark: str | None) -> dict[str, Plot]:
-    """Return every figure that the test has data for, by name."""
-    maker = _Plots(result, style, watermark)
-    plots = (
+@REPORT.figures(
+    {
+        "fy_vs_slip": "lateral force against slip angle, all loads",
+        "mz_vs_slip": "aligning moment against slip angle, all loads",
+        "fy_vs_load": "lateral force against load at constant slip angles",
+        "mz_vs_load": "aligning moment against load at constant slip angles",
+        "gough": "Gough plot: lateral force against aligning moment",
+        **{figure.name: figure.text for figure in figures()},
+    }
+)
+def build_plots(report: ReportedTest, style: Style) -> Iterable[Plot | None]:
+    """Return every figure that the test has data for."""
+    maker = _Plots(report.result, style, report.watermark)
+    return (
         maker.against_slip("FY"),
         maker.against_slip("MZ"),
         maker.against_load("FY"),
@@ -59,7 +70,6 @@ def build_plots(result: TestResult, style: Style, watermark: str | None) -> dict
         maker.gough(),
         *maker.characteristics(),
     )
-    return {plot.name: plot for plot in plots if plot is not None}
 
 
 class _Plots:

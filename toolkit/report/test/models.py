@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
 from toolkit.report.content import Cell, Curve, Plot
+from toolkit.report.document import Rows
+from toolkit.report.style import Style
 from toolkit.report.tags import format_number
+from toolkit.report.test.content import REPORT, ReportedTest
 
 if TYPE_CHECKING:
     from toolkit.tires.comparison import Comparison, ComparisonRow
@@ -14,6 +17,45 @@ if TYPE_CHECKING:
 _SYMBOLS = {"FX": "longitudinal force FX", "FY": "lateral force FY", "MZ": "aligning moment MZ"}
 _NAMED = 5
 _WIDTH = 0.38  # of a bar; two stand side by side at a model
+
+
+_CHANNEL = """
+    {0}_parameters|parameters fitted for {0}, all loads|1|d
+    {0}_error|error of {0} over the rows fitted|%|.2f
+    {0}_floor|scatter of {0} about its bin means|%|.2f
+    {0}_left_out|error of {0} where every load is predicted by a fit without it|%|.2f
+    """
+
+
+@REPORT.table(
+    "models",
+    "tire models side by side, one row a model and condition; of the forward run, asked for by --models",
+    f"""
+    model|tire model; magic_formula has one curve a load, the others are over all loads
+    condition|pure or combined slip
+    {_CHANNEL.format("FY").strip()}
+    {_CHANNEL.format("MZ").strip()}
+    seconds|time of all fits of the model|s|.2f|run
+    converged|yes where several starts ended at every lowest cost, else no
+    not_determined|parameters that the data do not determine, by channel
+    """,
+)
+def models(report: ReportedTest, _style: Style) -> Rows:
+    """Return the models that were asked for."""
+    return model_rows(report.comparison)
+
+
+@REPORT.figures(
+    {
+        "models_fy": "error of each tire model in lateral force, fitted and with each load left out",
+        "models_mz": "error of each tire model in aligning moment, fitted and with each load left out",
+    }
+)
+def error_charts(report: ReportedTest, style: Style) -> Iterable[Plot]:
+    """Return the errors of the models in both channels."""
+    return model_plots(
+        report.comparison, watermark=report.watermark, decimal_comma=style.decimal_comma
+    ).values()
 
 
 def model_rows(comparison: Comparison | None) -> list[dict[str, Cell]]:
