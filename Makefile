@@ -10,7 +10,7 @@ JOBS   ?= 2
 
 APT_PACKAGES := libreoffice-writer-nogui fonts-crosextra-carlito fonts-crosextra-caladea fonts-liberation2 poppler-utils
 
-.PHONY: demo test check bench coverage proof setup lock clean
+.PHONY: demo test check golden bench coverage proof setup lock clean
 
 setup: $(STAMP) $(SYSTEM)
 
@@ -25,6 +25,10 @@ check: $(STAMP)
 	$(BIN)/ruff check --quiet
 	$(BIN)/mypy --no-error-summary
 	$(BIN)/lint-imports --config pyproject.toml
+
+# Every frozen answer (records, reduced tests, tires, audits, diagnoses, documents) against the code of today.
+golden: setup
+	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m tests.golden check
 
 bench: setup
 	$(BIN)/python -m tests.benchmarks

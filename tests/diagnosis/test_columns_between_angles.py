@@ -125,7 +125,7 @@ def test_few_angles_under_little_noise_are_judged_by_what_is_known_between_them(
     wrong = float(np.sqrt(np.mean((asked(case, SA, FZ)[0] - magic(SA, FZ)) ** 2)))
     floor = problem_of(case, model).floor["FY"]
     assert floor < 1e-3 if judged else floor > wrong > noise
-    assert [one.rule for one in model.findings] == ([] if judged else ["case-few-slip-angles"] * 2)
+    assert [one.rule for one in model.capability.findings] == ([] if judged else ["case-few-slip-angles"] * 2)
 
 
 def test_a_sweep_knows_the_tire_between_its_rows(tmp_path):
@@ -139,7 +139,7 @@ def test_a_sweep_knows_the_tire_between_its_rows(tmp_path):
     case = written(tmp_path, frame)
     made, _ = asked(case, 0.9 * SA, FZ)
     np.testing.assert_allclose(made, magic(0.9 * SA, FZ), atol=8)
-    assert ColumnsModel(case).findings == ()
+    assert ColumnsModel(case).capability.findings == ()
 
 
 def test_a_drum_against_a_table_of_columns_is_the_shorter_patch(tmp_path):

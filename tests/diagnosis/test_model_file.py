@@ -163,9 +163,10 @@ def test_a_model_with_what_was_found_misses_nothing_on_the_same_recordings(tmp_p
 def test_small_forces_act_beside_what_a_model_has_in_it(tmp_path):
     case = drag_ode(tmp_path / "case")
     _, path = written(case, tmp_path / "answer")
-    model = model_of(read_case(case, model=path), None)
-    run, p = model.case.runs[0], {one.name: one.value for one in model.parameters}
-    linear = model.pushed(run, p, (), "v", lambda x: np.ones((len(x), 1)))["h"][:, 0]
+    read = read_case(case, model=path)
+    model = model_of(read, None)
+    run, p = read.runs[0], {one.name: one.value for one in model.parameters}
+    linear = model.capability.motion.pushed(run, p, (), "v", lambda x: np.ones((len(x), 1)))["h"][:, 0]
     push = Active(effect=effects()["constant_force"], channel="v", values={"force": 1e-3})
     moved = (model.simulate(run, p, (push,))["h"] - model.simulate(run, p, ())["h"]) / 1e-3
     # the drag holds back: less than the t^2/2 of a body without it
@@ -188,10 +189,11 @@ def simulate(inputs, p):
     case = write_case(tmp_path / "case", text + TWO, simulator=simulator, **frames)
     found, path = written(case, tmp_path / "answer")
     assert [one.name for one in found.effects] == ["quadratic_drag"]
-    model = model_of(read_case(case, model=path), None)
-    run, p = model.case.runs[0], {one.name: one.value for one in model.parameters}
+    read = read_case(case, model=path)
+    model = model_of(read, None)
+    run, p = read.runs[0], {one.name: one.value for one in model.parameters}
     seen = []
-    model.pushed(run, p, (), "h", lambda x: seen.append(x) or np.ones((len(x), 1)))
+    model.capability.motion.pushed(run, p, (), "h", lambda x: seen.append(x) or np.ones((len(x), 1)))
     w = np.sqrt(9.81 / 0.2)
     np.testing.assert_allclose(seen[0], -(w**2) / 9.81 * np.log(np.cosh(9.81 * run.t / w)), atol=0.03)
 

@@ -98,7 +98,7 @@ def test_linear_responses_of_an_equation_are_its_simulations_for_a_small_force(t
     def pattern(x):
         return np.stack([np.sin(2 * np.pi * x / period), np.cos(2 * np.pi * x / period)], axis=1)
 
-    linear = model.pushed(run, p, (), "om", pattern)["TH"]
+    linear = model.capability.motion.pushed(run, p, (), "om", pattern)["TH"]
     plain = model.simulate(run, p, ())["TH"]
     for column, phase in enumerate((0.0, 90.0)):
         values = {"amplitude": 1e-3, "period": period, "phase": phase}
@@ -117,7 +117,7 @@ def test_a_channel_that_is_saturated_shows_nothing_of_a_small_force(tmp_path):
     level = float(np.quantile(np.abs(plain), 0.6))
     stop = Active(effect=effects()["saturation"], channel="TH", values={"level": level})
     free, stopped = (
-        model.pushed(run, p, active, "om", lambda x: np.ones((len(x), 1)))["TH"][:, 0]
+        model.capability.motion.pushed(run, p, active, "om", lambda x: np.ones((len(x), 1)))["TH"][:, 0]
         for active in ((), (stop,))
     )
     beyond = np.abs(plain) > level

@@ -5,7 +5,7 @@ import pytest
 from tests.diagnosis.tire_case import SIGNS, python_tire
 from toolkit.diagnosis.case.reader import read_case
 from toolkit.diagnosis.diagnose import diagnose
-from toolkit.diagnosis.simulators.parameter_signs import sense
+from toolkit.diagnosis.simulators.parameter_units import sense
 from toolkit.diagnosis.simulators.simulator import Active
 from toolkit.effects.catalogue import effects
 

@@ -11,7 +11,7 @@ from tests.diagnosis.cases import CELL, write_case
 from toolkit.diagnosis.answer.model_text import model_text
 from toolkit.diagnosis.case.reader import read_case
 from toolkit.diagnosis.diagnose import diagnose
-from toolkit.diagnosis.simulators.channel_units import reduced
+from toolkit.diagnosis.simulators.parameter_units import reduced
 from toolkit.simulation.model_file import read_model
 
 

@@ -11,12 +11,18 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from toolkit.audit.model import CLEAN
 from toolkit.channels import ROTATIONS, Rotation
+from toolkit.characteristics.catalogue import summary
+from toolkit.characteristics.derivations import half_at_zero, secant
+from toolkit.characteristics.groups import CHANNELS
 from toolkit.findings import Finding
 from toolkit.machine import load_machine, machine_names
+
+if TYPE_CHECKING:
+    from toolkit.characteristics.characteristic import Characteristic, Scope
 
 _NEEDED = ("SA_deg", "FY_N", "MZ_Nm", "FY_change_N", "MZ_change_Nm", "step_SA_deg", "step_FZ_N")
 
@@ -28,8 +34,8 @@ Point = tuple[float, float, float, float, float]
 class Effect:
     """One characteristic of one load: ``old`` by the files' own values, ``new`` by the record in force.
 
-    ``name`` is ``cornering_stiffness`` [N/rad], ``aligning_stiffness`` [N·m/rad] of a direction, or
-    ``conicity``, ``plysteer`` [N], ``CRAT``, ``PRAT`` [N·m], whose ``rotation`` is None.
+    ``name`` is that of the catalogue's summary, as ``cornering_stiffness`` [N/rad] of a direction or
+    ``conicity`` [N], whose ``rotation`` is None; ``unit`` is SI.
     """
 
     load_N: float
@@ -139,27 +145,37 @@ def _stiffness(near: tuple[Point, Point], load: float, rotation: Rotation) -> li
     slope = [(b - a) / (above[0] - below[0]) for a, b in zip(below, above, strict=True)]
     return [
         Effect(
-            load_N=load, name=name, rotation=rotation, unit=unit, old=factor * slope[at],
-            new=factor * slope[at + 2],
+            load_N=load,
+            name=str(one.summary),
+            rotation=rotation,
+            unit=one.unit,
+            old=one.sign * slope[1 + at],
+            new=one.sign * slope[3 + at],
         )
-        for name, unit, factor, at in (
-            ("cornering_stiffness", "N/rad", -1.0, 1),
-            ("aligning_stiffness", "N*m/rad", 1.0, 2),
-        )
-    ]  # fmt: skip
+        for one, at in _told("direction")
+    ]
 
 
 def _pull(F: tuple[float, ...], R: tuple[float, ...], load: float) -> list[Effect]:
-    # In axes that follow the travel; see `toolkit.characteristics.pull`.
+    # In axes that follow the travel; see `toolkit.characteristics.derivations`.
     return [
         Effect(
-            load_N=load, name=name, rotation=None, unit=unit, old=(F[at] + sign * R[at]) / 2,
-            new=(F[at + 2] + sign * R[at + 2]) / 2,
+            load_N=load,
+            name=str(one.summary),
+            rotation=None,
+            unit=one.unit,
+            old=(F[at] + one.sign * R[at]) / 2,
+            new=(F[2 + at] + one.sign * R[2 + at]) / 2,
         )
-        for name, unit, sign, at in (
-            ("conicity", "N", -1, 0), ("plysteer", "N", 1, 0), ("CRAT", "N*m", -1, 1), ("PRAT", "N*m", 1, 1),
-        )
-    ]  # fmt: skip
+        for one, at in _told("load")
+    ]
+
+
+def _told(scope: Scope) -> Iterator[tuple[Characteristic, int]]:
+    """Yield what the summary of a report has of a scope, each with the place of its channel: FY 0, MZ 1."""
+    for one in summary():
+        if one.scope == scope and one.read in (secant, half_at_zero):
+            yield one, CHANNELS.index(one.channel)
 
 
 def _at_zero(points: list[Point]) -> tuple[float, ...] | None:

@@ -82,9 +82,9 @@ def check_units(record: CalibrationRecord, units: Mapping[str, str]) -> None:
     """
     for name, expected in zip(record.indications, record.indication_units, strict=True):
         got = units.get(name)
-        wanted = unit(expected, where=record.id)
-        found = None if got is None else unit(got, where=f"channel {name}")
-        if found is None or (found.factor, found.dimension) != (wanted.factor, wanted.dimension):
+        needed = unit(expected, where=record.id)
+        present = None if got is None else unit(got, where=f"channel {name}")
+        if present is None or (present.factor, present.dimension) != (needed.factor, needed.dimension):
             raise RecordError(
                 f"the unit of {name} is not that of record {record.id}",
                 where=f"{record.id}, {name}",

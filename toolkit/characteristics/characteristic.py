@@ -148,6 +148,20 @@ class Characteristic:
         """Its series in a figure that it shares."""
         return self.label or self.title
 
+    def facts(self) -> dict[str, str]:
+        """Return what people are told of it, in words."""
+        unit = self.unit if self.printed_unit == self.unit else f"{self.printed_unit} (SI: {self.unit})"
+        return {
+            "title": self.title,
+            "symbol": self.symbol,
+            "unit": unit.replace("*", "·"),
+            "means": self.definition,
+            "formula": self.formula,
+            "term": self.term,
+            "source": self.source,
+            "uncertainty": ", ".join(self.budget),
+        }
+
     def why_lacking(self, directions: Sequence[Direction]) -> str:
         """Return what a result lacks, in words.
 

@@ -1,4 +1,4 @@
-"""`toolkit explain`: a finding's rule, or an effect of a diagnosis, in plain words."""
+"""`toolkit explain`: a finding's rule, an effect of a diagnosis, or a characteristic, in plain words."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ import typer
 from toolkit.cli.console import Json, Quiet, answer
 
 if TYPE_CHECKING:
+    from toolkit.characteristics.characteristic import Characteristic
     from toolkit.effects.effect import Effect, EffectParameter
 
 NAME = "explain"
@@ -23,41 +24,55 @@ def command(
     rule: Annotated[
         str | None,
         typer.Argument(
-            metavar="RULE", help="Rule id, or the name of an effect; without it, all rules and effects."
+            metavar="RULE",
+            help="Rule id, or the name of an effect or of a characteristic; without it, all of them.",
         ),
     ] = None,
     json: Json = False,
     quiet: Quiet = False,
 ) -> int:
-    """Explain a finding's rule and what to do, or an effect that a diagnosis names.
+    """Explain a finding's rule and what to do, an effect that a diagnosis names, or a characteristic.
 
-    Examples: toolkit explain no-tare, toolkit explain relaxation
+    Examples: toolkit explain no-tare, toolkit explain relaxation, toolkit explain PRAT
     """
     import difflib
 
+    from toolkit.characteristics.catalogue import characteristics
     from toolkit.effects.catalogue import effects
     from toolkit.errors import ConfigError
 
     rules, known = rules_catalogue(), effects()
+    declared = {one.name: one for one in characteristics()}
     if rule is None:
         lines = [f"{name:<24}{entry['means']}" for name, entry in rules.items()]
         lines += ["", "effects that a diagnosis names:", ""]
         lines += [f"{name:<24}{one.statement}" for name, one in sorted(known.items())]
+        lines += ["", "characteristics of a test:", ""]
+        lines += [f"{name:<24}{one.definition}" for name, one in declared.items()]
         told = {
             "rules": [{"rule": name, **entry} for name, entry in rules.items()],
             "effects": [_as_json(one) for _, one in sorted(known.items())],
+            "characteristics": [{"name": name, **one.facts()} for name, one in declared.items()],
         }
         answer(told, "\n".join(lines), as_json=json, quiet=quiet)
         return 0
-    if rule in known:
-        answer(_as_json(known[rule]), _as_text(known[rule]), as_json=json, quiet=quiet)
+    # Conicity and plysteer are effects of a simulated tire and characteristics of a test: both are told.
+    if rule in known or rule in declared:
+        keys = _as_json(known[rule]) if rule in known else {}
+        texts = [_as_text(known[rule])] if rule in known else []
+        if rule in declared:
+            keys |= _characteristic(declared[rule])
+            texts.append(_characteristic_text(declared[rule]))
+        answer(keys, "\n\n".join(texts), as_json=json, quiet=quiet)
         return 0
     if rule not in rules:
-        near = difflib.get_close_matches(rule, [*rules, *known], n=3, cutoff=0.4)
+        near = difflib.get_close_matches(rule, [*rules, *known, *declared], n=3, cutoff=0.4)
         raise ConfigError(
             f"unknown rule {rule!r}",
             got=rule,
-            expected=", ".join(near) if near else "a rule id as findings print it, or an effect's name",
+            expected=", ".join(near)
+            if near
+            else "a rule id as findings print it, or the name of an effect or a characteristic",
             next_step="'toolkit explain' lists them all",
             rule="unknown-rule",
         )
@@ -75,6 +90,15 @@ def rules_catalogue() -> dict[str, dict[str, str]]:
     """Return every rule with what it means and what to do, in alphabetical order."""
     rules: dict[str, dict[str, str]] = tomllib.loads(RULES_FILE.read_text(encoding="utf-8"))
     return dict(sorted(rules.items()))
+
+
+def _characteristic_text(one: Characteristic) -> str:
+    facts = (f"  {name + ':':<13}{text}" for name, text in one.facts().items())
+    return "\n".join([f"{one.name}, a characteristic of a test", *facts])
+
+
+def _characteristic(one: Characteristic) -> dict[str, object]:
+    return {"characteristic": {"name": one.name, **one.facts()}}
 
 
 def _as_text(one: Effect) -> str:

@@ -31,14 +31,14 @@ def check_golden(calibrations: Path) -> tuple[list[Check], list[NotCovered]]:
         except ToolkitError as error:
             checks.append(not_run(GROUP, instrument, str(error)))
             continue
-        checks += [not_run(GROUP, one.id, f"refused, {one.rule}: {one.reason}") for one in bad]
+        checks += [
+            not_run(GROUP, refusal.id, f"refused, {refusal.rule}: {refusal.reason}") for refusal in bad
+        ]
         for record in good:
             if record.golden.inputs:
                 checks += [_check(record, at) for at in range(len(record.loads))]
             else:
-                not_covered.append(
-                    NotCovered(name=record.id, reason="a legacy import has no golden vectors")
-                )
+                not_covered.append(NotCovered(name=record.id, reason="a legacy import has no golden vectors"))
     if not checks:
         checks.append(not_run(GROUP, "registry", "no record with golden vectors was found"))
     return checks, not_covered

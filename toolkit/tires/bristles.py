@@ -119,7 +119,7 @@ def balance(tread: Tread, sx: Array, sy: Array, *, lines: int = 1, near: Balance
     near : the balance of a state near each case, to start from; where that did not settle its slopes stand,
         for what is searched again there is another side of the same jump
     """
-    made = [
+    parts = [
         _balance(tread.take(part), sx[part], sy[part], lines, None if near is None else near.take(part))
         for part in _parts(tread, sx, lines)
     ]
@@ -127,10 +127,10 @@ def balance(tread: Tread, sx: Array, sy: Array, *, lines: int = 1, near: Balance
         sums=np.zeros((3, 0)), slopes=np.zeros((2, 0)), inverse=np.zeros((2, 2, 0)), settled=np.zeros(0, bool)
     )
     return Balance(
-        sums=np.concatenate([none.sums, *(one.sums for one in made)], axis=1),
-        slopes=np.concatenate([none.slopes, *(one.slopes for one in made)], axis=1),
-        inverse=np.concatenate([none.inverse, *(one.inverse for one in made)], axis=2),
-        settled=np.concatenate([none.settled, *(one.settled for one in made)]),
+        sums=np.concatenate([none.sums, *(part.sums for part in parts)], axis=1),
+        slopes=np.concatenate([none.slopes, *(part.slopes for part in parts)], axis=1),
+        inverse=np.concatenate([none.inverse, *(part.inverse for part in parts)], axis=2),
+        settled=np.concatenate([none.settled, *(one.settled for one in parts)]),
     )
 
 

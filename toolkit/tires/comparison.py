@@ -142,16 +142,16 @@ def _rows(
 ) -> list[ComparisonRow]:
     pure = np.abs(data.rows.KAPPA) <= _FREE
     rows = []
-    for condition, own in (("pure", known & pure), ("combined", known & ~pure)):
-        if own.any():
+    for condition, rows_of in (("pure", known & pure), ("combined", known & ~pure)):
+        if rows_of.any():
             rows.append(
                 ComparisonRow(
                     model=name,
                     channel=channel,
                     condition=condition,
-                    n=int(own.sum()),
+                    n=int(rows_of.sum()),
                     parameters=parameters,
-                    error_percent=pooled_percent(model[own] - y[own], y[own]),
+                    error_percent=pooled_percent(model[rows_of] - y[rows_of], y[rows_of]),
                     prediction_error_percent=prediction if condition == "pure" or not pure.any() else None,
                     converged=converged,
                     not_determined=not_determined,
@@ -171,5 +171,5 @@ def model_curve(
         UNLOADED_RADIUS=r.UNLOADED_RADIUS,
     )  # fmt: skip
     with np.errstate(all="ignore"):
-        made = model.forces(fit.values.tolist(), rows)[channel]
-    return np.asarray(flip.get(channel, 1) * np.broadcast_to(made, len(rows)))
+        predicted = model.forces(fit.values.tolist(), rows)[channel]
+    return np.asarray(flip.get(channel, 1) * np.broadcast_to(predicted, len(rows)))

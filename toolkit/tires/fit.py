@@ -83,8 +83,8 @@ def fit_curves(curves: Sequence[Curve], *, loss: Loss = "linear") -> tuple[Curve
         parts = [[batch[i] for i in group] for group in groups]
         scaled = [_normalise(part) for part in parts]
         solved = _solved([problems for problems, _ in scaled], loss)
-        for group, part, (_, scale), one in zip(groups, parts, scaled, solved, strict=True):
-            fits.update(zip([first + i for i in group], _fit_group(part, scale, *one, loss), strict=True))
+        for group, part, (_, scale), fitted in zip(groups, parts, scaled, solved, strict=True):
+            fits.update(zip([first + i for i in group], _fit_group(part, scale, *fitted, loss), strict=True))
     return tuple(fits[i] for i in range(len(curves)))
 
 
@@ -214,13 +214,13 @@ def _fit_group(
     # Known uncertainties are a floor: scatter or misfit beyond them widens the intervals (Birge).
     cost = np.maximum(inflation * solution.state.cost, _TINY_VARIANCE * (lengths - 6))
     noise = noise_of(residual * problems.sw, columns, lengths, cost, scale.known)
-    found = spread(solution, problems, zero=-scale.middle / scale.half, noise=noise)
+    spreads = spread(solution, problems, zero=-scale.middle / scale.half, noise=noise)
     return [
         _result(
             curve,
             i,
             solution,
-            found,
+            spreads,
             scale,
             residual[i, : len(curve.y)],
             float(noise.time[i]),
@@ -240,7 +240,7 @@ def _result(
     time: float,
     loss: Loss,
 ) -> CurveFit:
-    middle, half, top = (float(one[i]) for one in (scale.middle, scale.half, scale.top))
+    middle, half, top = (float(column[i]) for column in (scale.middle, scale.half, scale.top))
     factor = np.array([1 / half, 1.0, top, 1.0, half, top])
     values = spread.theta[i] * factor
     values[4] -= middle
@@ -252,7 +252,7 @@ def _result(
     determined, bound = spread.determined[i], spread.at_bound[i]
     unit = CHANNEL_UNIT[curve.channel]
 
-    dof = [float(one) for one in spread.dof[i]]
+    dof = [float(count) for count in spread.dof[i]]
 
     def estimate(value: float, u: float, factor: float, unit: str, dof: float) -> Estimate | None:
         if not np.isfinite(u):
@@ -319,8 +319,8 @@ def _message(
         parts.append("the peak is not reached within the slip angles measured")
     if at_bound:
         parts.append(f"at its bound: {', '.join(at_bound)}")
-    if rest := [name for name in not_determined if name not in at_bound]:
-        parts.append(f"not determined by these data: {', '.join(rest)}")
+    if undetermined := [name for name in not_determined if name not in at_bound]:
+        parts.append(f"not determined by these data: {', '.join(undetermined)}")
     if curve.sigma is not None:
         parts.append("weighted by the stated standard uncertainties")
     if time > 1:

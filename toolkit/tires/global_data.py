@@ -54,10 +54,10 @@ class Measured:
 
     def __getitem__(self, channel: str) -> Array:
         """Return a channel that was measured."""
-        found: Array | None = getattr(self, channel)
-        if found is None:
+        column: Array | None = getattr(self, channel)
+        if column is None:
             raise KeyError(channel)
-        return found
+        return column
 
     def take(self, index: NDArray[np.intp] | NDArray[np.bool_]) -> Measured:
         """Return some of the rows; blocks and loads keep their numbers."""
@@ -94,7 +94,7 @@ def measured(
     """
     FZ = columns["FZ"]
     blocks = [load_block for load_block in load_blocks(FZ) if FZ[load_block].mean() >= _NO_LOAD]
-    kept = np.sort(np.concatenate(blocks)) if blocks else np.zeros(0, dtype=np.intp)
+    loaded = np.sort(np.concatenate(blocks)) if blocks else np.zeros(0, dtype=np.intp)
     number = np.zeros(len(FZ), dtype=np.intp)
     for index, block in enumerate(blocks):
         number[block] = index
@@ -103,20 +103,20 @@ def measured(
     nominal = rated_load_N or (float(loads[np.argmin(np.abs(loads - middle))]) if len(loads) else 1.0)
     pressure, speed = columns.get("P"), columns.get("V")
     rows = make_rows(
-        columns["SA"][kept],
-        FZ[kept],
-        IA=columns["IA"][kept] if "IA" in columns else 0.0,
-        P=None if pressure is None else pressure[kept],
-        V=None if speed is None else np.abs(speed[kept]),
-        KAPPA=columns["KAPPA"][kept] if "KAPPA" in columns else 0.0,
+        columns["SA"][loaded],
+        FZ[loaded],
+        IA=columns["IA"][loaded] if "IA" in columns else 0.0,
+        P=None if pressure is None else pressure[loaded],
+        V=None if speed is None else np.abs(speed[loaded]),
+        KAPPA=columns["KAPPA"][loaded] if "KAPPA" in columns else 0.0,
         FNOMIN=nominal,
         NOMPRES=200e3 if pressure is None else float(np.median(pressure)),
         LONGVL=16.7 if speed is None or not np.any(speed) else float(np.median(np.abs(speed))),
         UNLOADED_RADIUS=unloaded_radius_m,
     )
     return Measured(
-        rows=rows, axes=axes, block=number[kept], loads=loads, given=frozenset(columns),
-        **{name: columns[name][kept] for name in CHANNELS if name in columns},
+        rows=rows, axes=axes, block=number[loaded], loads=loads, given=frozenset(columns),
+        **{name: columns[name][loaded] for name in CHANNELS if name in columns},
     )  # fmt: skip
 
 
@@ -129,33 +129,33 @@ def of_table(table: TireTable, *, rated_load_N: float | None = None, radius_m: f
 
 def what_varies(data: Measured) -> frozenset[str]:
     """Return which of a parameter's ``needs`` the rows meet (`toolkit.tires.global_model.Need`)."""
-    r, found = data.rows, set()
+    r, varying = data.rows, set()
     if not len(r):
         return frozenset()
     loads = len(np.unique(data.block))
     sweeps = np.ptp(r.FZ) > _LOAD * r.FZ.max()
     if loads >= 2 or sweeps:
-        found.add("two_loads")
+        varying.add("two_loads")
     if loads >= _FEW or (loads == 1 and sweeps):
-        found.add("three_loads")
+        varying.add("three_loads")
     if _range(r.IA) > _CAMBER:
-        found.add("camber")
+        varying.add("camber")
     pressure = r.P / np.median(r.P)
     if _range(pressure) > _PRESSURE:
-        found.add("pressure")
+        varying.add("pressure")
         if len(np.unique(np.rint(pressure / _PRESSURE))) >= _FEW:
-            found.add("three_pressures")
+            varying.add("three_pressures")
     if _range(r.V) > _SPEED * np.median(r.V):
-        found.add("speed")
+        varying.add("speed")
     if r.SA.min() < -_ANGLE and r.SA.max() > _ANGLE:
-        found.add("both_signs")
+        varying.add("both_signs")
     if np.ptp(r.KAPPA) > _SLIP:
-        found.add("kappa")
+        varying.add("kappa")
         if r.KAPPA.min() < -_SLIP and r.KAPPA.max() > _SLIP:
-            found.add("both_kappas")
+            varying.add("both_kappas")
         if np.ptp(r.SA[np.abs(r.KAPPA) > _SLIP]) > _ANGLE if np.any(np.abs(r.KAPPA) > _SLIP) else False:
-            found.add("alpha_and_kappa")
-    return frozenset(found)
+            varying.add("alpha_and_kappa")
+    return frozenset(varying)
 
 
 def _range(column: Array) -> float:

@@ -50,10 +50,10 @@ def fit_global(
     FitError
         what `why_not_global` says, an unknown loss or weighting
     """
-    for name, got, known in (("loss", loss, LOSSES), ("weights", weights, WEIGHTS)):
-        if got not in known:
+    for name, got, choices in (("loss", loss, LOSSES), ("weights", weights, WEIGHTS)):
+        if got not in choices:
             raise FitError(
-                f"unknown {name} {got!r}", where=f"--{name}", got=got, expected=", ".join(known),
+                f"unknown {name} {got!r}", where=f"--{name}", got=got, expected=", ".join(choices),
                 next_step="name one of those expected", rule=f"unknown-{name}",
             )  # fmt: skip
     if (problem := why_not_global(data, model)) is not None:
@@ -66,15 +66,15 @@ def fit_global(
 def global_findings(fit: ModelFit) -> list[Finding]:
     """Return a finding for each channel whose minimum is not confirmed, a note for what data do not say."""
     findings = []
-    for one in fit.fits:
-        where = f"{one.model} {one.channel} over all loads"
-        if not one.converged:
-            findings.append(Finding(rule="not-converged", where=where, message=one.message))
-        if one.converged and (open_ := undetermined(one)):
+    for channel_fit in fit.fits:
+        where = f"{channel_fit.model} {channel_fit.channel} over all loads"
+        if not channel_fit.converged:
+            findings.append(Finding(rule="not-converged", where=where, message=channel_fit.message))
+        if channel_fit.converged and (open_ := undetermined(channel_fit)):
             text = f"not determined by these data: {', '.join(open_)}"
             findings.append(Finding(rule="not-determined", where=where, message=text, level="note"))
-        if one.at_bound:
-            text = f"{', '.join(one.at_bound)}: the search ended at the bound"
+        if channel_fit.at_bound:
+            text = f"{', '.join(channel_fit.at_bound)}: the search ended at the bound"
             findings.append(Finding(rule="at-bound", where=where, message=text, level="note"))
     return findings
 
@@ -112,10 +112,10 @@ class _Fitter:
         self.values = self.starts[0].copy()
         self.sigma: dict[str, Array] = {}
 
-    def _start(self, given: object) -> Array:
+    def _start(self, stated: object) -> Array:
         low = np.array([parameter.low for parameter in self.model.parameters])
         high = np.array([parameter.high for parameter in self.model.parameters])
-        return np.clip(self.model.values(given), low, high)  # type: ignore[arg-type]
+        return np.clip(self.model.values(stated), low, high)  # type: ignore[arg-type]
 
     def stages(self) -> list[tuple[str, ...]]:
         """Return the channels of each stage."""
@@ -203,17 +203,17 @@ class _Fitter:
         self.sigma[channels[0]] = np.clip(size, middle / 3, middle * 3)[self.data.block]
 
     def _curves(self, values: Array, data: Measured) -> dict[str, Array]:
-        made = self._forces(list(values), data.rows)
+        responses = self._forces(list(values), data.rows)
         return {
-            name: np.broadcast_to(self.flip.get(name, 1) * made[name], len(data)).astype(np.float64)
+            name: np.broadcast_to(self.flip.get(name, 1) * responses[name], len(data)).astype(np.float64)
             for stage in self.stages()
             for name in stage
         }
 
     def _forces(self, values: list[object], rows: Rows) -> dict[str, Array]:
         with np.errstate(all="ignore"):
-            made = self.model.forces(values, rows)
-        return {name: made[name] for name in self.model.channels if getattr(made, name) is not None}
+            responses = self.model.forces(values, rows)
+        return {name: responses[name] for name in self.model.channels if getattr(responses, name) is not None}
 
     def _predict(self, founds: dict[tuple[str, ...], Found]) -> dict[str, Array]:
         # Every block predicted by a fit that never saw it, from where the whole fit ended.
@@ -224,12 +224,12 @@ class _Fitter:
         kept_values, kept_starts, kept_sigma = self.values.copy(), self.starts, dict(self.sigma)
         for block in blocks:
             own = self.data.block == block
-            rest = self.data.take(~own)
+            others = self.data.take(~own)
             self.values = kept_values.copy()
-            self.sigma = {name: one[~own] for name, one in kept_sigma.items()}
+            self.sigma = {name: values[~own] for name, values in kept_sigma.items()}
             for channels, stage in founds.items():
                 self.starts = self.values[None]
-                self.values = self._refit(channels, stage.left, rest)
+                self.values = self._refit(channels, stage.left, others)
             curves = self._curves(self.values, self.data.take(own))
             for name, column in predicted.items():
                 column[own] = curves[name]

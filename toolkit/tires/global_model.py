@@ -122,8 +122,8 @@ def make_rows(
     """
     columns = np.broadcast_arrays(
         *(
-            np.atleast_1d(np.asarray(one, dtype=np.float64))
-            for one in (SA, FZ, IA, NOMPRES if P is None else P, LONGVL if V is None else V, KAPPA)
+            np.atleast_1d(np.asarray(column, dtype=np.float64))
+            for column in (SA, FZ, IA, NOMPRES if P is None else P, LONGVL if V is None else V, KAPPA)
         )
     )
     a, z, g, p, v, k = columns
@@ -143,10 +143,10 @@ class Responses:
 
     def __getitem__(self, channel: str) -> Array:
         """Return a channel that the model has."""
-        found: Array | None = getattr(self, channel)
-        if found is None:
+        response: Array | None = getattr(self, channel)
+        if response is None:
             raise KeyError(channel)
-        return found
+        return response
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -58,12 +58,12 @@ def seeds_of(data: Measured) -> Found:
             continue
         fit = by_key.get(("FY", curve.load_N))
         K, top, at = _read(fit, curve, reach)
-        other = by_key.get(("MZ", curve.load_N))
+        moment = by_key.get(("MZ", curve.load_N))
         loads.append(curve.load_N)
         stiffness.append(K)
         peak.append(top)
         angle.append(at)
-        trail.append(float(slope(other.values, 0.0)) / K if other is not None and K > 0 else np.nan)
+        trail.append(float(slope(moment.values, 0.0)) / K if moment is not None and K > 0 else np.nan)
     if not loads:  # MZ alone: the sizes of a force are then of no consequence
         loads = list(base.loads)
         stiffness, peak = [12.0 * load for load in loads], list(loads)

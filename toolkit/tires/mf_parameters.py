@@ -160,8 +160,8 @@ def mf_forces(parameters: Sequence[GlobalParameter], evaluator: Evaluator) -> An
 
     def forces(values: Sequence[Any], rows: Rows) -> Responses:
         p: Mapping[str, Any] = dict(zip(names, values, strict=True))
-        made = evaluator(p, mf_state(rows), UNLOADED_RADIUS=rows.UNLOADED_RADIUS)
-        return Responses(FY=made.FY, MZ=made.MZ, FX=made.FX)
+        responses = evaluator(p, mf_state(rows), UNLOADED_RADIUS=rows.UNLOADED_RADIUS)
+        return Responses(FY=responses.FY, MZ=responses.MZ, FX=responses.FX)
 
     return forces
 

@@ -64,9 +64,9 @@ def solve(groups: Sequence[Problems]) -> list[Solution]:
     state, count = _search(coarse, floor, _SWIFT)
     agreeing = _agreeing(state.cost.reshape(-1, count), floor)
     if (open_ := np.flatnonzero(agreeing < _ENOUGH)).size:
-        again, _ = _search(coarse.take(open_), floor[open_], _PATIENT)
+        patient, _ = _search(coarse.take(open_), floor[open_], _PATIENT)
         first = state.take(_rows(open_, count))
-        both = np.concatenate([first.cost.reshape(-1, count), again.cost.reshape(-1, count)], axis=1)
+        both = np.concatenate([first.cost.reshape(-1, count), patient.cost.reshape(-1, count)], axis=1)
         order = np.argsort(both, axis=1)[:, :count]
         own = np.arange(len(open_))[:, None] * count
         taken, new = (
@@ -74,7 +74,7 @@ def solve(groups: Sequence[Problems]) -> list[Solution]:
             np.where(order < count, 0, order - count + own),
         )
         merged = first.take(taken)
-        merged.put((order >= count).ravel(), again.take(new.ravel()))
+        merged.put((order >= count).ravel(), patient.take(new.ravel()))
         state.put_at(_rows(open_, count), merged)
         agreeing = _agreeing(state.cost.reshape(-1, count), floor)
     # The best goes to its end on the bins, where steps are cheap: on the rows few are left to do.

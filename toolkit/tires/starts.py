@@ -92,9 +92,9 @@ def _is_basin(score: Array32) -> NDArray[np.bool_]:
     basin = np.ones(grid.shape, dtype=np.bool_)
     for axis in range(1, grid.ndim):
         lead = (slice(None),) * axis
-        one, other = (*lead, slice(None, -1)), (*lead, slice(1, None))
-        basin[one] &= grid[one] <= grid[other]
-        basin[other] &= grid[other] <= grid[one]
+        before, after = (*lead, slice(None, -1)), (*lead, slice(1, None))
+        basin[before] &= grid[before] <= grid[after]
+        basin[after] &= grid[after] <= grid[before]
     return basin.reshape(score.shape)
 
 
@@ -103,9 +103,9 @@ def _deposit(problems: Problems) -> tuple[Array32, Array32]:
     curves = len(problems.u)
     w = problems.sw**2
     place = np.clip((problems.u + 1.0) * (0.5 * (_NODES - 1)), 0.0, _NODES - 1 - 1e-9)
-    left = place.astype(np.intp)
-    share = place - left
-    slot = left + _NODES * np.arange(curves)[:, None]
+    lower = place.astype(np.intp)
+    share = place - lower
+    slot = lower + _NODES * np.arange(curves)[:, None]
     size = curves * _NODES + 1
 
     def deposit(amount: Array) -> Array32:

@@ -46,7 +46,7 @@ def gross_outliers(curves: Sequence[Curve], fits: Sequence[CurveFit]) -> tuple[F
     ]
     if not suspects:
         return ()
-    found = []
+    findings = []
     for curve, fit in zip(suspects, fit_curves(suspects, loss="robust"), strict=True):
         residual = _residual(fit, curve)
         size = np.abs(residual)
@@ -61,8 +61,8 @@ def gross_outliers(curves: Sequence[Curve], fits: Sequence[CurveFit]) -> tuple[F
                 f"{in_both(curve.y[worst], unit, '.5g')} at {np.degrees(curve.SA[worst]):.2f} deg, by "
                 f"{in_both(size[worst], unit)}: least squares follows them"
             )
-            found.append(Finding(rule="gross-outliers", where=f"{curve.channel} at {load}", message=text))
-    return tuple(found)
+            findings.append(Finding(rule="gross-outliers", where=f"{curve.channel} at {load}", message=text))
+    return tuple(findings)
 
 
 def _residual(fit: CurveFit, curve: Curve) -> NDArray[np.float64]:
@@ -156,11 +156,11 @@ def fit_table(table: TireTable, models: tuple[TireModel, ...], *, loss: Loss = "
     fits = [fit for model in models for fit in fit_model(model, good, loss=loss)]
     findings = [
         Finding(
-            rule=one.rule or "not-fitted",
-            where=one.where or str(table.path),
-            message=f"{one.what}: {one.got}",
+            rule=refusal.rule or "not-fitted",
+            where=refusal.where or str(table.path),
+            message=f"{refusal.what}: {refusal.got}",
         )
-        for one in refused
+        for refusal in refused
     ]
     findings += fit_findings(fits)
     if own := [fit for fit in fits if fit.model == "magic_formula"]:

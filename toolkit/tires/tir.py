@@ -138,8 +138,10 @@ class TirFile:
     def _kind_as_written(self, fittyp: object) -> str:
         if fittyp is not None:
             return f"FITTYP = {fittyp:g}" if isinstance(fittyp, float) else f"FITTYP = {fittyp}"
-        told = self.get("PROPERTY_FILE_FORMAT")
-        return "no FITTYP" + (f", and PROPERTY_FILE_FORMAT = {told}" if told is not None else "")
+        file_format = self.get("PROPERTY_FILE_FORMAT")
+        return "no FITTYP" + (
+            f", and PROPERTY_FILE_FORMAT = {file_format}" if file_format is not None else ""
+        )
 
     def coefficients(self) -> dict[str, float]:
         """Return the numbers of the coefficient and scaling sections by their names; LFZ0 is LFZO.
@@ -253,13 +255,13 @@ _NO_NUMBERS = ("nan", "inf", "infinity", "1.#inf", "1.#qnan", "1.#ind")
 
 
 def _refuse_contradictions(tir: TirFile) -> None:
-    seen: dict[tuple[str, str], str | float] = {}
+    entries: dict[tuple[str, str], str | float] = {}
     for line in tir.lines:
         if not isinstance(line.value, float):
             continue
         coefficient = line.section.endswith("COEFFICIENTS")
         key = _ALIASES.get(line.key, line.key)
-        first = seen.setdefault(("COEFFICIENTS" if coefficient else line.section, key), line.value)
+        first = entries.setdefault(("COEFFICIENTS" if coefficient else line.section, key), line.value)
         if first != line.value:
             raise CellError(
                 f"the tire file gives {line.key} twice", where=f"{tir.where}, [{line.section}]",

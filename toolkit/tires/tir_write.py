@@ -74,9 +74,9 @@ def tire_fit(model: GlobalModel, fit: ModelFit, data: Measured, *, side: str = "
     turned = data.turned("ISO-W").rows
     values = dict(zip(model.names, fit.values.tolist(), strict=True))
     slips = bool(np.ptp(turned.KAPPA))
-    made: list[tuple[str, tuple[tuple[str, str | float], ...]]] = []
+    sections: list[tuple[str, tuple[tuple[str, str | float], ...]]] = []
     for channel in _SECTIONS:
-        if any(one.channel == channel for one in fit.fits):
+        if any(channel_fit.channel == channel for channel_fit in fit.fits):
             own = [
                 parameter
                 for parameter in model.parameters
@@ -85,10 +85,12 @@ def tire_fit(model: GlobalModel, fit: ModelFit, data: Measured, *, side: str = "
             extra: list[tuple[str, str | float]] = (
                 [("PKY4", 2.0)] if channel == "FY" and FITTYP[model.name] > 60 else []
             )
-            made.append((channel, (*((one.name, values[one.name]) for one in own), *extra)))
+            sections.append(
+                (channel, (*((parameter.name, values[parameter.name]) for parameter in own), *extra))
+            )
     return TireFit(
         FITTYP=FITTYP[model.name],
-        coefficients=tuple(made),
+        coefficients=tuple(sections),
         FNOMIN=turned.FNOMIN,
         UNLOADED_RADIUS=turned.UNLOADED_RADIUS,
         SA_range=_range(turned.SA),
@@ -135,7 +137,7 @@ def tir_text(fit: TireFit, *, comments: Sequence[str] = ()) -> str:
         ("VERTICAL_FORCE_RANGE", _limits("FZ", fit.FZ_range)),
         ("INFLATION_PRESSURE_RANGE", _limits("PRES", fit.P_range)),
         ("SCALING_COEFFICIENTS", [(name, 1.0) for name in _SCALES[fit.FITTYP].split()]),
-        *((_SECTIONS[channel], list(given)) for channel, given in fit.coefficients),
+        *((_SECTIONS[channel], list(entries)) for channel, entries in fit.coefficients),
     ]
     lines = [f"! {comment}" for comment in comments]
     for name, entries in sections:

@@ -78,12 +78,12 @@ def at_usual_shape(theta: Array, problems: Problems, low: Array, high: Array) ->
     residual = _residual(start, aim, problems)
     cost = np.vecdot(residual, residual)
     for E in np.array(_E_STARTS)[shape].T:
-        other = start.copy()
-        other[:, 3] = E
-        new = _residual(other, aim, problems)
+        usual = start.copy()
+        usual[:, 3] = E
+        new = _residual(usual, aim, problems)
         new_cost = np.vecdot(new, new)
         better = new_cost < cost
-        start[better], residual[better], cost[better] = other[better], new[better], new_cost[better]
+        start[better], residual[better], cost[better] = usual[better], new[better], new_cost[better]
     return _descend(start, residual, cost, aim, problems, (low, high))
 
 
@@ -170,7 +170,7 @@ def spread(solution: Solution, problems: Problems, *, zero: Array, noise: Noise)
     gradients = np.stack([slope_jacobian(theta.T, zero).T, jacobian(theta.T, zero).T])
     slope_se, value_se = np.sqrt(np.maximum(np.vecdot(gradients, np.matvec(covariance, gradients)), 0.0))
     dof = np.repeat(noise.dof[:, None], 8, axis=1)
-    common = np.array([coverage_factor(float(one)) for one in noise.dof])
+    common = np.array([coverage_factor(float(dof)) for dof in noise.dof])
     factor = np.repeat(common[:, None], 8, axis=1)
     if len(noise.coloured):
         asked = np.concatenate(

@@ -246,7 +246,9 @@ def as_found_history(registry: Registry, instrument: str) -> tuple[AsFound, ...]
     RegistryError, RecordError
         the ledger is damaged, or a record fails a gate
     """
-    return tuple(as_found(registry, one) for one in _of_phase(registry, instrument, "as_found"))
+    return tuple(
+        as_found(registry, session_record) for session_record in _of_phase(registry, instrument, "as_found")
+    )
 
 
 def as_found_before(registry: Registry, as_left: CalibrationRecord) -> AsFound | None:
@@ -261,11 +263,11 @@ def as_found_before(registry: Registry, as_left: CalibrationRecord) -> AsFound |
     def place(record: CalibrationRecord) -> tuple[str, int]:
         return record.date, entered.index(record.id)
 
-    found = [o for o in _of_phase(registry, as_left.instrument, "as_found") if place(o) < at]
-    left = [o for o in _of_phase(registry, as_left.instrument, "as_left") if place(o) < at]
-    if not found or (left and place(left[-1]) > place(found[-1])):
+    earlier = [o for o in _of_phase(registry, as_left.instrument, "as_found") if place(o) < at]
+    settled = [o for o in _of_phase(registry, as_left.instrument, "as_left") if place(o) < at]
+    if not earlier or (settled and place(settled[-1]) > place(earlier[-1])):
         return None
-    newest = found[-1]
+    newest = earlier[-1]
     return as_found(registry, newest) if dt.date.fromisoformat(newest.date) <= day else None
 
 
@@ -276,13 +278,13 @@ def _of_phase(registry: Registry, instrument: str, phase: str) -> list[Calibrati
         for record_id in ledger.entered()
         if not status_of(record_id, ledger.of(record_id), dt.date.max).ended
     ]
-    made = []
+    dated = []
     for at, record in enumerate(load_many(registry.folder / instrument, standing, ledger).values()):
         if isinstance(record, ToolkitError):
             raise record
         if phase_of(record) == phase:
-            made.append((record.date, at, record))
-    return [record for _, _, record in sorted(made, key=lambda one: one[:2])]
+            dated.append((record.date, at, record))
+    return [record for _, _, record in sorted(dated, key=lambda entry: entry[:2])]
 
 
 def _load(
@@ -291,15 +293,15 @@ def _load(
     reference: np.ndarray[tuple[int, ...], np.dtype[np.float64]],
     error: np.ndarray[tuple[int, ...], np.dtype[np.float64]],
 ) -> AsFoundLoad:
-    one = record.load(name)
+    load = record.load(name)
     worst = int(np.abs(error).argmax())
     full = float(np.abs(reference).max())
     return AsFoundLoad(
         load=name,
-        unit=one.unit,
+        unit=load.unit,
         reference=tuple(reference.tolist()),
         error=tuple(error.tolist()),
-        tolerance=one.tolerance or 1e-3 * one.largest,
+        tolerance=load.tolerance or 1e-3 * load.largest,
         full_scale=full,
         max_error=float(error[worst]),
         max_percent_fs=100 * abs(float(error[worst])) / full,

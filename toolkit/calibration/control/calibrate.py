@@ -59,8 +59,10 @@ def calibrate(
     ToolkitError
         as `registry.candidate.calibrate`; nothing is written
     """
-    made = enter(session_file, registry, machine=machine, again=again)
-    return dataclasses.replace(made, findings=made.findings + control_findings(registry, made.record))
+    candidate = enter(session_file, registry, machine=machine, again=again)
+    return dataclasses.replace(
+        candidate, findings=candidate.findings + control_findings(registry, candidate.record)
+    )
 
 
 def rehearse(
@@ -77,8 +79,8 @@ def rehearse(
     """
     instrument = read_session(session_file).instrument
     with rehearsal(registry, instrument) as copy:
-        made = calibrate(session_file, copy, machine=machine, again=again)
-    return dataclasses.replace(made, path=registry.folder / made.path.relative_to(copy.folder))
+        candidate = calibrate(session_file, copy, machine=machine, again=again)
+    return dataclasses.replace(candidate, path=registry.folder / candidate.path.relative_to(copy.folder))
 
 
 def control_findings(registry: Registry, record: CalibrationRecord) -> tuple[Finding, ...]:

@@ -145,19 +145,19 @@ def control_chart(
 def chart_findings(chart: Chart, session_record: str) -> tuple[Finding, ...]:
     """Return a finding for each rule that the points of one session break."""
     findings = []
-    for one in chart.series:
-        for broken in one.breaks:
-            point = one.points[broken.index]
-            if point.session_record != session_record or one.limits is None:
+    for series in chart.series:
+        for broken in series.breaks:
+            point = series.points[broken.index]
+            if point.session_record != session_record or series.limits is None:
                 continue
             findings.append(
                 Finding(
                     rule="chart",
-                    where=f"{one.load} at {one.check_load}",
+                    where=f"{series.load} at {series.check_load}",
                     message=f"rule {broken.rule.number} ({broken.rule.text}) is broken: error "
-                    f"{point.error:+.4g} {one.unit} by {point.record}, centre {one.limits.centre:+.4g}, "
-                    f"limits {one.limits.lower:+.4g} to {one.limits.upper:+.4g} "
-                    f"of {one.limits.points} sessions",
+                    f"{point.error:+.4g} {series.unit} by {point.record}, "
+                    f"limits {series.limits.lower:+.4g} to {series.limits.upper:+.4g} "
+                    f"of {series.limits.points} sessions",
                 )
             )
     return tuple(findings)
@@ -165,7 +165,7 @@ def chart_findings(chart: Chart, session_record: str) -> tuple[Finding, ...]:
 
 def _sessions(registry: Registry, instrument: str) -> tuple[list[_Session], list[tuple[str, str]]]:
     ledger = registry.ledger(instrument)
-    made: list[tuple[str, int, _Session]] = []
+    dated: list[tuple[str, int, _Session]] = []
     left_out: list[tuple[str, str]] = []
     standing = []
     for record_id in ledger.entered():
@@ -175,17 +175,17 @@ def _sessions(registry: Registry, instrument: str) -> tuple[list[_Session], list
         else:
             standing.append(record_id)
     checked: dict[str, CalibrationRecord] = {}
-    for record_id, one in load_many(registry.folder / instrument, standing, ledger).items():
-        if isinstance(one, ToolkitError):
-            raise one
-        checked[record_id] = one
+    for record_id, loaded in load_many(registry.folder / instrument, standing, ledger).items():
+        if isinstance(loaded, ToolkitError):
+            raise loaded
+        checked[record_id] = loaded
     for at, record in enumerate(checked.values()):
-        found = _session(registry, record, ledger, checked)
-        if isinstance(found, str):
-            left_out.append((record.id, found))
+        evaluated = _session(registry, record, ledger, checked)
+        if isinstance(evaluated, str):
+            left_out.append((record.id, evaluated))
         else:
-            made.append((record.date, at, found))
-    return [session for _, _, session in sorted(made, key=lambda one: one[:2])], left_out
+            dated.append((record.date, at, evaluated))
+    return [session for _, _, session in sorted(dated, key=lambda entry: entry[:2])], left_out
 
 
 def _session(
@@ -226,11 +226,13 @@ def _groups(sessions: list[_Session], same_percent: float) -> list[list[tuple[_S
     return groups
 
 
-def _same(one: tuple[_Session, int], other: tuple[_Session, int], same_percent: float) -> bool:
-    (a, i), (b, j) = one, other
+def _same(early: tuple[_Session, int], late: tuple[_Session, int], same_percent: float) -> bool:
+    (a, i), (b, j) = early, late
     if a.names != b.names:
         return False
-    full = np.array([max(one.record.load(n).largest * one.scale(n) for one in (a, b)) for n in a.names])
+    full = np.array(
+        [max(session.record.load(n).largest * session.scale(n) for session in (a, b)) for n in a.names]
+    )
     return bool((np.abs(a.references[i] - b.references[j]) <= same_percent / 100 * full).all())
 
 

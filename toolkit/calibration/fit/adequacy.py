@@ -63,13 +63,13 @@ def noise_terms(
     terms: Sequence[str], columns: Mapping[str, NDArray[np.float64]], loads: NDArray[np.float64]
 ) -> dict[str, float]:
     """Return terms without which the loads tell all others, the last first, each with its `noise_shares`."""
-    rest, found = list(terms), {}
-    while noisy := {t: s for t, s in noise_shares(rest, columns, loads).items() if s > NOISE_SHARE}:
+    remaining, shares = list(terms), {}
+    while noisy := {t: s for t, s in noise_shares(remaining, columns, loads).items() if s > NOISE_SHARE}:
         # The highest goes first: where it is gone the lower ones are often told.
         term, share = list(noisy.items())[-1]
-        found[term] = share
-        rest.remove(term)
-    return found
+        shares[term] = share
+        remaining.remove(term)
+    return shares
 
 
 def _clean(
@@ -214,13 +214,13 @@ def check_levels(session: Session) -> None:
     untold = noise_terms(session.terms, session.table.columns(session.indications), loads)
     if not untold:
         return
-    named = [term for term in session.terms if term in untold]
+    unresolved = [term for term in session.terms if term in untold]
     worst = max(untold, key=untold.__getitem__)
-    drop = ", ".join(f'"{term}"' for term in named)
+    drop = ", ".join(f'"{term}"' for term in unresolved)
     raise _refused(
         session,
-        f"the loads do not tell {', '.join(named)}: only the noise of the cells would decide about "
-        f"{'it' if len(named) == 1 else 'them'}",
+        f"the loads do not tell {', '.join(unresolved)}: only the noise of the cells would decide about "
+        f"{'it' if len(unresolved) == 1 else 'them'}",
         f"{min(untold[worst], 1.0):.0%} of what sets {worst} apart from the other terms is noise",
         f"at most {NOISE_SHARE:.0%}", "load-levels",
         "apply more load levels on each axis, and combined loads for products of cells, or leave the terms "
@@ -271,8 +271,8 @@ def _unnamed(session: Session) -> list[str]:
 
     present = {load.name for load in session.loads}
     try:
-        known = session.instrument in machine_names()
-        levers = known and bool(load_machine(session.instrument).overturning_lever_m)
+        is_machine = session.instrument in machine_names()
+        levers = is_machine and bool(load_machine(session.instrument).overturning_lever_m)
     except ConfigError:
         levers = False
     if levers and "MX" not in present:

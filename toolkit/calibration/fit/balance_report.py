@@ -83,7 +83,7 @@ def report_balance(fit: SessionFit) -> BalanceReport:
     solved = loads_by_iteration(form, measured)
     newton = loads_by_newton(form, measured)
     full = np.abs(table.matrix(names)).max(axis=0)
-    rest = 100 * (applied - solved.loads) / full
+    residual = 100 * (applied - solved.loads) / full
     check = _check(fit, form, full)
     rows = []
     for j, load in enumerate(fit.loads):
@@ -94,8 +94,8 @@ def report_balance(fit: SessionFit) -> BalanceReport:
                 unit=load.setting.unit,
                 direct_sd_percent_fs=100 * load.fit.residual_sd / float(full[j]),
                 direct_max_percent_fs=float(np.abs(direct).max()),
-                iterated_sd_percent_fs=float(np.sqrt(rest[:, j] @ rest[:, j] / form.fits[0].dof)),
-                iterated_max_percent_fs=float(np.abs(rest[:, j]).max()),
+                iterated_sd_percent_fs=float(np.sqrt(residual[:, j] @ residual[:, j] / form.fits[0].dof)),
+                iterated_max_percent_fs=float(np.abs(residual[:, j]).max()),
                 check_direct_percent_fs=load.check_max_percent_fs,
                 check_iterated_percent_fs=None if check is None else float(check[j]),
             )
@@ -121,7 +121,7 @@ def balance_findings(fit: SessionFit) -> list[Finding]:
         return [Finding(rule="balance", where=fit.session.path.name, message=message, level="note")]
     if report.tares is None:
         return []
-    found = []
+    findings = []
     for number, values in zip(report.tares.runs, report.tares.values, strict=True):
         for load, value in zip(fit.loads, values.tolist(), strict=True):
             if abs(value) > load.setting.tolerance:
@@ -130,8 +130,8 @@ def balance_findings(fit: SessionFit) -> list[Finding]:
                     f"tolerance {load.setting.tolerance:.4g} {load.setting.unit}: weigh the fixtures, and "
                     "add them to the reference loads"
                 )
-                found.append(Finding(rule="tare", where=load.setting.name, message=message, level="note"))
-    return found
+                findings.append(Finding(rule="tare", where=load.setting.name, message=message, level="note"))
+    return findings
 
 
 def _check(fit: SessionFit, form: BalanceForm, full: NDArray[np.float64]) -> NDArray[np.float64] | None:

@@ -55,15 +55,15 @@ def _repeated(rows: NDArray[np.float64], where: str) -> list[Finding]:
     """Return which rows repeat another one: a finding where they are many, else a note."""
     groups = replicate_groups(rows)
     _, first, inverse = np.unique(groups, return_index=True, return_inverse=True)
-    again = np.flatnonzero(first[inverse] != np.arange(len(rows)))
-    if not again.size:
+    repeated = np.flatnonzero(first[inverse] != np.arange(len(rows)))
+    if not repeated.size:
         return []
-    pairs = [f"{at + 1} = {first[inverse[at]] + 1}" for at in again[:MOST_NAMED].tolist()]
-    more = f" and {again.size - MOST_NAMED} more" if again.size > MOST_NAMED else ""
-    share = again.size / len(rows)
+    pairs = [f"{at + 1} = {first[inverse[at]] + 1}" for at in repeated[:MOST_NAMED].tolist()]
+    more = f" and {repeated.size - MOST_NAMED} more" if repeated.size > MOST_NAMED else ""
+    share = repeated.size / len(rows)
     message = (
-        f"{again.size} of {len(rows)} rows ({100 * share:.2g} %) repeat another row, indications and loads "
-        f"alike: rows {', '.join(pairs)}{more}"
+        f"{repeated.size} of {len(rows)} rows ({100 * share:.2g} %) repeat another row, indications and "
+        f"loads alike: rows {', '.join(pairs)}{more}"
     )
     return [
         Finding(
@@ -84,17 +84,17 @@ def _beyond(session: Session, check: Table) -> list[Finding]:
         fitted, values = session.table.column(name), check.column(name)
         low, high = float(fitted.min()), float(fitted.max())
         for at in np.flatnonzero((values < low - slack) | (values > high + slack)).tolist():
-            told = f"{name} = {values[at]:.6g} {text} (fitted: {low:.6g} to {high:.6g})"
-            outside.setdefault(at, []).append(told)
+            excess = f"{name} = {values[at]:.6g} {text} (fitted: {low:.6g} to {high:.6g})"
+            outside.setdefault(at, []).append(excess)
     return [
         Finding(
             rule="check-beyond-range",
             where=f"check row {at + 1}",
-            message=f"{', '.join(told)}: a check load there verifies an extrapolation, which neither the fit "
-            "nor its uncertainty covers",
+            message=f"{', '.join(excess)}: a check load there verifies an extrapolation, which neither the "
+            "fit nor its uncertainty covers",
             level="note",  # as where there are no check loads: the range that was fitted stands
         )
-        for at, told in sorted(outside.items())
+        for at, excess in sorted(outside.items())
     ]
 
 
@@ -230,19 +230,21 @@ def _robust_findings(fit: SessionFit) -> list[Finding]:
     """Point at rows that hide each other; those already named as outliers are not named twice."""
     columns = fit.session.table.columns(fit.session.indications)
     findings = []
-    for one in fit.loads:
-        load = fit.session.table.column(one.setting.name) - one.of_runs
-        within = within_runs(one.fit, one.of_runs)
+    for load_result in fit.loads:
+        load = fit.session.table.column(load_result.setting.name) - load_result.of_runs
+        within = within_runs(load_result.fit, load_result.of_runs)
         weights = robust_weights(within, columns=columns, load=load)
         hidden = hidden_outliers(within, weights, columns=columns)
-        rows = [row for row in hidden if row not in one.diagnostics.outliers]
+        rows = [row for row in hidden if row not in load_result.diagnostics.outliers]
         if rows:
             message = (
                 f"row{'s' if len(rows) > 1 else ''} {_some(rows)}: almost no weight in a robust fit "
                 "(Huber, then Tukey's biweight); rows that are wrong together hide from the ordinary "
                 "residuals. The fit is unchanged: look at these loadings"
             )
-            findings.append(Finding(rule="robust", where=one.setting.name, message=message, level="note"))
+            findings.append(
+                Finding(rule="robust", where=load_result.setting.name, message=message, level="note")
+            )
     return findings
 
 

@@ -98,16 +98,16 @@ def recommend_wider(fit: SessionFit) -> Wider | None:
     """Return the simplest wider model on which no other improves; None where the session's is as good."""
     session, columns = fit.session, fit.session.table.columns(fit.session.indications)
     loads = [load for load in fit.loads if not _exact(load)]
-    own = _Model(name="session", lines="", terms=session.terms)
+    current = _Model(name="session", lines="", terms=session.terms)
     applied = session.table.matrix([load.name for load in session.loads])
     models = [m for m in _models(session) if _determined(m.terms, columns, applied)]
     if not models or not loads:
         return None
-    solved = {(own.name, load.setting.name): _sum_of(load.fit) for load in loads}
+    solved = {(current.name, load.setting.name): _sum_of(load.fit) for load in loads}
     for model in models:
         sums = _refit(fit, loads, model.terms, columns)
-        solved |= {(model.name, load.setting.name): found for load, found in zip(loads, sums, strict=True)}
-    better = _better(own, models, loads, solved)
+        solved |= {(model.name, load.setting.name): total for load, total in zip(loads, sums, strict=True)}
+    better = _better(current, models, loads, solved)
     enough = [
         m
         for m in models
@@ -121,7 +121,7 @@ def recommend_wider(fit: SessionFit) -> Wider | None:
     ratio, probability, most = min(rows, key=lambda row: (row[1], -row[0]))
     full = float(np.abs(session.table.column(most)).max())
     before = 100 * next(load.fit.residual_sd for load in loads if load.setting.name == most) / full
-    old, new = solved[own.name, most], solved[model.name, most]
+    old, new = solved[current.name, most], solved[model.name, most]
     shrink = float(np.sqrt(new.squares / new.dof / (old.squares / old.dof)))
     return Wider(
         name=model.name,
@@ -148,20 +148,20 @@ def recommend_drop(fit: SessionFit) -> Droppable | None:
     small, tests = set(higher), []
     for load in loads:
         full = float(np.abs(session.table.column(load.setting.name)).max())
-        named = dict(zip(session.terms, load.fit.coefficients, strict=True))
+        coefficients = dict(zip(session.terms, load.fit.coefficients, strict=True))
         error = dict(zip(session.terms, load.fit.standard_errors.tolist(), strict=True))
-        small -= {t for t in higher if 100 * abs(named[t]) * extent[t] >= NEGLIGIBLE_PERCENT * full}
-        tests += [(t, _two_sided(named[t] / error[t], load.fit)) for t in higher]
+        small -= {t for t in higher if 100 * abs(coefficients[t]) * extent[t] >= NEGLIGIBLE_PERCENT * full}
+        tests += [(t, _two_sided(coefficients[t] / error[t], load.fit)) for t in higher]
     adjusted = holm([p for _, p in tests])
     needed = {t for (t, _), p in zip(tests, adjusted, strict=True) if p < RISK}
     idle = [t for t in higher if t not in needed]
     out = [t for t in higher if t in small or t in idle]
     if not out:
         return None
-    left = tuple(t for t in session.terms if t not in out)
+    remaining = tuple(t for t in session.terms if t not in out)
     ratios = [
         _f_test(narrow, _sum_of(load.fit))
-        for narrow, load in zip(_refit(fit, loads, left, columns), loads, strict=True)
+        for narrow, load in zip(_refit(fit, loads, remaining, columns), loads, strict=True)
     ]
     if idle and min(p for _, p in ratios) < RISK / len(loads):
         # Parallel terms share their effect: each seems idle while the other is there.
@@ -169,14 +169,14 @@ def recommend_drop(fit: SessionFit) -> Droppable | None:
         idle = [t for t in idle if t in small]
         if not out:
             return None
-        left = tuple(t for t in session.terms if t not in out)
+        remaining = tuple(t for t in session.terms if t not in out)
         ratios = [
             _f_test(narrow, _sum_of(load.fit))
-            for narrow, load in zip(_refit(fit, loads, left, columns), loads, strict=True)
+            for narrow, load in zip(_refit(fit, loads, remaining, columns), loads, strict=True)
         ]
     base = model_terms(session.model, session.indications, degree=session.degree)
     dropped = [t for t in base if t not in session.terms]
-    keeps = [t for t in left if t not in (*session.indications, INTERCEPT)]
+    keeps = [t for t in remaining if t not in (*session.indications, INTERCEPT)]
     return Droppable(
         small=tuple(t for t in out if t in small),
         idle=tuple(idle),
@@ -189,27 +189,27 @@ def recommend_drop(fit: SessionFit) -> Droppable | None:
 
 def _models(session: Session) -> list[_Model]:
     """Return the models that a session may name and that hold all of its own terms, simplest first."""
-    names, own, degree = session.indications, set(session.terms), session.degree
+    names, present, degree = session.indications, set(session.terms), session.degree
     linear = model_terms("linear", names)
     balance = model_terms("balance", names)
     # What the session leaves out of the linear part on purpose stays out.
-    gone = [t for t in linear if t not in own]
-    found = []
+    dropped = [t for t in linear if t not in present]
+    models = []
     cross = [t for t in balance if "*" in t and "abs" not in t]
     squares = [t for t in balance if t.endswith("^2")]
     for name, added in (("interaction", cross), ("interaction and squares", cross + squares)):
-        wanted = own | set(added)
-        if cross and wanted <= set(balance):
-            kept = tuple(t for t in balance if t in wanted)
-            drop = [t for t in balance if t not in wanted]
-            found.append(_Model(name=name, lines=_lines("balance", drop), terms=kept))
+        requested = present | set(added)
+        if cross and requested <= set(balance):
+            ordered = tuple(t for t in balance if t in requested)
+            drop = [t for t in balance if t not in requested]
+            models.append(_Model(name=name, lines=_lines("balance", drop), terms=ordered))
     for higher in range(max(degree, 1) + 1, min(max(degree, 1) + 2, HIGHEST_DEGREE) + 1):
-        terms = model_terms("polynomial", names, degree=higher, drop=gone)
-        lines = f'model = "polynomial"\ndegree = {higher}' + ("\n" + _drop_line(gone) if gone else "")
-        found.append(_Model(name=f"degree {higher}", lines=lines, terms=terms))
-    terms = tuple(t for t in balance if t not in gone)
-    found.append(_Model(name="balance", lines=_lines("balance", gone), terms=terms))
-    return [m for m in found if own < set(m.terms)]
+        terms = model_terms("polynomial", names, degree=higher, drop=dropped)
+        lines = f'model = "polynomial"\ndegree = {higher}' + ("\n" + _drop_line(dropped) if dropped else "")
+        models.append(_Model(name=f"degree {higher}", lines=lines, terms=terms))
+    terms = tuple(t for t in balance if t not in dropped)
+    models.append(_Model(name="balance", lines=_lines("balance", dropped), terms=terms))
+    return [m for m in models if present < set(m.terms)]
 
 
 def _better(
@@ -245,9 +245,9 @@ def _information(sums: Sequence[_Sum]) -> float:
     """Return the Bayesian information criterion, summed over the loads (Schwarz, Ann. Statist. 6, 1978)."""
     tiny = float(np.finfo(float).tiny)
     return sum(
-        one.rows * float(np.log(max(one.squares, tiny) / one.rows))
-        + (one.rows - one.dof) * float(np.log(one.rows))
-        for one in sums
+        total.rows * float(np.log(max(total.squares, tiny) / total.rows))
+        + (total.rows - total.dof) * float(np.log(total.rows))
+        for total in sums
     )
 
 
@@ -283,7 +283,7 @@ def _left_over(design: NDArray[np.float64], loads: NDArray[np.float64]) -> list[
     n, p = design.shape
     # Of a triangle of both, what stands below the design's rows is as long as the residuals.
     below = np.asarray(np.linalg.qr(np.hstack([design, loads]), mode="r"))[p:, p:]
-    return [_Sum(squares=float(one @ one), rows=n, dof=n - p) for one in below.T]
+    return [_Sum(squares=float(residual @ residual), rows=n, dof=n - p) for residual in below.T]
 
 
 def _root(load: LoadResult, rows: int) -> NDArray[np.float64]:

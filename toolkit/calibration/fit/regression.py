@@ -88,23 +88,23 @@ class CutDesign:
         grid = np.ldexp(1.0, of_sums[:, None] - _MANTISSA + 1 - of_terms[None, :] + self.bits)
         head = np.rint(x / grid) * grid
         fitted = head @ self.high
-        left = loads - fitted
+        high_part = loads - fitted
         # What that difference rounds away (Knuth, The Art of Computer Programming 2, 4.2.2, theorem B).
-        back = loads - left
-        lost = (loads - (left + back)) + (back - fitted)
-        rest = np.asarray(solution - head, dtype=np.float64) @ self.high
-        rest += x @ self.low
-        high = leading(left - rest, self.bits)
-        left -= high
-        left -= rest
-        left += lost
-        return Residuals(high=high, low=left)
+        back = loads - high_part
+        lost = (loads - (high_part + back)) + (back - fitted)
+        correction = np.asarray(solution - head, dtype=np.float64) @ self.high
+        correction += x @ self.low
+        high = leading(high_part - correction, self.bits)
+        high_part -= high
+        high_part -= correction
+        high_part += lost
+        return Residuals(high=high, low=high_part)
 
     def gradient(self, residuals: Residuals) -> NDArray[np.longdouble]:
         """Return the products of residuals and design (loads, terms)."""
         exact = residuals.high @ self.high.T
-        rest = residuals.low @ self.high.T + (residuals.high + residuals.low) @ self.low.T
-        return np.asarray(exact, dtype=np.longdouble) + rest
+        projected = residuals.low @ self.high.T + (residuals.high + residuals.low) @ self.low.T
+        return np.asarray(exact, dtype=np.longdouble) + projected
 
 
 def _largest(values: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -223,8 +223,8 @@ class Factor:
         from scipy.linalg import qr
 
         weighted = design if root is None else design * root[:, None]
-        found = qr(weighted, mode="economic", check_finite=False)
-        q, r = (np.asarray(one, dtype=np.float64) for one in found)
+        factors = qr(weighted, mode="economic", check_finite=False)
+        q, r = (np.asarray(factor, dtype=np.float64) for factor in factors)
         if not np.abs(np.diag(r)).all():
             raise np.linalg.LinAlgError("the terms are exactly dependent")
         # Elimination has nothing to do in a triangle: this is back-substitution.
@@ -246,17 +246,21 @@ class Factor:
         square = None if self.root is None else self.root**2
         first = self._first(loads)
         solution = first.astype(np.longdouble)
-        rest = cut.residuals(loads, solution)
+        residuals = cut.residuals(loads, solution)
         for _ in range(_REFINEMENTS):
             # A weight rounds once a row, as if its uncertainty were stated to 53 bits.
-            weighed = rest if square is None else Residuals.of(square * (rest.high + rest.low), cut.bits)
+            weighed = (
+                residuals
+                if square is None
+                else Residuals.of(square * (residuals.high + residuals.low), cut.bits)
+            )
             step = np.asarray(cut.gradient(weighed), dtype=np.float64) @ self.inverse
             solution = solution + step
             # A step is small: its product in doubles is exact enough for the residuals' low part.
-            rest = Residuals(high=rest.high, low=rest.low - step @ self.design.T)
+            residuals = Residuals(high=residuals.high, low=residuals.low - step @ self.design.T)
             if not (np.abs(step) > _SETTLED * np.abs(first)).any():
                 break
-        return solution, rest.high + rest.low
+        return solution, residuals.high + residuals.low
 
     def _first(self, loads: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return statsmodels' solution by QR (loads, terms).
@@ -268,11 +272,11 @@ class Factor:
 
         y = loads if self.root is None else loads * self.root
         head = y @ self.q
-        left = y - head @ self.q.T
-        length = np.sqrt(np.einsum("ij,ij->i", left, left))
+        residual = y - head @ self.q.T
+        length = np.sqrt(np.einsum("ij,ij->i", residual, residual))
         rows = np.vstack([self.r, np.zeros(len(self.r))])
-        found = [OLS(column, rows).fit(method="qr").params for column in np.column_stack([head, length])]
-        return np.asarray(found, dtype=np.float64)
+        solutions = [OLS(column, rows).fit(method="qr").params for column in np.column_stack([head, length])]
+        return np.asarray(solutions, dtype=np.float64)
 
 
 def raw_coefficients(basis: Basis, solution: NDArray[Any]) -> tuple[float, ...]:

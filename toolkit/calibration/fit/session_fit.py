@@ -92,38 +92,38 @@ def residual_correlation(fit: SessionFit) -> NDArray[np.float64]:
 
     Loads without scatter, or one load alone, have none: the identity.
     """
-    rest = np.array([load.fit.residuals for load in fit.loads])
-    products = np.einsum("ij,kj->ik", rest, rest)
+    residuals = np.array([load.fit.residuals for load in fit.loads])
+    products = np.einsum("ij,kj->ik", residuals, residuals)
     length = np.sqrt(np.diag(products))
     safe = np.where(length > 0, length, 1.0)
-    found: NDArray[np.float64] = products / np.outer(safe, safe)
-    np.fill_diagonal(found, 1.0)
-    return found
+    correlation: NDArray[np.float64] = products / np.outer(safe, safe)
+    np.fill_diagonal(correlation, 1.0)
+    return correlation
 
 
 def _solved(session: Session, columns: dict[str, NDArray[np.float64]]) -> tuple[TermFit, ...]:
     loads = [session.table.column(setting.name) for setting in session.loads]
     if session.method == "ols":
         return fit_loads(terms=session.terms, columns=columns, loads=loads)
-    found = []
+    fits = []
     for setting, load in zip(session.loads, loads, strict=True):
         if session.method == "wls":
             u = load_uncertainty(session, setting)
-            found.append(fit_terms(terms=session.terms, columns=columns, load=load, u=u))
+            fits.append(fit_terms(terms=session.terms, columns=columns, load=load, u=u))
             continue
         errors = load_errors(session, setting)
         try:
             if session.method == "gls":
-                found.append(fit_gls(terms=session.terms, columns=columns, load=load, errors=errors))
+                fits.append(fit_gls(terms=session.terms, columns=columns, load=load, errors=errors))
             else:
                 u = np.ones(len(load)) if errors.u is None else errors.u
-                found.append(
+                fits.append(
                     fit_odr(terms=session.terms, columns=columns, load=load, u=u, u_cells=errors.u_cells)
                 )
         except ValueError as error:
             expected = f"uncertainties that determine the fit, such as a column u_{setting.name}"
             raise wrong(session.path, f"method {session.method}, {setting.name}", error, expected) from error
-    return tuple(found)
+    return tuple(fits)
 
 
 def _result(
@@ -221,8 +221,12 @@ def session_statements(session: Session) -> Statements:
 
 def _resolution(session: Session, fit: TermFit) -> float:
     """Return the load that one digit of the coarsest stated cell is worth; 0 where none is stated."""
-    named = dict(zip(fit.terms, fit.coefficients, strict=True))
+    coefficients = dict(zip(fit.terms, fit.coefficients, strict=True))
     return max(
-        (abs(named.get(cell.name, 0.0)) * cell.resolution for cell in session.cells if cell.resolution),
+        (
+            abs(coefficients.get(cell.name, 0.0)) * cell.resolution
+            for cell in session.cells
+            if cell.resolution
+        ),
         default=0.0,
     )

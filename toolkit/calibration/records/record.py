@@ -164,9 +164,9 @@ class CalibrationRecord:
         RecordError
             the record has no such load
         """
-        for one in self.loads:
-            if one.load == name:
-                return one
+        for entry in self.loads:
+            if entry.load == name:
+                return entry
         raise RecordError(
             f"record {self.id} has no load {name}",
             where=self.id,
@@ -178,7 +178,7 @@ class CalibrationRecord:
 
     def data_file(self, role: str) -> DataFile | None:
         """Return the file of a role, None where the record has none."""
-        return next((one for one in self.data if one.role == role), None)
+        return next((part for part in self.data if part.role == role), None)
 
 
 _BREAK = re.compile(r"\n *")

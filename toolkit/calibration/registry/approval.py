@@ -46,19 +46,19 @@ def check_names(record: CalibrationRecord, checked_by: str, approved_by: str | N
     """
     names = [("entered by", record.entered_by), ("checked by", checked_by)]
     names += [("approved by", approved_by)] if approved_by is not None else []
-    seen: dict[str, str] = {}
+    roles: dict[str, str] = {}
     for role, name in names:
         key = name_key(name)
-        if not key or key in seen:
+        if not key or key in roles:
             raise RegistryError(
                 "entered, checked and approved must be different names",
                 where=record.id,
-                got=f"{role} {name!r}" + (f", also {seen[key]}" if key in seen else ""),
+                got=f"{role} {name!r}" + (f", also {roles[key]}" if key in roles else ""),
                 expected=f"a name that is none of {', '.join(f'{n!r} ({r})' for r, n in names if r != role)}",
                 next_step=f"nothing was changed; see 'toolkit calibration show {record.id}'",
                 rule="names",
             )
-        seen[key] = role
+        roles[key] = role
 
 
 def name_key(name: str) -> str:
@@ -69,8 +69,10 @@ def name_key(name: str) -> str:
     """
     # Compatibility forms first: they may unfold to spaces, capitals and marks.
     text = unicodedata.normalize("NFKC", unicodedata.normalize("NFKC", name).casefold())
-    seen = "".join(c for c in text if unicodedata.category(c) not in ("Cf", "Cc", "Cn", "Co") or c.isspace())
-    return " ".join(seen.split()).translate(_CYRILLIC).translate(_GREEK)
+    visible = "".join(
+        c for c in text if unicodedata.category(c) not in ("Cf", "Cc", "Cn", "Co") or c.isspace()
+    )
+    return " ".join(visible.split()).translate(_CYRILLIC).translate(_GREEK)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -172,8 +174,13 @@ def approve(
         judged = judge_stored(registry, record, ledger, machine=definition, readings=readings, reason=reason)
         failed = judged.failed
         terms = gates.unverifiable(record, stored_check(registry.folder, record))
-        findings = tuple(Finding(rule=one.rule, where=one.where, message=one.message) for one in failed)
-        evidence = (*judged.evidence, *(f"{one.rule}: {one.where}: {one.message}" for one in judged.told))
+        findings = tuple(
+            Finding(rule=result.rule, where=result.where, message=result.message) for result in failed
+        )
+        evidence = (
+            *judged.evidence,
+            *(f"{result.rule}: {result.where}: {result.message}" for result in judged.told),
+        )
         decided.append(
             Decision(
                 id=record_id,
@@ -330,9 +337,9 @@ def discard(registry: Registry, record_id: str, *, reason: str, by: str = "not s
         entries = ledger.of(record_id)
         status = status_of(record_id, entries, dt.date.max)
         if status.state != "candidate":
-            told = f"{status.state}: {status.reason}" if status.reason else status.state
+            standing = f"{status.state}: {status.reason}" if status.reason else status.state
             raise _refused(
-                record_id, f"the record is {status.state}, and only a candidate can be discarded", told,
+                record_id, f"the record is {status.state}, and only a candidate can be discarded", standing,
                 "a candidate that was never approved; an approved record is withdrawn", "discard",
             )  # fmt: skip
         return Change(
@@ -348,7 +355,7 @@ def discard(registry: Registry, record_id: str, *, reason: str, by: str = "not s
         )
 
     if not folder.is_dir():
-        known = ", ".join(registry.instruments()) or "a record"
-        raise _refused(record_id, "no such record", record_id, known, "missing")
+        instruments = ", ".join(registry.instruments()) or "a record"
+        raise _refused(record_id, "no such record", record_id, instruments, "missing")
     commit(folder, build)
     return registry.status(record_id)

@@ -121,20 +121,20 @@ def calibrate(
     # Before the write: a last approved record that fails its gates must stop this, not follow it.
     ledger = registry.ledger(session.instrument)
     history = history_of(registry, unnumbered, ledger)
-    written = commit(folder, build)
+    record_id = commit(folder, build)
     record = records[0]
-    if written:
+    if record_id:
         judged = judge(
             unnumbered, history=history, machine=definition, loads=session.table, check=session.check
         )
-        said = {(finding.rule, finding.where) for finding in findings}
+        present = {(finding.rule, finding.where) for finding in findings}
         findings += tuple(
-            result.finding() for result in judged.results if (result.rule, result.where) not in said
+            result.finding() for result in judged.results if (result.rule, result.where) not in present
         )
     return Candidate(
         record=record,
         path=folder / f"{record.id}.json",
-        existing=not written,
+        existing=not record_id,
         fit=fit,
         readings=readings,
         findings=findings,
@@ -191,7 +191,7 @@ def _recorded(
 
 def _contents(session: Session, record: CalibrationRecord) -> dict[str, bytes]:
     by_role = {"loads": session.data_bytes, "check": session.check_bytes, "session": session.session_bytes}
-    return {one.file: by_role[one.role] or b"" for one in record.data}
+    return {part.file: by_role[part.role] or b"" for part in record.data}
 
 
 def _record(fit: SessionFit) -> CalibrationRecord:

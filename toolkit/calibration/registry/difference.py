@@ -45,11 +45,13 @@ class TermDifference:
 def differences(one: CalibrationRecord, other: CalibrationRecord) -> tuple[TermDifference, ...]:
     """Compare two records term by term, in the order of the first."""
     names = dict.fromkeys(load.load for record in (one, other) for load in record.loads)
-    found: list[TermDifference] = []
+    terms_apart: list[TermDifference] = []
     for name in names:
         terms = (_coefficients(_load(record, name)) for record in (one, other))
-        found += [_difference(one, other, name, term) for term in dict.fromkeys(t for x in terms for t in x)]
-    return tuple(found)
+        terms_apart += [
+            _difference(one, other, name, term) for term in dict.fromkeys(t for x in terms for t in x)
+        ]
+    return tuple(terms_apart)
 
 
 def _difference(record: CalibrationRecord, other: CalibrationRecord, name: str, term: str) -> TermDifference:

@@ -68,13 +68,13 @@ def sign_and_span(
     failed: list[GateResult] = []
     before = {cell.name: cell for cell in old.cells}
     for load in new.loads:
-        other = next((o for o in old.loads if o.load == load.load), None)
-        if other is None or not same_dimension(load.unit, other.unit):
+        before_load = next((o for o in old.loads if o.load == load.load), None)
+        if before_load is None or not same_dimension(load.unit, before_load.unit):
             continue
         for cell in new.cells:
             if cell.name in before and (only is None or cell.name in only):
-                found = _change((new, load, cell), (old, other, before[cell.name]))
-                failed += [] if found is None else [found]
+                change = _change((new, load, cell), (old, before_load, before[cell.name]))
+                failed += [] if change is None else [change]
     return tuple(failed)
 
 
@@ -103,8 +103,8 @@ def _change(new: _Place, old: _Place) -> GateResult | None:
         return GateResult(rule="sign", where=where, message=f"the sign changed: {text}")
     if change > SPAN * abs(before.value):
         ratio = now.value / before.value if before.value else math.inf
-        told = f"by {100 * (ratio - 1):+.2f} %" if 0.1 < ratio < 10 else f"by a factor of {ratio:.4g}"
-        return GateResult(rule="span", where=where, message=f"the span changed {told}: {text}")
+        size = f"by {100 * (ratio - 1):+.2f} %" if 0.1 < ratio < 10 else f"by a factor of {ratio:.4g}"
+        return GateResult(rule="span", where=where, message=f"the span changed {size}: {text}")
     return None
 
 
@@ -146,7 +146,7 @@ def layout(new: CalibrationRecord, old: CalibrationRecord) -> tuple[GateResult, 
                     GateResult(rule="layout-changed", where=name, message=message, effect="tells")
                 )
                 continue
-            unit_now, unit_before = (one[1] or one[0] for one in (units, before[name]))
+            unit_now, unit_before = (cell_unit[1] or cell_unit[0] for cell_unit in (units, before[name]))
             if same_unit(unit_now, unit_before) and same_unit(units[0], before[name][0]):
                 continue
             message = f"the unit changed: {unit_now}, in {old.id} {unit_before}"

@@ -78,11 +78,11 @@ def history_of(registry: Registry, record: CalibrationRecord, ledger: Ledger, *,
         except (ToolkitError, OSError):
             # `verify` names it; what it held cannot be told.
             continue
-        found = {cell.name for cell in had.cells if serials.get(cell.name) == cell.serial} & sought
-        if found:
+        unchanged = {cell.name for cell in had.cells if serials.get(cell.name) == cell.serial} & sought
+        if unchanged:
             checked = load_checked(folder, record_id, ledger)
-            returned |= dict.fromkeys(found, checked)
-            sought -= found
+            returned |= dict.fromkeys(unchanged, checked)
+            sought -= unchanged
         if not sought:
             break
     return History(last=last, returned=returned)
@@ -159,18 +159,18 @@ def compared(
         results += sign_and_span(new, older, only=(name,))
         message = f"serial {_serial(new, name)} returns: its sign and span history goes on from {older.id}"
         results.append(GateResult(rule="serial", where=name, message=message, effect="tells"))
-    for one in sign_and_span(new, last, only=out):
-        load, name = one.where.split(", ")
-        settled = one.rule == "sign" and (load, name) in confirmed
-        allowed = one.rule == "span" and _within(new, last, load, name)
-        told = "; the cell is a replacement"
-        if one.rule == "sign":
-            told += " and its sign is confirmed" if settled else (
+    for result in sign_and_span(new, last, only=out):
+        load, name = result.where.split(", ")
+        settled = result.rule == "sign" and (load, name) in confirmed
+        allowed = result.rule == "span" and _within(new, last, load, name)
+        remark = "; the cell is a replacement"
+        if result.rule == "sign":
+            remark += " and its sign is confirmed" if settled else (
                 ": the machine definition or a polarity reading must confirm the new sign"
             )  # fmt: skip
         results.append(
             dataclasses.replace(
-                one, message=one.message + told, effect="tells" if settled or allowed else "blocks"
+                result, message=result.message + remark, effect="tells" if settled or allowed else "blocks"
             )
         )
     for name in out:

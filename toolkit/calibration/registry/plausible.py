@@ -46,9 +46,9 @@ def plausible(
         size, si = largest_load(load), unit(load.unit).si
         if math.isnan(size):
             continue
-        other = None if old is None else next((o for o in old.loads if o.load == load.load), None)
-        if old is not None and other is not None and same_dimension(load.unit, other.unit):
-            failed += _range(load.load, size, largest_load(other), si, f"in {old.id}")
+        earlier = None if old is None else next((o for o in old.loads if o.load == load.load), None)
+        if old is not None and earlier is not None and same_dimension(load.unit, earlier.unit):
+            failed += _range(load.load, size, largest_load(earlier), si, f"in {old.id}")
         if machine is not None and load.load in rated:
             failed += _range(load.load, size, rated[load.load], si, f"as rated by machine {machine.name}")
         if load.tolerance is not None and load.tolerance > TOLERANCE * load.largest:
@@ -108,12 +108,12 @@ def _levers(new: CalibrationRecord, machine: Machine) -> list[GateResult]:
     return failed
 
 
-def _range(name: str, size: float, other: float, si: str, where: str) -> list[GateResult]:
-    if math.isnan(other) or not other > 0 or 1 / RANGE <= size / other <= RANGE:
+def _range(name: str, size: float, reference: float, si: str, where: str) -> list[GateResult]:
+    if math.isnan(reference) or not reference > 0 or 1 / RANGE <= size / reference <= RANGE:
         return []
     message = (
-        f"the largest value is {size:.4g} {si} against {other:.4g} {si} {where}, a factor of "
-        f"{size / other:.3g}: is the unit right?"
+        f"the largest value is {size:.4g} {si} against {reference:.4g} {si} {where}, a factor of "
+        f"{size / reference:.3g}: is the unit right?"
     )
     return [GateResult(rule="range", where=name, message=message)]
 
@@ -150,7 +150,7 @@ def tare_claim(
     """
     if record.zero != "tared" or record.kind != "fit" or not tables:
         return ()
-    failed = [one for load in record.loads for one in _intercept(record, load, tables[0])]
+    failed = [result for load in record.loads for result in _intercept(record, load, tables[0])]
     noise = [_SIGMAS * (u or 0.0) for u in tuple(u_reference) or (None,) * len(record.loads)]
     rows = [_zero_rows(record, table, noise) for table in tables]
     zeros = np.vstack([table.matrix(record.indications)[at] for table, at in zip(tables, rows, strict=True)])
@@ -205,8 +205,8 @@ def _offsets(
     for column, cell in enumerate(record.cells):
         judged = []
         for load, least in zip(record.loads, noise, strict=True):
-            found = response(record, load, cell)
-            slope = found.value * unit(cell.unit).factor / unit(load.unit).factor
+            sensitivity = response(record, load, cell)
+            slope = sensitivity.value * unit(cell.unit).factor / unit(load.unit).factor
             limit = max(_limit(load), least)
             if slope != 0:
                 judged.append((abs(slope) / limit, slope, limit, load))

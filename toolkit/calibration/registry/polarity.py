@@ -54,13 +54,17 @@ def machine_polarity(
             sign = None if stated is None else stated.sign(one.load)
             if stated is None or sign is None or machine is None:
                 continue
-            found = response(record, one, cell)
-            limit = 3 * found.u if found.extent is None else max(tolerance(one) / found.extent, 3 * found.u)
+            sensitivity = response(record, one, cell)
+            limit = (
+                3 * sensitivity.u
+                if sensitivity.extent is None
+                else max(tolerance(one) / sensitivity.extent, 3 * sensitivity.u)
+            )
             where = f"{one.load}, {cell.name}"
-            said = f"machine {machine.name} states a {_WORD[sign]} one ({stated.source})"
-            if found.value * sign <= 0 or abs(found.value) <= limit:
-                shown = "no sign of it shows" if abs(found.value) <= limit else f"it is {found}"
-                message = f"the response has not the machine's sign: {shown}, {said}"
+            statement = f"machine {machine.name} states a {_WORD[sign]} one ({stated.source})"
+            if sensitivity.value * sign <= 0 or abs(sensitivity.value) <= limit:
+                shown = "no sign of it shows" if abs(sensitivity.value) <= limit else f"it is {sensitivity}"
+                message = f"the response has not the machine's sign: {shown}, {statement}"
                 failed.append(GateResult(rule="polarity", where=where, message=message))
             else:
                 pairs.add((one.load, cell.name))
@@ -92,7 +96,7 @@ def reading_polarity(
         predicted = _predicted(record, reading)
         limit = reading.tolerance * abs(reading.value)
         unit = reading.unit
-        told = f"{predicted:.5g} {unit} by the record where {reading.value:.5g} {unit} were applied"
+        comparison = f"{predicted:.5g} {unit} by the record where {reading.value:.5g} {unit} were applied"
         if abs(reading.value) < SMALLEST * largest:
             message = (
                 f"a load of {abs(reading.value):.4g} {unit} is too small to tell a direction: at least "
@@ -101,9 +105,11 @@ def reading_polarity(
         elif any(_in_rows(reading, table) for table in tables):
             message = "the reading equals a row of the session: it must be one taken apart from it"
         elif predicted * reading.value < 0:
-            message = f"the record has the wrong sign: {told}"
+            message = f"the record has the wrong sign: {comparison}"
         elif abs(predicted - reading.value) > limit:
-            message = f"the record misses the reading by more than {100 * reading.tolerance:.3g} %: {told}"
+            message = (
+                f"the record misses the reading by more than {100 * reading.tolerance:.3g} %: {comparison}"
+            )
         else:
             loads.add(reading.load)
             shown = {
@@ -112,7 +118,9 @@ def reading_polarity(
                 if abs(_predicted(record, reading, turned=name) - reading.value) > limit
             }
             indications |= shown
-            evidence.append(f"polarity reading: {told}; it shows {', '.join(sorted(shown)) or 'no cell'}")
+            evidence.append(
+                f"polarity reading: {comparison}; it shows {', '.join(sorted(shown)) or 'no cell'}"
+            )
             continue
         failed.append(GateResult(rule="polarity-reading", where=reading.place, message=message))
     return tuple(failed), Confirmed(
@@ -142,16 +150,16 @@ def _predicted(record: CalibrationRecord, reading: PolarityReading, turned: str 
     zero = dict(reading.zero)
     values = {}
     for name, value in reading.indications:
-        rest = zero.get(name, 0.0)
-        values[name] = np.array([2 * rest - value if name == turned else value])
-    found = apply_record(
+        at_zero = zero.get(name, 0.0)
+        values[name] = np.array([2 * at_zero - value if name == turned else value])
+    applied = apply_record(
         record,
         values,
         units=dict(zip(record.indications, record.indication_units, strict=True)),
         tare={name: zero.get(name, 0.0) for name in record.indications} if zero else None,
         only=(reading.load,),
     )
-    return float(found[reading.load][0]) / si_scale(reading.unit)
+    return float(applied[reading.load][0]) / si_scale(reading.unit)
 
 
 def _in_rows(reading: PolarityReading, table: Table) -> bool:

@@ -56,12 +56,12 @@ def check_reproduces(record: CalibrationRecord, table: Table) -> None:
     for cell in record.cells:
         values = columns[cell.name]
         _same_unit(record, cell.name, table.unit(cell.name), cell.unit)
-        found = (float(values.min()), float(values.max()))
-        _demand_equal(record, cell.name, "range", (cell.minimum, cell.maximum), found)
+        extent = (float(values.min()), float(values.max()))
+        _demand_equal(record, cell.name, "range", (cell.minimum, cell.maximum), extent)
     golden = record.golden
     shape = (len(record.cells), len(golden.inputs))
-    whole = len(golden.inputs) > len(record.cells) and len(golden.outputs) == len(record.loads)
-    if not whole or {(len(i), len(o)) for i in golden.inputs for o in golden.outputs} != {shape}:
+    complete = len(golden.inputs) > len(record.cells) and len(golden.outputs) == len(record.loads)
+    if not complete or {(len(i), len(o)) for i in golden.inputs for o in golden.outputs} != {shape}:
         raise _refused(
             record, "golden vectors", f"{len(golden.inputs)} inputs, {len(golden.outputs)} rows of outputs",
             "one output a load for each of the inputs, more inputs than indications", "golden",
@@ -72,8 +72,8 @@ def check_reproduces(record: CalibrationRecord, table: Table) -> None:
     for at, load in enumerate(record.loads):
         _same_unit(record, load.load, table.unit(load.load), load.unit)
         if load.method in ("gls", "odr"):
-            known = _known_errors_solver(record, load, table, points)
-            _check_load(record, at, load, known, table)
+            weighted = _known_errors_solver(record, load, table, points)
+            _check_load(record, at, load, weighted, table)
             continue
         weights = _weights(load, table)
         solver = shared.get(load.terms) if weights is None else None
@@ -94,9 +94,9 @@ def _known_errors_solver(
     errors = errors_of(record, load.load, table)
     if load.method == "gls":
         return _solver(terms, None, has_constant, golden, whiten=whitener(terms, loads, errors))
-    found = linearise(load.terms, columns, loads, errors)
-    solver = _solver(found.terms, found.weights, has_constant, golden)
-    solution, _ = solver.solve(found.load)
+    linear = linearise(load.terms, columns, loads, errors)
+    solver = _solver(linear.terms, linear.weights, has_constant, golden)
+    solution, _ = solver.solve(linear.load)
     residuals = loads - terms @ (solver.back @ solution)
     sd = math.sqrt(float(residuals @ residuals) / (len(loads) - len(load.terms)))
     # Range and extent are those of the indications as observed, whose digits a certificate prints.
@@ -168,18 +168,18 @@ def _check_load(record: CalibrationRecord, at: int, load: LoadFit, solver: _Solv
         and bool((np.abs(stored - expected) <= slack * np.outer(errors, errors)).all()),
         "another matrix in the record", "that of the refit",
     )  # fmt: skip
-    wanted = np.asarray(record.golden.outputs[at])
+    golden = np.asarray(record.golden.outputs[at])
     # A power series in the raw variable cancels: its own rounding is allowed for, nothing more.
     rounding = 64 * np.finfo(float).eps * (np.abs(solver.golden) @ np.abs(coefficients))
     ours = solver.golden @ coefficients
     theirs = solver.golden_design @ solution
     for values, by, share in ((ours, "the coefficients", GOLDEN), (theirs, "the refit", GOLDEN_REFIT)):
-        off = np.abs(values - wanted) - (share * largest + rounding)
+        off = np.abs(values - golden) - (share * largest + rounding)
         if not (off <= 0).all():
             row = int(off.argmax())
             raise _refused(
                 record, f"{where}, golden vector {row + 1}", f"{float(values[row])!r} from {by}",
-                f"{float(wanted[row])!r}", "golden",
+                f"{float(golden[row])!r}", "golden",
             )  # fmt: skip
 
 
@@ -193,12 +193,12 @@ def _covariance(
         # By the record's own residual sd, which was just held against the refit's: of noise-free data it is
         # rounding, and the covariance is that rounding squared.
         return (load.residual_sd or 0.0) ** 2 * solver.inverse
-    found = scatter_covariance(record, load, solver.back @ solver.pseudo @ solver.left.T, table)
-    if found is None:
+    covariance = scatter_covariance(record, load, solver.back @ solver.pseudo @ solver.left.T, table)
+    if covariance is None:
         raise _refused(
             record, f"{load.load}, scatter", "another scatter in the record", "the likeliest", "refit"
         )
-    return found
+    return covariance
 
 
 def scatter_covariance(
@@ -217,8 +217,8 @@ def scatter_covariance(
         )
     else:
         stated = statements_of(record).between(one.load)
-        wanted = stated_scatter(factor, stated, residual_sd=one.residual_sd or 0.0, dof=one.dof or 0)
-        sound = one.scatter == wanted
+        expected = stated_scatter(factor, stated, residual_sd=one.residual_sd or 0.0, dof=one.dof or 0)
+        sound = one.scatter == expected
     if one.scatter is None or not sound:
         return None
     return rows_of(design, load, group, operator).covariance(one.scatter)
@@ -284,7 +284,9 @@ def _solver(
     scale[scale == 0] = 1.0
     design[:, :k] /= scale
     weighted = design if weights is None else design * weights[:, None]
-    left, values, right = np.linalg.svd(weighted if whiten is None else whiten(weighted), full_matrices=False)
+    basis, values, right = np.linalg.svd(
+        weighted if whiten is None else whiten(weighted), full_matrices=False
+    )
     # Back to the raw terms: c = slope / scale, intercept = constant - centre . c
     back = np.zeros((p, p))
     back[:k, :k] = np.diag(1 / scale)
@@ -299,7 +301,7 @@ def _solver(
         design=design,
         weights=weights,
         whiten=whiten,
-        left=left,
+        left=basis,
         pseudo=right.T / values,
         back=back,
         inverse=inverse,

@@ -37,7 +37,7 @@ Pair = tuple["CalibrationRecord", "Table"]
 
 def reproducing(pairs: Sequence[Pair]) -> list[bool]:
     """Return for each record with its reference loads whether it certainly meets all criteria of `refit`."""
-    found = [False] * len(pairs)
+    reproduced = [False] * len(pairs)
     shapes: dict[Hashable, list[int]] = {}
     for at, (record, table) in enumerate(pairs):
         shape = _shape(record, table)
@@ -52,9 +52,9 @@ def reproducing(pairs: Sequence[Pair]) -> list[bool]:
         except (ValueError, TypeError, OverflowError, np.linalg.LinAlgError):
             # One of them is of another shape inside: each is judged alone.
             continue
-        for at, one in zip(places, good.tolist(), strict=True):
-            found[at] = one
-    return found
+        for at, is_good in zip(places, good.tolist(), strict=True):
+            reproduced[at] = is_good
+    return reproduced
 
 
 def _shape(record: CalibrationRecord, table: Table) -> Hashable | None:
@@ -111,9 +111,9 @@ def _accepted(pairs: Sequence[Pair]) -> NDArray[np.bool_]:
     good &= (scale > 0).all(axis=1)
     scale[scale == 0] = 1.0
     design[:, :, :k] /= scale[:, None]
-    left, singular, right = np.linalg.svd(design, full_matrices=False)
+    basis, singular, right = np.linalg.svd(design, full_matrices=False)
     pseudo = right.transpose(0, 2, 1) / singular[:, None]
-    y, across = loads.transpose(0, 2, 1), left.transpose(0, 2, 1)
+    y, across = loads.transpose(0, 2, 1), basis.transpose(0, 2, 1)
     solution = pseudo @ (across @ y)
     solution = solution + pseudo @ (across @ (y - design @ solution))
     residuals = y - design @ solution
@@ -141,7 +141,7 @@ def _accepted(pairs: Sequence[Pair]) -> NDArray[np.bool_]:
 
     root = back @ pseudo
     expected = (stored_sd**2)[:, :, None, None] * (root @ root.transpose(0, 2, 1))[:, None]
-    operators = root @ left.transpose(0, 2, 1)
+    operators = root @ basis.transpose(0, 2, 1)
     for i, (record, table) in enumerate(pairs):
         for j, load in enumerate(record.loads):
             if load.scatter is not None:
@@ -163,8 +163,8 @@ def _accepted(pairs: Sequence[Pair]) -> NDArray[np.bool_]:
     rounding = 64 * _EPS * (np.abs(coefficients) @ np.abs(golden).transpose(0, 2, 1))
     if outputs.shape != ours.shape or inputs.shape[2] != len(first.indications):
         raise ValueError("golden vectors of another shape")
-    for found, share in ((ours, GOLDEN), (theirs, GOLDEN_REFIT)):
-        good &= (np.abs(found - outputs) <= share * largest[:, :, None] + rounding).all(axis=(1, 2))
+    for predicted, share in ((ours, GOLDEN), (theirs, GOLDEN_REFIT)):
+        good &= (np.abs(predicted - outputs) <= share * largest[:, :, None] + rounding).all(axis=(1, 2))
     return good
 
 
@@ -186,13 +186,13 @@ def _issued(record: CalibrationRecord, extent: list[float], largest: list[float]
 
 def _numbers(values: list[Any]) -> NDArray[np.float64]:
     """Return nested numbers as an array; what is missing, or only looks like a number, is a TypeError."""
-    found = np.array(values)
-    if found.dtype.kind not in "if":
+    numbers = np.array(values)
+    if numbers.dtype.kind not in "if":
         raise TypeError("not numbers")
-    return found.astype(np.float64, copy=False)
+    return numbers.astype(np.float64, copy=False)
 
 
-def _equal(one: NDArray[np.float64], other: NDArray[np.float64]) -> NDArray[np.bool_]:
-    if one.shape != other.shape:
+def _equal(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.bool_]:
+    if a.shape != b.shape:
         raise ValueError("stored numbers of another shape")
-    return np.asarray((one == other).reshape(len(one), -1).all(axis=1))
+    return np.asarray((a == b).reshape(len(a), -1).all(axis=1))

@@ -94,10 +94,10 @@ def main_indications(record: CalibrationRecord, load: LoadFit) -> tuple[str, ...
 
     A legacy record has no range; there it is a tenth of the largest response.
     """
-    found = {cell.name: response(record, load, cell) for cell in record.cells}
-    effects = {name: one.effect for name, one in found.items()}
+    responses = {cell.name: response(record, load, cell) for cell in record.cells}
+    effects = {name: sensitivity.effect for name, sensitivity in responses.items()}
     if any(effect is None for effect in effects.values()):
-        effects = {name: abs(one.value) for name, one in found.items()}
+        effects = {name: abs(sensitivity.value) for name, sensitivity in responses.items()}
         scale = max((effect or 0.0) for effect in effects.values())
     else:
         scale = largest_load(load)

@@ -75,15 +75,15 @@ def status_of(record_id: str, entries: Sequence[Entry], known_at: date) -> Recor
     state: State = "approved" if approvals else "candidate"
     if end is not None:
         state = "discarded" if end.event == "discarded" else "withdrawn"
-    told = end or last
+    decision = end or last
     return RecordStatus(
         id=record_id,
         state=state,
         in_force_from=since,
         void_from=void_from,
         void_always=void_from is not None and (since is None or void_from <= since),
-        known_on=told.known_on if told else None,
-        reason=told.reason if told else None,
+        known_on=decision.known_on if decision else None,
+        reason=decision.reason if decision else None,
         entered_by=entered.by,
         checked_by=last.by if last else None,
         approved_by=last.approved_by if last else None,

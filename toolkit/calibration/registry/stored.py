@@ -51,8 +51,8 @@ def stored_check(registry: Path, record: CalibrationRecord) -> Table | None:
         runs=False,
     )
     units = dict(zip(record.indications, record.indication_units, strict=True))
-    other = [n for n, text in units.items() if unit(table.unit(n)).dimension != unit(text).dimension]
-    table = converted(table, _bridges(record, other), units, where=path)
+    mismatched = [n for n, text in units.items() if unit(table.unit(n)).dimension != unit(text).dimension]
+    table = converted(table, _bridges(record, mismatched), units, where=path)
     table = table.in_units(units | {load.load: load.unit for load in record.loads})
     return without_read_zeros(table, record.indications, loads, path) if record.zero == "run" else table
 
@@ -83,8 +83,8 @@ def parse_loads(record: CalibrationRecord, data: bytes, folder: Path) -> Table:
 
 def _labels(record: CalibrationRecord) -> tuple[str, ...]:
     # Few sessions name a group: the settings of the others are not parsed.
-    named = '"shared_group"' in record.settings
-    return group_column(json.loads(record.settings).get("reference", {})) if named else ()
+    has_group = '"shared_group"' in record.settings
+    return group_column(json.loads(record.settings).get("reference", {})) if has_group else ()
 
 
 def _as_fitted(record: CalibrationRecord, table: Table, where: Path) -> Table:
@@ -139,7 +139,7 @@ def stored_session(registry: Path, record: CalibrationRecord) -> Session:
         ``data``: a legacy import, which has no session
     """
     folder = registry / record.instrument
-    files = {one.role: (folder / one.file).read_bytes() for one in record.data}
+    files = {part.role: (folder / part.file).read_bytes() for part in record.data}
     if "session" not in files or "loads" not in files:
         raise RecordError(
             f"record {record.id} has no reference loads to report on",

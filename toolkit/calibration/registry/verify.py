@@ -127,20 +127,20 @@ def _judge_shared(folder: Path, ids: Sequence[str]) -> list[_Judged]:
 
 def _judge(folder: Path, ids: Sequence[str], ledger: Ledger) -> list[_Judged]:
     """Return the rows of some records and the names of their files."""
-    found = load_many(folder, ids, ledger)
-    return [_row(folder, record_id, one, ledger) for record_id, one in found.items()]
+    loaded = load_many(folder, ids, ledger)
+    return [_row(folder, record_id, result, ledger) for record_id, result in loaded.items()]
 
 
-def _row(folder: Path, record_id: str, found: CalibrationRecord | ToolkitError, ledger: Ledger) -> _Judged:
-    if isinstance(found, ToolkitError):
-        reason = f"{found.rule or 'unreadable'}: {found.what}"
-        reason += f" (got {found.got}, expected {found.expected})" if found.got else ""
+def _row(folder: Path, record_id: str, loaded: CalibrationRecord | ToolkitError, ledger: Ledger) -> _Judged:
+    if isinstance(loaded, ToolkitError):
+        reason = f"{loaded.rule or 'unreadable'}: {loaded.what}"
+        reason += f" (got {loaded.got}, expected {loaded.expected})" if loaded.got else ""
         row = VerifyRow(id=record_id, ok=False, verified=False, reason=reason)
         return row, tuple(_owned_by_bad(folder, record_id))
-    late = _untimely(found, ledger.of(record_id))
+    late = _untimely(loaded, ledger.of(record_id))
     untimely = None if late is None else f"time: {late}"
-    row = VerifyRow(id=record_id, ok=late is None, verified=found.verified, reason=untimely)
-    return row, tuple(one.file for one in found.data)
+    row = VerifyRow(id=record_id, ok=late is None, verified=loaded.verified, reason=untimely)
+    return row, tuple(part.file for part in loaded.data)
 
 
 def _untimely(record: CalibrationRecord, entries: Sequence[Entry]) -> str | None:
@@ -163,21 +163,21 @@ def _untimely(record: CalibrationRecord, entries: Sequence[Entry]) -> str | None
 
 def _files(folder: Path) -> list[str]:
     """Return every file and link below a folder, as sorted names relative to it."""
-    found: list[str] = []
+    present: list[str] = []
     for top, folders, names in os.walk(folder):
         below = os.path.relpath(top, folder)
         links = [name for name in folders if os.path.islink(os.path.join(top, name))]  # noqa: PTH114, PTH118
-        found += [name if below == "." else f"{below}/{name}" for name in (*names, *links)]
-    return sorted(found)
+        present += [name if below == "." else f"{below}/{name}" for name in (*names, *links)]
+    return sorted(present)
 
 
 def _owned_by_bad(folder: Path, record_id: str) -> set[str]:
     path = folder / f"{record_id}.json"
     try:
-        return {one.file for one in from_bytes(read_regular(path), where=path).data}
+        return {part.file for part in from_bytes(read_regular(path), where=path).data}
     except (ToolkitError, OSError):
         # What belongs to a record that cannot be read is told by the record's own row.
-        return {one.name for one in folder.glob(f"{record_id}.*")}
+        return {path.name for path in folder.glob(f"{record_id}.*")}
 
 
 def _stray(name: str) -> VerifyRow:

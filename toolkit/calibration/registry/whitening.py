@@ -48,10 +48,10 @@ def whitener(terms: NDArray[np.float64], load: NDArray[np.float64], errors: Know
     """Return the map that makes rows (rows, ...) independent and of unit spread."""
     ordinary = _weighted(terms, load, np.ones(len(load)))
     fitted = terms @ ordinary
-    rest = load - fitted
+    residual = load - fitted
     u = errors.u
     if u is None:
-        u = np.full(len(load), np.sqrt(rest @ rest / (len(load) - terms.shape[1])))
+        u = np.full(len(load), np.sqrt(residual @ residual / (len(load) - terms.shape[1])))
     acts = fitted / np.abs(load).max() if errors.proportional else np.ones(len(load))
     a = errors.u_shared * acts / u
     order = np.argsort(errors.group, kind="stable")
@@ -66,9 +66,9 @@ def whitener(terms: NDArray[np.float64], load: NDArray[np.float64], errors: Know
             after = 1 + np.cumsum(b * b)
             before = np.concatenate([[1.0], after[:-1]])
             # What the rows before tell of the shared error is taken out of each row.
-            told = np.cumsum(b[:, None] * x, axis=0)
-            known = np.vstack([np.zeros((1, x.shape[1])), told[:-1]]) / before[:, None]
-            white = (x - b[:, None] * known) * np.sqrt(before / after)[:, None]
+            sums = np.cumsum(b[:, None] * x, axis=0)
+            earlier = np.vstack([np.zeros((1, x.shape[1])), sums[:-1]]) / before[:, None]
+            white = (x - b[:, None] * earlier) * np.sqrt(before / after)[:, None]
             out[block] = white.reshape(scaled[block].shape)
         return out
 
@@ -92,15 +92,15 @@ def linearise(
     for _ in range(_ITERATIONS):
         at = dict(zip(columns, x + delta, strict=True))
         matrix = term_matrix(terms, at)
-        told = term_slopes(terms, coefficients, at)
-        slope = np.array([np.broadcast_to(told[name], load.shape) for name in columns])
+        slopes = term_slopes(terms, coefficients, at)
+        slope = np.array([np.broadcast_to(slopes[name], load.shape) for name in columns])
         weights = 1 / np.sqrt(u**2 + np.square(slope * u_x).sum(axis=0))
         carried = load + (slope * delta).sum(axis=0)
-        found = _weighted(matrix, carried, weights)
-        adjusted = slope * u_x**2 * (carried - matrix @ found) * weights**2
-        moved = float(np.abs(matrix @ (found - coefficients)).max())
+        linear = _weighted(matrix, carried, weights)
+        adjusted = slope * u_x**2 * (carried - matrix @ linear) * weights**2
+        moved = float(np.abs(matrix @ (linear - coefficients)).max())
         moved = max(moved, float(np.abs((slope * (adjusted - delta)).sum(axis=0)).max())) / largest
-        coefficients, delta = found, adjusted
+        coefficients, delta = linear, adjusted
         # At the level of rounding the steps stop shrinking: that is the end, not a failure.
         still = 0 if moved < best else still + 1
         best = min(best, moved)
@@ -114,8 +114,8 @@ def _weighted(
 ) -> NDArray[np.float64]:
     length = np.abs(matrix).max(axis=0)
     design = matrix / length * weights[:, None]
-    left, values, right = np.linalg.svd(design, full_matrices=False)
-    solution = right.T @ (left.T @ (load * weights) / values)
-    rest = (load - matrix @ (solution / length)) * weights
-    solution = solution + right.T @ (left.T @ rest / values)
+    basis, values, right = np.linalg.svd(design, full_matrices=False)
+    solution = right.T @ (basis.T @ (load * weights) / values)
+    residual = (load - matrix @ (solution / length)) * weights
+    solution = solution + right.T @ (basis.T @ residual / values)
     return np.asarray(solution / length, dtype=np.float64)

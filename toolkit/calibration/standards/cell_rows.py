@@ -90,15 +90,15 @@ def cell_rows(source: CellSource, load: str, indication: str) -> tuple[CellRows,
     SessionError
         ``standard``: no such load or indication, or no row in which the load acts alone
     """
-    for kind, name, known in (("load", load, source.loads), ("indication", indication, source.indications)):
-        if name not in known:
-            raise _refused(source.where, f"there is no {kind} {name}", name, ", ".join(known))
+    for kind, name, names in (("load", load, source.loads), ("indication", indication, source.indications)):
+        if name not in names:
+            raise _refused(source.where, f"there is no {kind} {name}", name, ", ".join(names))
     table = source.table
     force, reading = table.column(load), table.column(indication)
     alone = np.ones(table.rows, dtype=bool)
-    for other in source.loads:
-        if other != load:
-            values = np.abs(table.column(other))
+    for load_name in source.loads:
+        if load_name != load:
+            values = np.abs(table.column(load_name))
             alone &= values <= _OTHER_LOAD * values.max(initial=0.0)
     acting = np.abs(force) > _NO_LOAD * np.abs(force).max()
     if not (acting & alone).any():
@@ -173,20 +173,20 @@ def _scope(source: CellSource) -> Scope:
 
 
 def _stated_zeros(source: CellSource, indication: str) -> tuple[float | None, float | None]:
-    found: dict[str, float] = {}
+    zeros: dict[str, float] = {}
     for entry in zero_entries(list(source.statements.zero), _scope(source)):
-        found |= {entry.when.casefold(): dict(entry.values)[indication]} if indication in dict(
+        zeros |= {entry.when.casefold(): dict(entry.values)[indication]} if indication in dict(
             entry.values
         ) else {}  # fmt: skip
-    return found.get("before"), found.get("after")
+    return zeros.get("before"), zeros.get("after")
 
 
 def _creep(source: CellSource, load: str, indication: str) -> tuple[float, float] | None:
     readings: dict[str, dict[float, float]] = {}
     for entry in creep_entries(list(source.statements.creep), _scope(source)):
-        named = dict(entry.values)
-        if indication in named and (entry.load not in source.loads or entry.load == load):
-            readings.setdefault(entry.load, {})[entry.seconds] = named[indication]
+        indicated = dict(entry.values)
+        if indication in indicated and (entry.load not in source.loads or entry.load == load):
+            readings.setdefault(entry.load, {})[entry.seconds] = indicated[indication]
     early, late = _CREEP_SECONDS
     pairs = [
         (reading[early], reading[late])

@@ -274,8 +274,8 @@ def _class(
     if len(forces) < MIN_POINTS:
         reasons.append(f"{len(forces)} points, at least {MIN_POINTS} are needed")
     if runs is None or runs < MIN_RUNS:
-        told = "the runs are not stated" if runs is None else f"{runs} runs"
-        reasons.append(f"{told}, at least {MIN_RUNS} are needed")
+        stated = "the runs are not stated" if runs is None else f"{runs} runs"
+        reasons.append(f"{stated}, at least {MIN_RUNS} are needed")
     if resolution is None:
         reasons.append("the resolution is not stated")
     elif smallest < k * resolution:

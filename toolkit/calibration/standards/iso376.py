@@ -161,7 +161,7 @@ def evaluate_iso376(
     iso376_input.check(force, runs, force_uncertainty, resolution, creep, degree)
     forces = np.asarray(force, dtype=np.float64)
     rotated = iso376_input.rotated(runs)
-    X = np.array([one.up for one in rotated])
+    X = np.array([run.up for run in rotated])
     mean = X.mean(axis=0)
     fit = fit_curve(force=forces, indication=mean, degree=degree)
     curve = mean - fit.residuals
@@ -215,10 +215,10 @@ def evaluate_iso376(
     )
     worst = max(_rank(row.class_name) for row in rows)
     limiting = [row for row in rows if _rank(row.class_name) == worst and worst > 0]
-    told = [f"{row.force:g}: {reason}" for row in limiting for reason in row.reasons]
+    limits = [f"{row.force:g}: {reason}" for row in limiting for reason in row.reasons]
     return Iso376Result(
         class_name=LIMITS[worst].name if worst < len(LIMITS) and not procedure else None,
-        reasons=(*procedure, *told),
+        reasons=(*procedure, *limits),
         procedure=procedure,
         forces=tuple(rows),
         ranges=() if procedure else _ranges(rows),
@@ -238,7 +238,7 @@ def _repeatability(runs: Sequence[Iso376Run]) -> NDArray[np.float64] | None:
 
 def _reversibility(rotated: Sequence[Iso376Run]) -> NDArray[np.float64] | None:
     # The standard takes it at the turned mountings; the first one stands in where it is alone.
-    pairs = [(np.array(one.up), np.array(one.down)) for one in rotated[1:] if one.down is not None]
+    pairs = [(np.array(run.up), np.array(run.down)) for run in rotated[1:] if run.down is not None]
     if not pairs and rotated[0].down is not None:
         pairs = [(np.array(rotated[0].up), np.array(rotated[0].down))]
     if not pairs:
@@ -306,18 +306,18 @@ def _procedure(
     *,
     has_c: bool,
 ) -> tuple[str, ...]:
-    found = []
+    classes = []
     if len(forces) < MIN_FORCES:
-        found.append(f"{len(forces)} forces, at least {MIN_FORCES} are needed")
-    turned = sorted((one.rotation_deg - runs[0].rotation_deg) % 360 for one in rotated)
+        classes.append(f"{len(forces)} forces, at least {MIN_FORCES} are needed")
+    turned = sorted((run.rotation_deg - runs[0].rotation_deg) % 360 for run in rotated)
     if turned != [0, 120, 240]:
-        told = ", ".join(f"{angle:g}" for angle in turned)
-        found.append(f"mounted at {told} deg, 0, 120 and 240 deg are needed")
+        angles = ", ".join(f"{angle:g}" for angle in turned)
+        classes.append(f"mounted at {angles} deg, 0, 120 and 240 deg are needed")
     if preloads is None or preloads < MIN_PRELOADS:
-        told = "the preloads are not stated" if preloads is None else f"{preloads} preloads"
-        found.append(f"{told}, {MIN_PRELOADS} are needed")
-    if not has_c and not any(one.down is not None for one in rotated[1:]):
-        found.append(
+        angles = "the preloads are not stated" if preloads is None else f"{preloads} preloads"
+        classes.append(f"{angles}, {MIN_PRELOADS} are needed")
+    if not has_c and not any(run.down is not None for run in rotated[1:]):
+        classes.append(
             "neither decreasing forces at the turned mountings nor creep were measured, one of them is needed"
         )
-    return tuple(found)
+    return tuple(classes)

@@ -130,7 +130,7 @@ class Iso376Data:
 def iso376_runs(runs: Sequence[CellRun], *, stated: ReferenceUncertainty | None) -> Iso376Data:
     """Return the runs that have every increasing force of the first; ``stated`` for rows without an own u."""
     levels = np.array(_levels(runs[0].force[runs[0].up]))
-    made, reasons = [], []
+    inputs, reasons = [], []
     if runs[0].rotation_deg is None:
         reasons.append("the rotation of the runs is not stated")
     for run in runs:
@@ -147,7 +147,7 @@ def iso376_runs(runs: Sequence[CellRun], *, stated: ReferenceUncertainty | None)
             if (~run.up).any():
                 reasons.append(f"the decreasing forces of run {run.number} are not those of the first")
             down = None
-        made.append(
+        inputs.append(
             Iso376Run(
                 rotation_deg=run.rotation_deg or 0.0,
                 up=tuple(value for value in up if value is not None),
@@ -165,7 +165,7 @@ def iso376_runs(runs: Sequence[CellRun], *, stated: ReferenceUncertainty | None)
         ])  # fmt: skip
     return Iso376Data(
         force=levels,
-        runs=tuple(made),
+        runs=tuple(inputs),
         force_uncertainty=None if u is None else 200 * u / levels,
         reasons=tuple(reasons),
     )
@@ -182,8 +182,8 @@ def _levels(force: NDArray[np.float64]) -> list[float]:
 def _at(
     levels: NDArray[np.float64], force: NDArray[np.float64], deflection: NDArray[np.float64]
 ) -> tuple[float | None, ...]:
-    found: list[float | None] = []
+    zeros: list[float | None] = []
     for level in levels:
         near = np.abs(force - level) <= _SAME * level
-        found.append(float(np.mean(deflection[near] * (level / force[near]))) if near.any() else None)
-    return tuple(found)
+        zeros.append(float(np.mean(deflection[near] * (level / force[near]))) if near.any() else None)
+    return tuple(zeros)

@@ -70,16 +70,17 @@ def calibration_budget(
     RecordError
         the record has no such load
     """
-    one = _fitted(record, load)
-    low, high = min(one.minimum or 0.0, 0.0), max(one.maximum or 0.0, 0.0)
+    fitted = _fitted(record, load)
+    low, high = min(fitted.minimum or 0.0, 0.0), max(fitted.maximum or 0.0, 0.0)
     value = (high if high >= -low else low) if at is None else float(at)
     if not low <= value <= high:
         raise _refused(
-            f"{record.id}, {load}", "the load lies outside the calibrated range", f"{value:.6g} {one.unit}",
-            f"{low:.6g} to {high:.6g} {one.unit}", "ask within the range, or calibrate over a larger one",
+            f"{record.id}, {load}", "the load lies outside the calibrated range",
+            f"{value:.6g} {fitted.unit}", f"{low:.6g} to {high:.6g} {fitted.unit}",
+            "ask within the range, or calibrate over a larger one",
         )  # fmt: skip
     point = typical_indications(record, loads, load, value)
-    return _budget(record, loads, check, one, value, point, temperature, probability)
+    return _budget(record, loads, check, fitted, value, point, temperature, probability)
 
 
 def predict(
@@ -99,7 +100,7 @@ def predict(
     SessionError
         ``budget``: a legacy record; an indication is missing, unknown or no finite number
     """
-    one = _fitted(record, load)
+    fitted = _fitted(record, load)
     if set(indications) != set(record.indications) or not all(map(math.isfinite, indications.values())):
         raise _refused(
             record.id, "the indications are not those of the record",
@@ -107,10 +108,10 @@ def predict(
             "a finite number for each of " + ", ".join(record.indications), "give every indication once",
         )  # fmt: skip
     point = np.array([indications[name] for name in record.indications])
-    terms = term_matrix(one.terms, dict(zip(record.indications, point[:, None], strict=True)))
-    value = float((terms @ np.asarray(one.coefficients))[0])
+    terms = term_matrix(fitted.terms, dict(zip(record.indications, point[:, None], strict=True)))
+    value = float((terms @ np.asarray(fitted.coefficients))[0])
     return Prediction(
-        budget=_budget(record, loads, check, one, value, point, temperature, probability),
+        budget=_budget(record, loads, check, fitted, value, point, temperature, probability),
         beyond=tuple(
             cell.name
             for cell, x in zip(record.cells, point.tolist(), strict=True)
@@ -128,8 +129,8 @@ def typical_indications(record: CalibrationRecord, loads: Table, load: str, at: 
     design = np.column_stack([loads.matrix(names), np.ones(loads.rows)])
     scale = np.maximum(np.abs(design).max(axis=0), 1e-300)
     plane = np.linalg.lstsq(design / scale, loads.matrix(record.indications), rcond=None)[0]
-    here = np.array([at if name == load else 0.0 for name in names] + [1.0])
-    point: NDArray[np.float64] = (here / scale) @ plane
+    place = np.array([at if name == load else 0.0 for name in names] + [1.0])
+    point: NDArray[np.float64] = (place / scale) @ plane
     return point
 
 
@@ -167,13 +168,13 @@ def _budget(
 
 
 def _fitted(record: CalibrationRecord, load: str) -> LoadFit:
-    one = record.load(load)
-    if record.kind != "fit" or not one.covariance:
+    fitted = record.load(load)
+    if record.kind != "fit" or not fitted.covariance:
         raise _refused(
             f"{record.id}, {load}", "a record without its data has no budget", "a legacy import",
             "a record that was fitted from reference loads", "calibrate the instrument",
         )  # fmt: skip
-    return one
+    return fitted
 
 
 def _refused(where: str, what: str, got: object, expected: object, next_step: str) -> SessionError:

@@ -121,11 +121,11 @@ def _reference(statements: Statements, load: LoadFit, value: float) -> Component
 
 
 def _fit(record: CalibrationRecord, load: LoadFit, point: NDArray[np.float64], curve: _Variance) -> Component:
-    known = load.method != "ols"  # the covariance follows from stated uncertainties alone
+    from_stated = load.method != "ols"  # the covariance follows from stated uncertainties alone
     text = f"J V J^T of the {len(load.terms)} coefficients at {_point(record, point)}"
     return _part(
-        "fit", text, "B" if known else "A", "normal" if known else "student", math.sqrt(curve.variance),
-        curve.dof, "data", joint=not known,
+        "fit", text, "B" if from_stated else "A", "normal" if from_stated else "student",
+        math.sqrt(curve.variance), curve.dof, "data", joint=not from_stated,
     )  # fmt: skip
 
 
@@ -207,14 +207,14 @@ def _zero(record: CalibrationRecord, load: LoadFit, slope: NDArray[np.float64]) 
     if isinstance(drift, str) and not intercept:
         return _absent("zero", drift, "session")
     moved = 0.0 if isinstance(drift, str) else abs(float(slope @ np.asarray(drift)))
-    said = (
+    reason = (
         []
         if isinstance(drift, str)
         else [f"zeros after the session minus before move the load by {moved:.3g}"]
     )
     if intercept:
-        said.append(f"tared indications of zero mean {intercept:.3g}")
-    text = f"{'; '.join(said)}: rectangular half-width"
+        reason.append(f"tared indications of zero mean {intercept:.3g}")
+    text = f"{'; '.join(reason)}: rectangular half-width"
     return _part("zero", text, "B", "rectangular", math.hypot(moved, intercept) / ROOT3, math.inf, "session")
 
 
@@ -238,8 +238,8 @@ def _temperature(
     session = "the session's temperature is not stated" if at is None else f"the session was at {at:.1f} degC"
     cells = [cell for cell in statements.cells if (cell.span_per_K, cell.zero_per_K) != (None, None)]
     if temperature is None:
-        known = "the range of use is not" if cells else "nor the range of use"
-        why = f"{'a' if cells else 'no'} temperature coefficient is stated, {known}; {session}"
+        lacking = "the range of use is not" if cells else "nor the range of use"
+        why = f"{'a' if cells else 'no'} temperature coefficient is stated, {lacking}; {session}"
         return _absent("temperature", why, "conditions of use")
     if temperature.coefficient_per_K is not None:
         per_K = temperature.coefficient_per_K * value

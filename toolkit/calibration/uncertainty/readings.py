@@ -61,8 +61,8 @@ def sensitivities(record: CalibrationRecord, load: LoadFit, point: Sequence[floa
     values = term_matrix(load.terms, dict(zip(record.indications, moved, strict=True))) @ np.asarray(
         load.coefficients
     )
-    found: NDArray[np.float64] = (values[: len(steps)] - values[len(steps) :]) / (2 * steps)
-    return found
+    slopes: NDArray[np.float64] = (values[: len(steps)] - values[len(steps) :]) / (2 * steps)
+    return slopes
 
 
 def zero_drift(record: CalibrationRecord) -> tuple[float, ...] | str:
@@ -75,9 +75,9 @@ def zero_drift(record: CalibrationRecord) -> tuple[float, ...] | str:
     entries = [e for e in zero_entries(zero_readings(json.loads(record.settings)), scope) if not e.shunt]
     if len(entries) < 2:
         return "no zero before and after the session is stated"
-    said = [entry.when.casefold() for entry in entries]
-    before = next((i for i, text in enumerate(said) if text.startswith("before")), 0)
-    after = max((i for i, text in enumerate(said) if text.startswith("after")), default=len(said) - 1)
+    moments = [entry.when.casefold() for entry in entries]
+    before = next((i for i, text in enumerate(moments) if text.startswith("before")), 0)
+    after = max((i for i, text in enumerate(moments) if text.startswith("after")), default=len(moments) - 1)
     first, last = dict(entries[before].values), dict(entries[after].values)
     missing = [name for name in record.indications if name not in first or name not in last]
     if missing:

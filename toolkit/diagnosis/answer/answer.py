@@ -148,9 +148,9 @@ class Diagnosis:
 
 def cut_short(skipped: Sequence[str]) -> bool:
     """Tell whether a search ended before every known effect was tried; what comes later leaves names."""
-    return any(one not in ("swaps", "predictions") for one in skipped)
+    return any(step not in ("swaps", "predictions") for step in skipped)
 
 
 def recorded(runs: Iterable[Run]) -> tuple[Recorded, ...]:
     """Return what an answer says of the recordings of a case."""
-    return tuple(Recorded(name=one.name, sha256=one.sha256, own=one.own) for one in runs)
+    return tuple(Recorded(name=run.name, sha256=run.sha256, own=run.own) for run in runs)

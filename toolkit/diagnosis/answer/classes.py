@@ -6,11 +6,11 @@ from dataclasses import replace
 
 from toolkit.diagnosis.answer.answer import FoundEffect
 from toolkit.diagnosis.fit.problem import Problem
+from toolkit.diagnosis.policy import VERDICT
 from toolkit.diagnosis.search.forward_step import Step
 from toolkit.diagnosis.simulators.simulator import Active
 from toolkit.effects.catalogue import effects as catalogue
 
-_CLOSE = 3.0  # log-likelihood within which the data prefer neither
 _PULL = ("conicity", "camber_offset", "crosstalk")
 _ANGLE = ("plysteer", "steer_offset")
 # A load that is slow to come and a tire that is slow to settle: one may always be taken for the other.
@@ -19,7 +19,7 @@ _AKIN = {"load_lag": ("viscoelastic_settling",), "viscoelastic_settling": ("load
 
 def equivalent_to(problem: Problem, step: Step) -> tuple[str, ...]:
     """Return the other names that explain a step as well, without the step's own."""
-    names = [one.active.effect.name for one in step.rivals if one.difference > -_CLOSE]
+    names = [one.active.effect.name for one in step.rivals if one.difference > -VERDICT.close]
     names += _always(problem, step.active)
     own = step.active.effect.name
     return tuple(dict.fromkeys(name for name in names if name != own))
@@ -50,12 +50,7 @@ def _always(problem: Problem, active: Active) -> list[str]:
     is_load = name == "crosstalk" and active.channel == "FY" and active.source in ("FZ", "FZ_CMD")
     if (name in ("conicity", "camber_offset") or is_load) and not turned:
         return list(_PULL)
-    cells = getattr(problem.model, "cells", None)
-    record = getattr(problem.model, "record", None)
-    of_cells = (cells.names if cells is not None else ()) or (
-        record.indications if record is not None else ()
-    )
-    if name == "channel_sign" and active.channel in of_cells:
+    if name == "channel_sign" and active.channel in problem.model.capability.cells:
         return ["channel_sign", "wrong_calibration"]
     if name == "wrong_calibration":
         return ["wrong_calibration", "channel_sign"]

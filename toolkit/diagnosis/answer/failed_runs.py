@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from toolkit.diagnosis.simulators.simulator import Active
 
 
-class Refused:
+class FailedRuns:
     """A model's ``simulate`` that counts where the simulation gave nothing: by itself, and with an effect."""
 
     def __init__(self, simulate: Callable[..., dict[str, NDArray[np.float64]]]) -> None:

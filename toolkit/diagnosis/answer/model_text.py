@@ -12,8 +12,7 @@ from typing import TYPE_CHECKING, Any
 from toolkit import __version__
 from toolkit.diagnosis.fit.nuisance import INPUT_NOISE
 from toolkit.diagnosis.simulators.built_in import parameter_names
-from toolkit.diagnosis.simulators.channel_units import unit_of
-from toolkit.diagnosis.simulators.parameter_signs import sense
+from toolkit.diagnosis.simulators.parameter_units import sense, unit_of
 from toolkit.diagnosis.simulators.setting import nominal_load
 from toolkit.effects.sense import turned
 from toolkit.files import sha256_file
@@ -47,7 +46,7 @@ def model_text(case: Case, found: Search, made: Diagnosis, folder: Path) -> str 
     ]
     time = next((one.name for one in case.channels if one.role == "time"), None)
     lines += _entries({} if time is None else {"time": time})
-    load = getattr(found.problem.model, "nominal_load_N", None) or nominal_load(case)
+    load = found.problem.model.capability.nominal_load_N or nominal_load(case)
     lines += _entries({"nominal_load_N": load})
     lines += [
         "",

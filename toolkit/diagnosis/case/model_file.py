@@ -21,10 +21,10 @@ def simulation_of(model: ModelFile) -> Simulation:
             got=model.kind, expected=", ".join(KINDS),
             next_step="name a file that toolkit diagnose has written", rule="model-file",
         )  # fmt: skip
-    told: Mapping[str, Any] = model.simulation
+    entries: Mapping[str, Any] = model.simulation
     # A file by path is a path, whatever folder the case lies in.
     machine, calibration = (
-        str(file.absolute()) if (file := model.file(key)) is not None else str(told.get(key, ""))
+        str(file.absolute()) if (file := model.file(key)) is not None else str(entries.get(key, ""))
         for key in ("machine", "calibration")
     )
     return Simulation(
@@ -33,21 +33,27 @@ def simulation_of(model: ModelFile) -> Simulation:
         calibration=calibration,
         tire=model.file("tire"),
         path=model.file("path"),
-        function=str(told.get("function", "simulate")),
-        states=tuple(told.get("states", ())),
-        force_terms=tuple(dict(told.get("force_terms", {})).items()),
-        simulated=tuple(dict(told.get("simulated", {})).items()),
+        function=str(entries.get("function", "simulate")),
+        states=tuple(entries.get("states", ())),
+        force_terms=tuple(dict(entries.get("force_terms", {})).items()),
+        simulated=tuple(dict(entries.get("simulated", {})).items()),
     )
 
 
-def parameters_of(model: ModelFile, given: tuple[CaseParameter, ...] = ()) -> tuple[CaseParameter, ...]:
+def parameters_of(model: ModelFile, first: tuple[CaseParameter, ...] = ()) -> tuple[CaseParameter, ...]:
     """Return the model's parameters, free within their standard errors; those ``given`` go before them."""
-    own = tuple(
-        CaseParameter(name=one.name, value=one.value, unit=one.unit, sd=one.standard_error, bounds=one.bounds)
-        for one in model.parameters
-        if one.name not in {each.name for each in given}
+    further = tuple(
+        CaseParameter(
+            name=parameter.name,
+            value=parameter.value,
+            unit=parameter.unit,
+            sd=parameter.standard_error,
+            bounds=parameter.bounds,
+        )
+        for parameter in model.parameters
+        if parameter.name not in {each.name for each in first}
     )
-    return (*given, *own)
+    return (*first, *further)
 
 
 def tire_model(path: Path, where: str) -> ModelFile:
@@ -78,17 +84,20 @@ def corrections_of(simulation: Simulation) -> tuple[ModelEffect, ...]:
     machine = load_machine(simulation.machine)
     return tuple(
         ModelEffect(
-            effect=effect(one.effect, where=machine.name),
-            channel=one.channel,
-            source=one.source,
+            effect=effect(correction.effect, where=machine.name),
+            channel=correction.channel,
+            source=correction.source,
             parameters=(
                 ModelParameter(
-                    name=one.parameter, value=one.value, unit=one.unit, standard_error=one.u or None
+                    name=correction.parameter,
+                    value=correction.value,
+                    unit=correction.unit,
+                    standard_error=correction.u or None,
                 ),
             ),
             axes="machine",
             of_machine=True,
-            origin=f"{machine.name}, version {machine.version}: answer {one.answer_sha256[:16]}",
+            origin=f"{machine.name}, version {machine.version}: answer {correction.answer_sha256[:16]}",
         )
-        for one in machine.corrections
+        for correction in machine.corrections
     )

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolkit.diagnosis.fit.noise import Layout, Noise, autocovariance, whiten
+from toolkit.diagnosis.fit.noise import Autoregression, Layout, autocovariance, whiten
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -22,7 +22,7 @@ def covariance(
     prior: NDArray[np.float64],
     sizes: NDArray[np.float64],
     layouts: dict[str, Layout],
-    noise: dict[str, Noise],
+    noise: dict[str, Autoregression],
     *,
     plain: bool,
 ) -> NDArray[np.float64]:
@@ -46,10 +46,10 @@ def covariance(
             spread = spread + weight**2 * columns.T @ _correlated(columns, where, noise[name])
         else:
             parts.append(whiten(columns, where, noise[name]))
-    whole = np.vstack([*parts, prior])
-    size = np.sqrt((whole**2).sum(axis=0))
+    rows = np.vstack([*parts, prior])
+    size = np.sqrt((rows**2).sum(axis=0))
     size[size == 0] = 1.0
-    _, s, vt = np.linalg.svd(whole / size, full_matrices=False)
+    _, s, vt = np.linalg.svd(rows / size, full_matrices=False)
     keep = s > 1e-10 * s.max()
     inverse = (vt[keep].T / s[keep] ** 2) @ vt[keep]
     if plain:
@@ -60,14 +60,14 @@ def covariance(
     return np.asarray(inverse * np.outer(scale, scale))
 
 
-def _correlated(columns: NDArray[np.float64], where: Layout, noise: Noise) -> NDArray[np.float64]:
+def _correlated(columns: NDArray[np.float64], where: Layout, noise: Autoregression) -> NDArray[np.float64]:
     """Return the noise's covariance matrix times columns, segment by segment."""
     from scipy.signal import fftconvolve
 
-    made = np.empty_like(columns)
-    for one in where.segments:
-        n = one.stop - one.start
+    products = np.empty_like(columns)
+    for segment in where.segments:
+        n = segment.stop - segment.start
         gamma = autocovariance(noise, n)
         kernel = np.concatenate([gamma[:0:-1], gamma])[:, None]
-        made[one] = fftconvolve(columns[one], kernel, mode="full", axes=0)[n - 1 : 2 * n - 1]
-    return made
+        products[segment] = fftconvolve(columns[segment], kernel, mode="full", axes=0)[n - 1 : 2 * n - 1]
+    return products

@@ -11,8 +11,9 @@ import numpy as np
 
 from toolkit.diagnosis.fit.covariance import covariance
 from toolkit.diagnosis.fit.descent import Derivatives, descend
-from toolkit.diagnosis.fit.noise import Layout, Noise, fit_noise, log_likelihood
+from toolkit.diagnosis.fit.noise import Autoregression, Layout, fit_noise, log_likelihood
 from toolkit.diagnosis.fit.space import Space
+from toolkit.diagnosis.policy import NOISE
 from toolkit.diagnosis.simulators.simulator import Active
 
 if TYPE_CHECKING:
@@ -24,8 +25,6 @@ if TYPE_CHECKING:
 
 _OUTER = 4  # times that the noise is estimated anew
 _BETTER = 0.02  # of the log-likelihood: less is no step worth another round
-_APART = 2.0  # of its own standard deviation: a larger difference of two solutions is none of chance
-_SAME = 0.05  # by which the coloured fit's residual variance may exceed the plain one's
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -40,7 +39,7 @@ class Fit:
     active: tuple[Active, ...]
     residual: Stacked
     simulated: Stacked
-    noise: dict[str, Noise]
+    noise: dict[str, Autoregression]
     log_posterior: float
     covariance: NDArray[np.float64]
     rows: NDArray[np.bool_] | None
@@ -54,7 +53,7 @@ class _Solved:
     x: NDArray[np.float64]
     simulated: Stacked
     residual: Stacked
-    noise: dict[str, Noise]
+    noise: dict[str, Autoregression]
     score: float
 
 
@@ -64,7 +63,7 @@ def fit(
     *,
     start: Sequence[float] | None = None,
     rows: NDArray[np.bool_] | None = None,
-    noise: dict[str, Noise] | None = None,
+    noise: dict[str, Autoregression] | None = None,
     rounds: int = _OUTER,
     plain: bool | None = None,
 ) -> Fit:
@@ -81,7 +80,7 @@ def fit(
     space = Space.of(problem, tuple(active))
     known = Derivatives(space)
     layouts = {name: problem.layout(name, rows) for name in problem.names}
-    x = space.begin([one.value for one in problem.free] if start is None else start)
+    x = space.begin([parameter.value for parameter in problem.free] if start is None else start)
     made = _coloured(space, layouts, x, noise, 2 if plain else rounds, known)
     other = None
     if plain is None:
@@ -108,7 +107,7 @@ def _coloured(
     space: Space,
     layouts: dict[str, Layout],
     x: NDArray[np.float64],
-    noise: dict[str, Noise] | None,
+    noise: dict[str, Autoregression] | None,
     rounds: int,
     derivatives: Derivatives,
 ) -> _Solved:
@@ -118,10 +117,10 @@ def _coloured(
     for turn in range(max(rounds, 1)):
         if known is None:
             known = _white(space.problem, space.residual(space.simulated(x)), layouts)
-        here = _solve(space, layouts, x, known, derivatives)
-        if best is not None and here.score < best.score + _BETTER:
-            return here if here.score > best.score else best
-        best, x, known = here, here.x, here.noise
+        solved = _solve(space, layouts, x, known, derivatives)
+        if best is not None and solved.score < best.score + _BETTER:
+            return solved if solved.score > best.score else best
+        best, x, known = solved, solved.x, solved.noise
         if not len(x) and turn:
             break
     return cast("_Solved", best)
@@ -129,11 +128,13 @@ def _coloured(
 
 def _plain(space: Space, layouts: dict[str, Layout], from_: _Solved, known: Derivatives) -> _Solved | None:
     """Return ordinary least squares, each output weighed by what its rows are worth; None for white noise."""
-    if not len(from_.x) or not any(one.reflection for one in from_.noise.values()):
+    if not len(from_.x) or not any(autoregression.reflection for autoregression in from_.noise.values()):
         return None
     weights = {
-        name: Noise(reflection=(), sd=one.marginal_sd * math.sqrt(one.correlation_rows))
-        for name, one in from_.noise.items()
+        name: Autoregression(
+            reflection=(), sd=autoregression.marginal_sd * math.sqrt(autoregression.correlation_rows)
+        )
+        for name, autoregression in from_.noise.items()
     }
     return _solve(space, layouts, from_.x, weights, known)
 
@@ -146,10 +147,12 @@ def _absorbs(coloured: _Solved, plain: _Solved, layouts: dict[str, Layout]) -> b
     manner of Hausman), and the plain one is to be trusted.
     """
     for name, where in layouts.items():
-        one = float(np.mean(coloured.residual[name][where.index] ** 2)) if where.n else 0.0
-        other = float(np.mean(plain.residual[name][where.index] ** 2)) if where.n else 0.0
+        coloured_square = float(np.mean(coloured.residual[name][where.index] ** 2)) if where.n else 0.0
+        plain_square = float(np.mean(plain.residual[name][where.index] ** 2)) if where.n else 0.0
         worth = plain.noise[name].correlation_rows / max(where.n, 1)
-        if one > other * (1 + _SAME + 3 * len(plain.x) * worth):
+        if coloured_square > plain_square * (
+            1 + NOISE.absorbed + NOISE.absorbed_by_chance * len(plain.x) * worth
+        ):
             return True
     return False
 
@@ -158,7 +161,7 @@ def _solve(
     space: Space,
     layouts: dict[str, Layout],
     x: NDArray[np.float64],
-    weights: dict[str, Noise],
+    weights: dict[str, Autoregression],
     known: Derivatives,
 ) -> _Solved:
     x = descend(space, layouts, x, weights, known)
@@ -176,22 +179,22 @@ def replace_effects(problem: Problem, made: Fit, active: tuple[Active, ...]) -> 
     there = [i for i, one in enumerate(after) if one in before]
     known = [before.index(after[i]) for i in there]
     covariance[np.ix_(there, there)] = made.covariance[np.ix_(known, known)]
-    residual = {name: problem.observed[name] - one for name, one in simulated.items()}
+    residual = {name: problem.observed[name] - column for name, column in simulated.items()}
     return replace(made, active=active, simulated=simulated, residual=residual, covariance=covariance)
 
 
 def _columns(problem: Problem, active: Sequence[Active]) -> list[tuple[object, ...]]:
     """Return what tells the parameters of a fit apart, in the order of its covariance."""
-    made: list[tuple[object, ...]] = [(one.name,) for one in problem.free]
-    for one in active:
-        at = (one.effect.name, one.channel, one.source, one.runs)
-        made += [(*at, each.name) for each in one.searched]
-    return made
+    columns: list[tuple[object, ...]] = [(parameter.name,) for parameter in problem.free]
+    for applied in active:
+        at = (applied.effect.name, applied.channel, applied.source, applied.runs)
+        columns += [(*at, parameter.name) for parameter in applied.searched]
+    return columns
 
 
 def noise_of(
     problem: Problem, residual: Stacked, layouts: dict[str, Layout], *, used: int = 0
-) -> dict[str, Noise]:
+) -> dict[str, Autoregression]:
     """Return the noise of every output's residual."""
     return {
         name: fit_noise(
@@ -208,7 +211,8 @@ def noise_of(
 def log_prior(problem: Problem, p: Sequence[float]) -> float:
     """Return the logarithm of the priors' density, without its constant."""
     return -0.5 * sum(
-        ((value - one.value) / (one.sd or 1.0)) ** 2 for value, one in zip(p, problem.free, strict=True)
+        ((value - parameter.value) / (parameter.sd or 1.0)) ** 2
+        for value, parameter in zip(p, problem.free, strict=True)
     )
 
 
@@ -228,13 +232,13 @@ def jacobian(problem: Problem, made: Fit) -> tuple[dict[str, NDArray[np.float64]
     return space.around(space.at(made.p))[1], space.sizes
 
 
-def _white(problem: Problem, residual: Stacked, layouts: dict[str, Layout]) -> dict[str, Noise]:
-    made = {}
+def _white(problem: Problem, residual: Stacked, layouts: dict[str, Layout]) -> dict[str, Autoregression]:
+    noise = {}
     for name, where in layouts.items():
         values = residual[name][where.index]
         size = math.sqrt(float(np.mean(values**2))) if len(values) else 0.0
-        made[name] = Noise(reflection=(), sd=max(size, problem.floor[name]))
-    return made
+        noise[name] = Autoregression(reflection=(), sd=max(size, problem.floor[name]))
+    return noise
 
 
 def _score(
@@ -242,7 +246,7 @@ def _score(
     x: NDArray[np.float64],
     residual: Stacked,
     layouts: dict[str, Layout],
-    noise: dict[str, Noise],
+    noise: dict[str, Autoregression],
 ) -> float:
     p, _ = space.split(x)
     total = log_prior(space.problem, p)
@@ -263,13 +267,11 @@ def _covariance(
     if not len(solved.x):
         return np.zeros((0, 0))
     J = space.around(solved.x)[1]
-    prior = np.zeros((len(space.problem.free), len(solved.x)))
-    for i, one in enumerate(space.problem.free):
-        prior[i, i] = space.sizes[i] / (one.sd or 1.0)
-    made = covariance(J, prior, space.sizes, layouts, solved.noise, plain=plain)
+    prior = space.problem.prior_rows(space.sizes, len(solved.x))
+    matrix = covariance(J, prior, space.sizes, layouts, solved.noise, plain=plain)
     if other is not None:
         unsure = np.diag(covariance(J, prior, space.sizes, layouts, other.noise, plain=True))
         apart = ((other.x - solved.x) * space.sizes) ** 2
-        expected = np.maximum(unsure - np.diag(made), 0.0)
-        made = made + np.diag(np.where(apart > _APART**2 * expected, apart, 0.0))
-    return made
+        expected = np.maximum(unsure - np.diag(matrix), 0.0)
+        matrix = matrix + np.diag(np.where(apart > NOISE.apart**2 * expected, apart, 0.0))
+    return matrix

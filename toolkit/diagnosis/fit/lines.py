@@ -12,15 +12,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from toolkit.diagnosis.policy import STRUCTURE
+
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from toolkit.diagnosis.fit.problem import Problem
-
-_AROUND = 12  # frequencies on each side that make the level
-_FEWEST = 64  # rows of a run
-_EVEN = 0.05  # by which the runs' mean steps of time may differ
-_JITTER = 0.9  # of a step, by which single steps may: the residual is taken on an even clock
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -39,10 +36,10 @@ def strongest_line(problem: Problem, name: str, residual: NDArray[np.float64]) -
     runs = []
     for run, place in zip(problem.runs, problem.slices, strict=True):
         steps = np.diff(run.t)
-        if run.rows < _FEWEST or np.ptp(steps) > _JITTER * np.median(steps):
+        if run.rows < STRUCTURE.line_rows or np.ptp(steps) > STRUCTURE.line_jitter * np.median(steps):
             continue
         good = problem.kept[name][place]
-        if good.mean() < 0.9:
+        if good.mean() < STRUCTURE.line_kept:
             continue
         values = residual[place]
         even = np.linspace(run.t[0], run.t[-1], run.rows)
@@ -51,7 +48,7 @@ def strongest_line(problem: Problem, name: str, residual: NDArray[np.float64]) -
         return None
     n = min(len(values) for _, values in runs)
     step = runs[0][0]
-    if any(abs(one - step) > _EVEN * step for one, _ in runs):
+    if any(abs(run_step - step) > STRUCTURE.line_even * step for run_step, _ in runs):
         return None
     window = np.hanning(n + 2)[1:-1]
     power = np.zeros(n // 2 + 1)
@@ -60,17 +57,17 @@ def strongest_line(problem: Problem, name: str, residual: NDArray[np.float64]) -
         power += np.abs(np.fft.rfft(x * window)) ** 2
     level = np.array([_level(power, k) for k in range(len(power))])
     ratio = np.where(level > 0, power / np.maximum(level, 1e-300), 0.0)
-    ratio[:8] = 0.0  # below eight cycles a run it is a trend
+    ratio[: STRUCTURE.line_cycles] = 0.0
     k = int(np.argmax(ratio))
     # A sum of R independent periodograms is chi-squared with 2R degrees, its median the level.
     p = min(1.0, len(power) * _tail(ratio[k], len(runs)))
-    held = power[max(k - 1, 1) : k + 2].sum() - 3 * level[k]
-    share = max(0.0, float(held / max(power[1:].sum(), 1e-300)))
+    line_power = power[max(k - 1, 1) : k + 2].sum() - 3 * level[k]
+    share = max(0.0, float(line_power / max(power[1:].sum(), 1e-300)))
     return Line(frequency=k / (n * step), p_value=p, share=share)
 
 
 def _level(power: NDArray[np.float64], k: int) -> float:
-    low, high = max(1, k - _AROUND), min(len(power), k + _AROUND + 1)
+    low, high = max(1, k - STRUCTURE.line_around), min(len(power), k + STRUCTURE.line_around + 1)
     around = np.concatenate([power[low : max(low, k - 2)], power[min(high, k + 3) : high]])
     return float(np.median(around)) if len(around) else 0.0
 
@@ -80,4 +77,4 @@ def _tail(ratio: float, runs: int) -> float:
 
     median = float(chi2.median(2 * runs))
     # The level is itself a median of some twenty values: its own scatter is allowed for.
-    return float(chi2.sf(ratio * median / (1 + 2 / math.sqrt(2 * _AROUND)), 2 * runs))
+    return float(chi2.sf(ratio * median / (1 + 2 / math.sqrt(2 * STRUCTURE.line_around)), 2 * runs))

@@ -29,17 +29,17 @@ def prediction_names(runs: Sequence[Run]) -> tuple[str, ...]:
     The path of the case is kept without what would lead out of the folder, a workbook becomes a CSV; where
     two would then be one, a number tells them apart.
     """
-    made: list[str] = []
+    names: list[str] = []
     for run in runs:
-        parts = [one for one in run.name.replace("\\", "/").split("/") if one not in ("", ".", "..")]
+        parts = [part for part in run.name.replace("\\", "/").split("/") if part not in ("", ".", "..")]
         path = PurePosixPath(*parts) if parts else PurePosixPath("prediction.csv")
         if path.suffix.lower() in (".xlsx", ".xlsm"):
             path = path.with_suffix(".csv")
         at, name = 2, str(path)
-        while name in made:
+        while name in names:
             name, at = str(path.with_stem(f"{path.stem}-{at}")), at + 1
-        made.append(name)
-    return tuple(made)
+        names.append(name)
+    return tuple(names)
 
 
 def prediction_csv(problem: Problem, run: Run, fits: Sequence[Fit | None]) -> str:
@@ -51,12 +51,12 @@ def prediction_csv(problem: Problem, run: Run, fits: Sequence[Fit | None]) -> st
     """
     case = problem.case
     columns: dict[str, NDArray[np.float64]] = {}
-    for one in case.channels:
-        if one.role == "time":
-            columns[one.name] = run.columns[one.name]
-    made = [_simulated(problem, run, one) for one in fits]
+    for channel in case.channels:
+        if channel.role == "time":
+            columns[channel.name] = run.columns[channel.name]
+    variants = [_simulated(problem, run, fit) for fit in fits]
     for output in problem.model.outputs:
-        for variant, values in zip(VARIANTS, made, strict=True):
+        for variant, values in zip(VARIANTS, variants, strict=True):
             columns[f"{output.name}_{variant}"] = values[output.name]
     return csv_of(columns)
 
@@ -72,23 +72,25 @@ def _simulated(problem: Problem, run: Run, made: Fit | None) -> Mapping[str, NDA
     values = dict(problem.known)
     if made is None:
         return problem.model.simulate(run, values, ())
-    values.update(zip((one.name for one in problem.free), made.p, strict=True))
-    return problem.model.simulate(run, values, tuple(_spread_to(problem, run, one) for one in made.active))
+    values.update(zip((parameter.name for parameter in problem.free), made.p, strict=True))
+    return problem.model.simulate(
+        run, values, tuple(_spread_to(problem, run, applied) for applied in made.active)
+    )
 
 
-def _spread_to(problem: Problem, run: Run, one: Active) -> Active:
+def _spread_to(problem: Problem, run: Run, applied: Active) -> Active:
     """Return an effect that is confined to some runs with the new run in it, where a condition says so.
 
     The condition is the one whose values part the effect's runs from all the others.
     """
-    if one.runs is None:
-        return one
-    for key in one.effect.confining(run.conditions):
-        inside = {each.conditions.get(key) for each in problem.runs if each.name in one.runs}
-        outside = {each.conditions.get(key) for each in problem.runs if each.name not in one.runs}
+    if applied.runs is None:
+        return applied
+    for key in applied.effect.confining(run.conditions):
+        inside = {other.conditions.get(key) for other in problem.runs if other.name in applied.runs}
+        outside = {other.conditions.get(key) for other in problem.runs if other.name not in applied.runs}
         if not inside & outside and run.conditions[key] in inside:
-            return replace(one, runs=one.runs | {run.name})
-    return replace(one, runs=one.runs - {run.name})
+            return replace(applied, runs=applied.runs | {run.name})
+    return replace(applied, runs=applied.runs - {run.name})
 
 
 def _cell(name: str) -> str:

@@ -11,10 +11,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from toolkit.diagnosis.fit.nuisance import INPUT_NOISE
+from toolkit.diagnosis.policy import STARTS
 from toolkit.diagnosis.search import ripple
-from toolkit.diagnosis.simulators.channel_units import channel_unit
 from toolkit.diagnosis.simulators.forces import LEAST_REACH
-from toolkit.diagnosis.simulators.simulator import DISCRETE, Active
+from toolkit.diagnosis.simulators.parameter_units import channel_unit
+from toolkit.diagnosis.simulators.simulator import DISCRETE, Active, MotionSizes
 from toolkit.effects.catalogue import effects
 from toolkit.effects.creep import FROM_REST
 from toolkit.effects.drum_curvature import EXPONENT
@@ -37,10 +38,10 @@ _IN_TIME = frozenset(
         "turn_slip load_lag input_noise"
     ).split()
 )
-_SUBSETS = 8
-_LOADS = 0.2  # of the largest load: less tells nothing of what goes with it
-_LATE = (1, 4, 12)  # rows
-_SHORT = 0.05  # of the position's spread: the longest distance over which dry friction builds up
+
+
+# What tells candidates apart: name, channel, source, runs.
+Key = tuple[str, str | None, str | None, frozenset[str] | None]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -79,7 +80,7 @@ class Start:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Candidate:
+class CandidateEffect:
     """An effect at a place, and how a search may start; ``discrete`` ones are there or not."""
 
     active: Active
@@ -87,7 +88,7 @@ class Candidate:
     discrete: bool
 
     @property
-    def key(self) -> tuple[str, str | None, str | None, frozenset[str] | None]:
+    def key(self) -> Key:
         """What tells candidates apart."""
         return (self.active.effect.name, self.active.channel, self.active.source, self.active.runs)
 
@@ -97,7 +98,7 @@ class Candidate:
         return self.active.effect.name
 
 
-def candidates(problem: Problem) -> tuple[Candidate, ...]:
+def candidates(problem: Problem) -> tuple[CandidateEffect, ...]:
     """Return every candidate of a case."""
     made = []
     for effect in (*effects().values(), INPUT_NOISE):
@@ -110,14 +111,16 @@ def candidates(problem: Problem) -> tuple[Candidate, ...]:
                 active = replace(whole, runs=runs)
                 starts = _starts(problem, active)
                 if starts:
-                    made.append(Candidate(active=active, starts=starts, discrete=effect.name in DISCRETE))
+                    made.append(
+                        CandidateEffect(active=active, starts=starts, discrete=effect.name in DISCRETE)
+                    )
     return tuple(made)
 
 
 def _as_known(problem: Problem, effect: Effect) -> Effect:
     """Return an effect without the parameters that mean nothing in a case: nobody should search for them."""
     needless: set[str] = set()
-    if effect.name == "load_friction" and getattr(problem.model, "nominal_load_N", None) is not None:
+    if effect.name == "load_friction" and problem.model.capability.nominal_load_N is not None:
         needless = {"reference"}  # the tire's own file states the load
         effect = replace(effect, equation="friction = 1 + sensitivity * (FZ - FZ0)/FZ0, FZ0 the nominal load")
     if effect.name == "drum_curvature" and all(one.name != "MZ" for one in problem.model.outputs):
@@ -132,7 +135,7 @@ def _as_known(problem: Problem, effect: Effect) -> Effect:
 
 def _several_loads(problem: Problem) -> bool:
     loads = _values(problem, "FZ")
-    return len(loads) > 0 and float(np.ptp(loads)) > _LOADS * float(np.abs(loads).max())
+    return len(loads) > 0 and float(np.ptp(loads)) > STARTS.loads * float(np.abs(loads).max())
 
 
 def _within_reach(problem: Problem, active: Active) -> Active:
@@ -141,16 +144,16 @@ def _within_reach(problem: Problem, active: Active) -> Active:
     A bristle as long as the way itself is a spring: over a fall from rest it grows as drag does. A ripple of
     which the way sees less than two periods does not repeat: it is a stiffness, linear and cubic.
     """
-    from toolkit.diagnosis.simulators.ode import OdeModel
-
     if active.effect.name == ripple.NAME:
         return _bounded(active, "period", ripple.longest(problem, active.channel))
-    if active.effect.name != "coulomb_friction" or not isinstance(problem.model, OdeModel):
+    if active.effect.name != "coulomb_friction" or not _integrates(problem):
         return active
-    _, speed, way = _motion_scales(problem, active)
-    if problem.model.position_of(str(active.channel)) is None:
-        way = speed * max((float(run.t[-1] - run.t[0]) for run in problem.runs if run.rows), default=0.0)
-    most = max(_SHORT * way, speed * _row_time(problem))
+    sizes = _motion_sizes(problem, active)
+    way = sizes.place
+    if not sizes.has_position:
+        longest = max((float(run.t[-1] - run.t[0]) for run in problem.runs if run.rows), default=0.0)
+        way = sizes.speed * longest
+    most = max(STARTS.bristle * way, sizes.speed * _row_time(problem))
     return _bounded(active, "presliding", most)
 
 
@@ -206,9 +209,7 @@ def _shares(problem: Problem, effect: Effect) -> tuple[float, ...]:
     A motion answers a small force in proportion; one that is as large as it may ever be has another phase, or
     comes to rest.
     """
-    from toolkit.diagnosis.simulators.ode import OdeModel
-
-    moves = isinstance(problem.model, OdeModel) and effect.stage == "dynamics"
+    moves = _integrates(problem) and effect.stage == "dynamics"
     return (1.0, 0.1) if moves and effect.name not in (ripple.NAME, "overflow") else (1.0,)
 
 
@@ -220,11 +221,9 @@ def _tried(problem: Problem, active: Active, one: EffectParameter, scale: float)
 
 
 def _grid(problem: Problem, one: EffectParameter) -> tuple[float, ...]:
-    from toolkit.diagnosis.simulators.ode import OdeModel
-
     starts = one.starts or (_middle(one),)
     # The longest bristle of an equation that turns at every row is a spring.
-    return starts[:2] if one.name == "presliding" and isinstance(problem.model, OdeModel) else starts
+    return starts[:2] if one.name == "presliding" and _integrates(problem) else starts
 
 
 def _histories(effect: Effect) -> tuple[dict[str, float], ...]:
@@ -236,7 +235,7 @@ def _steps(problem: Problem, active: Active, one: EffectParameter) -> tuple[floa
     """Return where the only amplitude of an effect starts: a unit is taken for one of its own dimension."""
     if one.unit == "s":
         # Of a plant whose rows are far apart, some rows: so far off the response is no straight line.
-        far = [rows * _row_time(problem) for rows in _LATE]
+        far = [rows * _row_time(problem) for rows in STARTS.late]
         far = [time for time in far if time > max(map(abs, one.starts))]
         return (*one.starts, *far, *(-time for time in far if min(one.starts) < 0))
     if active.effect.name != "unit_error":
@@ -274,20 +273,18 @@ def _scale(problem: Problem, active: Active, one: EffectParameter) -> float:
 
 
 def _dynamic_scale(problem: Problem, active: Active, one: EffectParameter) -> float:
-    force, speed, place = _motion_scales(problem, active)
-    known: dict[str, tuple[float, float]] = getattr(problem.model, "reach", {})
-    reach = known.get(str(active.channel), (speed, place))
+    sizes = _motion_sizes(problem, active)
     return {
-        "force": force,
-        "coulomb": force,
-        "amplitude": force,
+        "force": sizes.force,
+        "coulomb": sizes.force,
+        "amplitude": sizes.force,
         # Where it is largest, not at its spread: a cube of three of them would be another motion.
-        "viscous": force / reach[0],
-        "drag": force / reach[0] ** 2,
-        "k3": force / reach[1] ** 3,
-        "period": place,
-        "level": place,
-        "presliding": speed * _row_time(problem),
+        "viscous": sizes.force / sizes.fastest,
+        "drag": sizes.force / sizes.fastest**2,
+        "k3": sizes.force / sizes.farthest**3,
+        "period": sizes.place,
+        "level": sizes.level,
+        "presliding": sizes.speed * _row_time(problem),
     }[one.name]
 
 
@@ -296,36 +293,27 @@ def _row_time(problem: Problem) -> float:
     return float(np.median(steps))
 
 
-def _motion_scales(problem: Problem, active: Active) -> tuple[float, float, float]:
-    """Return the sizes of force, velocity and position of the equation that an effect enters."""
-    from toolkit.diagnosis.simulators.ode import OdeModel
+def _integrates(problem: Problem) -> bool:
+    """Tell whether a simulation integrates its own equation of motion."""
+    moving = problem.model.capability.motion
+    return moving is not None and moving.integrates
 
-    model = problem.model
-    if isinstance(model, OdeModel):
-        name = str(active.channel)
-        rate, own = model.scale[name]
-        position = model.position_of(name)
-        place = own if position is None else model.scale[position][1]
-        if active.effect.name == "overflow":
-            # A state that starts at zero and only falls has no level to run over.
-            place = model.largest[name] or place
-        return rate, own, place
-    motion = getattr(model, "motion", None)
-    force = _spread(problem, active.channel)
-    speed = place = 1.0
-    if motion is not None:
-        if motion.kind == "force":
-            speed = _spread(problem, motion.velocity) if motion.velocity else 1.0
-            place = _spread(problem, motion.position) if motion.position else 1.0
-        else:
-            force, speed, place = motion.scales()
-    return force, speed, place
+
+def _motion_sizes(problem: Problem, active: Active) -> MotionSizes:
+    """Return the sizes of the equation that an effect enters; of nothing that moves, the channel's own."""
+    moving = problem.model.capability.motion
+    if moving is not None:
+        return moving.sizes(active.channel, lambda name: _spread(problem, name))
+    return MotionSizes(
+        force=_spread(problem, active.channel), speed=1.0, place=1.0, fastest=1.0, farthest=1.0, level=1.0,
+        has_position=False,
+    )  # fmt: skip
 
 
 def _smoothing(problem: Problem, active: Active) -> dict[str, float]:
     if active.effect.name != "coulomb_friction":
         return {}
-    speed = _motion_scales(problem, active)[1]
+    speed = _motion_sizes(problem, active).speed
     return {"smooth": 1e-3 * speed, LEAST_REACH: 1e-3 * speed * _row_time(problem)}
 
 
@@ -378,7 +366,7 @@ def _subsets(problem: Problem, effect: Effect) -> list[frozenset[str]]:
         ordered = _in_order(list(levels))
         groups: list[Sequence[str]] = [[one] for one in ordered]
         groups += [ordered[:k] for k in range(2, len(ordered))]
-        for group in groups[:_SUBSETS]:
+        for group in groups[: STARTS.subsets]:
             chosen = frozenset(itertools.chain.from_iterable(levels[one] for one in group))
             if chosen not in made and chosen != names:
                 made.append(chosen)

@@ -12,16 +12,12 @@ from toolkit.diagnosis.fit.fit import Fit, fit
 from toolkit.diagnosis.fit.folds import Folds, HeldOut, beyond_form, hold_out, matters
 from toolkit.diagnosis.fit.nuisance import INPUT_NOISE
 from toolkit.diagnosis.fit.problem import Problem
-from toolkit.diagnosis.search.refit_masking import Key
+from toolkit.diagnosis.policy import STEP
+from toolkit.diagnosis.search.candidates import Key
 from toolkit.diagnosis.search.screen import Scored
 from toolkit.diagnosis.simulators.simulator import Active
 from toolkit.errors import FitError
 
-_FAR_BEHIND = 0.25  # of the best gain: a candidate below cannot win a joint fit
-_MOST = 0.5  # of the held-out mean square: what a candidate far behind must take away
-_REFINED = 8  # candidates that are fitted jointly, of those that screening ranks first
-_TRIED = 3  # of the joint fits
-_BOUND = 1e-3
 # By how much of what it does an effect's law may be off: what it leaves then is no effect of its own. One
 # factor and one exponent for a patch on a drum are off by up to a tenth beside bristles on a carcass.
 _FORM = {"drum_curvature": 0.1} | dict.fromkeys(
@@ -31,8 +27,6 @@ _FORM = {"drum_curvature": 0.1} | dict.fromkeys(
     ).split(),
     0.03,
 )
-_SIGNAL = 0.5  # of an output in its right unit: what else it may have in it
-LEAST_GAIN = 1.5  # of the held-out log score
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -74,12 +68,12 @@ def step_groups(
     """
     if not ranked:
         return []
-    near = min(_FAR_BEHIND * ranked[0].gain, ranked[0].gain - 40)
-    first = [one for one in ranked if one.gain > near][:_REFINED]
+    near = min(STEP.far_behind * ranked[0].gain, ranked[0].gain - STEP.near)
+    first = [one for one in ranked if one.gain > near][: STEP.refined]
     # What the refit may have absorbed is fitted with the first, however small it looks from there.
     first += [one for one in ranked if one.candidate.key in hidden and all(one is not each for each in first)]
-    behind = [one for one in ranked if all(one is not each for each in first)][:_REFINED]
-    return [(first, least), *([(behind, _MOST)] if behind else [])]
+    behind = [one for one in ranked if all(one is not each for each in first)][: STEP.refined]
+    return [(first, least), *([(behind, STEP.least_behind)] if behind else [])]
 
 
 def joint_fits(problem: Problem, base: Fit, promising: Sequence[Scored]) -> tuple[Joint, ...]:
@@ -114,14 +108,14 @@ def best_step(
     refitted : the held-out rows without any effect
     """
     form = max((_FORM.get(one.effect.name, 0.0) for one in base.active), default=0.0)
-    for one in joint[:_TRIED]:
+    for one in joint[: STEP.judged]:
         made = one.fit
         try:
             held = hold_out(problem, folds, made.active, made)
         except FitError:
             continue
         gain = held.total - held_base.total
-        if gain < LEAST_GAIN or one.score - base.log_posterior < LEAST_GAIN:
+        if gain < STEP.least_gain or one.score - base.log_posterior < STEP.least_gain:
             continue
         # One that a later effect drives to its bound is no better than one that starts there.
         if any(at_bound(each) for each in made.active) or not matters(problem, held_base, held, least):
@@ -149,7 +143,7 @@ def _shows(problem: Problem, held: HeldOut, one: Active) -> bool:
     kept = problem.kept[name]
     simulated = held.simulated[name][kept]
     left = problem.observed[name][kept] - simulated
-    return float(np.mean(left**2)) < _SIGNAL**2 * float(np.mean(simulated**2))
+    return float(np.mean(left**2)) < STEP.signal**2 * float(np.mean(simulated**2))
 
 
 def rivals(problem: Problem, chosen: Joint, joint: Sequence[Joint]) -> tuple[Rival, ...]:
@@ -202,7 +196,7 @@ def at_bound(one: Active) -> bool:
             continue
         value = one.values[parameter.name]
         for bound in parameter.bounds:
-            if math.isfinite(bound) and bound != 0 and abs(value - bound) < _BOUND * abs(bound):
+            if math.isfinite(bound) and bound != 0 and abs(value - bound) < STEP.bound * abs(bound):
                 return True
     return False
 

@@ -13,14 +13,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from toolkit.diagnosis.policy import LATTICE
+
 if TYPE_CHECKING:
     from numpy.typing import NDArray
-
-_FEWEST = 20
-_COARSE = 0.1  # of the residual's variance that rounding to the step must make
-_EXACT = 1e-3  # of a step, by which values may miss the lattice
-_FINER = 1.5  # a step of one last place is only how the file was printed
-_COARSER, _MANY = 10.0, 8  # a few values have a step of two or five places by chance
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -43,23 +39,24 @@ def lattice_of(values: NDArray[np.float64], residual_sd: float) -> Lattice | Non
     values : as recorded, (n,), without missing ones
     residual_sd : of what a simulation leaves of them
     """
-    if len(values) < _FEWEST:
+    if len(values) < LATTICE.fewest:
         return None
     steps = np.diff(np.unique(values))
     size = float(np.abs(values).max())
     steps = steps[steps > 1e-9 * max(size, 1e-300)]
-    if len(steps) < 3:
+    if len(steps) < LATTICE.fewest_steps:
         return None
     least = float(steps.min())
     counts = np.round(steps / least)
-    if np.abs(steps / least - counts).max() > _EXACT * max(float(counts.max()), 1.0):
+    if np.abs(steps / least - counts).max() > LATTICE.exact * max(float(counts.max()), 1.0):
         return None
     whole = float(np.sum(counts))
     step = float(np.sum(steps)) / whole
     printed = _last_place(values)
+    rounded = step**2 / 12  # variance of what rounding to a step takes away
     if (
-        step < (_FINER if len(steps) >= _MANY else _COARSER) * printed
-        or step**2 / 12 < _COARSE * residual_sd**2
+        step < (LATTICE.finer if len(steps) >= LATTICE.many else LATTICE.coarser) * printed
+        or rounded < LATTICE.coarse * residual_sd**2
     ):
         return None
     ends = _rounding(values, printed)

@@ -10,19 +10,18 @@ from typing import TYPE_CHECKING
 
 from toolkit.diagnosis.fit.fit import Fit, fit
 from toolkit.diagnosis.fit.folds import Folds, HeldOut, hold_out
+from toolkit.diagnosis.policy import STEP
 from toolkit.effects.dead_band import NOISE
 from toolkit.errors import FitError
 
 if TYPE_CHECKING:
     from toolkit.diagnosis.fit.problem import Problem
-    from toolkit.diagnosis.search.candidates import Candidate
+    from toolkit.diagnosis.search.candidates import CandidateEffect
     from toolkit.diagnosis.simulators.simulator import Active
-
-_BETTER = 2.0  # of the log posterior: noise that goes through a band is taken for more likely
 
 
 def refined(
-    problem: Problem, folds: Folds, base: Fit, held: HeldOut, listed: Sequence[Candidate]
+    problem: Problem, folds: Folds, base: Fit, held: HeldOut, listed: Sequence[CandidateEffect]
 ) -> tuple[Fit, HeldOut]:
     """Return the hypothesis that a search found with what its effects' sizes depend on.
 
@@ -43,7 +42,7 @@ def refined(
     # Rows inside a band have no noise, so that a fold's noise, and its score, hang on which rows it has: the
     # noise before a band is for the band's width alone, and the score stays that of the sharp one.
     for one in base.active:
-        base = _better(problem, base, _with_noise(base, one), _BETTER)
+        base = _better(problem, base, _with_noise(base, one), STEP.band_noise)
     return base, held
 
 
@@ -68,7 +67,7 @@ def _better(problem: Problem, base: Fit, active: tuple[Active, ...] | None, leas
     return made if made.log_posterior >= base.log_posterior + least else base
 
 
-def _with_zeros(base: Fit, listed: Sequence[Candidate]) -> tuple[Active, ...] | None:
+def _with_zeros(base: Fit, listed: Sequence[CandidateEffect]) -> tuple[Active, ...] | None:
     there = {one.channel for one in base.active if one.effect.name == "zero_offset"}
     wanted = {one.channel for one in base.active if one.effect.name == "thermal_drift"} - there
     zeros = tuple(

@@ -14,16 +14,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from toolkit.diagnosis.policy import SCREENING
+
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from toolkit.diagnosis.search.screen import Screen
-
-_DRAWS = 4_000
+    from toolkit.diagnosis.search.screen import LinearisedFit
 
 
 def search_p_values(
-    screen: Screen, blocks: Sequence[NDArray[np.float64]], gains: Sequence[float], seed: int
+    screen: LinearisedFit, blocks: Sequence[NDArray[np.float64]], gains: Sequence[float], seed: int
 ) -> list[float]:
     """Return for every statistic the chance that a search without an effect finds one as improbable.
 
@@ -34,38 +34,38 @@ def search_p_values(
     """
     if not blocks:
         return []
-    widths = [one.shape[1] for one in blocks]
+    widths = [block.shape[1] for block in blocks]
     stacked = np.hstack(blocks)
     gram = stacked.T @ stacked
     values, vectors = np.linalg.eigh(gram)
     keep = values > 1e-9 * max(float(values.max()), 1e-300)
     root = vectors[:, keep] * np.sqrt(values[keep])
     n = screen.n
-    left = max(n - screen.sizes.size - int(keep.sum()), 1)
+    dof = max(n - screen.sizes.size - int(keep.sum()), 1)
     rng = np.random.default_rng(seed)
-    normal = rng.standard_normal((_DRAWS, root.shape[1]))
+    normal = rng.standard_normal((SCREENING.draws, root.shape[1]))
     z = normal @ root.T
-    whole = (normal**2).sum(axis=1) + rng.chisquare(left, _DRAWS)
-    smallest = np.full(_DRAWS, math.inf)
+    total = (normal**2).sum(axis=1) + rng.chisquare(dof, SCREENING.draws)
+    smallest = np.full(SCREENING.draws, math.inf)
     starts = np.cumsum([0, *widths[:-1]])
     for width in sorted(set(widths) - {0}):
         chosen = starts[[i for i, one in enumerate(widths) if one == width]]
         part = sum(z[:, chosen + k] ** 2 for k in range(width))
-        share = np.asarray(part) / whole[:, None]
+        share = np.asarray(part) / total[:, None]
         statistic = -n * np.log1p(-np.minimum(share, 1 - 1e-9))
         smallest = np.minimum(smallest, _log_p(statistic.max(axis=1), width))
     smallest.sort()
-    found = []
+    p_values = []
     for gain, width in zip(gains, widths, strict=True):
         p = float(_log_p(np.array([max(gain, 0.0)]), max(width, 1))[0])
         below = int(np.searchsorted(smallest, p, side="right"))
-        if below >= 20:
-            found.append((below + 1) / (_DRAWS + 1))
+        if below >= SCREENING.fewest_draws:
+            p_values.append((below + 1) / (SCREENING.draws + 1))
         else:
             # Beyond what was drawn: Bonferroni on as many independent tests as the drawn tail shows.
-            tail = float(smallest[int(0.01 * _DRAWS)])
-            found.append(min(1.0, math.exp(min(0.0, p - tail)) * 0.01))
-    return found
+            tail = float(smallest[int(SCREENING.tail * SCREENING.draws)])
+            p_values.append(min(1.0, math.exp(min(0.0, p - tail)) * SCREENING.tail))
+    return p_values
 
 
 def _log_p(statistic: NDArray[np.float64], dof: int) -> NDArray[np.float64]:

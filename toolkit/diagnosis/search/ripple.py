@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolkit.diagnosis.simulators.simulator import Moving
+from toolkit.diagnosis.policy import RIPPLE
 from toolkit.errors import FitError
 
 if TYPE_CHECKING:
@@ -25,15 +25,11 @@ if TYPE_CHECKING:
     Stacked = dict[str, NDArray[np.float64]]
 
 NAME = "periodic_ripple"
-_CLOSE = 0.5  # cycles over the way from one period to the next
-_FEWEST, _MOST = 2.0, 200.0  # cycles over the way, of the longest and the shortest period
-_WORK = 4_000_000  # rows times periods
-_LEAST = 40
 
 
 def longest(problem: Problem, channel: str | None) -> float:
     """Return the longest period of which a motion shows that it repeats, in the position's unit."""
-    return float(_way(problem, channel)[0] / _FEWEST)
+    return float(_way(problem, channel)[0] / RIPPLE.longest)
 
 
 def periods(problem: Problem, channel: str | None) -> tuple[float, ...]:
@@ -42,13 +38,17 @@ def periods(problem: Problem, channel: str | None) -> tuple[float, ...]:
     if not whole > 0:
         return ()
     # Two rows to a period at the usual speed; where the motion is slower, shorter ones would still be seen.
-    most = min(_MOST, whole / (2 * step) if step > 0 else _MOST)
-    count = min(int((most - _FEWEST) / _CLOSE), max(_LEAST, _WORK // problem.rows))
-    return tuple(float(whole / cycles) for cycles in _FEWEST + _CLOSE * np.arange(max(count, 1)))
+    most = min(RIPPLE.shortest, whole / (2 * step) if step > 0 else RIPPLE.shortest)
+    count = min(
+        int((most - RIPPLE.longest) / RIPPLE.step),
+        max(RIPPLE.least, RIPPLE.work // problem.rows),
+    )
+    return tuple(float(whole / cycles) for cycles in RIPPLE.longest + RIPPLE.step * np.arange(max(count, 1)))
 
 
 def _way(problem: Problem, channel: str | None) -> tuple[float, float]:
-    return problem.model.way(channel) if isinstance(problem.model, Moving) else (0.0, 0.0)
+    moving = problem.model.capability.motion
+    return (0.0, 0.0) if moving is None else moving.way(channel)
 
 
 def responses(

@@ -10,15 +10,10 @@ import numpy as np
 from toolkit.diagnosis.fit.fit import Fit
 from toolkit.diagnosis.fit.lines import strongest_line
 from toolkit.diagnosis.fit.problem import Problem
-from toolkit.diagnosis.fit.structure import Group, groups
+from toolkit.diagnosis.fit.structure import SmoothDependence, groups
+from toolkit.diagnosis.policy import STEP, STRUCTURE
 from toolkit.diagnosis.search.null import search_p_values
-from toolkit.diagnosis.search.screen import Screen
-
-ALPHA_STRUCTURE = 0.0005
-NOTICED = 0.01  # of an error: a smaller gain is real perhaps, and matters to nobody
-_EXACT = 15  # groups whose gain is computed with the noise estimated anew
-_STATED = 1.1  # times a stated noise that a residual may have: certificates are round numbers
-_LINE, _LINE_SHARE = 1e-8, 0.05  # p-value and share of variance of a spectral line
+from toolkit.diagnosis.search.screen import LinearisedFit
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -31,59 +26,63 @@ class StructureFound:
     p_value: float
 
 
-def remainder(problem: Problem, screen: Screen, base: Fit, seed: int) -> tuple[StructureFound, ...]:
+def remainder(problem: Problem, screen: LinearisedFit, base: Fit, seed: int) -> tuple[StructureFound, ...]:
     """Return what stays unexplained about a fit, the largest first; nothing that matters to nobody."""
-    listed: list[Group] = groups(problem, base)
-    directions = [one.directions(problem) for one in listed]
-    quick = [screen.quick(one) for one in directions]
+    listed: list[SmoothDependence] = groups(problem, base)
+    directions = [dependence.directions(problem) for dependence in listed]
+    quick = [screen.quick(dependence) for dependence in directions]
     order = sorted(range(len(listed)), key=lambda i: -quick[i][0])
     gains = [gain for gain, _ in quick]
     trusts = [screen.trust(base.noise)] * len(listed)
     for place, i in enumerate(order):
-        if place < _EXACT:
+        if place < STRUCTURE.sharpened:
             gains[i], _, trusts[i] = screen.gain(directions[i])
-    least = min((gains[i] for i in order[:_EXACT]), default=0.0)
-    for i in order[_EXACT:]:
+    least = min((gains[i] for i in order[: STRUCTURE.sharpened]), default=0.0)
+    for i in order[STRUCTURE.sharpened :]:
         gains[i] = min(gains[i], least)
     weighed = [gain * trust for gain, trust in zip(gains, trusts, strict=True)]
     p_values = search_p_values(screen, [block for _, block in quick], weighed, seed)
-    found = [
-        StructureFound(output=one.output, variables=one.variables, gain=gain, p_value=p)
-        for one, gain, p in zip(listed, gains, p_values, strict=True)
-        if p < ALPHA_STRUCTURE and _share(problem, base, one) > 2 * NOTICED
+    findings = [
+        StructureFound(output=dependence.output, variables=dependence.variables, gain=gain, p_value=p)
+        for dependence, gain, p in zip(listed, gains, p_values, strict=True)
+        if p < STRUCTURE.alpha and _share(problem, base, dependence) > STEP.first
     ]
     for name in problem.names:
         line = strongest_line(problem, name, base.residual[name])
-        if line is not None and line.p_value < _LINE and line.share > _LINE_SHARE:
+        if line is not None and line.p_value < STRUCTURE.line and line.share > STRUCTURE.line_share:
             gain = -2 * math.log(max(line.p_value, 1e-300))
-            told = f"time (a line at {line.frequency:.4g} Hz)"
-            found.append(StructureFound(output=name, variables=(told,), gain=gain, p_value=line.p_value))
+            line_text = f"time (a line at {line.frequency:.4g} Hz)"
+            findings.append(
+                StructureFound(output=name, variables=(line_text,), gain=gain, p_value=line.p_value)
+            )
         beyond = _beyond_noise(problem, base, name)
         if beyond is not None:
-            found.append(beyond)
-    return tuple(sorted(found, key=lambda one: -one.gain))
+            findings.append(beyond)
+    return tuple(sorted(findings, key=lambda dependence: -dependence.gain))
 
 
 def _beyond_noise(problem: Problem, base: Fit, name: str) -> StructureFound | None:
     """Return the finding that a residual is larger than the sensor noise which a certificate states."""
     from scipy.stats import chi2
 
-    sd, kept = problem.sd_of(name), problem.kept[name]
-    if sd is None or kept.sum() < 10:
+    sd, counted = problem.sd_of(name), problem.kept[name]
+    if sd is None or counted.sum() < STRUCTURE.stated_rows:
         return None
     # Coarse steps add their own to what the sensor is stated to have.
-    ratio = float(np.mean(base.residual[name][kept] ** 2)) / (sd**2 + problem.floor[name] ** 2)
-    worth = max(kept.sum() / base.noise[name].correlation_rows, 3.0)
-    p = float(chi2.sf(ratio / _STATED**2 * worth, worth))
-    if p >= ALPHA_STRUCTURE:
+    ratio = float(np.mean(base.residual[name][counted] ** 2)) / (sd**2 + problem.floor[name] ** 2)
+    worth = max(counted.sum() / base.noise[name].correlation_rows, STRUCTURE.stated_worth)
+    p = float(chi2.sf(ratio / STRUCTURE.stated**2 * worth, worth))
+    if p >= STRUCTURE.alpha:
         return None
     gain = float(worth * (ratio - 1 - math.log(ratio)))
     return StructureFound(output=name, variables=("more than its stated noise",), gain=gain, p_value=p)
 
 
-def _share(problem: Problem, base: Fit, group: Group) -> float:
+def _share(problem: Problem, base: Fit, group: SmoothDependence) -> float:
     """Return the share of a residual's variance that a group's columns explain."""
-    kept = problem.kept[group.output]
-    residual, columns = base.residual[group.output][kept], group.columns[kept]
-    found = np.linalg.lstsq(columns, residual, rcond=None)[0]
-    return 1 - float(np.sum((residual - columns @ found) ** 2)) / max(float(np.sum(residual**2)), 1e-300)
+    counted = problem.kept[group.output]
+    residual, columns = base.residual[group.output][counted], group.columns[counted]
+    coefficients = np.linalg.lstsq(columns, residual, rcond=None)[0]
+    return 1 - float(np.sum((residual - columns @ coefficients) ** 2)) / max(
+        float(np.sum(residual**2)), 1e-300
+    )

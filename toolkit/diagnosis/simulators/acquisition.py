@@ -10,7 +10,7 @@ import numpy as np
 from toolkit.calibration.apply import apply_record
 from toolkit.diagnosis.simulators.channels import through_channels
 from toolkit.diagnosis.simulators.setting import nominal_load, setting
-from toolkit.diagnosis.simulators.simulator import Active, Output
+from toolkit.diagnosis.simulators.simulator import Active, Capability, Output
 from toolkit.effects.effect import Effect
 from toolkit.errors import ConfigError, RecordError
 from toolkit.units import unit
@@ -59,6 +59,15 @@ class AcquisitionModel:
                 rule="case",
             )
         self.case, self.record = case, record
+        self.capability = Capability(
+            nominal_load_N=None,
+            cells=record.indications,
+            unsure={},
+            findings=(),
+            repeats=None,
+            together=None,
+            motion=None,
+        )
         self._others = {one.id: one for one in others if one.id != record.id}
         self.parameters = case.parameters
         self.outputs = tuple(

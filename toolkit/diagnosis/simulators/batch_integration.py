@@ -34,7 +34,7 @@ class NotTogetherError(Exception):
 
 def columns_of(sets: Sequence[Mapping[str, float]]) -> dict[str, Array]:
     """Return sets of parameters as one, each value a row of columns (m,)."""
-    return {name: np.array([one[name] for one in sets], dtype=np.float64) for name in sets[0]}
+    return {name: np.array([values[name] for values in sets], dtype=np.float64) for name in sets[0]}
 
 
 def takes_columns(

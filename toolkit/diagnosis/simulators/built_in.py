@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from toolkit.diagnosis.case.case import CaseParameter
-from toolkit.diagnosis.simulators.channel_units import unit_of
-from toolkit.diagnosis.simulators.simulator import Active, Model, Moving
+from toolkit.diagnosis.simulators.parameter_units import unit_of
+from toolkit.diagnosis.simulators.simulator import Active, Capability, Model
 from toolkit.effects.sense import computed_in
 from toolkit.errors import ConfigError
 from toolkit.findings import Finding
@@ -52,56 +52,71 @@ class _BuiltIn:
         return dataclasses.replace(self.active, values={**self.active.values, **values})
 
 
-def build_in(case: Case, model: Model) -> None:
-    """Put the effects of a case's own simulation into its model, for good.
+class WithEffects:
+    """A simulation with the effects of its own case in it, in every question that is asked of it.
 
     Raises
     ------
     ConfigError
         ``model-place``: an effect acts on what this case does not have, or in another dimension
     """
-    if not case.effects:
-        return
-    own = {one.name for one in model.parameters}
-    built: list[_BuiltIn] = []
-    free: list[CaseParameter] = []
-    for one, names in zip(case.effects, parameter_names(case.effects), strict=True):
-        made, parameters = _built(case, model, one, names)
-        built.append(made)
-        free += parameters
-    model.parameters = (*model.parameters, *free)
-    plain, places = model.simulate, model.places
-    repeats, prepare = getattr(model, "repeats", None), getattr(model, "prepare", None)
 
-    def only_own(p: Mapping[str, float]) -> dict[str, float]:
-        return {name: value for name, value in p.items() if name in own}
+    def __init__(self, case: Case, plain: Model) -> None:
+        self._plain = plain
+        self._own = {one.name for one in plain.parameters}
+        pairs = [
+            _built(case, plain, effect, names)
+            for effect, names in zip(case.effects, parameter_names(case.effects), strict=True)
+        ]
+        self._effects = [effect for effect, _ in pairs]
+        self.outputs = plain.outputs
+        self.parameters = (*plain.parameters, *(one for _, free in pairs for one in free))
+        self.capability = self._wrapped(plain.capability)
 
-    def with_them(p: Mapping[str, float], active: Sequence[Active]) -> tuple[Active, ...]:
-        return (*(one.at(p) for one in built), *active)
+    def _wrapped(self, plain: Capability) -> Capability:
+        repeats, together, motion = plain.repeats, plain.together, plain.motion
+        if repeats is not None:
+            plain = dataclasses.replace(plain, repeats=lambda run, p: repeats(run, self._parameters(p)))
+        if together is not None:
+            plain = dataclasses.replace(
+                plain,
+                together=lambda run, sets: together(
+                    run, [(self._parameters(p), self._all(p, active)) for p, active in sets]
+                ),
+            )
+        if motion is not None:
+            pushed = motion.pushed
+            motion = dataclasses.replace(
+                motion,
+                pushed=lambda run, p, active, channel, pattern: pushed(
+                    run, self._parameters(p), self._all(p, active), channel, pattern
+                ),
+            )
+        return dataclasses.replace(plain, motion=motion)
 
-    def simulate(run: Run, p: Mapping[str, float], active: Sequence[Active]) -> Arrays:
-        return plain(run, only_own(p), with_them(p, active))
+    def _parameters(self, p: Mapping[str, float]) -> dict[str, float]:
+        return {name: value for name, value in p.items() if name in self._own}
 
-    def not_yet(effect: Effect) -> list[tuple[str | None, str | None]]:
+    def _all(self, p: Mapping[str, float], active: Sequence[Active]) -> tuple[Active, ...]:
+        return (*(one.at(p) for one in self._effects), *active)
+
+    def observed(self, run: Run) -> Arrays:
+        """Return what was recorded of every output."""
+        return self._plain.observed(run)
+
+    def simulate(self, run: Run, p: Mapping[str, float], active: Sequence[Active]) -> Arrays:
+        """Return every output of a run, the simulation's own effects before those that are added."""
+        return self._plain.simulate(run, self._parameters(p), self._all(p, active))
+
+    def places(self, effect: Effect) -> list[tuple[str | None, str | None]]:
+        """Return where a further effect could act."""
         # Steps on steps of the same size are no second effect, and the recording would name them again.
-        taken = {
-            one.active.channel for one in built if one.active.effect.name == effect.name == "quantisation"
+        stepped = {
+            one.active.channel
+            for one in self._effects
+            if one.active.effect.name == effect.name == "quantisation"
         }
-        return [place for place in places(effect) if place[0] not in taken]
-
-    model.simulate = simulate  # type: ignore[method-assign]
-    model.places = not_yet  # type: ignore[method-assign]
-    if repeats is not None:
-        model.repeats = lambda run, p: repeats(run, only_own(p))  # type: ignore[attr-defined]
-    if prepare is not None:
-        model.prepare = lambda run, sets: prepare(  # type: ignore[attr-defined]
-            run, [(only_own(p), with_them(p, active)) for p, active in sets]
-        )
-    if isinstance(model, Moving):
-        pushed = model.pushed
-        model.pushed = lambda run, p, active, *more: pushed(  # type: ignore[method-assign]
-            run, only_own(p), with_them(p, active), *more
-        )
+        return [place for place in self._plain.places(effect) if place[0] not in stepped]
 
 
 def parameter_names(effects: Sequence[ModelEffect]) -> tuple[tuple[str, ...], ...]:

@@ -8,17 +8,22 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from toolkit.calibration.apply import apply_record
+from toolkit.calibration.records.record import CalibrationRecord, from_bytes
+from toolkit.calibration.registry.registry import Registry
+from toolkit.diagnosis.policy import SURFACE
 from toolkit.diagnosis.simulators.channels import channel_places, undone
 from toolkit.diagnosis.simulators.simulator import Active, Output
 from toolkit.effects.effect import Effect
 from toolkit.effects.signals import Setting
 from toolkit.errors import ConfigError
+from toolkit.files import read_bytes
 from toolkit.units import unit
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from numpy.typing import NDArray
 
-    from toolkit.calibration.records.record import CalibrationRecord
     from toolkit.diagnosis.case.case import Case, Run
 
 
@@ -31,11 +36,10 @@ _BY_VALUE = (
     "filter_lag",
     "channel_delay",
 )
-_LEAST_ROWS = 20  # of a run, to tell what its cells carried from its loads
 _ON_TARE = ("channel_sign", "sensitivity_error", "unit_error")
 
 
-class Cells:
+class CaseCells:
     """Recorded cells and the record that turns them into loads, with the tare of the case's tare runs."""
 
     def __init__(self, case: Case, record: CalibrationRecord) -> None:
@@ -121,7 +125,7 @@ class Cells:
         columns += [run.columns[name] for name in ("FZ",) if np.isfinite(run.columns.get(name, np.nan)).all()]
         there = np.column_stack([*columns, np.ones(len(shown))])
         good = np.isfinite(there).all(axis=1) & np.isfinite(shown)
-        if int(good.sum()) < _LEAST_ROWS:
+        if int(good.sum()) < SURFACE.cell_rows:
             return shown
         return np.asarray(there @ np.linalg.lstsq(there[good], shown[good], rcond=None)[0])
 
@@ -205,3 +209,21 @@ class Cells:
                     made[output.name] + (shown[output.name] - without[output.name]) / unit(output.unit).factor
                 )
         return made
+
+
+def record_of(case: Case, calibrations: Path | None) -> CalibrationRecord:
+    """Return the calibration that a case names: a path beside the case file, or a registry's id."""
+    named = case.simulation.calibration
+    path = case.path.parent / named
+    if path.is_file():
+        return from_bytes(read_bytes(path), where=path)
+    if calibrations is None:
+        raise ConfigError(
+            "the case names a calibration and there is no registry",
+            where=f"{case.path}: simulation.calibration",
+            got=named,
+            expected="the path of a record beside the case, or a home with calibrations/",
+            next_step="give --calibrations DIR",
+            rule="case",
+        )
+    return Registry(calibrations).load(named)

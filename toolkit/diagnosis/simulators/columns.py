@@ -17,7 +17,7 @@ import numpy as np
 from toolkit.diagnosis.simulators.channels import channel_places, through_channels
 from toolkit.diagnosis.simulators.motion import AlongMotion, Motion, motion_of
 from toolkit.diagnosis.simulators.setting import NOMINAL_SPEED, nominal_load, setting
-from toolkit.diagnosis.simulators.simulator import Active, Output
+from toolkit.diagnosis.simulators.simulator import Active, Capability, Output
 from toolkit.diagnosis.simulators.surface import Surface
 from toolkit.diagnosis.simulators.tire import (
     base_drive,
@@ -33,6 +33,8 @@ from toolkit.errors import ConfigError
 from toolkit.units import unit
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from numpy.typing import NDArray
 
     from toolkit.diagnosis.case.case import Case, Run
@@ -83,9 +85,17 @@ class ColumnsModel(AlongMotion):
         drivers = {one.name for one in case.drivers}
         is_tire = bool(drivers & {"SA", "SA_CMD"}) and bool({"FY", "MZ"} & set(named))
         self._surface = Surface(case) if is_tire else None
-        self.findings = () if self._surface is None else self._surface.too_coarse()
-        self.unsure = {} if self._surface is None else self._surface.unsure
         self.motion: Motion | None = None if is_tire else motion_of(case)
+        findings = () if self._surface is None else self._surface.too_coarse()
+        self.capability = Capability(
+            nominal_load_N=None,
+            cells=(),
+            unsure={} if self._surface is None else self._surface.unsure,
+            findings=findings,
+            repeats=None,
+            together=None,
+            motion=self.moving(),
+        )
 
     def observed(self, run: Run) -> dict[str, NDArray[np.float64]]:
         """Return what was recorded of every output, where the other program has a value too."""
@@ -178,6 +188,11 @@ class ColumnsModel(AlongMotion):
             loaded = late(loads, active, run, here, lambda one: steady(one.SA, one))
             result["FZ"] = result["FZ"] if loaded is None else loaded.FZ
         return result
+
+
+def build(case: Case, _: Path | None) -> ColumnsModel:
+    """Return the simulation of a case of this kind; ConfigError where an output has no column."""
+    return ColumnsModel(case)
 
 
 def _whole(run: Run, name: str) -> NDArray[np.float64]:

@@ -102,7 +102,7 @@ def _advance(
     states of a plant that takes less than half the time of arrays.
     """
     of = range(len(x))
-    bends = {one.bend for one in slides}
+    bends = {slide.bend for slide in slides}
     y: list[float] = x.tolist()
     (a21,), (a31, a32), (a41, a42, a43), (a51, a52, a53, a54), (a61, a62, a63, a64, a65) = A
     b1, _, b3, b4, b5, b6 = B

@@ -9,10 +9,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from toolkit.diagnosis.simulators.cells import Cells
+from toolkit.calibration.registry.registry import Registry
+from toolkit.diagnosis.simulators.acquisition import AcquisitionModel
+from toolkit.diagnosis.simulators.cells import CaseCells, record_of
 from toolkit.diagnosis.simulators.channels import channel_places, through_channels
 from toolkit.diagnosis.simulators.setting import setting, si
-from toolkit.diagnosis.simulators.simulator import Active, Output
+from toolkit.diagnosis.simulators.simulator import Active, Capability, Output
 from toolkit.diagnosis.simulators.tir_tire import TirTire
 from toolkit.diagnosis.simulators.tire import (
     base_drive,
@@ -27,14 +29,17 @@ from toolkit.effects.effect import Effect
 from toolkit.effects.filters import followed
 from toolkit.effects.signals import Drive, TireForces
 from toolkit.errors import ConfigError
+from toolkit.machine import load_machine
+from toolkit.tires.tir import TirFile, read_tir
 from toolkit.units import unit
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from numpy.typing import NDArray
 
     from toolkit.calibration.records.record import CalibrationRecord
     from toolkit.diagnosis.case.case import Case, Run
-    from toolkit.tires.tir import TirFile
 
 # Numbers of the machine definition that the simulation of FY and MZ depends on or may be asked for.
 _MACHINE_NUMBERS = {"drum.speed": "speed", "drum.circumference": "length", "cells.pitch_diameter": "length"}
@@ -45,13 +50,20 @@ class MachineModel:
     """A tire file of the Magic Formula on a machine definition, with the cells' calibration."""
 
     def __init__(self, case: Case, tir: TirFile, record: CalibrationRecord | None, speed_m_s: float) -> None:
-
         self.case = case
         self._tire = TirTire(tir)
-        self.findings = tir.findings()
         self._speed = speed_m_s
-        self._load = self.nominal_load_N = self._tire.FNOMIN
-        self.cells = None if record is None else Cells(case, record)
+        self._load = self._tire.FNOMIN
+        self.cells = None if record is None else CaseCells(case, record)
+        self.capability = Capability(
+            nominal_load_N=self._load,
+            cells=() if self.cells is None else self.cells.names,
+            unsure={},
+            findings=tir.findings(),
+            repeats=None,
+            together=None,
+            motion=None,
+        )
         self.parameters = case.parameters
         for one in case.parameters:
             if one.name in _MACHINE_NUMBERS:
@@ -222,3 +234,38 @@ def _check_dimension(case: Case, name: str, text: str) -> None:
             next_step="correct the unit",
             rule="case",
         )
+
+
+def build(case: Case, calibrations: Path | None) -> MachineModel | AcquisitionModel:
+    """Return the simulation of a case of this kind: a tire on the machine, or the acquisition alone.
+
+    Raises
+    ------
+    ConfigError
+        no tire, or a tire file, calibration or channel that cannot be used
+    """
+    machine = load_machine(case.simulation.machine)
+    record = record_of(case, calibrations) if case.simulation.calibration else None
+    roles = {one.name: one.role for one in case.channels}
+    if record is not None and all(roles.get(name) == "input" for name in record.indications):
+        return AcquisitionModel(case, record, _others(calibrations))
+    if case.simulation.tire is None:
+        raise ConfigError(
+            "the simulation has no tire",
+            where=f"{case.path}: simulation.tire",
+            got="nothing",
+            expected='tire = "tire.tir", or the cells as inputs with a calibration',
+            next_step="name the tire file",
+            rule="case",
+        )
+    # Where FY and MZ are given in place of the cells, a calibration has nothing to be applied to.
+    if record is not None and not any(name in roles for name in record.indications):
+        record = None
+    return MachineModel(case, read_tir(case.simulation.tire), record, machine.drum.speed_m_s)
+
+
+def _others(calibrations: Path | None) -> tuple[CalibrationRecord, ...]:
+    if calibrations is None:
+        return ()
+    registry = Registry(calibrations)
+    return tuple(record for instrument in registry.instruments() for record in registry.usable(instrument)[0])

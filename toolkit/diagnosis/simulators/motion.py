@@ -19,7 +19,7 @@ import numpy as np
 from toolkit.diagnosis.simulators.channels import slopes
 from toolkit.diagnosis.simulators.linear_response import integrated
 from toolkit.diagnosis.simulators.setting import dimension
-from toolkit.diagnosis.simulators.simulator import Active
+from toolkit.diagnosis.simulators.simulator import Active, MotionSizes, Moving
 from toolkit.effects.effect import Effect
 from toolkit.units import unit
 
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from toolkit.diagnosis.case.case import Case, Run
-    from toolkit.diagnosis.simulators.simulator import Pattern
+    from toolkit.diagnosis.simulators.simulator import Largest, Pattern
     from toolkit.effects.signals import Setting
 
 _LENGTHS, _SPEEDS = ("length", "angle"), ("speed", "rad/s", "angular_speed")
@@ -57,7 +57,28 @@ class Motion:
             return []
         return [(self.output, None)]
 
-    def scales(self) -> tuple[float, float, float]:
+    def sizes(self, force: float, largest: Largest) -> MotionSizes:
+        """Return sizes of the motion; those of the recorded channels where the output is a force."""
+        if self.kind == "force":
+            speed = largest(self.velocity) if self.velocity else 1.0
+            place = largest(self.position) if self.position else 1.0
+        else:
+            force, speed, place = self._scales()
+        return MotionSizes(
+            force=force, speed=speed, place=place, fastest=speed, farthest=place, level=place,
+            has_position=self.position is not None,
+        )  # fmt: skip
+
+    def units(self) -> tuple[str, str, str]:
+        """Return units of a force-like term, of its velocity and of its position."""
+        output = self.case.unit(self.output)
+        if self.kind == "force":
+            speed = "1" if self.velocity is None else self.case.unit(self.velocity)
+            return output, speed, f"{speed}*s" if self.position is None else self.case.unit(self.position)
+        length = output if self.kind == "position" else f"{output}*s"
+        return f"{length}/s^2", f"{length}/s", length
+
+    def _scales(self) -> tuple[float, float, float]:
         """Return sizes of acceleration, velocity and position of an output that moves."""
         run = max(self.case.runs, key=lambda one: one.rows)
         y = run.columns[self.output]
@@ -160,27 +181,27 @@ class AlongMotion(ABC):
     ) -> dict[str, NDArray[np.float64]]:
         """Return every output of a run with effects in it."""
 
-    def way(self, _channel: str | None) -> tuple[float, float]:
-        """Return the longest way of a run and the usual one between rows, nothing where nothing moves."""
-        return (0.0, 0.0) if self.motion is None else self.motion.way()
+    def moving(self) -> Moving | None:
+        """Return what moves along the recordings, None where their units show no motion."""
+        motion = self.motion
+        if motion is None:
+            return None
 
-    def pushed(
-        self,
-        run: Run,
-        p: Mapping[str, float],
-        active: Sequence[Active],
-        _channel: str | None,
-        pattern: Pattern,
-    ) -> dict[str, NDArray[np.float64]]:
-        """Return what small forces of a pattern over the position add to every output, (rows, forces)."""
-        if self.motion is None:
-            return {}
-        # The class's own: a model file's effects, which wrap that of the instance, are in `active` already.
-        made = type(self).simulate(self, run, p, [one for one in active if one.effect.channel is None])
-        shown = slopes(made, active, run, self.setting(run), run.columns)
-        return {
-            name: shown[name][:, None] * one for name, one in self.motion.pushed(made, run, pattern).items()
-        }
+        def sizes(channel: str | None, largest: Largest) -> MotionSizes:
+            return motion.sizes(largest(channel), largest)
+
+        def pushed(
+            run: Run, p: Mapping[str, float], active: Sequence[Active], _: str | None, pattern: Pattern
+        ) -> dict[str, NDArray[np.float64]]:
+            simulated = self.simulate(run, p, [one for one in active if one.effect.channel is None])
+            shown = slopes(simulated, active, run, self.setting(run), run.columns)
+            responses = motion.pushed(simulated, run, pattern)
+            return {name: shown[name][:, None] * column for name, column in responses.items()}
+
+        return Moving(
+            integrates=False, sizes=sizes, units=lambda _: motion.units(), way=lambda _: motion.way(),
+            pushed=pushed,
+        )  # fmt: skip
 
 
 def _step(

@@ -19,20 +19,23 @@ from toolkit.diagnosis.simulators.equation import Equation, failed
 from toolkit.diagnosis.simulators.forces import Forces
 from toolkit.diagnosis.simulators.integrate import IntegrationError, integrate
 from toolkit.diagnosis.simulators.linear_response import propagated
-from toolkit.diagnosis.simulators.python import silenced
+from toolkit.diagnosis.simulators.parameter_units import reduced
 from toolkit.diagnosis.simulators.setting import nominal_load, setting
-from toolkit.diagnosis.simulators.simulator import Active, Output
+from toolkit.diagnosis.simulators.simulator import Active, Capability, MotionSizes, Moving, Output
 from toolkit.diagnosis.simulators.states import dimensions, fitting
+from toolkit.diagnosis.simulators.user_code import load_functions, silenced
 from toolkit.effects.effect import Effect
 from toolkit.effects.filters import STRAIGHT
 from toolkit.effects.signals import Setting
 from toolkit.errors import ConfigError, FitError
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from numpy.typing import NDArray
 
     from toolkit.diagnosis.case.case import Case, Run
-    from toolkit.diagnosis.simulators.simulator import Pattern
+    from toolkit.diagnosis.simulators.simulator import Largest, Pattern
 
 ATOL = 1e-7  # of a state's spread over a run; before that is known, a hundredth of it of one
 _FINER = 4
@@ -85,6 +88,18 @@ class OdeModel:
         self.scale: dict[str, tuple[float, float]] = {}
         self.scale = self._sizes(p)
         self._takes_columns = self._tried(p)
+        self.capability = Capability(
+            nominal_load_N=None,
+            cells=(),
+            unsure={},
+            findings=(),
+            repeats=None,
+            together=self._prepare,
+            motion=Moving(
+                integrates=True, sizes=self._motion_sizes, units=self._motion_units, way=self._way,
+                pushed=self._pushed,
+            ),
+        )  # fmt: skip
 
     def _tried(self, p: Mapping[str, float]) -> bool:
         run = self.case.runs[0]
@@ -114,9 +129,9 @@ class OdeModel:
             )
             for i, name in enumerate(self.states)
         }
-        self.largest = {name: float(x[i].max()) for i, name in enumerate(self.states)}
+        self._largest = {name: float(x[i].max()) for i, name in enumerate(self.states)}
         farthest = np.abs(x).max(axis=1)
-        self.reach = {
+        self._reach = {
             name: (float(farthest[i]) or 1.0, float(farthest[self._derivative_of.get(i, i)]) or 1.0)
             for i, name in enumerate(self.states)
         }
@@ -129,12 +144,35 @@ class OdeModel:
             for i, name in enumerate(self.states)
         }
 
-    def way(self, channel: str | None) -> tuple[float, float]:
-        """Return the longest way of a run on the position of a velocity state, and the usual one a row."""
+    def _motion_sizes(self, channel: str | None, _: Largest) -> MotionSizes:
+        state = str(channel)
+        rate, own = self.scale[state]
+        position = self.position_of(state)
+        place = own if position is None else self.scale[position][1]
+        fastest, farthest = self._reach[state]
+        return MotionSizes(
+            force=rate, speed=own, place=place, fastest=fastest, farthest=farthest,
+            # A state that starts at zero and only falls has no level to run over.
+            level=self._largest[state] or place, has_position=position is not None,
+        )  # fmt: skip
+
+    def _motion_units(self, channel: str | None) -> tuple[str, str, str]:
+        state, recorded = str(channel), {one.name: one.unit for one in self.case.channels}
+        force = self.force_units.get(state) or f"{recorded.get(state, '1')}/s"
+        rate = "m/s^2" if force == "N/kg" else force
+
+        def of(name: str, implied: str) -> str:
+            text = recorded.get(name, "1")
+            return implied if text == "1" else text
+
+        speed, position = of(state, reduced(f"{rate}*s")), self.position_of(state)
+        return force, speed, speed if position is None else of(position, f"{speed}*s")
+
+    def _way(self, channel: str | None) -> tuple[float, float]:
         position = self.position_of(str(channel))
         return (0.0, 0.0) if position is None else self._ways[position]
 
-    def pushed(
+    def _pushed(
         self,
         run: Run,
         p: Mapping[str, float],
@@ -203,7 +241,7 @@ class OdeModel:
         made = through_channels(kept, fine, finer, self.setting(finer), finer.columns)
         return {name: values[::_FINER] for name, values in made.items()}
 
-    def prepare(self, run: Run, wanted: Sequence[tuple[Mapping[str, float], Sequence[Active]]]) -> None:
+    def _prepare(self, run: Run, wanted: Sequence[tuple[Mapping[str, float], Sequence[Active]]]) -> None:
         """Integrate several sets of parameters and effects at once, for `simulate` to find."""
         if not self._takes_columns or run.rows < 2:
             return
@@ -344,3 +382,8 @@ class OdeModel:
         if run not in self._settings:
             self._settings[run] = setting(self.case, run, nominal_load_N=nominal_load(self.case))
         return self._settings[run]
+
+
+def build(case: Case, _: Path | None) -> OdeModel:
+    """Return the simulation of a case of this kind; ConfigError where its file lacks a function."""
+    return OdeModel(case, *load_functions(case.file(), "rhs", "outputs", "initial"))

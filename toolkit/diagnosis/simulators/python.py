@@ -2,21 +2,16 @@
 
 from __future__ import annotations
 
-import contextlib
-import difflib
-import io
-import warnings
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from numbers import Real
-from pathlib import Path
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from toolkit.diagnosis.simulators.channels import channel_places, through_channels
 from toolkit.diagnosis.simulators.motion import AlongMotion, Motion, motion_of
 from toolkit.diagnosis.simulators.setting import NOMINAL_SPEED, nominal_load, setting
-from toolkit.diagnosis.simulators.simulator import Active, Output
+from toolkit.diagnosis.simulators.simulator import Active, Capability, Output
 from toolkit.diagnosis.simulators.tire import (
     base_drive,
     late,
@@ -25,13 +20,15 @@ from toolkit.diagnosis.simulators.tire import (
     tire_places,
     tire_signs,
 )
+from toolkit.diagnosis.simulators.user_code import load_functions, silenced
 from toolkit.effects.effect import Effect
 from toolkit.effects.signals import Drive, Setting, TireForces
-from toolkit.errors import ConfigError, FitError
-from toolkit.files import read_regular
+from toolkit.errors import FitError
 from toolkit.units import unit
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from numpy.typing import NDArray
 
     from toolkit.diagnosis.case.case import Case, Run
@@ -58,6 +55,15 @@ class PythonModel(AlongMotion):
             {"FY", "MZ"} & {one.name for one in self.outputs}
         )
         self.motion: Motion | None = None if self._is_tire else motion_of(case)
+        self.capability = Capability(
+            nominal_load_N=None,
+            cells=(),
+            unsure={},
+            findings=(),
+            repeats=self._repeats,
+            together=None,
+            motion=self.moving(),
+        )
 
     def observed(self, run: Run) -> dict[str, NDArray[np.float64]]:
         """Return what was recorded of every output."""
@@ -93,7 +99,7 @@ class PythonModel(AlongMotion):
             self._kept[key] = self._called(run, p, changed)
         return self._kept[key]
 
-    def repeats(self, run: Run, p: Mapping[str, float]) -> None:
+    def _repeats(self, run: Run, p: Mapping[str, float]) -> None:
         """Refuse a simulator that answers one question in two ways: its noise would pass for physics."""
         first, again = self.call(run, p, {}), self._called(run, p, {})
         for name, values in first.items():
@@ -213,55 +219,9 @@ class PythonModel(AlongMotion):
         return made
 
 
-def load_functions(path: Path, *names: str) -> tuple[Callable[..., Any], ...]:
-    """Return functions of one Python file, which is run once and may import its neighbours.
-
-    Raises
-    ------
-    ConfigError
-        the file raises or ends the process, or has no such function
-    """
-    import sys
-    import types
-
-    space = types.ModuleType(f"simulator_{abs(hash(path.resolve()))}")
-    space.__file__ = str(path)
-    # Dataclasses and pickles look their module up by name.
-    sys.modules[space.__name__] = space
-    folder = str(path.resolve().parent)
-    if folder not in sys.path:
-        sys.path.append(folder)
-    try:
-        with silenced():
-            exec(compile(read_regular(path), str(path), "exec"), space.__dict__)  # noqa: S102
-    except (Exception, SystemExit) as error:
-        raise ConfigError(
-            "the simulator cannot be loaded", where=path, got=f"{type(error).__name__}: {error}",
-            expected=f"a Python file with {names[0]}(..)", next_step="run the file by itself and mend it",
-            rule="simulator",
-        ) from error  # fmt: skip
-    made = []
-    for name in names:
-        function = getattr(space, name, None)
-        if not callable(function):
-            own = [key for key, one in vars(space).items() if callable(one) and not key.startswith("_")]
-            near = difflib.get_close_matches(name, own, n=1, cutoff=0.5)
-            raise ConfigError(
-                f"the simulator has no function {name!r}", where=path, got=", ".join(own) or "no functions",
-                expected=f"def {name}(..)",
-                next_step=f"did you mean {near[0]!r}?" if near else "name the function in the case",
-                rule="simulator",
-            )  # fmt: skip
-        made.append(cast("Callable[..., Any]", function))
-    return tuple(made)
-
-
-@contextlib.contextmanager
-def silenced() -> Iterator[None]:
-    """Keep what a simulator prints and warns out of our own output."""
-    with contextlib.redirect_stdout(io.StringIO()), np.errstate(all="ignore"), warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        yield
+def build(case: Case, _: Path | None) -> PythonModel:
+    """Return the simulation of a case of this kind; ConfigError where its file has no such function."""
+    return PythonModel(case, *load_functions(case.file(), case.simulation.function))
 
 
 def _failed(case: Case, run: Run, got: str) -> FitError:

@@ -32,12 +32,16 @@ def setting(
 ) -> Setting:
     """Return the setting of a run; its channels are all drivers, in SI."""
     channels = {
-        one.name: si(case, one.name, run.columns[one.name]) for one in case.drivers if one.name in run.columns
+        channel.name: si(case, channel.name, run.columns[channel.name])
+        for channel in case.drivers
+        if channel.name in run.columns
     }
     first = {}
-    for one in case.drivers:
-        source = next((r for r in case.runs if one.name in r.columns), run)
-        first[one.name] = float(si(case, one.name, source.columns[one.name])[0]) if source.rows else 0.0
+    for channel in case.drivers:
+        source = next((r for r in case.runs if channel.name in r.columns), run)
+        first[channel.name] = (
+            float(si(case, channel.name, source.columns[channel.name])[0]) if source.rows else 0.0
+        )
     return Setting(
         t=run.t,
         elapsed_s=elapsed(case, run),
@@ -81,15 +85,15 @@ def nominal_load(case: Case) -> float:
     """
     if case.nominal_load_N is not None:
         return case.nominal_load_N
-    for one in case.parameters:
-        named = one.name.replace("_", "").upper() in _NOMINAL_LOADS
-        if named and dimension(one.unit) == dimension("N") and one.value > 0:
-            return one.value * unit(one.unit).factor
+    for parameter in case.parameters:
+        named = parameter.name.replace("_", "").upper() in _NOMINAL_LOADS
+        if named and dimension(parameter.unit) == dimension("N") and parameter.value > 0:
+            return parameter.value * unit(parameter.unit).factor
     loads = [
         si(case, name, run.columns[name])
         for run in case.runs
         for name in ("FZ", "FZ_CMD")
-        if name in run.columns and any(one.name == name for one in case.channels)
+        if name in run.columns and any(channel.name == name for channel in case.channels)
     ]
     if not loads:
         return 4000.0

@@ -43,12 +43,20 @@ def held(slides: Sequence[Slide], before: list[float]) -> Callable[[list[float]]
     It raises TurnedError for a state in which a body has turned.
     """
     known = []
-    for one in slides:
-        if before[one.velocity] == 0:
+    for slide in slides:
+        if before[slide.velocity] == 0:
             return None
-        way = math.copysign(1.0, before[one.velocity])
+        way = math.copysign(1.0, before[slide.velocity])
         known.append(
-            (one.bend, one.velocity, one.way, way, before[one.bend] - way, before[one.way], one.reach)
+            (
+                slide.bend,
+                slide.velocity,
+                slide.way,
+                way,
+                before[slide.bend] - way,
+                before[slide.way],
+                slide.reach,
+            )
         )
 
     def hold(y: list[float]) -> None:

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from toolkit.diagnosis.policy import SURFACE
 from toolkit.diagnosis.simulators.gaussian_process import Process, cells_of, likeliest, thinned
 from toolkit.diagnosis.simulators.setting import nominal_load
 from toolkit.diagnosis.simulators.tire import base_drive, rotation
@@ -19,14 +20,10 @@ if TYPE_CHECKING:
     from toolkit.diagnosis.case.case import Case, Run
 
 _OUTPUTS = ("FY", "MZ")
-_ENOUGH = 0.02  # of the simulated output's spread that the surface may miss
 _POINTS, _TRIED = 400, 130  # through which it goes, and by which its shape is chosen
 _FINE, _LOADS = 121, 17  # of the table that stands for it in simulations
 _LEAST = 0.05  # nominal loads, below which a force is no longer counted to its load
 _NO_STATE = frozenset(("date", "order", "repeat_of"))
-# An angle that is left out has neighbours twice as far away as a point between angles has, and an
-# interpolation of third order is off by the third power of that.
-_CLOSER = 8.0
 
 
 class Surface:
@@ -39,7 +36,7 @@ class Surface:
 
     def __init__(self, case: Case) -> None:
         self._load = nominal_load(case)
-        self._fits: dict[tuple[str, str], _Table] = {}
+        self._fits: dict[tuple[str, str], _FineGrid] = {}
         self.good = True
         self.between: dict[str, float] = {}
         self.unsure: dict[str, float] = {}
@@ -71,12 +68,12 @@ class Surface:
         shape = likeliest(points[few], y[few] / over[few])
         many = thinned(points, _POINTS)
         found = Process(shape, points[many], y[many] / over[many])
-        self._fits[name, way] = _Table(found, self._slips, self._loads)
+        self._fits[name, way] = _FineGrid(found, self._slips, self._loads)
         missed = float(np.sqrt(np.mean((over * self._fits[name, way].at(points) - y) ** 2)))
-        if missed > _ENOUGH * max(float(np.std(y)), 1e-300):
+        if missed > SURFACE.missed * max(float(np.std(y)), 1e-300):
             self.good = False
         left_out = over[many] * found.left_out()
-        between = float(np.sqrt(np.mean(left_out**2))) / _CLOSER
+        between = float(np.sqrt(np.mean(left_out**2))) / SURFACE.closer
         self.between[name] = max(between, self.between.get(name, 0.0))
 
     def too_coarse(self) -> tuple[Finding, ...]:
@@ -131,7 +128,7 @@ def _refuse_other_ways(case: Case) -> None:
             )
 
 
-class _Table:
+class _FineGrid:
     """A process on a fine grid, with cubic splines between: at a thousand rows a hundred times faster."""
 
     def __init__(self, found: Process, slips: tuple[float, float], loads: tuple[float, float]) -> None:
@@ -156,7 +153,7 @@ def scatter(case: Case, name: str, load_N: float) -> float | None:
     Nothing changes within one slip angle, load and condition; which run of several it is does not count, nor
     its date. None where no place has two rows.
     """
-    stated = next((one.sd for one in case.outputs if one.name == name), None)
+    stated = next((output.sd for output in case.outputs if output.name == name), None)
     if stated is not None:
         return stated
     places: dict[object, list[float]] = {}

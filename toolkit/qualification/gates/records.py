@@ -93,8 +93,8 @@ def _replaced(file: str, old: bytes, new: bytes) -> Callable[[Path], object]:
 
 def _first_load(change: Callable[[LoadFit], LoadFit]) -> Change:
     def alter(record: CalibrationRecord) -> CalibrationRecord:
-        first, *rest = record.loads
-        return dataclasses.replace(record, loads=(change(first), *rest))
+        first, *others = record.loads
+        return dataclasses.replace(record, loads=(change(first), *others))
 
     return alter
 
@@ -129,8 +129,8 @@ def _exchange_loads(folder: Path) -> None:
     data = path.read_bytes().replace(b",3000.0,", b",3100.0,")
     path.write_bytes(data)
     files = tuple(
-        dataclasses.replace(one, sha256=sha256_bytes(data)) if one.role == "loads" else one
-        for one in record.data
+        dataclasses.replace(part, sha256=sha256_bytes(data)) if part.role == "loads" else part
+        for part in record.data
     )
     forge(folder, dataclasses.replace(record, data=files))
 

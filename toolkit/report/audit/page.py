@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from toolkit.audit.since_good import DriftedFile, DriftedTest
 from toolkit.calibration.records.use import mark_of
+from toolkit.characteristics.catalogue import summary
 from toolkit.files import atomic_path
 from toolkit.recording.marks import OWN_OUTPUT
 from toolkit.report.audit.svg import COLOURS, rows_of, timeline
@@ -40,9 +41,6 @@ _HEAD = (
     "reports",
 )
 _KINDS = ("text", "grade", "text", "text", "text", "date", "number", "number", "text")
-_NAMES = {
-    "cornering_stiffness": "cornering stiffness", "aligning_stiffness": "aligning stiffness",
-}  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -195,23 +193,24 @@ def _effects(made: ArchiveAudit) -> Iterator[str]:
     yield "of all "
     yield f"loads; the {_TESTS} tests that change most.</p><div class=scroll><table><thead><tr><th>test</th>"
     yield "<th>date</th><th class=n>files not right</th>"
-    names = ("cornering_stiffness", "aligning_stiffness", "conicity", "plysteer", "CRAT", "PRAT")
-    units = ("%", "%", "N", "N", "N·m", "N·m")
-    for name, unit in zip(names, units, strict=True):
-        yield f"<th class=n>{_NAMES.get(name, name)} [{unit}]</th>"
+    characteristics = summary()
+    for one in characteristics:
+        unit = "%" if one.scope == "direction" else one.printed_unit.replace("*", "·")
+        yield f"<th class=n>{str(one.summary).replace('_', ' ')} [{unit}]</th>"
     yield "</tr></thead><tbody>"
     for _, test in worst:
         yield f"<tr><td>{escape(test['test'])}</td><td class=d>{test['date']}</td>"
         yield f"<td class=n>{test['not_clean']} of {test['files']}</td>"
-        for name in names:
-            yield f"<td class=n>{_largest(test['effects'], name)}</td>"
+        for one in characteristics:
+            percent = one.scope == "direction"
+            yield f"<td class=n>{_largest(test['effects'], str(one.summary), percent=percent)}</td>"
         yield "</tr>"
     yield "</tbody></table></div>"
 
 
-def _largest(effects: Sequence[Mapping[str, Any]], name: str) -> str:
+def _largest(effects: Sequence[Mapping[str, Any]], name: str, *, percent: bool = False) -> str:
     changes = [
-        100 * one["change"] / abs(one["old"]) if name.endswith("stiffness") and one["old"] else one["change"]
+        100 * one["change"] / abs(one["old"]) if percent and one["old"] else one["change"]
         for one in effects
         if one["name"] == name
     ]

@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from toolkit.diagnosis.answer.failed_runs import Refused
+from toolkit.diagnosis.answer.failed_runs import FailedRuns
 from toolkit.diagnosis.simulators.simulator import Active
 from toolkit.effects.catalogue import effects
 from toolkit.errors import FitError
@@ -25,19 +25,19 @@ def _friction(size):
 
 
 def test_an_effect_that_never_could_be_simulated_is_told_and_one_that_sometimes_could_is_not():
-    refused = Refused(_simulate)
+    failed = FailedRuns(_simulate)
     drag = Active(effect=effects()["quadratic_drag"], channel="v", values={"drag": 1.0})
     for active in ([_friction(3.0)], [_friction(1.0), drag], [drag]):
         with pytest.raises(FitError):
-            refused(RUN, {"m": 1.0}, active)
-    refused(RUN, {"m": 1.0}, [_friction(1.0)])
-    refused(RUN, {"m": 1.0}, [])
-    (found,) = refused.findings(CASE)
+            failed(RUN, {"m": 1.0}, active)
+    failed(RUN, {"m": 1.0}, [_friction(1.0)])
+    failed(RUN, {"m": 1.0}, [])
+    (found,) = failed.findings(CASE)
     assert (found.rule, found.level) == ("effect-not-simulated", "note")
     assert "quadratic_drag on v" in found.message
 
 
 def test_nothing_is_told_where_every_simulation_gave_numbers():
-    refused = Refused(_simulate)
-    refused(RUN, {"m": 1.0}, [_friction(1.0)])
-    assert refused.findings(CASE) == ()
+    failed = FailedRuns(_simulate)
+    failed(RUN, {"m": 1.0}, [_friction(1.0)])
+    assert failed.findings(CASE) == ()

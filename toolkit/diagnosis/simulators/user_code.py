@@ -1,14 +1,71 @@
-"""What a simulator of others may do to the process that runs it: nothing that outlives its run."""
+"""Code of others: loaded from its file, silenced, and kept from changing the process that runs it."""
 
 from __future__ import annotations
 
 import contextlib
 import ctypes
+import difflib
+import io
 import os
 import sys
-from collections.abc import Iterator
+import types
+import warnings
+from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import TextIO
+from typing import Any, TextIO, cast
+
+import numpy as np
+
+from toolkit.errors import ConfigError
+from toolkit.files import read_regular
+
+
+def load_functions(path: Path, *names: str) -> tuple[Callable[..., Any], ...]:
+    """Return functions of one Python file, which is run once and may import its neighbours.
+
+    Raises
+    ------
+    ConfigError
+        the file raises or ends the process, or has no such function
+    """
+    space = types.ModuleType(f"simulator_{abs(hash(path.resolve()))}")
+    space.__file__ = str(path)
+    # Dataclasses and pickles look their module up by name.
+    sys.modules[space.__name__] = space
+    folder = str(path.resolve().parent)
+    if folder not in sys.path:
+        sys.path.append(folder)
+    try:
+        with silenced():
+            exec(compile(read_regular(path), str(path), "exec"), space.__dict__)  # noqa: S102
+    except (Exception, SystemExit) as error:
+        raise ConfigError(
+            "the simulator cannot be loaded", where=path, got=f"{type(error).__name__}: {error}",
+            expected=f"a Python file with {names[0]}(..)", next_step="run the file by itself and mend it",
+            rule="simulator",
+        ) from error  # fmt: skip
+    made = []
+    for name in names:
+        function = getattr(space, name, None)
+        if not callable(function):
+            own = [key for key, one in vars(space).items() if callable(one) and not key.startswith("_")]
+            near = difflib.get_close_matches(name, own, n=1, cutoff=0.5)
+            raise ConfigError(
+                f"the simulator has no function {name!r}", where=path, got=", ".join(own) or "no functions",
+                expected=f"def {name}(..)",
+                next_step=f"did you mean {near[0]!r}?" if near else "name the function in the case",
+                rule="simulator",
+            )  # fmt: skip
+        made.append(cast("Callable[..., Any]", function))
+    return tuple(made)
+
+
+@contextlib.contextmanager
+def silenced() -> Iterator[None]:
+    """Keep what a simulator prints and warns out of our own output."""
+    with contextlib.redirect_stdout(io.StringIO()), np.errstate(all="ignore"), warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        yield
 
 
 @contextlib.contextmanager

@@ -1,12 +1,14 @@
-"""Units of an effect's parameters in a case: the placeholders of the catalogue filled in."""
+"""An effect's parameters as a case has them: their units, and the signs of its axes."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Iterator
 
+from toolkit.channels import Axes
 from toolkit.diagnosis.case.case import Case
 from toolkit.diagnosis.simulators.simulator import Active, Model
+from toolkit.effects.sense import computed_in
 
 
 def unit_of(case: Case, model: Model, active: Active, name: str) -> str:
@@ -15,10 +17,20 @@ def unit_of(case: Case, model: Model, active: Active, name: str) -> str:
     if "{" not in text:
         return text
     if active.effect.stage == "dynamics":
-        force, velocity, position = _motion(case, model, active)
+        motion = model.capability.motion
+        own = channel_unit(case, model, active.channel)
+        force, velocity, position = (own, "1", "1") if motion is None else motion.units(active.channel)
         return reduced(text.format(force=force, velocity=velocity, position=position))
     own, other = channel_unit(case, model, active.channel), channel_unit(case, model, active.source)
     return reduced(text.format_map({"channel": _bracketed(own, text), "from": _bracketed(other, text)}))
+
+
+def sense(active: Active, parameter: str, axes: Axes) -> int:
+    """Return the factor, +1 or -1, of a parameter's value in the case's axes, the drum running forward.
+
+    Inside, values have the signs of SAE and of the machine's axes.
+    """
+    return computed_in(active.effect.name, parameter, axes)
 
 
 def _bracketed(unit: str, text: str) -> str:
@@ -35,33 +47,6 @@ def channel_unit(case: Case, model: Model, name: str | None) -> str:
         if each.name == name:
             return each.unit
     return "1"
-
-
-def _motion(case: Case, model: Model, active: Active) -> tuple[str, str, str]:
-    forces = getattr(model, "force_units", None)
-    if forces is not None:
-        state = str(active.channel)
-        position = model.position_of(state)  # type: ignore[attr-defined]
-        force = forces.get(state) or f"{channel_unit(case, model, state)}/s"
-        rate = "m/s^2" if force == "N/kg" else force
-        speed = _state(case, model, state, reduced(f"{rate}*s"))
-        return force, speed, speed if position is None else _state(case, model, position, f"{speed}*s")
-    motion = getattr(model, "motion", None)
-    own = channel_unit(case, model, active.channel)
-    if motion is None:
-        return own, "1", "1"
-    if motion.kind == "force":
-        speed = channel_unit(case, model, motion.velocity)
-        place = f"{speed}*s" if motion.position is None else channel_unit(case, model, motion.position)
-        return own, speed, place
-    length = own if motion.kind == "position" else f"{own}*s"
-    return f"{length}/s^2", f"{length}/s", length
-
-
-def _state(case: Case, model: Model, name: str, derived: str) -> str:
-    """Return the unit of a state: that of the output of its name, else what its equation implies."""
-    unit = channel_unit(case, model, name)
-    return derived if unit == "1" else unit
 
 
 _PARTS = re.compile(r"[()*/]|\^\d|[^\W\d]+|°|%|1")
