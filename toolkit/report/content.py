@@ -132,7 +132,11 @@ class ReportContent:
     def draft_reasons(self) -> tuple[str, ...]:
         """Why this is a draft; empty where it is none."""
         return tuple(
-            dict.fromkeys(f"{one.id}: {reason}" for one in self.calibrations for reason in one.draft_reasons)
+            dict.fromkeys(
+                f"{calibration.id}: {reason}"
+                for calibration in self.calibrations
+                for reason in calibration.draft_reasons
+            )
         )
 
     def holds(self, name: str) -> bool:
@@ -182,8 +186,8 @@ def say_table(table: Table, words: Mapping[str, str]) -> Table:
     ours = [column.name in _OWN_COLUMNS for column in table.columns]
     rows = tuple(
         tuple(
-            say(cell, words) if own and isinstance(cell, str) else cell
-            for own, cell in zip(ours, row, strict=True)
+            say(cell, words) if our and isinstance(cell, str) else cell
+            for our, cell in zip(ours, row, strict=True)
         )
         for row in table.rows
     )
@@ -203,5 +207,5 @@ def say_plot(plot: Plot, words: Mapping[str, str], alt: Mapping[str, str]) -> Pl
         caption=say(plot.caption, words),
         watermark=None if plot.watermark is None else say(plot.watermark, words),
         legend_title=None if plot.legend_title is None else say(plot.legend_title, words),
-        curves=tuple(replace(one, label=say(one.label, words)) for one in plot.curves),
+        curves=tuple(replace(curve, label=say(curve.label, words)) for curve in plot.curves),
     )

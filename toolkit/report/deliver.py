@@ -91,7 +91,7 @@ class Delivered:
     def warnings(self) -> tuple[str, ...]:
         """What a person should look at although the report was delivered."""
         said = [f"{one.rule}: {one.message}" for one in self.filled.lint]
-        said += [f"{one.name}: {one.message}" for one in self.checks if not one.ok]
+        said += [f"{check.name}: {check.message}" for check in self.checks if not check.ok]
         said += [f"missing-value: {tag} prints a visible mark" for tag in self.filled.missing]
         said += [
             f"mark-added: the template has no place for the mark {name!r}" for name in self.filled.marks_added
@@ -272,10 +272,10 @@ class _Run:
         digest = content_hash(self.filled, job.template)
         names = job.names()
         if job.provenance is not None:
-            outputs = [self._stage() / one for one in names if one != MANIFEST]
+            outputs = [self._stage() / name for name in names if name != MANIFEST]
             text = manifest_json(job.provenance, job.content, job.template, digest, outputs)
             (self._stage() / MANIFEST).write_text(text, encoding="utf-8")
-        targets = _hand_over([self._stage() / one for one in names], job.out)
+        targets = _hand_over([self._stage() / name for name in names], job.out)
         beside = 2 + len(job.companions)
         self.delivered = Delivered(
             docx=targets[0],
@@ -306,7 +306,7 @@ class _Run:
 
 
 def _demand(checks: list[Check]) -> None:
-    failed = [one for one in checks if not one.ok and not one.warning]
+    failed = [check for check in checks if not check.ok and not check.warning]
     if failed:
         raise RenderError(
             "the report was not verified and is not delivered",
@@ -346,7 +346,7 @@ def _hand_over(files: list[Path], out: Path) -> list[Path]:
 
     try:
         out.mkdir(parents=True, exist_ok=True)
-        targets = [out / one.name for one in files]
+        targets = [out / file.name for file in files]
         for source, target in zip(files, targets, strict=True):
             source.replace(target)
         sync_folder(out)

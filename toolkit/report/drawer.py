@@ -133,16 +133,16 @@ def _work(hands: int) -> None:
             thread.join()
 
 
-def _pass_on(drawn: IO[bytes], told: threading.Lock) -> None:
+def _pass_on(drawn: IO[bytes], lock: threading.Lock) -> None:
     # Taken as it comes: a pipe holds one figure or two, and its writer would stand still.
     with contextlib.suppress(EOFError):
         while True:
             name, picture = pickle.load(drawn)  # noqa: S301  a copy of this process wrote it
-            _tell(name, picture, told)
+            _tell(name, picture, lock)
 
 
-def _tell(name: str, picture: Picture, told: threading.Lock) -> None:
-    with told:
+def _tell(name: str, picture: Picture, lock: threading.Lock) -> None:
+    with lock:
         sys.stdout.buffer.write(pickle.dumps((name, picture)))
         sys.stdout.buffer.flush()
 

@@ -212,7 +212,7 @@ def _chopped(word: str) -> list[str]:
             pieces[-1] += part
         else:
             pieces += [part[i : i + room] for i in range(0, len(part), room)]
-    return [one for one in pieces if one]
+    return [piece for piece in pieces if piece]
 
 
 def _legend(figure: Figure, plot: Plot) -> None:

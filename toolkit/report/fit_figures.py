@@ -56,9 +56,9 @@ def fit_plots(data: Measured, curves: Sequence[CurveFit], models: Sequence[Model
 
     shown, _, _ = binned(data)
     plots = []
-    for name in dict.fromkeys(one.model for one in curves):
+    for name in dict.fromkeys(curve.model for curve in curves):
         for channel in ("FY", "MZ"):
-            own = [one for one in curves if one.model == name and one.channel == channel]
+            own = [curve for curve in curves if curve.model == name and curve.channel == channel]
             if own and channel in data.channels:
                 plots += _pair(shown, name, channel, _of_loads(own))
     for fit in models:
@@ -80,7 +80,7 @@ def fit_plots(data: Measured, curves: Sequence[CurveFit], models: Sequence[Model
 
 
 def _of_loads(fits: Sequence[CurveFit]) -> Evaluate:
-    loads = np.array([one.load_N or 0.0 for one in fits])
+    loads = np.array([fit.load_N or 0.0 for fit in fits])
 
     def evaluate(SA: np.ndarray, load: float) -> np.ndarray | None:
         nearest = int(np.argmin(np.abs(loads - load)))

@@ -31,7 +31,7 @@ def content_hash(filled: Filled, template: Template) -> str:
         "cells": [row for at, row in enumerate(filled.cells) if at not in filled.rows_of_the_run],
         "figures": [[tag, alt] for tag, alt in filled.figures],
         "pictures": filled.pictures,
-        "contents": [[one.text, one.level] for one in filled.contents.entries],
+        "contents": [[entry.text, entry.level] for entry in filled.contents.entries],
     }
     return sha256_bytes(json.dumps(told, ensure_ascii=False, separators=(",", ":")).encode())
 
@@ -56,10 +56,11 @@ def manifest_json(
         "template": {"name": template.path.name, "sha256": template.sha256},
         "draft": bool(content.draft_reasons),
         "draft_reasons": list(content.draft_reasons),
-        "calibrations": [one.as_dict() for one in content.calibrations],
+        "calibrations": [calibration.as_dict() for calibration in content.calibrations],
         **provenance,
         "outputs": [
-            {"name": one.name, "sha256": sha256_file(one), "bytes": one.stat().st_size} for one in outputs
+            {"name": output.name, "sha256": sha256_file(output), "bytes": output.stat().st_size}
+            for output in outputs
         ],
     }
     return json.dumps(told, ensure_ascii=False, indent=2) + "\n"

@@ -64,9 +64,9 @@ class Style:
         table = dict(self.decimals)
         return next((table[name] for name in names if name in table), None)
 
-    def in_units_of(self, other: Style) -> Style:
+    def in_units_of(self, style: Style) -> Style:
         """Return this style with the units of forces and moments of another one."""
-        return replace(self, force=other.force, moment=other.moment)
+        return replace(self, force=style.force, moment=style.moment)
 
     def unit(self, unit: str | None) -> tuple[str | None, float]:
         """Return a report unit in the organisation's choice, and the factor from the SI-side one."""

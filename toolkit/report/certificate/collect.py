@@ -116,10 +116,10 @@ def collect(
         reference=statements.reference.standard,
         reference_certificate=statements.reference.certificate,
         reference_uncertainties=tuple(
-            (one.load, one.U, one.k, record.load(one.load).unit)
-            if one.relative is None
-            else (one.load, 100 * one.relative, one.k, "% of the applied load")
-            for one in statements.reference.uncertainties
+            (uncertainty.load, uncertainty.U, uncertainty.k, record.load(uncertainty.load).unit)
+            if uncertainty.relative is None
+            else (uncertainty.load, 100 * uncertainty.relative, uncertainty.k, "% of the applied load")
+            for uncertainty in statements.reference.uncertainties
         ),
         rule=stated.rule,
         interval=stated.interval,
@@ -184,7 +184,7 @@ def _admit(
         raise not_in_force(
             record.id, reasons, where=record.id, expected=expected, rule="certificate-candidate"
         )
-    return tuple(one.text for one in reasons)
+    return tuple(reason.text for reason in reasons)
 
 
 def _identity(record: CalibrationRecord, stated: Stated, replaces: str | None, amendment: str | None) -> str:
@@ -222,18 +222,18 @@ def _found_session(registry: Registry, found: AsFound) -> FoundSession | None:
     )
 
 
-def _adjustment(statements: Statements, found: AsFound | None) -> str:
+def _adjustment(statements: Statements, as_found: AsFound | None) -> str:
     if statements.phase is None:
         return "No adjustment or repair is stated: the results hold for the item as it was calibrated."
     if statements.phase == "as_found":
         text = "The results are those of the item as found, before any adjustment."
     else:
         text = "The results are those of the item as left, after adjustment."
-    if found is None:
+    if as_found is None:
         return f"{text} There is no record of the results before the adjustment."
-    if found.reason is not None:
-        return f"{text} As found could not be judged: {found.reason}."
-    return f"{text} As found is judged by {found.record}, the record in force when the item came in."
+    if as_found.reason is not None:
+        return f"{text} As found could not be judged: {as_found.reason}."
+    return f"{text} As found is judged by {as_found.record}, the record in force when the item came in."
 
 
 def _same_number(registry: Registry, record: CalibrationRecord, stated: Stated) -> str | None:

@@ -130,7 +130,7 @@ class LoadResult:
     def verdict(self) -> Verdict | None:
         """The least favourable statement of the check loads; None where none was made."""
         order = list(VERDICTS)
-        stated = [one.verdict for one in self.checks]
+        stated = [check.verdict for check in self.checks]
         if not stated or None in stated:
             return None
         return max((one for one in stated if one), key=order.index)
@@ -138,7 +138,7 @@ class LoadResult:
     @property
     def not_stated(self) -> tuple[str, ...]:
         """Components of the budget for which nothing was stated or measured."""
-        return tuple(one.name for one in self.parts if not one.stated)
+        return tuple(part.name for part in self.parts if not part.stated)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -217,4 +217,4 @@ class Certificate:
     @property
     def unverifiable(self) -> tuple[tuple[str, str], ...]:
         """Return (load, term) of every term that the check loads could not verify."""
-        return tuple((one.load, term) for one in self.loads for term in one.unverifiable)
+        return tuple((load.load, term) for load in self.loads for term in load.unverifiable)

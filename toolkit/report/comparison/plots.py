@@ -49,9 +49,9 @@ def _plot(comparison: Comparison, figure: Figure, drawn: Characteristic, style: 
         said.append(f"{entry.label}: {listed} {load_unit}")
     if len(curves) < 2:
         return None
-    simulated = any(one.simulated for one in comparison.entries)
-    words = (*(one.word for one in comparison.uses), "SIMULATED" if simulated else None)
-    mark = " - ".join(dict.fromkeys(one for one in words if one))
+    simulated = any(entry.simulated for entry in comparison.entries)
+    words = (*(use.word for use in comparison.uses), "SIMULATED" if simulated else None)
+    mark = " - ".join(dict.fromkeys(word for word in words if word))
     title = figure.title + (f", {drawn.series_label}, drum forward" if drawn.scope == "direction" else "")
     title = title[:1].upper() + title[1:]
     return Plot(

@@ -63,40 +63,40 @@ DIAGNOSIS: Document[Told] = Document(
 )
 
 
-def _summary(told: Told, style: Style) -> str:
+def _summary(source: Told, style: Style) -> str:
     sentences = []
-    for one in told.answer.held_out:
-        if told.answer.effects:
+    for one in source.answer.held_out:
+        if source.answer.effects:
             ends = f"from {_n(one.refitted_rmse, style)} to {_n(one.augmented_rmse, style)} {_unit(one.unit)}"
         else:
             ends = f"is {_n(one.refitted_rmse, style)} {_unit(one.unit)}"
         sentences.append(f"{one.channel} {ends} (noise {_n(one.noise_floor, style)})")
-    fell = "With the effects the error on held-out rows falls: " if told.answer.effects else None
+    fell = "With the effects the error on held-out rows falls: " if source.answer.effects else None
     text = f"{fell or 'Error on held-out rows: '}{'; '.join(sentences)}."
-    return " ".join([text if sentences else "Nothing was fitted.", *_rests_on(told)])
+    return " ".join([text if sentences else "Nothing was fitted.", *_rests_on(source)])
 
 
-def _rests_on(told: Told) -> list[str]:
+def _rests_on(source: Told) -> list[str]:
     # On which calibration a cause rests stands beside it also where a report has no table of its findings.
-    if told.case is not None:
+    if source.case is not None:
         return []
-    rests = (finding for finding in told.answer.findings if finding.rule == "case-calibration")
+    rests = (finding for finding in source.answer.findings if finding.rule == "case-calibration")
     return [f"{finding.message.capitalize()}." for finding in rests]
 
 
-def _opinion(told: Told, _style: Style) -> str | None:
-    if not told.answer.effects:
+def _opinion(source: Told, _style: Style) -> str | None:
+    if not source.answer.effects:
         return None
     return " ".join(
-        f"{_label(one)}" + (f", or {', '.join(one.equivalent_to)}" if one.equivalent_to else "")
-        + f": {one.statement}"
-        for one in told.answer.effects
+        f"{_label(effect)}" + (f", or {', '.join(effect.equivalent_to)}" if effect.equivalent_to else "")
+        + f": {effect.statement}"
+        for effect in source.answer.effects
     )  # fmt: skip
 
 
-def _where(told: Told, style: Style) -> str | None:
+def _where(source: Told, style: Style) -> str | None:
     sentences = []
-    for one in told.answer.mismatch:
+    for one in source.answer.mismatch:
         share = _n(100 * one.share_of_variance, style)
         text = f"{one.channel}: {share} % of the residual's variance is structure"
         if one.share_of_variance < 0.005:
@@ -109,62 +109,62 @@ def _where(told: Told, style: Style) -> str | None:
     return " ".join(sentences) or None
 
 
-def _remains(told: Told, _style: Style) -> str:
-    if told.answer.depends_on:
-        listed = "; ".join(over(channel, names) for channel, names in told.answer.depends_on[:6])
+def _remains(source: Told, _style: Style) -> str:
+    if source.answer.depends_on:
+        listed = "; ".join(over(channel, names) for channel, names in source.answer.depends_on[:6])
         return f"Structure that no named effect explains, a description and not physics: {listed}."
-    if told.answer.remaining == "unknown":
+    if source.answer.remaining == "unknown":
         return "Not judged: no search was made, or none to its end."
     return (
         "Nothing that stands out of the noise, down to the sizes that the answer lists for effects not found."
     )
 
 
-def _not_observable(told: Told, _style: Style) -> str | None:
+def _not_observable(source: Told, _style: Style) -> str | None:
     why: dict[str, list[str]] = {}
-    for one in told.answer.not_found:
+    for one in source.answer.not_found:
         if not one.observable:
-            why.setdefault(one.why or "not told by these recordings", []).append(one.name)
+            why.setdefault(one.why or "not source by these recordings", []).append(one.name)
     return " ".join(f"{reason.capitalize()}: {', '.join(names)}." for reason, names in why.items()) or None
 
 
-def _case(told: Told, _style: Style) -> str:
-    digest = f"SHA-256 {told.answer.case_sha256}"
-    return digest if told.case is None else f"{told.case.path.name}, {digest}"
+def _case(source: Told, _style: Style) -> str:
+    digest = f"SHA-256 {source.answer.case_sha256}"
+    return digest if source.case is None else f"{source.case.path.name}, {digest}"
 
 
-def _released(told: Told, _style: Style) -> str | None:
-    released = f"released by {told.by}" if told.by else "draft: nobody authorised has released it"
-    return released if told.answer.effects else None
+def _released(source: Told, _style: Style) -> str | None:
+    released = f"released by {source.by}" if source.by else "draft: nobody authorised has released it"
+    return released if source.answer.effects else None
 
 
-def _held_out_by(told: Told, _style: Style) -> str:
-    return f"Held out by {told.answer.held_out_by}; each in turn, the fits made on the rest."
+def _held_out_by(source: Told, _style: Style) -> str:
+    return f"Held out by {source.answer.held_out_by}; each in turn, the fits made on the rest."
 
 
-def _complete(told: Told, _style: Style) -> str | None:
-    answer = told.answer
+def _complete(source: Told, _style: Style) -> str | None:
+    answer = source.answer
     return None if answer.complete else f"The budget was spent at: {', '.join(answer.skipped)}."
 
 
 _text = DIAGNOSIS.text
 VALUES = (
-    _text("id", "identification of the diagnosis, made from its case", lambda told, _: told.id),
-    _text("title", "title of the case", lambda told, _: told.answer.title),
-    _text("verdict", "verdict in one sentence", lambda told, _: headline(told.answer)),
+    _text("id", "identification of the diagnosis, made from its case", lambda source, _: source.id),
+    _text("title", "title of the case", lambda source, _: source.answer.title),
+    _text("verdict", "verdict in one sentence", lambda source, _: headline(source.answer)),
     _text("summary", "what was found, in one sentence with numbers; a result", _summary),
     _text(
         "opinion", "what is taken for the cause: an opinion, not a result (ISO/IEC 17025, 7.8.7)", _opinion
     ),
     _text("opinion_by", "who has released the opinion", _released),
-    _text("basis", "what the opinion rests on", lambda told, _: _BASIS if told.answer.effects else None),
+    _text("basis", "what the opinion rests on", lambda source, _: _BASIS if source.answer.effects else None),
     _text("where", "where the mismatch is", _where),
     _text("held_out_by", "what was held out", _held_out_by),
     _text("remains", "what remains unexplained", _remains),
     _text("not_observable", "effects of which these recordings can tell nothing, and why", _not_observable),
     _text("case", "case file and its hash, which covers the recordings", _case),
     _text("complete", "what a spent budget left out", _complete),
-    finding_table(DIAGNOSIS, "diagnosis_findings", "file or channel", lambda told: told.answer.findings),
+    finding_table(DIAGNOSIS, "diagnosis_findings", "file or channel", lambda source: source.answer.findings),
 )
 
 
@@ -178,9 +178,9 @@ VALUES = (
     equation|its equation
     """,
 )
-def found(told: Told, _style: Style) -> Rows:
+def found(source: Told, _style: Style) -> Rows:
     """Return the effects."""
-    for effect in told.answer.effects:
+    for effect in source.answer.effects:
         yield _label(effect), ", ".join(effect.equivalent_to) or "-", effect.statement, effect.equation
 
 
@@ -196,9 +196,9 @@ def found(told: Told, _style: Style) -> Rows:
     runs|runs in which it acts
     """,
 )
-def found_parameters(told: Told, style: Style) -> Rows:
+def found_parameters(source: Told, style: Style) -> Rows:
     """Return the parameters of the effects."""
-    for effect in told.answer.effects:
+    for effect in source.answer.effects:
         for parameter in effect.parameters:
             value, interval = parameter.value, parameter.ci95
             yield (
@@ -221,12 +221,12 @@ def found_parameters(told: Told, style: Style) -> Rows:
     noise|noise floor
     """,
 )
-def errors(told: Told, style: Style) -> Rows:
+def errors(source: Told, style: Style) -> Rows:
     """Return the errors of every output."""
-    for fit in told.answer.held_out:
+    for fit in source.answer.held_out:
         yield (
             fit.channel, _unit(fit.unit), _n(fit.nominal_rmse, style), _n(fit.refitted_rmse, style),
-            _n(fit.augmented_rmse, style) if told.answer.effects else "-", _n(fit.noise_floor, style),
+            _n(fit.augmented_rmse, style) if source.answer.effects else "-", _n(fit.noise_floor, style),
         )  # fmt: skip
 
 
@@ -239,9 +239,9 @@ def errors(told: Told, style: Style) -> Rows:
     less|log-likelihood less than with the effect
     """,
 )
-def rejected(told: Told, style: Style) -> Rows:
+def rejected(source: Told, style: Style) -> Rows:
     """Return the alternatives to each effect, the best six."""
-    for effect in told.answer.effects:
+    for effect in source.answer.effects:
         for name, less in effect.rejected[:6]:
             yield _label(effect), name, _n(-less, style)
 
@@ -258,9 +258,9 @@ def rejected(told: Told, style: Style) -> Rows:
     shift|change over the prior standard deviation
     """,
 )
-def nominal(told: Told, style: Style) -> Rows:
+def nominal(source: Told, style: Style) -> Rows:
     """Return the parameters of the simulation."""
-    for parameter in told.answer.nominal_parameters:
+    for parameter in source.answer.nominal_parameters:
         prior, shift = parameter.prior_sd, parameter.shift_in_sd
         yield (
             parameter.name, _unit(parameter.unit), _n(parameter.before, style, 6),
@@ -279,31 +279,31 @@ def nominal(told: Told, style: Style) -> Rows:
     unit|unit
     """,
 )
-def not_found(told: Told, style: Style) -> Rows:
+def not_found(source: Told, style: Style) -> Rows:
     """Return the effects that these recordings could have shown."""
-    for effect in told.answer.not_found:
+    for effect in source.answer.not_found:
         if effect.observable:
             size = effect.minimum_detectable
             yield effect.name, "-" if size is None else _n(size, style), _unit(effect.unit) or "-"
 
 
 @DIAGNOSIS.table("next", "what to measure next", "measure|measurement")
-def next_measurements(told: Told, _style: Style) -> Rows:
+def next_measurements(source: Told, _style: Style) -> Rows:
     """Return the measurements that the answer advises."""
-    return ((text,) for text in told.answer.next_measurements)
+    return ((text,) for text in source.answer.next_measurements)
 
 
 @DIAGNOSIS.figures(
     {"diagnosis_errors": "error on held-out rows over the noise, before and after: the chart of ten seconds"}
 )
-def errors_chart(told: Told, style: Style) -> Iterator[Plot]:
+def errors_chart(source: Told, style: Style) -> Iterator[Plot]:
     """Return the chart, where something was fitted."""
-    if told.answer.held_out:
-        yield errors_plot(told.answer, style)
+    if source.answer.held_out:
+        yield errors_plot(source.answer, style)
 
 
-def _label(one: FoundEffect) -> str:
-    return f"{one.name} on {one.channel}" if one.channel else one.name
+def _label(effect: FoundEffect) -> str:
+    return f"{effect.name} on {effect.channel}" if effect.channel else effect.name
 
 
 def _unit(text: str) -> str:

@@ -37,7 +37,7 @@ def build_diagnosis_content(
     model_sha256 : of the answer's model file
     by : who has released the opinion on the cause; without a name the document says that nobody has
     """
-    told = Told(
+    source = Told(
         answer=result.diagnosis,
         by=by,
         case=case,
@@ -47,30 +47,32 @@ def build_diagnosis_content(
         issued=issued,
     )
     return DIAGNOSIS.content(
-        told,
+        source,
         style,
         calibrations=() if use is None else (use,),
-        title=told.answer.title,
+        title=source.answer.title,
         author=style.laboratory or "toolkit",
-        identity=told.id,
+        identity=source.id,
         subject="Diagnosis: simulation against recording",
         issued=issued,
     )
 
 
-def _calibrations(told: Told, _style: Style) -> str:
-    if told.use is None:
+def _calibrations(source: Told, _style: Style) -> str:
+    if source.use is None:
         return "none"
-    standing = f", {told.use.status}" if told.use.draft else " UNVERIFIED" if told.use.unverified else ""
-    return f"{told.use.id} ({told.use.sha256}){standing}"
+    standing = (
+        f", {source.use.status}" if source.use.draft else " UNVERIFIED" if source.use.unverified else ""
+    )
+    return f"{source.use.id} ({source.use.sha256}){standing}"
 
 
-def _unverified(told: Told, _style: Style) -> bool:
-    return told.use is not None and told.use.unverified
+def _unverified(source: Told, _style: Style) -> bool:
+    return source.use is not None and source.use.unverified
 
 
-def _draft(told: Told, _style: Style) -> str | None:
-    return f"Calibration {told.use.id}: {told.use.status}." if told.use and told.use.draft else None
+def _draft(source: Told, _style: Style) -> str | None:
+    return f"Calibration {source.use.id}: {source.use.status}." if source.use and source.use.draft else None
 
 
 DECLARED = (
@@ -78,26 +80,30 @@ DECLARED = (
     DIAGNOSIS.text(
         "model",
         "model file with what was found, and its hash",
-        lambda told, _: None if told.model_sha256 is None else f"model.toml, SHA-256 {told.model_sha256}",
+        lambda source, _: (
+            None if source.model_sha256 is None else f"model.toml, SHA-256 {source.model_sha256}"
+        ),
     ),
-    DIAGNOSIS.date("issued", "day of the diagnosis", lambda told, _: told.issued),
+    DIAGNOSIS.date("issued", "day of the diagnosis", lambda source, _: source.issued),
     DIAGNOSIS.text("software", "program and version that made it", lambda *_: f"toolkit {__version__}"),
     DIAGNOSIS.condition("unverified", "a calibration of the case is not verified", _unverified),
     DIAGNOSIS.condition(
-        "draft", "a calibration of the case is not approved", lambda told, style: bool(_draft(told, style))
+        "draft",
+        "a calibration of the case is not approved",
+        lambda source, style: bool(_draft(source, style)),
     ),
-    DIAGNOSIS.condition("effects", "an effect was found", lambda told, _: bool(told.answer.effects)),
-    DIAGNOSIS.condition("no_effects", "no effect was found", lambda told, _: not told.answer.effects),
+    DIAGNOSIS.condition("effects", "an effect was found", lambda source, _: bool(source.answer.effects)),
+    DIAGNOSIS.condition("no_effects", "no effect was found", lambda source, _: not source.answer.effects),
     DIAGNOSIS.condition(
         "incomplete",
         "the budget was spent before the search was at its end",
-        lambda told, _: not told.answer.complete,
+        lambda source, _: not source.answer.complete,
     ),
     DIAGNOSIS.mark(
         "unverified",
         "if.unverified diagnosis.calibrations",
-        lambda told, style: (
-            "UNVERIFIED: the calibration is a legacy import." if _unverified(told, style) else None
+        lambda source, style: (
+            "UNVERIFIED: the calibration is a legacy import." if _unverified(source, style) else None
         ),
     ),
     DIAGNOSIS.mark("draft", "diagnosis.calibrations", _draft),
@@ -114,9 +120,9 @@ DECLARED = (
     sha256|beginning of the file's hash
     """,
 )
-def recorded(told: Told, _style: Style) -> Rows:
+def recorded(source: Told, _style: Style) -> Rows:
     """Return the recordings of the case."""
-    for run in told.case.runs if told.case else ():
+    for run in source.case.runs if source.case else ():
         conditions = ", ".join(f"{key} {value}" for key, value in run.conditions.items())
         yield run.name, conditions or "-", str(run.rows), run.sha256[:16]
 
@@ -127,7 +133,7 @@ def recorded(told: Told, _style: Style) -> Rows:
         "diagnosis_run": "the run with the largest mismatch, recorded and simulated",
     }
 )
-def mismatches(told: Told, style: Style) -> Iterator[Plot]:
+def mismatches(source: Told, style: Style) -> Iterator[Plot]:
     """Return where the mismatch is, and the run with the largest; nothing where nothing was searched."""
-    if told.search is not None:
-        yield from search_plots(told.search, told.answer, style)
+    if source.search is not None:
+        yield from search_plots(source.search, source.answer, style)

@@ -26,22 +26,22 @@ _STEPS = ("as declared", "refitted", "with the effects")
 _MOST = 300  # points of a curve in print
 
 
-def search_plots(found: Search, made: Diagnosis, style: Style) -> Iterator[Plot]:
+def search_plots(search: Search, diagnosis: Diagnosis, style: Style) -> Iterator[Plot]:
     """Return where the mismatch of each output is, and the run with the largest one."""
-    wheres = (_where(found, mismatch, made, style) for mismatch in made.mismatch)
+    wheres = (_where(search, mismatch, diagnosis, style) for mismatch in diagnosis.mismatch)
     for i, plot in enumerate([plot for plot in wheres if plot is not None][:WHERE], start=1):
         yield replace(plot, name=f"diagnosis_where_{i}")
-    if made.mismatch:
-        yield _run(found, made, style)
+    if diagnosis.mismatch:
+        yield _run(search, diagnosis, style)
 
 
-def errors_plot(made: Diagnosis, style: Style) -> Plot:
+def errors_plot(diagnosis: Diagnosis, style: Style) -> Plot:
     """Return the errors on held-out rows over the noise, before and after: the chart of ten seconds."""
-    steps = _STEPS if made.effects else _STEPS[:2]
+    steps = _STEPS if diagnosis.effects else _STEPS[:2]
     names: list[str] = []
     bars: list[tuple[list[float], list[float]]] = [([], []) for _ in steps]
     said = []
-    for one in made.held_out:
+    for one in diagnosis.held_out:
         errors = (one.nominal_rmse, one.refitted_rmse, one.augmented_rmse)
         if not all(map(math.isfinite, (*errors, one.noise_floor))):
             continue
@@ -77,18 +77,18 @@ def errors_plot(made: Diagnosis, style: Style) -> Plot:
     )
 
 
-def _where(found: Search, one: Mismatch, made: Diagnosis, style: Style) -> Plot | None:
+def _where(search: Search, mismatch: Mismatch, diagnosis: Diagnosis, style: Style) -> Plot | None:
     """Return an output's residual over the first variable that has numbers, in means of equal counts."""
-    problem = found.problem
-    kept = problem.kept[one.channel]
-    for place in one.where:
-        x = variable_of(found, place.variable)
+    problem = search.problem
+    kept = problem.kept[mismatch.channel]
+    for place in mismatch.where:
+        x = variable_of(search, place.variable)
         if x is None or not isinstance(place.start, float) or not isinstance(place.end, float):
             continue
-        unit = _unit(found, one.channel)
-        series = [("refitted", 1, found.refitted.residual[one.channel])]
-        if made.effects:
-            series.append(("with the effects", 0, found.augmented.residual[one.channel]))
+        unit = _unit(search, mismatch.channel)
+        series = [("refitted", 1, search.refitted.residual[mismatch.channel])]
+        if diagnosis.effects:
+            series.append(("with the effects", 0, search.augmented.residual[mismatch.channel]))
         curves = []
         for label, group, residual in series:
             at, mean = binned(x[kept], residual[kept])
@@ -100,19 +100,20 @@ def _where(found: Search, one: Mismatch, made: Diagnosis, style: Style) -> Plot 
         return Plot(
             name="",
             x_label=f"{place.variable} [{place.unit}]" if place.unit else place.variable,
-            y_label=f"recorded − simulated {one.channel} [{unit}]",
+            y_label=f"recorded − simulated {mismatch.channel} [{unit}]",
             curves=tuple(curves),
-            caption=f"{one.channel}: mean residual over {place.variable}; the mismatch is {much} {span}.",
-            alt=f"Mean of recorded less simulated {one.channel} over {place.variable}, {much} {span}.",
+            caption=f"{mismatch.channel}: mean residual over {place.variable}; "
+            f"the mismatch is {much} {span}.",
+            alt=f"Mean of recorded less simulated {mismatch.channel} over {place.variable}, {much} {span}.",
             legend_title="simulation",
             decimal_comma=style.decimal_comma,
         )
     return None
 
 
-def _run(found: Search, made: Diagnosis, style: Style) -> Plot:
-    problem, channel = found.problem, made.mismatch[0].channel
-    which = worst_run(found, channel)
+def _run(search: Search, diagnosis: Diagnosis, style: Style) -> Plot:
+    problem, channel = search.problem, diagnosis.mismatch[0].channel
+    which = worst_run(search, channel)
     rows, run = problem.slices[which], problem.runs[which]
     some = slice(None, None, max(1, -(-run.rows // _MOST)))
     good = np.isfinite(problem.observed[channel][rows][some])
@@ -128,15 +129,15 @@ def _run(found: Search, made: Diagnosis, style: Style) -> Plot:
 
     curves = [
         curve("recorded", 6, problem.observed[channel][rows][some], points=True),
-        curve("refitted", 1, found.refitted.simulated[channel][rows][some]),
+        curve("refitted", 1, search.refitted.simulated[channel][rows][some]),
     ]
-    if made.effects:
-        curves.append(curve("with the effects", 0, found.augmented.simulated[channel][rows][some]))
+    if diagnosis.effects:
+        curves.append(curve("with the effects", 0, search.augmented.simulated[channel][rows][some]))
     timed = problem.case.has_time
     return Plot(
         name="diagnosis_run",
         x_label=f"time [{clock}]" if timed else "row",
-        y_label=f"{channel} [{_unit(found, channel)}]",
+        y_label=f"{channel} [{_unit(search, channel)}]",
         curves=tuple(curves),
         caption=f"{channel} in {run.name}, the run with the largest mismatch.",
         alt=f"{channel} in {run.name}: recorded and simulated over {'time' if timed else 'rows'}.",
@@ -145,8 +146,8 @@ def _run(found: Search, made: Diagnosis, style: Style) -> Plot:
     )
 
 
-def _unit(found: Search, channel: str) -> str:
-    text = next(one.unit for one in found.problem.model.outputs if one.name == channel)
+def _unit(search: Search, channel: str) -> str:
+    text = next(output.unit for output in search.problem.model.outputs if output.name == channel)
     return text.replace("*", "·")
 
 

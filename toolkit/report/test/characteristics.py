@@ -42,9 +42,9 @@ _HEADS = {
 def wide_table(table: WideTable) -> DeclaredTable[ReportedTest]:
     """Return the declaration of a table with a column for each characteristic, and for its uncertainty."""
     lines = [
-        f"{one.column_name} ±|{one.column_text}|{unit}|.{one.digits}f"
-        for one in columns(table)
-        for unit in [QUANTITIES.get(one.printed_unit, one.printed_unit)]
+        f"{column.column_name} ±|{column.column_text}|{unit}|.{column.digits}f"
+        for column in columns(table)
+        for unit in [QUANTITIES.get(column.printed_unit, column.printed_unit)]
     ]
     return REPORT.table(table.name, table.text, "\n".join([_HEADS[table.scope], *lines]))(
         lambda report, _: wide_rows(report.result, table)
@@ -56,7 +56,7 @@ def wide_rows(result: TestResult, table: WideTable) -> list[Cells]:
 
     A load without any of them is left out; a direction is not.
     """
-    declared = {one.name: one for one in columns(table)}
+    declared = {column.name: column for column in columns(table)}
     lines: dict[tuple[float, str, float | None], Cells] = {}
     for row in result.characteristics.rows:
         if row.name not in declared:
@@ -91,7 +91,7 @@ def wide_rows(result: TestResult, table: WideTable) -> list[Cells]:
 def long_rows(report: ReportedTest, style: Style) -> Rows:
     """Return every characteristic that has a value, one row each, but for those at slip angles."""
     result, lines = report.result, list[Cells]()
-    for one in (one for table in tables() if table.scope != "angle" for one in columns(table)):
+    for one in (column for table in tables() if table.scope != "angle" for column in columns(table)):
         unit, factor = style.unit(one.printed_unit)
         scale = factor * one.factor
         for row in result.characteristics.of(one.name):

@@ -160,7 +160,7 @@ def report_id(result: TestResult, details: ReportDetails | None = None) -> str:
 
 def _has_any(report: ReportedTest, table: WideTable, *, summarised: bool = False) -> bool:
     """Tell whether a characteristic of a table has a value; ``summarised``: one that the summary has."""
-    names = {one.name for one in columns(table) if one.summary is not None or not summarised}
+    names = {column.name for column in columns(table) if column.summary is not None or not summarised}
     rows = report.result.characteristics.rows
     return any(row.name in names and row.estimate is not None for row in rows)
 

@@ -41,11 +41,11 @@ def load_groups(conditions: Sequence[Condition]) -> list[tuple[float, tuple[Cond
     Blocks of one nominal load share ``FZ_common``; a gap of 4 % separates two loads.
     """
     groups: list[list[Condition]] = []
-    for one in sorted(conditions, key=lambda c: c.FZ_common):
-        if groups and one.FZ_common - groups[-1][-1].FZ_common <= 0.04 * one.FZ_common:
-            groups[-1].append(one)
+    for condition in sorted(conditions, key=lambda c: c.FZ_common):
+        if groups and condition.FZ_common - groups[-1][-1].FZ_common <= 0.04 * condition.FZ_common:
+            groups[-1].append(condition)
         else:
-            groups.append([one])
+            groups.append([condition])
     return [(float(np.mean([c.FZ_common for c in group])), tuple(group)) for group in groups]
 
 
@@ -305,12 +305,12 @@ class _Plots:
             rotations = self._rotations() if members[0].scope == "direction" else [None]
             series = [
                 (
-                    one.series_label + (f", {rotation}" if rotation else ""),
-                    one,
-                    of(one.name, rotation=rotation),
+                    member.series_label + (f", {rotation}" if rotation else ""),
+                    member,
+                    of(member.name, rotation=rotation),
                 )
                 for rotation in rotations
-                for one in members
+                for member in members
             ]
             plots.append(self._against(figure, series) if series else None)
         return plots

@@ -63,7 +63,7 @@ def model_rows(comparison: Comparison | None) -> list[dict[str, Cell]]:
     if comparison is None:
         return []
     floors, seconds = dict(comparison.floors), dict(comparison.seconds)
-    made: list[dict[str, Cell]] = []
+    cellses: list[dict[str, Cell]] = []
     for condition in dict.fromkeys(one for one, _ in comparison.conditions):
         for model in comparison.models:
             found = {name: comparison.get(model, condition, name) for name in ("FY", "MZ")}
@@ -83,18 +83,18 @@ def model_rows(comparison: Comparison | None) -> list[dict[str, Cell]]:
                     row[f"{name}_parameters"] = one.parameters
                     row[f"{name}_error"] = one.error_percent
                     row[f"{name}_left_out"] = one.prediction_error_percent
-            made.append(row)
-    return made
+            cellses.append(row)
+    return cellses
 
 
 def _open(rows: Sequence[ComparisonRow]) -> str:
     # More names than that would make the row a list: the JSON of `toolkit fit` has them all.
     parts = []
-    for one in rows:
-        count = len(one.not_determined)
+    for row in rows:
+        count = len(row.not_determined)
         if count:
-            named = ", ".join(one.not_determined)
-            parts.append(f"{one.channel}: {named if count <= _NAMED else f'{count} of {one.parameters}'}")
+            named = ", ".join(row.not_determined)
+            parts.append(f"{row.channel}: {named if count <= _NAMED else f'{count} of {row.parameters}'}")
     return "; ".join(parts) or "-"
 
 
@@ -129,17 +129,17 @@ def model_plot(
     if not rows:
         return None
     places = range(len(rows))
-    said = [format_number(one.error_percent, ".2f", decimal_comma=decimal_comma) for one in rows]
+    said = [format_number(row.error_percent, ".2f", decimal_comma=decimal_comma) for row in rows]
     curves = [
         Curve(
             label="fitted",
             x=tuple(place - _WIDTH / 2 for place in places),
-            y=tuple(one.error_percent for one in rows),
+            y=tuple(row.error_percent for row in rows),
             style="bars",
             notes=tuple(said),
         )
     ]
-    away = [(place, one.prediction_error_percent) for place, one in zip(places, rows, strict=True)]
+    away = [(place, row.prediction_error_percent) for place, row in zip(places, rows, strict=True)]
     if known := [(place, value) for place, value in away if value is not None]:
         x, y = zip(*known, strict=True)
         curves.append(
@@ -153,7 +153,7 @@ def model_plot(
                 open=True,
             )
         )  # fmt: skip
-    told = ", ".join(f"{one.model} {text} %" for one, text in zip(rows, said, strict=True))
+    told = ", ".join(f"{row.model} {text} %" for row, text in zip(rows, said, strict=True))
     mark = f"{watermark}. " if watermark else ""
     symbol = _SYMBOLS[channel]
     return Plot(
@@ -165,5 +165,5 @@ def model_plot(
         alt=f"{mark}Error of the tire models in {symbol}, {condition} slip: {told}.",
         watermark=watermark,
         decimal_comma=decimal_comma,
-        names=tuple(one.model for one in rows),
+        names=tuple(row.model for row in rows),
     )

@@ -236,15 +236,17 @@ VALUES = (
 )
 
 
-def _summarised(one: Characteristic) -> tuple[DeclaredValue[ReportedTest], DeclaredValue[ReportedTest]]:
+def _summarised(
+    characteristic: Characteristic,
+) -> tuple[DeclaredValue[ReportedTest], DeclaredValue[ReportedTest]]:
     """Return the value of a characteristic at the load of the summary, and its text with ``U``."""
-    name = str(one.summary)
+    name = str(characteristic.summary)
     number = _number(
         f"summary.{name}",
-        one.summary_text,
+        characteristic.summary_text,
         lambda t, _: summary_estimates(t.result)[name],
-        unit=one.printed_unit,
-        spec=f".{one.digits}f",
+        unit=characteristic.printed_unit,
+        spec=f".{characteristic.digits}f",
     )
 
     def with_U(t: ReportedTest, style: Style) -> str | None:
@@ -258,7 +260,7 @@ def _summarised(one: Characteristic) -> tuple[DeclaredValue[ReportedTest], Decla
             return value.text(None, style)
         return plus_minus(float(value.value or 0.0), value.U, decimal_comma=style.decimal_comma)
 
-    description = f"{one.summary_text}, with its expanded uncertainty; n/a where there is none"
+    description = f"{characteristic.summary_text}, with its expanded uncertainty; n/a where there is none"
     return number, _text(f"summary.{name}.with_U", description, with_U)
 
 

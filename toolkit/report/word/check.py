@@ -71,13 +71,13 @@ def check_stories(
 ) -> tuple[LintFinding, ...]:
     """Return the findings of an opened package (see `check_template`)."""
     sites = scan(parts)
-    found = [
+    findings = [
         *_tags(sites, style, words),
         *_tables(sites, words),
         *_broken(parts),
         *surroundings(package, parts, style),
     ]
-    found += [
+    findings += [
         LintFinding(
             rule="attached-template",
             level="warning",
@@ -88,7 +88,7 @@ def check_stories(
         for target in template.dropped
     ]
     if fonts:
-        found += [
+        findings += [
             LintFinding(
                 rule="font-unavailable",
                 level="warning",
@@ -98,7 +98,7 @@ def check_stories(
             )
             for name in missing_fonts(package, parts)
         ]
-    return tuple(sorted(found, key=lambda one: one.level != "error"))
+    return tuple(sorted(findings, key=lambda finding: finding.level != "error"))
 
 
 def vocabulary_of(sites: list[Site], vocabularies: Mapping[str, Vocabulary]) -> Vocabulary:
@@ -117,9 +117,9 @@ def vocabulary_of(sites: list[Site], vocabularies: Mapping[str, Vocabulary]) -> 
     return vocabularies[first]
 
 
-def _beyond(sites: list[Site], first: Vocabulary, other: Vocabulary) -> bool:
+def _beyond(sites: list[Site], first: Vocabulary, vocabulary: Vocabulary) -> bool:
     paths = {site.tag.path for site in sites if site.tag.family == "value"}
-    return any(first.knows(path) and not other.knows(path) for path in paths)
+    return any(first.knows(path) and not vocabulary.knows(path) for path in paths)
 
 
 def _at(site: Site, rule: str, message: str) -> LintFinding:
@@ -266,7 +266,7 @@ def _tables(sites: list[Site], words: Vocabulary) -> Iterator[LintFinding]:
                 site, "no-table", f"{site.tag}: no table inside the control, nor right after its paragraph"
             )
             continue
-        columns = [one.name for one in words.tables[site.tag.name].columns]
+        columns = [column.name for column in words.tables[site.tag.name].columns]
         rows: list[Element] = []
         for other in sites:
             row = row_in(table, other.element) if other.story is site.story else None
