@@ -46,3 +46,14 @@ def test_importing_the_package_imports_nothing_heavy() -> None:
     ).stdout.split()
     heavy = {"numpy", "scipy", "pandas", "matplotlib", "statsmodels", "pint", "openpyxl", "docx", "lxml"}
     assert heavy.isdisjoint(loaded)
+
+
+def test_every_module_of_the_command_line_holds_a_command() -> None:
+    from toolkit.cli.main import _register, app
+
+    _register()
+    groups = [app, *(group.typer_instance for group in app.registered_groups)]
+    commands = [command.callback for group in groups for command in group.registered_commands]
+    homes = {callback.__module__.rpartition(".")[2] for callback in commands if callback is not None}
+    modules = {path.stem for path in (ROOT / "cli").glob("*.py")}
+    assert modules - homes == {"__init__", "console", "main"}

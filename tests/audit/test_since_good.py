@@ -166,5 +166,5 @@ def test_the_command_tells_each_test_and_its_page_too(home, tmp_path):
     for one in told["tests"]:
         line = next(row for row in text.splitlines() if row.startswith(one["test"]) and "%" in row)
         assert line.split()[-2:] == [f"{one['FY_max_abs_N']:.2f}", f"{one['MZ_max_abs_Nm']:.3f}"]
-        assert f"<tr><td>{one['test']}</td><td class=d>{one['date']}</td>" in page
-        assert f"<td class=n>{one['FY_max_abs_N']:.2f}</td>" in page
+        assert f'<tr><td>{one["test"]}</td><td class="d">{one["date"]}</td>' in page
+        assert f'<td class="n">{one["FY_max_abs_N"]:.2f}</td>' in page

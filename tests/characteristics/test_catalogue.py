@@ -29,7 +29,7 @@ from toolkit.characteristics.characterise import characterise
 from toolkit.characteristics.characteristic import PRINTED, Characteristic
 from toolkit.characteristics.groups import CHANNELS
 from toolkit.characteristics.layout import PULL, STIFFNESS
-from toolkit.cli.home import packaged_home
+from toolkit.lab.home import packaged_home
 from toolkit.report.test.content import REPORT
 from toolkit.simulation.plan import Plan
 from toolkit.simulation.run import simulate

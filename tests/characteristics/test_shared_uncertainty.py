@@ -14,7 +14,7 @@ from toolkit.calibration.registry.registry import Registry
 from toolkit.calibration.uncertainty.propagation import record_covariance
 from toolkit.characteristics.characterise import characterise
 from toolkit.characteristics.shared import Shared
-from toolkit.cli.home import packaged_home
+from toolkit.lab.home import packaged_home
 from toolkit.machine import TypeB, load_machine
 from toolkit.pipeline import TestResult, process, read_test
 from toolkit.recording.folder import read_test_folder

@@ -10,9 +10,9 @@ import pytest
 
 import toolkit
 from toolkit.audit.model import Grade
-from toolkit.cli.explain import rules_catalogue
 from toolkit.cli.main import run
 from toolkit.effects.catalogue import effects
+from toolkit.lab.rules import rules_catalogue
 from toolkit.report.word.check import RULES
 
 SOURCES = sorted(Path(toolkit.__file__).parent.rglob("*.py"))

@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from tests.campaigns import physics_gate as campaign
-from toolkit.cli.home import packaged_home
 from toolkit.cli.main import run
+from toolkit.lab.home import packaged_home
 from toolkit.reduction.physics import RULES
 from toolkit.simulation.plan import with_effects
 from toolkit.simulation.run import simulate

@@ -18,13 +18,13 @@ from report_factory import make_record, make_result
 from template_factory import make, p, tbl
 
 import toolkit
-from toolkit.cli import resolve
-from toolkit.cli.delivery import home_template
-from toolkit.cli.handover import details_of
 from toolkit.cli.report import command
 from toolkit.cli.template import check, new, tags
 from toolkit.errors import ConfigError, OutputError, TemplateError
 from toolkit.findings import Finding
+from toolkit.lab import resolve
+from toolkit.lab.handover import details_of
+from toolkit.lab.home import home_template
 from toolkit.recording.marks import is_own_output
 from toolkit.tires.tir import read_tir
 from toolkit.tires.tydex import read_tydex

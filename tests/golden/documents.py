@@ -90,8 +90,8 @@ def diagnosis(place: Workplace) -> Any:
         "--by", "operator two", "--budget", 3600,
     )  # fmt: skip
     chapter = _report(place, "org.docx", "--diagnosis", place.folder / "answer", "--by", "operator two")
-    rows = chapter["answer"].get("manifest", [])
+    tags = chapter["answer"].get("manifest", {})
     return {
         "document": answer,
-        "chapter": [row for row in rows if "diagnosis" in row["tag"]],
+        "chapter": {tag: texts for tag, texts in tags.items() if "diagnosis" in tag},
     }

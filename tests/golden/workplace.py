@@ -22,6 +22,8 @@ NO_RESULT = frozenset(
     """.split()
 )
 """Keys of answers that hold times, versions, ledger heads, layout and hashes of whole documents."""
+NO_RESULT_TAGS = frozenset(("tk:table.models.seconds", "tk:certificate.ledger_head"))
+"""Tags of documents that print a time, or a ledger's head, which has times in it."""
 
 
 @dataclass(slots=True)
@@ -86,9 +88,17 @@ class Workplace:
         return self.answer(*words, calibrations=CALIBRATIONS)
 
     def tidy(self, value: Any) -> Any:
-        """Return an answer without what is no result, its folders written as names."""
+        """Return an answer without what is no result, its folders written as names.
+
+        What a document holds stands by its tag: of each, the texts and their parts in the order of the
+        document.
+        """
         if isinstance(value, dict):
-            return {key: self.tidy(entry) for key, entry in value.items() if key not in NO_RESULT}
+            return {
+                key: self.tidy(_by_tag(entry) if key in ("manifest", "figures") else entry)
+                for key, entry in value.items()
+                if key not in NO_RESULT
+            }
         if isinstance(value, list):
             return [self.tidy(entry) for entry in value]
         if not isinstance(value, str):
@@ -98,6 +108,16 @@ class Workplace:
         for folder, name in folders.items():
             value = value.replace(str(folder), name)
         return value
+
+
+def _by_tag(rows: Any) -> Any:
+    if not isinstance(rows, list) or not all(isinstance(row, dict) and "tag" in row for row in rows):
+        return rows
+    tags: dict[str, list[Any]] = {}
+    for row in rows:
+        if row["tag"] not in NO_RESULT_TAGS:
+            tags.setdefault(row["tag"], []).append([text for key, text in row.items() if key != "tag"])
+    return tags
 
 
 def read_record(path: Path) -> dict[str, Any]:

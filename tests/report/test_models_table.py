@@ -10,10 +10,11 @@ import pytest
 from report_factory import COMPARISON, LOADS_N, entry, make_record, make_result
 from template_factory import FOLDER, make, p, tbl
 
-from toolkit.cli import resolve
-from toolkit.cli.report import Options, _compared, _job, command
-from toolkit.cli.resolve import Resolved
+from toolkit.cli.report import command
 from toolkit.errors import FitError, TemplateError
+from toolkit.lab import resolve
+from toolkit.lab.reports import Options, _compared, _job
+from toolkit.lab.resolve import Resolved
 from toolkit.report.content import ReportContent
 from toolkit.report.figures import draw, draw_svg
 from toolkit.report.handover import content_hash

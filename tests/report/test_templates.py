@@ -23,10 +23,10 @@ from tests.conftest import EXAMPLES
 from tests.diagnosis.cases import HEAD, TWO, carriage, write_case
 from toolkit.audit.archive import audit_archive
 from toolkit.calibration.registry.registry import Registry
-from toolkit.cli.explain import rules_catalogue
 from toolkit.diagnosis.case.reader import read_case
 from toolkit.diagnosis.diagnose import Result
 from toolkit.errors import ConfigError
+from toolkit.lab.rules import rules_catalogue
 from toolkit.recording.details import read_details
 from toolkit.report.audit.content import build_audit_content
 from toolkit.report.audit.page import AuditView

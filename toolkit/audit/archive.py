@@ -9,7 +9,6 @@ from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 
-from toolkit import __version__
 from toolkit.audit.cluster import run_on_cluster
 from toolkit.audit.inventory import inventory
 from toolkit.audit.lines import Lines
@@ -21,6 +20,7 @@ from toolkit.calibration.registry.registry import Refused, Registry
 from toolkit.errors import ConfigError, RegistryError
 from toolkit.files import sha256_bytes
 from toolkit.findings import Finding
+from toolkit.version import __version__
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

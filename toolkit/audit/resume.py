@@ -24,13 +24,13 @@ from pathlib import Path
 from types import TracebackType
 from typing import IO, Any, overload
 
-from toolkit import __version__
 from toolkit.audit.one_file import FileAudit, OwnOutput
 from toolkit.audit.serial import SHAPE, from_plain, to_plain
 from toolkit.errors import OutputError
 from toolkit.files import sha256_bytes, sha256_file
 from toolkit.recording.folder import nearest_test_toml
 from toolkit.recording.marks import GENERATOR, OWN_OUTPUT
+from toolkit.version import __version__
 
 RESULTS = "results.jsonl"
 _HEADER = (json.dumps({"generator": GENERATOR, "marks": OWN_OUTPUT}) + "\n").encode()

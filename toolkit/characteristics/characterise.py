@@ -105,18 +105,18 @@ def _refused_findings(
             text = f"{problem.what} (got {problem.got}, expected {problem.expected})"
             key = (groups[index].rotation, problem.rule or "not-fitted", text)
             same.setdefault(key, {}).setdefault(channel, {})[index] = None
-    found = []
+    findings = []
     for (rotation, rule, text), channels in same.items():
         loads = dict.fromkeys(index for indices in channels.values() for index in indices)
         where = in_both([groups[index].load_N for index in loads], "lbf", ".0f")
-        found.append(
+        findings.append(
             Finding(
                 rule=rule,
                 where=f"drum {rotation}, {where}, {' and '.join(channels)}",
                 message=f"{text}; what these curves feed is null",
             )
         )
-    return found
+    return findings
 
 
 def _where(group: Group) -> str:
@@ -125,29 +125,29 @@ def _where(group: Group) -> str:
 
 def _line_findings(directions: Sequence[Direction]) -> list[Finding]:
     """Hold the curve's value at SA = 0 against the line through the nearest points."""
-    found = []
-    for one in directions:
-        SA = one.group.SA
+    findings = []
+    for direction in directions:
+        SA = direction.group.SA
         if not (len(SA) > 1 and SA[0] <= 0.0 <= SA[-1]):
-            if one.fit.FY is not None:
+            if direction.fit.FY is not None:
                 message = "the slip angles lie on one side of zero: stiffness and pull at SA = 0 are null"
-                found.append(Finding(rule="one-sided", where=_where(one.group), message=message))
+                findings.append(Finding(rule="one-sided", where=_where(direction.group), message=message))
             continue
-        for channel, unit, fit in (("FY", "N", one.fit.FY), ("MZ", "N*m", one.fit.MZ)):
+        for channel, unit, fit in (("FY", "N", direction.fit.FY), ("MZ", "N*m", direction.fit.MZ)):
             if fit is None:
                 continue
             at_zero = estimate_at(fit, 0.0)
-            line = float(np.interp(0.0, SA, one.group.values(channel)))
+            line = float(np.interp(0.0, SA, direction.group.values(channel)))
             # The line itself is wrong by the curve's bend: a fiftieth of the range is left to it.
-            limit = max(5 * at_zero.u, 0.02 * float(np.ptp(one.group.values(channel))))
+            limit = max(5 * at_zero.u, 0.02 * float(np.ptp(direction.group.values(channel))))
             if abs(at_zero.value - line) > limit:
-                found.append(
+                findings.append(
                     Finding(
                         rule="curve-against-line",
-                        where=_where(one.group),
+                        where=_where(direction.group),
                         message=f"{channel} at SA = 0 is {in_both(at_zero.value, unit)} by the curve, "
                         f"{in_both(line, unit)} by the line through the nearest points: look at the "
                         "residuals",
                     )
                 )
-    return found
+    return findings

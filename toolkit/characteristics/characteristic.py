@@ -170,10 +170,10 @@ class Characteristic:
         directions : those of one load, or the one that it is read off
         """
         if self.scope == "load":
-            there = {one.group.rotation: one for one in directions}
-            absent = [rotation for rotation in self.runs if rotation not in there]
+            by_rotation = {direction.group.rotation: direction for direction in directions}
+            absent = [rotation for rotation in self.runs if rotation not in by_rotation]
             if absent:
                 return f"no run with the drum {' and '.join(absent)}"
-            directions = [there[rotation] for rotation in self.runs]
-        unmet = (need.text for need in self.needs if not all(need.met(one) for one in directions))
+            directions = [by_rotation[rotation] for rotation in self.runs]
+        unmet = (need.text for need in self.needs if not all(need.met(direction) for direction in directions))
         return next(unmet, "the data do not determine it")

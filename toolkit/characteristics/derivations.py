@@ -36,16 +36,16 @@ if TYPE_CHECKING:
     from toolkit.characteristics.reading import Reader
 
 
-def half_at_zero(what: Characteristic, forward: Reader, reverse: Reader) -> Uncertain | None:
+def half_at_zero(declared: Characteristic, forward: Reader, reverse: Reader) -> Uncertain | None:
     """Return half the forward value plus ``sign`` times the reversed one, both at SA = 0."""
     if not (forward.covers_zero() and reverse.covers_zero()):
         return None
-    return _half(forward.value(what.channel, 0.0), reverse.value(what.channel, 0.0), what.sign)
+    return _half(forward.value(declared.channel, 0.0), reverse.value(declared.channel, 0.0), declared.sign)
 
 
-def half_without_force(what: Characteristic, forward: Reader, reverse: Reader) -> Uncertain | None:
+def half_without_force(declared: Characteristic, forward: Reader, reverse: Reader) -> Uncertain | None:
     """Return half MZ forward plus ``sign`` times MZ reversed, each at its direction's own FY = 0."""
-    return _half(forward.moment_without_force(), reverse.moment_without_force(), what.sign)
+    return _half(forward.moment_without_force(), reverse.moment_without_force(), declared.sign)
 
 
 def residual_moment(_what: Characteristic, run: Reader) -> Uncertain | None:
@@ -53,19 +53,19 @@ def residual_moment(_what: Characteristic, run: Reader) -> Uncertain | None:
     return run.moment_without_force()
 
 
-def secant(what: Characteristic, run: Reader) -> Uncertain | None:
+def secant(declared: Characteristic, run: Reader) -> Uncertain | None:
     """Return ``sign`` times the +-1 deg secant of the channel [per rad]."""
-    return _signed(run.secant(what.channel), what.sign)
+    return _signed(run.secant(declared.channel), declared.sign)
 
 
-def slope(what: Characteristic, run: Reader) -> Uncertain | None:
+def slope(declared: Characteristic, run: Reader) -> Uncertain | None:
     """Return ``sign`` times the slope of the channel's curve at SA = 0 [per rad]."""
-    return _signed(run.slope(what.channel), what.sign)
+    return _signed(run.slope(declared.channel), declared.sign)
 
 
-def curve_value(what: Characteristic, run: Reader, SA: float) -> Uncertain | None:
+def curve_value(declared: Characteristic, run: Reader, SA: float) -> Uncertain | None:
     """Return the channel's curve at a slip angle [rad]."""
-    return run.value(what.channel, SA)
+    return run.value(declared.channel, SA)
 
 
 def _half(forward: Uncertain | None, reverse: Uncertain | None, sign: float) -> Uncertain | None:

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from toolkit.characteristics.catalogue import characteristic, tables
+from toolkit.characteristics.catalogue import by_name, tables
 from toolkit.characteristics.characteristic import BOTH, Characteristic
 from toolkit.characteristics.groups import DirectionFit
 from toolkit.characteristics.uncertain import Part, Uncertain
@@ -66,7 +66,7 @@ class Row:
     @property
     def characteristic(self) -> Characteristic:
         """What the catalogue declares of it."""
-        return characteristic(self.name)
+        return by_name()[self.name]
 
     @property
     def number(self) -> Uncertain:

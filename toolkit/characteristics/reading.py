@@ -54,12 +54,12 @@ class Reader:
         self._calibration = {c: shared.calibration_rows(c, conditions) for c in CHANNELS}
         self._zero = {c: shared.zero_rows(c, conditions) for c in CHANNELS}
         # A tare of each file is a shift of that file alone.
-        own = np.zeros(len(conditions))
-        self._tares = {"FY": own, "MZ": own}
+        zeros = np.zeros(len(conditions))
+        self._tares = {"FY": zeros, "MZ": zeros}
         if shared.tared and not shared.u_cell_zero:
             self._tares = {
-                "FY": np.array([one.u_FY_zero for one in conditions]),
-                "MZ": np.array([one.u_MZ_zero for one in conditions]),
+                "FY": np.array([condition.u_FY_zero for condition in conditions]),
+                "MZ": np.array([condition.u_MZ_zero for condition in conditions]),
             }
         self._pseudo: dict[Channel, NDArray[np.float64]] = {}
         # Several characteristics are made of the values at SA = 0 and of MZ where FY is zero.
@@ -99,13 +99,14 @@ class Reader:
         if fit is None or "slope_at_zero" in fit.not_determined or fit.slope_at_zero is None:
             return None
         gradient = model(fit.model).slope_jacobian(fit.values, 0.0)
-        one = slope_estimate_at(fit, 0.0)
+        estimate = slope_estimate_at(fit, 0.0)
         # A zero of the slip angle moves along the curve to where its slope is another one.
         step = 1e-4
         bend = (float(slope_at(fit, step)) - float(slope_at(fit, -step))) / (2 * step)
-        angle = tuple(self.shared.angle_parts(bend, one.value))
+        angle = tuple(self.shared.angle_parts(bend, estimate.value))
         weights = self._weights(channel, gradient)
-        return self._read(_Reading(channel=channel, estimate=one, weights=weights, angle=angle), "slope at 0")
+        reading = _Reading(channel=channel, estimate=estimate, weights=weights, angle=angle)
+        return self._read(reading, "slope at 0")
 
     def secant(self, channel: Channel) -> Uncertain | None:
         """Return (y(1 deg) - y(-1 deg)) / 2 deg [per rad] from the measured steps.
@@ -127,14 +128,14 @@ class Reader:
         if span <= 0:
             return None
         fit = self.direction.curve(channel)
-        one = float(np.radians(1.0))
+        degree = float(np.radians(1.0))
         if fit is not None:
-            steps = np.where(weights > 0, one, -one)
+            steps = np.where(weights > 0, degree, -degree)
             y = y + value_at(fit, steps) - value_at(fit, SA)
-            span = 2 * one
+            span = 2 * degree
         slope = float(weights @ y) / span
         # What an error of the angle does to the two ends, by the slopes there; by the chord without a curve.
-        ends = (slope, slope) if fit is None else slope_at(fit, np.array([one, -one])).tolist()
+        ends = (slope, slope) if fit is None else slope_at(fit, np.array([degree, -degree])).tolist()
         parts = list(self.shared.angle_parts((ends[0] - ends[1]) / span, (ends[0] + ends[1]) / 2))
         if fit is None or self.scatter is None:
             # The zero of the slip angle cancels in the span; what is left of the angle is its scatter, which
@@ -149,19 +150,19 @@ class Reader:
 
     def _chord(self, channel: Channel) -> Uncertain | None:
         fit = self.direction.curve(channel)
-        one = float(np.radians(1.0))
+        degree = float(np.radians(1.0))
         SA = self.group.SA
-        if fit is None or SA[0] > -one or SA[-1] < one:
+        if fit is None or SA[0] > -degree or SA[-1] < degree:
             return None
         at = model(fit.model)
-        gradient = (at.jacobian(fit.values, one) - at.jacobian(fit.values, -one)) / (2 * one)
-        low, high = value_at(fit, np.array([-one, one])).tolist()
-        left, right = slope_at(fit, np.array([-one, one])).tolist()
-        slope = (high - low) / (2 * one)
+        gradient = (at.jacobian(fit.values, degree) - at.jacobian(fit.values, -degree)) / (2 * degree)
+        low, high = value_at(fit, np.array([-degree, degree])).tolist()
+        lower, upper = slope_at(fit, np.array([-degree, degree])).tolist()
+        slope = (high - low) / (2 * degree)
         u = float(np.sqrt(max(float(gradient @ np.asarray(fit.covariance) @ gradient), 0.0)))
         dof = estimate_at(fit, 0.0).dof
         estimate = Estimate(value=slope, u=u, unit=f"{UNIT[channel]}/rad", dof=dof)
-        angle = tuple(self.shared.angle_parts((right - left) / (2 * one), (right + left) / 2))
+        angle = tuple(self.shared.angle_parts((upper - lower) / (2 * degree), (upper + lower) / 2))
         weights = self._weights(channel, gradient)
         return self._read(_Reading(channel=channel, estimate=estimate, weights=weights, angle=angle), "chord")
 
@@ -196,7 +197,7 @@ class Reader:
             self._pseudo[channel] = weights_of(self.direction, channel)
         return np.asarray(gradient @ self._pseudo[channel])
 
-    def _read(self, first: _Reading, what: str, *more: tuple[float, _Reading]) -> Uncertain:
+    def _read(self, first: _Reading, reading: str, *more: tuple[float, _Reading]) -> Uncertain:
         """Return the value of the first reading with all parts of a weighted sum of readings.
 
         What further readings share with the first, and what one block's errors do to both channels, is
@@ -204,28 +205,28 @@ class Reader:
         """
         terms = ((1.0, first), *more)
         channel, shared = first.channel, self.shared
-        weights = {one.channel: factor * one.weights for factor, one in terms}
+        weights = {term.channel: factor * term.weights for factor, term in terms}
         rows = _norm(np.concatenate([w * self.group.own_u(c) for c, w in weights.items()]))
         tares = _norm(np.concatenate([w * self._tares[c] for c, w in weights.items()]))
         if self.scatter is not None and all(self.direction.curve(c) is not None for c in weights):
-            rest, dof = self.scatter.of(self.direction, weights)
+            scatter, dof = self.scatter.of(self.direction, weights)
         else:
             # The fit's residuals hold the scatter of the rows already; where a curve follows its points more
             # closely than their own scatter allows, the scatter stands. Never both.
-            u = _norm(np.array([factor * one.estimate.u for factor, one in terms]))
-            rest, dof = float(np.sqrt(max(u**2 - rows**2, 0.0))), first.estimate.dof
+            u = _norm(np.array([factor * term.estimate.u for factor, term in terms]))
+            scatter, dof = float(np.sqrt(max(u**2 - rows**2, 0.0))), first.estimate.dof
         parts: list[Part] = []
         for c, w in weights.items():
             parts += shared.calibration_parts(c, self._calibration[c] @ w)
             parts += shared.zero_parts(self._zero[c] @ w)
-        parts.append(self._own(channel, "tare", what, tares))
-        parts += [replace(part, u=factor * part.u) for factor, one in terms for part in one.angle]
-        parts.append(self._own(channel, "repeatability", what, rows))
-        parts.append(self._own(channel, "fit", what, rest, dof))
+        parts.append(self._own(channel, "tare", reading, tares))
+        parts += [replace(part, u=factor * part.u) for factor, term in terms for part in term.angle]
+        parts.append(self._own(channel, "repeatability", reading, rows))
+        parts.append(self._own(channel, "fit", reading, scatter, dof))
         return Uncertain(value=first.estimate.value, unit=first.estimate.unit, parts=merged(parts))
 
-    def _own(self, channel: str, source: str, what: str, u: float, dof: float = np.inf) -> Part:
-        where = f"{self.shared.test}/{self.group.load_N:.6g}/{self.group.rotation}/{channel}/{what}"
+    def _own(self, channel: str, source: str, reading: str, u: float, dof: float = np.inf) -> Part:
+        where = f"{self.shared.test}/{self.group.load_N:.6g}/{self.group.rotation}/{channel}/{reading}"
         return Part(source=source, key=f"{source}/{where}", u=u, dof=dof)
 
 

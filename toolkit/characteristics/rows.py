@@ -72,8 +72,8 @@ def at_angles(
         if not SA[0] - _REACH_RAD <= angle <= SA[-1] + _REACH_RAD:
             continue
         read: dict[_Key, Uncertain | None] = {
-            (one, reader.group.load_N, reader.group.rotation, angle): one.read(one, reader, angle)
-            for one in (of_scope("angle") if declared is None else declared)
+            (entry, reader.group.load_N, reader.group.rotation, angle): entry.read(entry, reader, angle)
+            for entry in (of_scope("angle") if declared is None else declared)
         }
         if any(number is not None for number in read.values()):
             numbers |= read
@@ -90,9 +90,9 @@ def lacking_row(
     key : load [N], rotation, slip angle [rad]
     """
     load, rotation, SA = key
-    mine = [one for one in directions if rotation in (BOTH, one.group.rotation)]
+    read_off = [direction for direction in directions if rotation in (BOTH, direction.group.rotation)]
     return Row(
-        name=declared.name, load_N=load, rotation=rotation, SA_rad=SA, lacking=declared.why_lacking(mine)
+        name=declared.name, load_N=load, rotation=rotation, SA_rad=SA, lacking=declared.why_lacking(read_off)
     )
 
 
@@ -130,24 +130,26 @@ def point_u(directions: Sequence[Direction], *, shared: Shared) -> Mapping[tuple
     Sources: the record, the cells' zeros or tares, the scatter of the rows and about the curves, and through
     the curve's slopes the slip angle (zero and scale), the load and the pressure.
     """
-    every = [(one, place) for one in directions for place in range(len(one.group.conditions))]
-    groups = at_one_angle([one.group.conditions[place] for one, place in every])
+    every = [
+        (direction, place) for direction in directions for place in range(len(direction.group.conditions))
+    ]
+    groups = at_one_angle([direction.group.conditions[place] for direction, place in every])
     scatter = scatter_of(directions)
-    found: dict[tuple[str, int], dict[str, float]] = {}
+    uncertainties: dict[tuple[str, int], dict[str, float]] = {}
     for channel in CHANNELS:
         squares = _squares(directions, channel, shared, scatter)
-        for members in groups:
-            pairs = [every[index] for index in members]
-            conditions = [one.group.conditions[place] for one, place in pairs]
+        for places in groups:
+            pairs = [every[index] for index in places]
+            conditions = [direction.group.conditions[place] for direction, place in pairs]
             FZ = np.array([c.FZ for c in conditions])
             y = np.array([c.FY if channel == "FY" else c.MZ for c in conditions])
-            for (one, place), c, value, slope in zip(pairs, conditions, y, slopes(FZ, y), strict=True):
+            for (direction, place), c, value, slope in zip(pairs, conditions, y, slopes(FZ, y), strict=True):
                 load = shared.load_part(float(value / c.FZ) if slope is None else slope.value, c.FZ)
                 pressure = shared.pressure_part(float(value))
                 more = load.u**2 + (pressure.u**2 if pressure else 0.0)
-                u = math.sqrt(squares[id(one)][place] + more)
-                found.setdefault((c.file, c.first_row), {})[channel] = u
-    return found
+                u = math.sqrt(squares[id(direction)][place] + more)
+                uncertainties.setdefault((c.file, c.first_row), {})[channel] = u
+    return uncertainties
 
 
 def _squares(
@@ -156,22 +158,22 @@ def _squares(
     """Return the variance of each condition of each direction but for load and pressure."""
     from toolkit.tires.evaluate import slope_at
 
-    found = {}
-    for one in directions:
-        conditions = one.group.conditions
+    variances = {}
+    for direction in directions:
+        conditions = direction.group.conditions
         rows = np.array([c.u_FY if channel == "FY" else c.u_MZ for c in conditions])
         total = rows**2
-        for moved in (shared.calibration_rows(channel, conditions), shared.zero_rows(channel, conditions)):
-            total = total + np.sum(moved**2, axis=0)
+        for shift in (shared.calibration_rows(channel, conditions), shared.zero_rows(channel, conditions)):
+            total = total + np.sum(shift**2, axis=0)
         if shared.tared and not shared.u_cell_zero:
             total = (
                 total + np.array([c.u_FY_zero if channel == "FY" else c.u_MZ_zero for c in conditions]) ** 2
             )
-        fit = one.curve(channel)
+        fit = direction.curve(channel)
         if fit is not None:
-            SA = one.group.SA
+            SA = direction.group.SA
             slope = slope_at(fit, SA)
-            total = total + scatter.each(one, channel)
+            total = total + scatter.each(direction, channel)
             total = total + (slope * shared.SA.u) ** 2 + (slope * SA * shared.SA_scale.relative) ** 2
-        found[id(one)] = total
-    return found
+        variances[id(direction)] = total
+    return variances

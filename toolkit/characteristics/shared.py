@@ -76,9 +76,9 @@ class Shared:
     roots: Mapping[str, NDArray[np.float64]] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        found = {} if self.record is None else record_covariance(self.record)
-        object.__setattr__(self, "covariance", MappingProxyType(found))
-        roots = {load: root_of(one) for load, one in found.items()}
+        covariances = {} if self.record is None else record_covariance(self.record)
+        object.__setattr__(self, "covariance", MappingProxyType(covariances))
+        roots = {load: root_of(covariance) for load, covariance in covariances.items()}
         object.__setattr__(self, "roots", MappingProxyType(roots))
 
     def owner(self, stated: TypeB) -> str:
@@ -89,8 +89,8 @@ class Shared:
         """Return the sign of a channel from the cells' axes to SAE for each condition (conditions,)."""
         return np.array(
             [
-                signs(self.machine_axes, "SAE", seen_by_cells(one.rotation, self.reversal))[channel]
-                for one in conditions
+                signs(self.machine_axes, "SAE", seen_by_cells(condition.rotation, self.reversal))[channel]
+                for condition in conditions
             ],
             dtype=float,
         )
@@ -106,7 +106,10 @@ class Shared:
         # The conditions hold tared means. A record whose intercept carries the zero of its session loses
         # that term with the tare, and the difference to a tare of zero says so.
         tare = dict.fromkeys(names, 0.0) if self.tared else None
-        rows = {name: np.array([one.indications[i] for one in conditions]) for i, name in enumerate(names)}
+        rows = {
+            name: np.array([condition.indications[i] for condition in conditions])
+            for i, name in enumerate(names)
+        }
         jacobian = coefficient_jacobian(self.record, channel, rows, tare)
         moved = (jacobian @ self.roots[channel]).T * si_scale(self.record.load(channel).unit)
         return np.asarray(moved * self.signed(channel, conditions))
@@ -117,22 +120,22 @@ class Shared:
         Shape (cells + corrections, rows); no row for a cell where its zero is known.
         """
         sign = self.signed(channel, conditions)
-        rows = [self._correction_row(one, channel, conditions) for one in self.corrections]
+        rows = [self._correction_row(correction, channel, conditions) for correction in self.corrections]
         if self.record is not None and conditions and any(self.u_cell_zero):
-            cells = np.array([one.indications for one in conditions]).T
+            cells = np.array([correction.indications for correction in conditions]).T
             rows = [*zero_shifts(self.record, cells, self.u_cell_zero)[channel], *rows]
         return np.reshape(np.asarray(rows, dtype=float), (len(rows), len(conditions))) * sign
 
     def _correction_row(
-        self, one: Correction, channel: str, conditions: Sequence[Condition]
+        self, correction: Correction, channel: str, conditions: Sequence[Condition]
     ) -> NDArray[np.float64]:
         """Return what the uncertainty of a correction moves in each condition [SI], machine axes."""
-        if one.channel != channel:
+        if correction.channel != channel:
             return np.zeros(len(conditions))
-        source = str(one.source)
+        source = str(correction.source)
         sign = np.ones(len(conditions)) if source == "FZ" else self.signed(source, conditions)
-        values = np.array([getattr(each, source) for each in conditions], dtype=float)
-        return np.asarray(one.u * one.factor * sign * values)
+        values = np.array([getattr(condition, source) for condition in conditions], dtype=float)
+        return np.asarray(correction.u * correction.factor * sign * values)
 
     def calibration_parts(self, channel: str, moved: NDArray[np.float64]) -> list[Part]:
         """Return the record's parts of a weighted sum that its variables move by ``moved``."""
@@ -156,8 +159,12 @@ class Shared:
                 for i, u in enumerate(moved[:cells])
             ),
             *(
-                Part(source="machine correction", key=f"correction/{self.machine}/{one.label}", u=float(u))
-                for one, u in zip(self.corrections, moved[cells:], strict=True)
+                Part(
+                    source="machine correction",
+                    key=f"correction/{self.machine}/{correction.label}",
+                    u=float(u),
+                )
+                for correction, u in zip(self.corrections, moved[cells:], strict=True)
             ),
         ]
 
@@ -194,12 +201,12 @@ def shared_of(reduced: ReducedTest, *, machine: Machine, record: CalibrationReco
     """Return what the rows of a reduced test have in common."""
     own_tares = reduced.tare.source == "block"  # a tare of each file is no shift of all rows
     SA = machine.stated_uncertainty("SA")
-    left = u_SA(machine, np.array([one.MZ for one in reduced.conditions]))
+    u_uncorrected = u_SA(machine, np.array([condition.MZ for condition in reduced.conditions]))
     return Shared(
         record=record,
         machine_axes=machine.axes,
         tared=reduced.tare.source != "none",
-        SA=replace(SA, u=float(np.hypot(SA.u, left))) if left else SA,
+        SA=replace(SA, u=float(np.hypot(SA.u, u_uncorrected))) if u_uncorrected else SA,
         SA_scale=machine.stated_uncertainty("SA_scale"),
         FZ=machine.stated_uncertainty("FZ"),
         P=machine.stated_uncertainty("P"),
@@ -209,13 +216,17 @@ def shared_of(reduced: ReducedTest, *, machine: Machine, record: CalibrationReco
         machine=machine.name,
         test=identity_of(reduced),
         reversal=reduced.info.reversal,
-        corrections=tuple(one for one in machine.corrections if one.channel in ("FY", "MZ")),
+        corrections=tuple(
+            condition for condition in machine.corrections if condition.channel in ("FY", "MZ")
+        ),
     )
 
 
 def identity_of(reduced: ReducedTest) -> str:
     """Return what tells a test from every other: a hash of its files, whatever the folder's name."""
-    text = "\n".join(sorted({f"{one.file} {one.file_sha256}" for one in reduced.conditions}))
+    text = "\n".join(
+        sorted({f"{condition.file} {condition.file_sha256}" for condition in reduced.conditions})
+    )
     return hashlib.sha256(text.encode()).hexdigest()[:12]
 
 
@@ -230,12 +241,12 @@ def root_of(covariance: NDArray[np.float64]) -> NDArray[np.float64]:
     """
     spread = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     safe = np.where(spread > 0, spread, 1.0)
-    rest = covariance / np.outer(safe, safe)
-    size = len(rest)
+    correlation = covariance / np.outer(safe, safe)
+    size = len(correlation)
     lower = np.zeros((size, size))
     for j in range(size):
-        pivot = rest[j, j] - lower[j, :j] @ lower[j, :j]
+        pivot = correlation[j, j] - lower[j, :j] @ lower[j, :j]
         if pivot > _NO_PIVOT:
             lower[j, j] = np.sqrt(pivot)
-            lower[j + 1 :, j] = (rest[j + 1 :, j] - lower[j + 1 :, :j] @ lower[j, :j]) / lower[j, j]
+            lower[j + 1 :, j] = (correlation[j + 1 :, j] - lower[j + 1 :, :j] @ lower[j, :j]) / lower[j, j]
     return np.asarray(lower * spread[:, None])

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import math
 import time
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated
 
 import typer
 
-from toolkit.channels import CHANNELS
-from toolkit.characteristics.characteristic import BOTH
 from toolkit.cli.console import (
     CalibrationId,
     Calibrations,
@@ -25,18 +22,9 @@ from toolkit.cli.console import (
     answer,
     day,
     exit_code,
-    finding_lines,
     progress,
-    table,
 )
 from toolkit.cli.console import reader as choose_reader
-from toolkit.cli.delivery import draft_keys, mark_words
-from toolkit.estimate import plus_minus
-
-if TYPE_CHECKING:
-    from toolkit.cli.resolve import Resolved
-    from toolkit.estimate import Estimate
-    from toolkit.report.style import Style
 
 NAME = "process"
 
@@ -63,8 +51,9 @@ def command(
 
     Example: toolkit process tests/2019-06-04 --out test.xlsx
     """
-    from toolkit.cli.resolve import resolve_test
-    from toolkit.cli.units import unit_choice
+    from toolkit.lab.answers import unit_choice
+    from toolkit.lab.process_answer import process_payload, process_text
+    from toolkit.lab.resolve import resolve_test
     from toolkit.recording.marks import refuse_original
     from toolkit.testfile import write_test_file
 
@@ -85,169 +74,11 @@ def command(
             step=step,
         )
     digest = write_test_file(out, resolved.result, dict(resolved.recordings)) if out else None
-    payload = test_payload(resolved)
+    payload = process_payload(resolved)
     payload |= {
         "out": out,
         "content_sha256": digest,
         "timing": {"seconds": time.perf_counter() - started},
     }
-    answer(payload, _text(resolved, out, style), as_json=json, quiet=quiet)
+    answer(payload, process_text(resolved, out, style), as_json=json, quiet=quiet)
     return exit_code(resolved.findings)
-
-
-def test_payload(resolved: Resolved) -> dict[str, Any]:
-    """Return a reduced test as the JSON answer: SI units, SAE axes; names carry the units.
-
-    ``u_FY_N`` and ``u_MZ_Nm`` of a condition hold every source of its budget, null where it is not used.
-    """
-    from toolkit.characteristics.model import answer_lists
-
-    reduced, characteristics = resolved.result.reduced, resolved.result.characteristics
-    points = {(p.file, p.first_row): p for p in characteristics.points}
-    return {
-        "test": reduced.info.name,
-        "machine": reduced.info.machine,
-        "simulated": reduced.info.simulated,
-        "axes": reduced.axes,
-        "averaging": reduced.averaging,
-        "protocol": reduced.protocol,
-        "reversal": reduced.info.reversal,
-        "calibration": reduced.calibration.as_dict(),
-        **draft_keys(reduced.calibration),
-        "tare": {
-            "source": reduced.tare.source,
-            "values": dict(reduced.tare.values),
-            "unit": reduced.tare.unit,
-        },
-        "stated": [
-            {
-                "symbol": one.symbol,
-                "u": one.u,
-                "unit": CHANNELS[one.symbol].si if one.symbol in CHANNELS else "1",
-                "relative": one.relative,
-                "effect": one.effect,
-                "common": one.common,
-                "source": one.source,
-            }
-            for one in reduced.stated
-        ],
-        "conditions": [
-            {
-                "file": c.file,
-                "rotation": c.rotation,
-                "rows": [c.first_row, c.last_row],
-                "step_SA_rad": c.step_SA,
-                "step_FZ_N": c.step_FZ,
-                "SA_rad": c.SA,
-                "FZ_N": c.FZ,
-                "FY_N": c.FY,
-                "MZ_Nm": c.MZ,
-                "u_FY_N": points[c.file, c.first_row].u_FY if c.used else None,
-                "u_FY_repeatability_N": c.u_FY,
-                "u_MZ_Nm": points[c.file, c.first_row].u_MZ if c.used else None,
-                "u_MZ_repeatability_Nm": c.u_MZ,
-                "FY_file_N": c.FY_file,
-                "MZ_file_Nm": c.MZ_file,
-                "FZ_common_N": c.FZ_common,
-                "FY_common_N": c.FY_common,
-                "MZ_common_Nm": c.MZ_common,
-                "u_FY_common_N": math.hypot(c.u_FY_common, c.u_FY_zero),
-                "u_MZ_common_Nm": math.hypot(c.u_MZ_common, c.u_MZ_zero),
-                "used": c.used,
-                "calibration_sha256": c.calibration_sha256,
-            }
-            for c in reduced.conditions
-        ],
-        "characteristics": {
-            **{
-                name: [_entry(entry) for entry in entries]
-                for name, entries in answer_lists(characteristics.rows).items()
-            },
-            "budgets": [
-                {
-                    "load_N": row.load_N,
-                    "rotation": row.rotation,
-                    "name": row.name,
-                    "unit": row.estimate.unit,
-                    "standard_uncertainty": dict(row.sources),
-                }
-                for row in characteristics.rows
-                if row.estimate is not None and row.SA_rad is None
-            ],
-        },
-        "impossible": [finding.as_dict() for finding in reduced.impossible],
-        "findings": [finding.as_dict() for finding in resolved.findings],
-    }
-
-
-def _entry(entry: dict[str, Any]) -> dict[str, Any]:
-    from toolkit.estimate import Estimate
-
-    return {key: _estimate(value) if isinstance(value, Estimate) else value for key, value in entry.items()}
-
-
-def _estimate(estimate: Estimate) -> dict[str, Any]:
-    U, k = estimate.expanded()
-    return {
-        "value": estimate.value,
-        "standard_uncertainty": estimate.u,
-        "dof": estimate.dof,
-        "expanded_uncertainty": U,
-        "k": k,
-        "unit": estimate.unit,
-    }
-
-
-def _text(resolved: Resolved, out: Path | None, style: Style) -> str:
-    reduced = resolved.result.reduced
-    mark = "  SIMULATED" if reduced.info.simulated else ""
-    used = sum(c.used for c in reduced.conditions)
-    lines = [
-        f"{reduced.info.name}: {used} conditions of {len({c.file for c in reduced.conditions})} files{mark}",
-        f"calibration {reduced.calibration.id} ({reduced.calibration.sha256[:12]}...)"
-        + mark_words(reduced.calibration),
-        *(["IMPOSSIBLE VALUES: no tire has them, see the findings"] if reduced.impossible else []),
-        f"averaging: {reduced.averaging}",
-        f"tare: {reduced.tare.source}",
-        *(["reversed runs: the tire turned round on the hub"] if reduced.info.reversal == "tire" else []),
-        "",
-        _characteristics_table(resolved, style),
-    ]
-    if resolved.findings:
-        lines += ["", f"findings: {len(resolved.findings)} (toolkit explain RULE tells more)"]
-        lines += finding_lines(resolved.findings)
-    lines.append("")
-    lines.append(
-        f"written: {out}" if out else "nothing written; --out test.xlsx keeps the whole test in one file"
-    )
-    return "\n".join(lines)
-
-
-def _characteristics_table(resolved: Resolved, style: Style) -> str:
-    """Return the printed characteristics, one row a load; those of a direction with the drum forward."""
-    from toolkit.characteristics.catalogue import columns, tables
-    from toolkit.units import from_si
-
-    printed = [one for table in tables() for one in columns(table) if one.console_heading is not None]
-    units = {one.name: style.unit(one.printed_unit) for one in printed}
-    characteristics = resolved.result.characteristics
-    lines = []
-    for load in characteristics.loads_N:
-        rotations = {row.rotation for row in characteristics.rows if row.load_N == load}
-        direction = "forward" if "forward" in rotations else "reverse"
-        cells = [f"{load:.0f}", f"{float(from_si(load, 'lbf')):.0f}"]
-        for one in printed:
-            row = characteristics.at(one.name, load, BOTH if one.scope == "load" else direction)
-            factor = one.factor * units[one.name][1]
-            cells.append(_shown(row.estimate if row is not None else None, factor, one.digits))
-        lines.append(cells)
-    head = ["FZ [N]", "FZ [lbf]"]
-    head += [f"{one.console_heading} [{str(units[one.name][0]).replace('*', '·')}]" for one in printed]
-    return table(head, lines, align=">" * len(head))
-
-
-def _shown(estimate: Estimate | None, factor: float, digits: int) -> str:
-    if estimate is None:
-        return "-"
-    shown = estimate.scaled(factor, "")
-    return plus_minus(shown.value, shown.expanded()[0], spec=f".{digits}f")

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
-from toolkit.cli.console import Calibrations, Draft, Home, Json, Quiet, answer, table
+from toolkit.cli.console import Calibrations, Draft, Home, Json, Quiet, answer
 
 app = typer.Typer(help="The contract of report templates.", no_args_is_help=True, rich_markup_mode=None)
 
@@ -29,17 +29,20 @@ def check(
     from toolkit.report.word.xml import stories
 
     template = read_template(file)
-    found = check_template(template, read_style(style_file(file)))
+    findings = check_template(template, read_style(style_file(file)))
     tags = len({str(site.tag) for site in scan(stories(open_package(template)))})
-    text = "\n".join(f"{one.level:<8}{one.rule:<18}{one.part}, {one.place}: {one.message}" for one in found)
+    text = "\n".join(
+        f"{finding.level:<8}{finding.rule:<18}{finding.part}, {finding.place}: {finding.message}"
+        for finding in findings
+    )
     payload = {
         "template_sha256": template.sha256,
         "tag_count": tags,
-        "findings": [one.as_dict() for one in found],
+        "findings": [finding.as_dict() for finding in findings],
     }
     # Their number tells a template that another program has robbed of its controls.
     answer(payload, text or f"{file}: no findings; {tags} different tags", as_json=json, quiet=quiet)
-    return 1 if found else 0
+    return 1 if findings else 0
 
 
 @app.command("tags")
@@ -67,6 +70,7 @@ def tags(
 
     Example: toolkit template tags --test tests/2019-06-04
     """
+    from toolkit.lab.answers import table
     from toolkit.report.kinds import VOCABULARIES
     from toolkit.report.reference import list_tags
     from toolkit.report.style import read_style, style_file
@@ -77,14 +81,19 @@ def tags(
     style = read_style(style_file(template)) if template else read_style(None)
     content = None
     if test is not None:
-        from toolkit.cli.resolve import resolve_test
+        from toolkit.lab.resolve import resolve_test
 
         resolved = resolve_test(
             test, calibration=calibration, calibrations=calibrations, home=home, draft=draft
         )
         content = build_content(resolved.result, resolved.record, findings=resolved.findings, style=style)
     listed = list_tags(content, style, VOCABULARIES[kind])
-    answer({"tags": listed}, _text(listed), as_json=json, quiet=quiet)
+    rows = [
+        [tag["tag"], tag["kind"], tag["unit"] or "", str(tag["value"] or "")[:40], tag["description"]]
+        for tag in listed
+    ]
+    text = table(["tag", "kind", "unit", "value", "description"], rows, align="<<<<<")
+    answer({"tags": listed}, text, as_json=json, quiet=quiet)
     return 0
 
 
@@ -106,9 +115,9 @@ def new(
 
     Example: toolkit template new report_templates/ours.docx --like summary
     """
-    from toolkit.cli.home import packaged_home
     from toolkit.errors import OutputError
     from toolkit.files import write_atomic
+    from toolkit.lab.home import packaged_home
     from toolkit.report.style import style_file
 
     sources = {path.stem: path for path in sorted((packaged_home() / "report_templates").glob("*.docx"))}
@@ -140,11 +149,3 @@ def new(
     write_atomic(style, (style_file(source) or source.with_name("org.toml")).read_bytes())
     answer({"template": file, "style": style}, f"{file}\n{style}", as_json=json, quiet=quiet)
     return 0
-
-
-def _text(listed: list[dict[str, Any]]) -> str:
-    rows = [
-        [one["tag"], one["kind"], one["unit"] or "", str(one["value"] or "")[:40], one["description"]]
-        for one in listed
-    ]
-    return table(["tag", "kind", "unit", "value", "description"], rows, align="<<<<<")

@@ -35,24 +35,24 @@ def differences(entries: Sequence[Entry], *, level: float) -> tuple[tuple[Differ
     """
     reference = entries[0]
     base = series_of(reference.rows)
-    found: list[Difference] = []
+    compared_rows: list[Difference] = []
     left_out: list[str] = []
     for other in entries[1:]:
-        theirs = series_of(other.rows)
+        other_series = series_of(other.rows)
         lacking: dict[str, None] = {}
         beyond: dict[float, None] = {}
         for series, rows in base.items():
-            if series not in theirs:
+            if series not in other_series:
                 lacking[_said(series)] = None
                 continue
-            for row in sorted(rows, key=lambda one: one.load_N):
-                number = at_load(theirs[series], row.load_N, owner=other.identity)
+            for row in sorted(rows, key=lambda row: row.load_N):
+                number = at_load(other_series[series], row.load_N, owner=other.identity)
                 if number is None:
                     beyond[round(row.load_N)] = None
                 else:
-                    found.append(_difference(series, row, number, other.label))
+                    compared_rows.append(_difference(series, row, number, other.label))
         left_out += _left_out(other.label, lacking, beyond)
-    return tuple(one for part in PARTS for one in _decided(found, part, level)), tuple(left_out)
+    return tuple(row for part in PARTS for row in _decided(compared_rows, part, level)), tuple(left_out)
 
 
 def _difference(series: Series, row: Row, number: Uncertain, label: str) -> Difference:
@@ -76,12 +76,12 @@ def _difference(series: Series, row: Row, number: Uncertain, label: str) -> Diff
     )
 
 
-def _decided(found: Sequence[Difference], part: Part, level: float) -> list[Difference]:
-    mine = [one for one in found if one.part == part]
-    adjusted = holm([one.p for one in mine])
+def _decided(differences: Sequence[Difference], part: Part, level: float) -> list[Difference]:
+    table = [difference for difference in differences if difference.part == part]
+    adjusted = holm([difference.p for difference in table])
     return [
-        replace(one, p_holm=p, significant=p is not None and p < level)
-        for one, p in zip(mine, adjusted, strict=True)
+        replace(difference, p_holm=p, significant=p is not None and p < level)
+        for difference, p in zip(table, adjusted, strict=True)
     ]
 
 
@@ -91,12 +91,12 @@ def _said(series: Series) -> str:
 
 
 def _left_out(label: str, lacking: dict[str, None], beyond: dict[float, None]) -> list[str]:
-    found = []
+    sentences = []
     if lacking:
-        found.append(f"{label} has no {', '.join(lacking)}")
+        sentences.append(f"{label} has no {', '.join(lacking)}")
     if beyond:
-        found.append(f"{label} does not reach the load {in_both(list(beyond), 'N', '.0f')}")
-    return found
+        sentences.append(f"{label} does not reach the load {in_both(list(beyond), 'N', '.0f')}")
+    return sentences
 
 
 def pattern_effects(entries: Sequence[Entry]) -> tuple[PatternEffect, ...]:
@@ -111,14 +111,14 @@ def pattern_effects(entries: Sequence[Entry]) -> tuple[PatternEffect, ...]:
     turned = [entry for entry in entries if entry.condition("belt") == "reversed"]
     if len(regular) != 1 or len(turned) != 1:
         return ()
-    ours, theirs = series_of(regular[0].rows), series_of(turned[0].rows)
+    regular_series, turned_series = series_of(regular[0].rows), series_of(turned[0].rows)
     effects = []
     for declared in compared():
         series = (declared.name, "both", None)
-        if not declared.belt_sign or series not in theirs:
+        if not declared.belt_sign or series not in turned_series:
             continue
-        for row in sorted(ours.get(series, ()), key=lambda row: row.load_N):
-            other = at_load(theirs[series], row.load_N, owner=turned[0].identity)
+        for row in sorted(regular_series.get(series, ()), key=lambda row: row.load_N):
+            other = at_load(turned_series[series], row.load_N, owner=turned[0].identity)
             if other is not None:
                 effects.append(
                     PatternEffect(

@@ -55,9 +55,9 @@ def maker_rows(
     table = read_table(path, axes=axes)
     _check_possible(table)
     _check_one_condition(table)
-    curves = [_in_sae(one) for one in table_curves(table)]
-    problems = [why_not(one) for one in curves]
-    good = [one for one, problem in zip(curves, problems, strict=True) if problem is None]
+    curves = [_in_sae(curve) for curve in table_curves(table)]
+    problems = [why_not(curve) for curve in curves]
+    good = [curve for curve, problem in zip(curves, problems, strict=True) if problem is None]
     if not good:
         first = next(problem for problem in problems if problem is not None)
         raise FitError(
@@ -67,10 +67,12 @@ def maker_rows(
     fits = fit_curves(good)
     findings = [
         Finding(
-            rule=one.rule or "not-fitted", where=f"{path.name}, {one.where}", message=f"{one.what}: {one.got}"
+            rule=problem.rule or "not-fitted",
+            where=f"{path.name}, {problem.where}",
+            message=f"{problem.what}: {problem.got}",
         )
-        for one in problems
-        if one is not None
+        for problem in problems
+        if problem is not None
     ]
     by_load: dict[float, dict[str, tuple[Curve, CurveFit]]] = {}
     for curve, fit in zip(good, fits, strict=True):
@@ -81,9 +83,10 @@ def maker_rows(
         rows += _rows(reader, load, angles_rad)
     sae = TireTable(path=path, axes="SAE", columns=())
     # Which parameters a curve leaves open is of no interest here: values and slopes are read off it.
-    told = [one for one in fit_findings(list(fits)) if one.level != "note"]
+    warnings = [finding for finding in fit_findings(list(fits)) if finding.level != "note"]
     findings += [
-        replace(one, where=f"{path.name}, {one.where}") for one in (*told, *axes_findings(sae, fits))
+        replace(finding, where=f"{path.name}, {finding.where}")
+        for finding in (*warnings, *axes_findings(sae, fits))
     ]
     findings += (*repeat_findings(table), *table.mark_findings)
     return tuple(rows), tuple(findings)
@@ -116,8 +119,8 @@ def _in_sae(curve: Curve) -> Curve:
 
 def _direction(load: float, channels: dict[str, tuple[Curve, CurveFit]], path: Path) -> Direction:
     """Return a load of the table as the direction of a test: one condition a row."""
-    one = next(iter(channels.values()))[0]
-    order = np.argsort(one.SA, kind="stable")
+    curve = next(iter(channels.values()))[0]
+    order = np.argsort(curve.SA, kind="stable")
     y = {name: curve.y[order] for name, (curve, _) in channels.items()}
     zeros = np.zeros(len(order))
     conditions = tuple(
@@ -128,7 +131,7 @@ def _direction(load: float, channels: dict[str, tuple[Curve, CurveFit]], path: P
             u_FY_common=0.0, u_MZ_common=0.0, u_FY_zero=0.0, u_MZ_zero=0.0, used=True, calibration_sha256="",
         )
         for i, (SA, FY, MZ) in enumerate(
-            zip(one.SA[order].tolist(), y.get("FY", zeros).tolist(), y.get("MZ", zeros).tolist(), strict=True)
+            zip(*(a.tolist() for a in (curve.SA[order], y.get("FY", zeros), y.get("MZ", zeros))), strict=True)
         )
     )  # fmt: skip
     fits = {name: fit for name, (_, fit) in channels.items()}

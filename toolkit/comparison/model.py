@@ -175,4 +175,4 @@ class Comparison:
     @property
     def uses(self) -> tuple[CalibrationUse, ...]:
         """The records that computed the tests, each once."""
-        return tuple(dict.fromkeys(one.calibration for one in self.entries if one.calibration))
+        return tuple(dict.fromkeys(entry.calibration for entry in self.entries if entry.calibration))

@@ -57,8 +57,8 @@ def grubbs_p(values: NDArray[np.float64]) -> float | None:
     if n < 3 or s <= 0:
         return None
     G = float(np.max(np.abs(values - values.mean()))) / s
-    rest = (n - 1) ** 2 - n * G * G
-    if rest <= 0:
+    remainder = (n - 1) ** 2 - n * G * G
+    if remainder <= 0:
         return 0.0
-    t = math.sqrt(n * (n - 2) * G * G / rest)
+    t = math.sqrt(n * (n - 2) * G * G / remainder)
     return min(1.0, 2 * n * float(stdtr(n - 2, -t)))

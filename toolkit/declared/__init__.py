@@ -57,6 +57,7 @@ a fixed length, ``Mapping[str, X]``, a dataclass (a table), ``tuple[Dataclass, .
   written; ``plain=True`` takes a number alone too, ``beside="unit"`` one whose unit stands in the entry
   ``unit`` of the same table;
 - `Text` (empty, stripped, pattern, from a number), `Day` (a date held as ISO 8601 text), `UnitName`;
+- `Short`: a value alone stands for a table with one entry;
 - `Size`, `Distinct`; `Keyed` for tables whose keys are names, ``[cells.D51]``, and `Names` for texts or
   keys that are among names given or declared by another entry: ``Names(of="loads")``.
 
@@ -82,6 +83,7 @@ reads back equal.
 from toolkit.declared.declaration import table_of
 from toolkit.declared.describe import json_schema, reference, starter
 from toolkit.declared.faults import Fault, Source, nearest, refuse
+from toolkit.declared.lines import lines_of
 from toolkit.declared.marks import (
     Above,
     AtLeast,
@@ -94,6 +96,7 @@ from toolkit.declared.marks import (
     Keyed,
     Names,
     Quantity,
+    Short,
     Size,
     Text,
     Unit,
@@ -115,6 +118,7 @@ __all__ = [
     "Keyed",
     "Names",
     "Quantity",
+    "Short",
     "Size",
     "Source",
     "Text",
@@ -125,6 +129,7 @@ __all__ = [
     "build",
     "json_schema",
     "json_value",
+    "lines_of",
     "nearest",
     "plain",
     "read",

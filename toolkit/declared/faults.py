@@ -63,7 +63,7 @@ class Fault:
             return f"{name}: unknown key; {self.hint}"
         if self.kind == "missing":
             return f"{name}: missing; expected {self.expected}"
-        problem = self.what or f"{shown(self.got, quoted=True)} cannot be used"
+        problem = self.what or f"{display(self.got, quoted=True)} cannot be used"
         return f"{name}: {problem}; expected {self.expected}"
 
 
@@ -79,10 +79,10 @@ def key_text(path: Path) -> str:
     return text
 
 
-def shown(value: Any, *, quoted: bool = False) -> str:
+def display(value: Any, *, quoted: bool = False) -> str:
     """Return a value as a settings file writes it, cut where it is long.
 
-    >>> shown({"value": 80, "unit": "km/h"})
+    >>> display({"value": 80, "unit": "km/h"})
     '{ value = 80, unit = "km/h" }'
     """
     if value is None:
@@ -110,7 +110,7 @@ def _inline(value: Any) -> str:
     return value.isoformat() if isinstance(value, dt.date | dt.time) else str(value)
 
 
-def nearest(name: str, known: Sequence[str], present: Container[str] = ()) -> str | None:
+def nearest(name: str, candidates: Sequence[str], present: Container[str] = ()) -> str | None:
     """Return the known name that was meant, None where none is alike.
 
     Case does not count: ``dot`` is DOT. Of two that are as near, that which is not there yet was meant.
@@ -123,7 +123,7 @@ def nearest(name: str, known: Sequence[str], present: Container[str] = ()) -> st
         ratio = difflib.SequenceMatcher(None, name.lower(), candidate.lower()).ratio()
         return ratio, candidate not in present, candidate
 
-    near = max(known, key=likeness, default=None)
+    near = max(candidates, key=likeness, default=None)
     return None if near is None or likeness(near)[0] < LIKE else near
 
 
@@ -187,7 +187,7 @@ def refuse(faults: Sequence[Fault], source: Source) -> None:
         f"{name} {what}" if fault.what is None else f"{name}: {what}",
         where=f"{document.where}: {fault.name}" if fault.name else document.where,
         line=None if line is None else document.excerpt(line),
-        got=shown(fault.got),
+        got=display(fault.got),
         expected=fault.expected,
         next_step=_next_step(fault),
         rule=fault.rule_id,

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from pathlib import Path as FilePath
 from typing import Any, ClassVar
 
-from toolkit.declared.faults import Fault, nearest, shown
+from toolkit.declared.faults import Fault, display, nearest
 from toolkit.declared.lines import Path
 from toolkit.declared.marks import Above, AtLeast, AtMost, Below, Entry, Format, Names, Text
 from toolkit.files import is_number
@@ -149,13 +149,13 @@ class NumberKind(Kind):
 
     shape = (int, float)
     limits: tuple[Limit, ...] = ()
-    whole: bool = False
+    integer: bool = False
 
     def form(self) -> str:
         """Return what may stand there: ``a number above 0 and below 90``."""
-        noun = "whole number" if self.whole else "number"
+        noun = "whole number" if self.integer else "number"
         if not self.limits:
-            return f"a {noun}" if self.whole else "a finite number"
+            return f"a {noun}" if self.integer else "a finite number"
         if self.limits == (Above(0),):
             return f"a positive {noun}"
         return f"a {noun} {self.range()}"
@@ -177,13 +177,13 @@ class NumberKind(Kind):
 
     def read(self, value: Any, place: Place) -> Any:
         """Return a float, or an int where it is whole."""
-        if not is_number(value) or not self.inside(value) or (self.whole and not isinstance(value, int)):
+        if not is_number(value) or not self.inside(value) or (self.integer and not isinstance(value, int)):
             return self.wrong(value, place)
-        return value if self.whole else float(value)
+        return value if self.integer else float(value)
 
     def write(self, value: Any) -> Any:
         """Return a number of Python; numpy's are turned into one."""
-        return int(value) if self.whole else float(value)
+        return int(value) if self.integer else float(value)
 
     def schema(self) -> dict[str, Any]:
         """Return the schema of the number with its limits."""
@@ -191,7 +191,7 @@ class NumberKind(Kind):
             Above: "exclusiveMinimum", AtLeast: "minimum", Below: "exclusiveMaximum", AtMost: "maximum",
         }  # fmt: skip
         limits = {words[type(limit)]: limit.limit for limit in self.limits}
-        return {"type": "integer" if self.whole else "number", **limits}
+        return {"type": "integer" if self.integer else "number", **limits}
 
     def example(self) -> Any:
         """Return the example, else the smallest handy number that is inside the limits."""
@@ -202,7 +202,7 @@ class NumberKind(Kind):
         if number is None:
             low, high = self.limits[0].limit, self.limits[-1].limit
             number = (low + high) / 2
-        return int(number) if self.whole else float(number)
+        return int(number) if self.integer else float(number)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -226,8 +226,8 @@ class TextKind(Kind):
         return isinstance(value, str) or self._from_number(value) is not None
 
     def _from_number(self, value: Any) -> str | None:
-        whole, decimal = type(value) is int, type(value) is float
-        taken = (whole and self.text.numbers != "") or (decimal and self.text.numbers == "any")
+        integer, decimal = type(value) is int, type(value) is float
+        taken = (integer and self.text.numbers != "") or (decimal and self.text.numbers == "any")
         return str(value) if taken else None
 
     def read(self, value: Any, place: Place) -> Any:
@@ -240,7 +240,7 @@ class TextKind(Kind):
             near = nearest(text, names)
             return place.refuse(
                 value, ", ".join(names), rule=self.entry.rule,
-                what=f"{shown(value, quoted=True)} is not known, did you mean {near!r}?" if near else None,
+                what=f"{display(value, quoted=True)} is not known, did you mean {near!r}?" if near else None,
             )  # fmt: skip
         return text.strip() if self.text.strip else text
 
@@ -277,9 +277,7 @@ class ChoiceKind(Kind):
 
     def form(self) -> str:
         """Return what may stand there."""
-        if all(isinstance(choice, int) for choice in self.choices):
-            return " or ".join(map(str, self.choices))
-        return ", ".join(map(str, self.choices))
+        return (" or " if len(self.choices) <= 2 else ", ").join(map(str, self.choices))
 
     def read(self, value: Any, place: Place) -> Any:
         """Return the choice."""
@@ -290,7 +288,7 @@ class ChoiceKind(Kind):
                 near = nearest(value, [choice for choice in self.choices if isinstance(choice, str)])
             return place.refuse(
                 value, self.expected, rule=self.entry.rule,
-                what=f"{shown(value, quoted=True)} is not known, did you mean {near!r}?" if near else None,
+                what=f"{display(value, quoted=True)} is not known, did you mean {near!r}?" if near else None,
             )  # fmt: skip
         return value
 
@@ -309,6 +307,7 @@ class DateKind(Kind):
 
     shape = (dt.date, str)
     text: bool = False
+    moment: bool = False
 
     def form(self) -> str:
         """Return what may stand there."""
@@ -317,6 +316,8 @@ class DateKind(Kind):
     def read(self, value: Any, place: Place) -> Any:
         """Return the date."""
         day = value if type(value) is dt.date else None
+        if self.moment and isinstance(value, dt.datetime):
+            day = value.date()
         if isinstance(value, str) and len(value) == len("2026-03-31"):
             try:
                 day = dt.date.fromisoformat(value)

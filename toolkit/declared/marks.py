@@ -60,23 +60,39 @@ class Text:
     """How a text may be: empty, stripped of spaces at its ends, of a pattern, or written as a number.
 
     ``numbers``: ``"int"`` takes a whole number without quotes for its digits, ``"any"`` every number.
+    ``accepts`` is asked of a text where no pattern can say it; the field's `Entry` says what is expected.
     """
 
     empty: bool = False
     strip: bool = False
     pattern: str | None = None
     numbers: str = ""
+    accepts: Callable[[str], object] | None = None
 
     def fits(self, text: str) -> bool:
         """Tell whether a text is as it should be."""
-        return (self.empty or bool(text.strip())) and (
-            self.pattern is None or re.fullmatch(self.pattern, text) is not None
+        return (
+            (self.empty or bool(text.strip()))
+            and (self.pattern is None or re.fullmatch(self.pattern, text) is not None)
+            and (self.accepts is None or bool(self.accepts(text)))
         )
 
 
 @dataclass(frozen=True, slots=True)
 class Day:
-    """A text that is a date: a TOML date or ISO 8601 text is read, ISO 8601 text is held."""
+    """A text that is a date: a TOML date or ISO 8601 text is read, ISO 8601 text is held.
+
+    ``moment``: of a TOML date with a time the day is taken.
+    """
+
+    moment: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Short:
+    """A value alone stands for a table with this one entry: ``"a text"`` for ``{ statement = "a text" }``."""
+
+    key: str
 
 
 @dataclass(frozen=True, slots=True)

@@ -58,44 +58,15 @@ def build(cls: type[T], table: Any, source: Source | object) -> T:
         every entry that is unknown, missing or cannot be used
     """
     origin = source if isinstance(source, Source) else Source(where=source)
-    made, faults = attempt(cls, table)
+    instance, faults = attempt(cls, table)
     refuse(faults, origin)
-    assert made is not None  # noqa: S101  without a fault there is an object
-    return made
+    assert instance is not None  # noqa: S101  without a fault there is an object
+    return instance
 
 
 def attempt(cls: type[T], table: Any) -> tuple[T | None, tuple[Fault, ...]]:
     """Return the object of a parsed file, None where it has faults, and the faults."""
-    form = form_of(cls) or Format()
     faults: list[Fault] = []
     root = table if isinstance(table, Mapping) else {}
-    place = Place((), form, faults, root)
-    if isinstance(table, dict):
-        table = _of_newest(table, form, place)
-        if faults:
-            return None, tuple(faults)
-    made = table_of(cls).read(table, Place((), form, faults, table if isinstance(table, Mapping) else {}))
-    return None if faults else made, tuple(faults)
-
-
-def _of_newest(table: dict[str, Any], form: Format, place: Place) -> dict[str, Any]:
-    """Return the entries in the newest form, without a fault only where their schema is known."""
-    if form.schema is None:
-        return table
-    stated = table.get("schema", None if form.schema_required else form.schema)
-    if stated is None:
-        place.at("schema").refuse(None, f"schema = {form.schema}", kind="missing")
-        return table
-    older = dict(form.older or {})
-    if type(stated) is not int or (stated != form.schema and stated not in older):
-        newer = type(stated) is int and stated > form.schema
-        place.at("schema").refuse(
-            stated,
-            " or ".join(map(str, sorted({form.schema, *older}))),
-            what=f"this {form.title} was written by a newer version of the toolkit" if newer else None,
-        )
-        return table
-    while stated != form.schema:
-        table = {**older[stated](table), "schema": stated + 1}
-        stated += 1
-    return table
+    instance = table_of(cls).read(table, Place((), form_of(cls) or Format(), faults, root))
+    return None if faults else instance, tuple(faults)

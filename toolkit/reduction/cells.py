@@ -171,7 +171,7 @@ def _cells(
     info: TestInfo,
     tares: Mapping[str, Tare],
 ) -> Cells:
-    per_FY, levers = _linear(record, "FY"), dict(machine.overturning_lever_m)
+    per_FY, levers = _linear(record, "FY"), dict(machine.layout.overturning_lever_m)
     turns = [signs(machine.axes, "SAE", seen_by_cells(c.rotation, info.reversal)) for c in conditions]
     zeros = {
         name: [

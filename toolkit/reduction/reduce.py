@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolkit import __version__
 from toolkit.calibration.records.use import not_asked
 from toolkit.channels import Reversal, Rotation, seen_by_cells, signs
 from toolkit.reduction import protocol as plan
@@ -21,6 +20,7 @@ from toolkit.reduction.model import CalibrationUse, Condition, ReducedTest, Tare
 from toolkit.reduction.prepare_rows import OpenedFile, check_record, open_file, split_rests
 from toolkit.reduction.repeats import drift_findings
 from toolkit.reduction.tare import choose_tares, zero_shifts
+from toolkit.version import __version__
 
 if TYPE_CHECKING:
     from toolkit.calibration.records.record import CalibrationRecord

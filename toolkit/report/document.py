@@ -258,6 +258,15 @@ class Document(Generic[Source]):
             foreign=self.foreign,
         )
 
+    def plots(self, source: Source, style: Style) -> dict[str, Plot]:
+        """Return the figures that the source has data for, by name."""
+        return {
+            plot.name: replace(plot, decimal_comma=style.decimal_comma)
+            for declared in self._all(DeclaredFigures)
+            for plot in cast("Iterable[Plot | None]", declared.build(source, style) or ())
+            if plot is not None
+        }
+
     def content(
         self,
         source: Source,
@@ -271,12 +280,7 @@ class Document(Generic[Source]):
         issued: dt.date,
     ) -> ReportContent:
         """Return the content of declared document: everything that a template of the kind can ask for."""
-        plots = {
-            plot.name: replace(plot, decimal_comma=style.decimal_comma)
-            for declared in self._all(DeclaredFigures)
-            for plot in cast("Iterable[Plot | None]", declared.build(source, style) or ())
-            if plot is not None
-        }
+        plots = self.plots(source, style)
         tables = {
             declared.name: printed_table(declared, cast("Rows", declared.build(source, style) or ()), style)
             for declared in self._all(DeclaredTable)

@@ -64,6 +64,14 @@ def draw_svg(plot: Plot) -> bytes:
     return stream.getvalue()
 
 
+def figure_of(plot: Plot) -> Figure:
+    """Return one figure as matplotlib holds it, before it is a picture: for a notebook."""
+    import matplotlib as mpl
+
+    with mpl.rc_context(_RC):
+        return _figure(plot)
+
+
 def _figure(plot: Plot) -> Figure:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure

@@ -16,7 +16,8 @@ from typing import Any, Literal, cast
 from toolkit.channels import ROTATIONS, Rotation
 from toolkit.errors import ConfigError
 from toolkit.files import check_keys, read_toml
-from toolkit.machine.definition import Machine, load_machine, quantity
+from toolkit.machine.definition import Machine, load_machine
+from toolkit.machine.quantity import quantity
 from toolkit.simulation.acquisition import AcquisitionTruth
 from toolkit.simulation.carriage import CarriageTruth
 from toolkit.simulation.case_plan import CasePlan, read_case_plan

@@ -13,8 +13,8 @@ from typing import Any, Literal, cast
 from toolkit.channels import ROTATIONS, Rotation
 from toolkit.errors import ConfigError
 from toolkit.files import check_keys
-from toolkit.machine.definition import Machine, quantity
-from toolkit.machine.quantity import one_of, quantities
+from toolkit.machine.definition import Machine
+from toolkit.machine.quantity import one_of, quantities, quantity
 from toolkit.units import unit
 
 Mounting = Literal["normal", "turned"]

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, cast, get_type_hints
 
 from toolkit.channels import Rotation
-from toolkit.characteristics.catalogue import characteristic
+from toolkit.characteristics.catalogue import by_name
 from toolkit.characteristics.groups import Direction, DirectionFit, group
 from toolkit.characteristics.model import Characteristics, Point, Row, in_order
 from toolkit.characteristics.rows import lacking_row
@@ -299,9 +299,9 @@ def _row(cells: Cells, budgets: _Budgets, directions: Sequence[Direction]) -> Ro
     estimate = _estimate(cells["value"], cells["u"], cells["dof"], cells["unit"])
     if estimate is None:
         there = [one for one in directions if one.group.load_N == load]
-        return lacking_row(characteristic(name), (load, rotation, SA), there)
+        return lacking_row(by_name()[name], (load, rotation, SA), there)
     return Row(
-        name=characteristic(name).name,
+        name=by_name()[name].name,
         load_N=load,
         rotation=rotation,
         SA_rad=SA,

@@ -272,7 +272,7 @@ def _unnamed(session: Session) -> list[str]:
     present = {load.name for load in session.loads}
     try:
         is_machine = session.instrument in machine_names()
-        levers = is_machine and bool(load_machine(session.instrument).overturning_lever_m)
+        levers = is_machine and bool(load_machine(session.instrument).layout.overturning_lever_m)
     except ConfigError:
         levers = False
     if levers and "MX" not in present:

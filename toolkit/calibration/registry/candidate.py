@@ -312,7 +312,7 @@ def _software() -> tuple[tuple[str, str], ...]:
     import platform
     from importlib.metadata import version
 
-    import toolkit
+    from toolkit.version import __version__
 
     packages = tuple((name, version(name)) for name in ("numpy", "scipy", "statsmodels"))
-    return tuple(sorted((*packages, ("python", platform.python_version()), ("toolkit", toolkit.__version__))))
+    return tuple(sorted((*packages, ("python", platform.python_version()), ("toolkit", __version__))))

@@ -52,13 +52,13 @@ def import_legacy(path: Path, registry: Registry, *, again: bool = False) -> tup
     """
     import datetime as dt
 
-    import toolkit
+    from toolkit.version import __version__
 
     source = read_bytes(path)
     unnumbered = read_legacy(source, where=path)
     check_possible(unnumbered, where=path)
     check_begun(dt.date.fromisoformat(unnumbered.date), "the source's date", f"{path}: date")
-    unnumbered = dataclasses.replace(unnumbered, software=(("toolkit", toolkit.__version__),))
+    unnumbered = dataclasses.replace(unnumbered, software=(("toolkit", __version__),))
     folder = registry.folder / unnumbered.instrument
     records: list[CalibrationRecord] = []
 

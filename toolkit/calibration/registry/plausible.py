@@ -85,8 +85,8 @@ def _levers(new: CalibrationRecord, machine: Machine) -> list[GateResult]:
     if "FY" not in loads:
         return []
     failed = []
-    drawn = {name: abs(lever) for name, lever in machine.overturning_lever_m}
-    pitch = machine.cell_pitch_diameter_m
+    drawn = {name: abs(lever) for name, lever in machine.layout.overturning_lever_m}
+    pitch = machine.layout.pitch_diameter_m
     for cell in new.cells:
         stated = machine.cell(cell.name)
         limits = {

@@ -19,7 +19,7 @@ from typing import Any
 from toolkit.calibration.session.reading_entries import Scope
 from toolkit.calibration.session.settings import wrong
 from toolkit.files import check_keys, is_number
-from toolkit.machine.definition import quantity
+from toolkit.machine.quantity import quantity
 from toolkit.units import unit
 
 AGREEMENT = 0.2

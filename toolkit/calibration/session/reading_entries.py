@@ -26,7 +26,7 @@ from toolkit.calibration.session.bridge import RATIO, RATIO_DIMENSION, Bridge
 from toolkit.calibration.session.settings import wrong
 from toolkit.errors import UnitError
 from toolkit.files import check_keys, is_number
-from toolkit.machine.definition import quantity
+from toolkit.machine.quantity import quantity
 from toolkit.units import unit
 
 SHUNT_TOLERANCE_PERCENT = 0.1

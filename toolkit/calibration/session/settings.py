@@ -19,7 +19,7 @@ from toolkit.calibration.session.plain_toml import plain_toml
 from toolkit.calibration.terms import INTERCEPT, MODELS, NAME, model_terms
 from toolkit.errors import ConfigError, ToolkitError
 from toolkit.files import parse_toml, sha256_bytes
-from toolkit.machine.definition import quantity
+from toolkit.machine.quantity import quantity
 from toolkit.units import unit
 
 _ENCODER = json.JSONEncoder(

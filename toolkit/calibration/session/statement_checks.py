@@ -21,7 +21,7 @@ from toolkit.calibration.session.reading_entries import (
 from toolkit.calibration.session.settings import wrong, zero_readings
 from toolkit.errors import SessionError, UnitError
 from toolkit.files import check_keys, is_number
-from toolkit.machine.definition import quantity
+from toolkit.machine.quantity import quantity
 from toolkit.units import Unit, si_scale, unit
 
 if TYPE_CHECKING:

@@ -19,7 +19,7 @@ from toolkit.calibration.session.bridge import bridge_of, bridges_of
 from toolkit.calibration.session.reading_entries import Scope
 from toolkit.calibration.session.settings import preloads_of, zero_readings
 from toolkit.calibration.session.statement_checks import temperature_effect
-from toolkit.machine.definition import quantity
+from toolkit.machine.quantity import quantity
 from toolkit.units import unit
 
 if TYPE_CHECKING:

@@ -23,6 +23,7 @@ from toolkit.calibration.session.statements import statements_of
 from toolkit.calibration.terms import term_matrix
 from toolkit.calibration.uncertainty.components import components_of
 from toolkit.calibration.uncertainty.model import Budget, Temperature
+from toolkit.calibration.uncertainty.scatter import Scatter, scatter_of
 from toolkit.errors import SessionError
 from toolkit.estimate import coverage_factor, effective_dof
 
@@ -120,6 +121,39 @@ def predict(
     )
 
 
+def budgets_of_rows(
+    record: CalibrationRecord,
+    loads: Table,
+    check: Table | None,
+    load: str,
+    indications: NDArray[np.float64],
+    *,
+    probability: float = PROBABILITY,
+) -> tuple[Budget | None, ...]:
+    """Return the budget of a load at every row of indications (rows, indications) [the record's units].
+
+    Each is that of `predict` at the row; the session's scatter is taken once for all of them. None where a
+    row is not finite.
+
+    Raises
+    ------
+    SessionError
+        ``budget``: a legacy record
+    RecordError
+        the record has no such load
+    """
+    one = _fitted(record, load)
+    terms = term_matrix(one.terms, dict(zip(record.indications, indications.T, strict=True)))
+    values = terms @ np.asarray(one.coefficients)
+    scatter = scatter_of(record, loads, one)
+    return tuple(
+        _budget(record, loads, check, one, float(value), point, None, probability, scatter)
+        if math.isfinite(value)
+        else None
+        for value, point in zip(values.tolist(), indications, strict=True)
+    )
+
+
 def typical_indications(record: CalibrationRecord, loads: Table, load: str, at: float) -> NDArray[np.float64]:
     """Return the indications (indications,) that a load makes by itself: a plane through the session's rows.
 
@@ -153,10 +187,12 @@ def _budget(
     point: NDArray[np.float64],
     temperature: Temperature | None,
     probability: float,
+    scatter: Scatter | None = None,
 ) -> Budget:
     parts, scatter_dof = components_of(
-        record, statements_of(record), loads, check, load, value=value, point=point, temperature=temperature
-    )
+        record, statements_of(record), loads, check, load, value=value, point=point, temperature=temperature,
+        scatter=scatter,
+    )  # fmt: skip
     joint = math.sqrt(math.fsum(part.u**2 for part in parts if part.joint))
     apart = [(part.u, part.dof) for part in parts if not part.joint]
     u, dof, k, U = combine([(joint, scatter_dof), *apart], probability)

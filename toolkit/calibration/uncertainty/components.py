@@ -40,13 +40,16 @@ def components_of(
     value: float,
     point: NDArray[np.float64],
     temperature: Temperature | None,
+    scatter: Scatter | None = None,
 ) -> tuple[tuple[Component, ...], float]:
     """Return every component at a point (indications,), whose load is ``value`` [the load's unit].
+
+    ``scatter`` of the session's rows is the same at every point; None: it is taken here.
 
     With them the degrees of freedom of those that the session's rows give together: u^2 of their sum is
     linear in the variances within and between runs, and Satterthwaite's formula holds for it as a whole.
     """
-    scatter = scatter_of(record, loads, load)
+    scatter = scatter or scatter_of(record, loads, load)
     slope = sensitivities(record, load, point.tolist())
     share = abs(value) / load.largest
     curve = _curve(record, load, scatter, point)

@@ -9,7 +9,6 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from toolkit import __version__
 from toolkit.diagnosis.fit.nuisance import INPUT_NOISE
 from toolkit.diagnosis.simulators.built_in import parameter_names
 from toolkit.diagnosis.simulators.parameter_units import sense, unit_of
@@ -17,6 +16,7 @@ from toolkit.diagnosis.simulators.setting import nominal_load
 from toolkit.effects.sense import turned
 from toolkit.files import sha256_file
 from toolkit.simulation.model_file import CONTENT
+from toolkit.version import __version__
 
 if TYPE_CHECKING:
     from toolkit.diagnosis.answer.answer import Diagnosis

@@ -7,16 +7,17 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, cast
 
-from toolkit import __version__
 from toolkit.audit.model import TELLS
 from toolkit.files import sha256_bytes
 from toolkit.report.content import Curve, Plot, ReportContent
 from toolkit.report.document import Document, Rows
 from toolkit.report.style import Style
+from toolkit.version import __version__
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
+    from toolkit.audit.archive import ArchiveAudit
     from toolkit.audit.model import Grade
     from toolkit.report.audit.page import AuditView
 
@@ -95,6 +96,14 @@ def build_audit_content(view: AuditView, style: Style | None = None) -> ReportCo
         subject="Audit of an archive of recordings",
         issued=view.made.known_at,
     )
+
+
+def audit_plots(made: ArchiveAudit, style: Style | None = None) -> dict[str, Plot]:
+    """Return the figures of an audit by name; none where the files are of one year."""
+    from toolkit.report.audit.page import AuditView
+
+    view = AuditView(made=made, rules={}, timelines=(), traces=())
+    return AUDIT.plots(_summary(view), style or Style())
 
 
 def _conclusion(summary: Summary, _style: Style) -> str:

@@ -8,13 +8,13 @@ from __future__ import annotations
 
 import re
 
-from toolkit import __version__
 from toolkit.estimate import round_uncertainty
 from toolkit.report.certificate.model import VERDICTS, Certificate
 from toolkit.report.certificate.statements import RULES
 from toolkit.report.content import ReportContent
 from toolkit.report.document import Document
 from toolkit.report.style import Style
+from toolkit.version import __version__
 
 GAP = "NOT STATED"
 _PERCENT = re.compile(r"\d+\.\d+(?= %)")

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from toolkit import __version__
 from toolkit.errors import ConfigError
 from toolkit.estimate import round_to_uncertainty, round_uncertainty
 from toolkit.recording.marks import OWN_OUTPUT
@@ -27,6 +26,7 @@ from toolkit.report.certificate.dcc_xml import (
 )
 from toolkit.report.certificate.statements import RULES
 from toolkit.units import unit
+from toolkit.version import __version__
 
 if TYPE_CHECKING:
     from toolkit.report.certificate.model import Certificate, LoadResult

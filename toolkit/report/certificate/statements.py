@@ -11,8 +11,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from toolkit.calibration.session.declaration import Fault, is_text
-from toolkit.calibration.session.keys import TEXTS, certificate_faults, rule_of
+from toolkit.calibration.session.session_file import TEXTS, certificate_faults, rule_of
+from toolkit.declared import Fault
 from toolkit.errors import ConfigError
 from toolkit.findings import Finding
 from toolkit.report.certificate.model import Verdict
@@ -104,13 +104,12 @@ def _interval(
 def _told(fault: Fault, where: str) -> Finding:
     """Return the finding of an entry of a record from before sessions were checked for it, or refuse it."""
     if fault.kind == "unknown":
-        known = f"did you mean {fault.near!r}?" if fault.near else f"known are {fault.expected}"
-        message = f"{fault.name!r} is not known and is not printed; {known}"
+        message = f"{fault.name!r} is not known and is not printed; {fault.hint}"
         return Finding(rule="certificate-key", where=f"{where}: [certificate]", message=message)
-    if fault.name == "decision_rule" and is_text(fault.got):
+    if fault.name == "decision_rule" and _is_text(fault.got):
         message = f"decision rule {fault.got!r} is not known ({fault.expected}): no conformity is stated"
         return Finding(rule="certificate-rule", where=where, message=message)
-    if fault.name == "country" and is_text(fault.got):
+    if fault.name == "country" and _is_text(fault.got):
         message = f"country {fault.got!r} is not {fault.expected}"
         return Finding(rule="certificate-country", where=where, message=message)
     raise ConfigError(
@@ -121,6 +120,11 @@ def _told(fault: Fault, where: str) -> Finding:
         next_step="correct the session and calibrate again: the statement belongs to the record",
         rule="certificate-statement",
     )
+
+
+def _is_text(value: object) -> bool:
+    # A whole number may stand without quotes.
+    return (isinstance(value, str) and bool(value.strip())) or type(value) is int
 
 
 def _date(table: Mapping[str, Any], key: str) -> dt.date | None:

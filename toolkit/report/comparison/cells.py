@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from toolkit.characteristics.catalogue import characteristic
+from toolkit.characteristics.catalogue import by_name
 from toolkit.estimate import plus_minus
 
 if TYPE_CHECKING:
@@ -19,7 +19,7 @@ MOST_ROWS = 90
 
 def shown_unit(name: str, style: Style) -> tuple[str, float]:
     """Return a quantity's unit as it is shown, and the factor from SI."""
-    declared = characteristic(name)
+    declared = by_name()[name]
     unit, factor = style.unit(declared.printed_unit)
     return str(unit).replace("*", "·"), factor * declared.factor
 
@@ -46,7 +46,7 @@ def named(name: str, rotation: str, SA_rad: float | None = None, *, title: bool 
     >>> named("FY", "forward", math.radians(-2)), named("PRAT", "both", title=True)
     ('FY at -2 deg, forward', 'PRAT at 0 deg')
     """
-    text = characteristic(name).title if title else name
+    text = by_name()[name].title if title else name
     angle = "" if SA_rad is None else f" at {math.degrees(SA_rad):+.0f} deg".replace("+0 ", "0 ")
     return f"{text}{angle}" + ("" if rotation == "both" else f", {rotation}")
 
@@ -85,7 +85,7 @@ def conclusion(comparison: Comparison) -> str:
             continue
         counts: dict[str, list[int]] = {}
         for one in mine:
-            count = counts.setdefault(characteristic(one.name).title, [0, 0])
+            count = counts.setdefault(by_name()[one.name].title, [0, 0])
             count[0] += one.significant
             count[1] += 1
         certain = sum(n for n, _ in counts.values())

@@ -7,7 +7,6 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-from toolkit import __version__
 from toolkit.characteristics.catalogue import comparison_figures
 from toolkit.files import sha256_bytes
 from toolkit.report.comparison.cells import (
@@ -23,6 +22,7 @@ from toolkit.report.comparison.cells import (
 from toolkit.report.comparison.plots import comparison_plots
 from toolkit.report.content import Plot, ReportContent
 from toolkit.report.document import Document, Row, Rows, finding_table
+from toolkit.version import __version__
 
 if TYPE_CHECKING:
     from toolkit.comparison.model import Comparison, Difference

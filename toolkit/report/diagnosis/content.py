@@ -6,11 +6,11 @@ import datetime as dt
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-from toolkit import __version__
 from toolkit.report.content import Plot, ReportContent
 from toolkit.report.diagnosis.answer import DIAGNOSIS, Told
 from toolkit.report.diagnosis.plots import WHERE, search_plots
 from toolkit.report.document import Rows
+from toolkit.version import __version__
 
 if TYPE_CHECKING:
     from toolkit.calibration.records.use import CalibrationUse
@@ -56,6 +56,11 @@ def build_diagnosis_content(
         subject="Diagnosis: simulation against recording",
         issued=issued,
     )
+
+
+def diagnosis_plots(result: Result, style: Style) -> dict[str, Plot]:
+    """Return the figures of a diagnosis by name."""
+    return DIAGNOSIS.plots(Told(answer=result.diagnosis, search=result.search), style)
 
 
 def _calibrations(source: Told, _style: Style) -> str:

@@ -78,6 +78,10 @@ class _Plots:
         self.groups = load_groups(result.reduced.used())
         self.loads = [load for load, _ in self.groups]
         self.fits = result.characteristics.fits
+        self.at_angles: dict[tuple[str, str], list[Row]] = {}
+        for row in result.characteristics.rows:
+            if row.SA_rad is not None:
+                self.at_angles.setdefault((row.name, row.rotation), []).append(row)
         self.tire = result.reduced.info.tire_size or result.reduced.info.name
 
     def _scale(self, channel: str) -> tuple[str, float]:
@@ -171,7 +175,7 @@ class _Plots:
     ) -> tuple[float, float] | None:
         """Return a value at a slip angle [deg] and its expanded uncertainty, 0 where none is known."""
         for rotation in self._rotations():
-            for row in self.result.characteristics.of(channel, rotation=rotation):
+            for row in self.at_angles.get((channel, rotation), ()):
                 same_load = self._group(row.load_N) == self._group(load)
                 if not same_load or row.estimate is None or row.SA_rad is None:
                     continue

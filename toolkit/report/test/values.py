@@ -6,7 +6,6 @@ import math
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
-from toolkit import __version__
 from toolkit.characteristics.catalogue import summary
 from toolkit.estimate import plus_minus
 from toolkit.report.content import Value
@@ -17,6 +16,7 @@ from toolkit.report.test.characteristics import summary_estimates, summary_load
 from toolkit.report.test.content import REPORT, ReportedTest, report_id
 from toolkit.report.test.figures import TURNED, load_groups
 from toolkit.report.vocabulary import Entry
+from toolkit.version import __version__
 
 if TYPE_CHECKING:
     from toolkit.characteristics.characteristic import Characteristic

@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Any
 from docx.enum.section import WD_HEADER_FOOTER
 from lxml import etree
 
-from toolkit import __version__
 from toolkit.calibration.records.use import DRAFT
 from toolkit.recording.marks import output_keywords
 from toolkit.report.content import ReportContent
 from toolkit.report.word.scan import LITERAL, visible_texts
 from toolkit.report.word.xml import W_P, Element, Story, clean, in_fallback, new_run, q
+from toolkit.version import __version__
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence

@@ -1,0 +1,154 @@
+"""What the code names: effects outside their own file, and pages that have to exist."""
+
+from __future__ import annotations
+
+import ast
+import io
+import re
+import tokenize
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from tests.house.source import PACKAGE, Module
+
+EFFECT_LAYERS = ("effects", "simulation", "diagnosis")
+"""Layers in which a word equal to an effect's name is that effect.
+
+Elsewhere the words of the field mean what they mean (a cell's creep in a calibration, the characteristic
+conicity), unless the module imports the effects or the diagnosis.
+"""
+
+
+@dataclass(frozen=True, slots=True)
+class Mention:
+    """A word at a line of a module."""
+
+    module: str
+    line: int
+    word: str
+
+
+def effect_names(modules: Sequence[Module]) -> frozenset[str]:
+    """Return the names of the effects: the files of ``toolkit/effects`` that define ``EFFECT``."""
+    return frozenset(
+        module.path.stem
+        for module in modules
+        if module.layer == "effects" and any(_binds(node, "EFFECT") for node in module.tree.body)
+    )
+
+
+def _binds(node: ast.stmt, name: str) -> bool:
+    targets = node.targets if isinstance(node, ast.Assign) else [getattr(node, "target", None)]
+    return any(isinstance(target, ast.Name) and target.id == name for target in targets)
+
+
+def effects_named(modules: Sequence[Module], catalogue: str = "toolkit.effects.catalogue") -> list[Mention]:
+    """Return where an effect is named outside its own file, each name once a line.
+
+    A name is a string equal to it, alone or before ``.``, ``=`` or ``:``, or a word of a string that is a
+    list of such names; and an import of the effect's module. Other identifiers are free: the virtual tire
+    has a conicity, and a parameter of a tire file may be a pressure change. So are docstrings and comments.
+    The catalogue's own list counts once, until the catalogue is found by scan.
+    """
+    names = effect_names(modules)
+    mentions: list[Mention] = []
+    for module in modules:
+        if module.layer not in EFFECT_LAYERS and not _imports_effects(module):
+            continue
+        at = {pair for pair in _words(module.tree, names) if pair[1] != module.path.stem}
+        if module.name == catalogue:
+            at = set(sorted(at)[:1])
+        mentions += [Mention(module.name, line, word) for line, word in sorted(at)]
+    return mentions
+
+
+def _imports_effects(module: Module) -> bool:
+    if "effects" not in module.text and "diagnosis" not in module.text:
+        return False
+    for node in ast.walk(module.tree):
+        if isinstance(node, ast.ImportFrom) and node.module:
+            if node.module.startswith((f"{PACKAGE}.effects", f"{PACKAGE}.diagnosis")):
+                return True
+            if node.module == PACKAGE and any(alias.name in ("effects", "diagnosis") for alias in node.names):
+                return True
+    return False
+
+
+def _words(tree: ast.Module, names: frozenset[str]) -> Iterator[tuple[int, str]]:
+    nodes = list(ast.walk(tree))
+    # Strings that stand as statements: docstrings, and remarks below attributes.
+    free = {id(node.value) for node in nodes if isinstance(node, ast.Expr)}
+    for node in nodes:
+        match node:
+            case ast.Constant(value=str(text)) if id(node) not in free:
+                words = [re.split(r"[.=:@]", word)[0] for word in text.split()]
+                named = [word for word in words if word in names]
+                if 2 * len(named) >= len(words):  # a name or a list of names, no sentence
+                    yield from ((node.lineno, word) for word in named)
+            case ast.ImportFrom(module=str(module), names=aliases) if module.startswith(f"{PACKAGE}.effects"):
+                for word in (*(alias.name for alias in aliases), module.split(".")[-1]):
+                    if word in names:
+                        yield node.lineno, word
+
+
+_PAGE = re.compile(r"(?<![\w./*-])((?:[\w.-]+/)*[\w-]+\.md)\b(?:#([\w-]+))?")
+_FOLDER = re.compile(r"(?<![\w./-])(docs/[\w./-]*\w)")
+_SECTION = re.compile(r"\.md[`'\"]?,\s+(?:section\s+)?[\"“']([^\"”']+)[\"”']")
+
+
+def pages_missing(modules: Sequence[Module], root: Path) -> list[Mention]:
+    """Return citations of pages, or of their sections, that the checkout does not hold.
+
+    Read are docstrings, comments and messages: every ``page.md``, ``docs/...``, ``page.md#section`` and
+    ``page.md, "Section"``. A page may be cited by its path or by its name alone.
+    """
+    pages = {path.relative_to(root).as_posix(): path for path in _pages(root)}
+    mentions: list[Mention] = []
+    for module in modules:
+        for line, text in _prose(module):
+            for match in _PAGE.finditer(text):
+                page = _page(match[1], pages, root)
+                title = _SECTION.match(text, match.end(1) - 3)
+                section = match[2] or (title and title[1])
+                if page is None or (section and not _has_section(page, section)):
+                    mentions.append(Mention(module.name, line, match[0] + (f", {title[1]}" if title else "")))
+            mentions += [
+                Mention(module.name, line, match[1])
+                for match in _FOLDER.finditer(text)
+                if not match[1].endswith(".md") and not (root / match[1]).exists()
+            ]
+    return mentions
+
+
+def _pages(root: Path) -> Iterator[Path]:
+    yield from root.glob("*.md")
+    yield from (root / "docs").rglob("*.md")
+    yield from (root / PACKAGE).rglob("*.md")
+
+
+def _page(cited: str, pages: dict[str, Path], root: Path) -> Path | None:
+    if cited in pages:
+        return pages[cited]
+    if "/" in cited:
+        return root / cited if (root / cited).is_file() else None
+    return next((path for name, path in pages.items() if name.rsplit("/", 1)[-1] == cited), None)
+
+
+def _has_section(page: Path, section: str) -> bool:
+    titles = re.findall(r"(?m)^#+\s+(.*?)\s*#*$", page.read_text(encoding="utf-8"))
+    return section.lower() in [title.lower() for title in titles] or section.lower() in map(_anchor, titles)
+
+
+def _anchor(title: str) -> str:
+    return re.sub(r"[^\w -]", "", title.lower()).replace(" ", "-")
+
+
+def _prose(module: Module) -> Iterator[tuple[int, str]]:
+    """Yield comments and strings with their lines; a string of many lines line by line."""
+    if ".md" not in module.text and "docs/" not in module.text:
+        return
+    for token in tokenize.generate_tokens(io.StringIO(module.text).readline):
+        if token.type in (tokenize.COMMENT, tokenize.STRING):
+            for number, text in enumerate(token.string.splitlines()):
+                yield token.start[0] + number, text
