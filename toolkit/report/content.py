@@ -143,11 +143,11 @@ class ReportContent:
         """Tell whether ``tk:if.<name>`` is kept: it is true, or the figure, table or value is there."""
         if name in self.conditions:
             return self.conditions[name]
-        family, _, rest = name.partition(".")
+        family, _, member = name.partition(".")
         if family == "figure":
-            return rest in self.plots
+            return member in self.plots
         if family == "table":
-            return rest in self.tables and bool(self.tables[rest].rows)
+            return member in self.tables and bool(self.tables[member].rows)
         return name in self.values and not self.values[name].missing
 
 

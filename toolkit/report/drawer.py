@@ -123,12 +123,12 @@ def _work(hands: int) -> None:
         names = list(plots)
         # What draws beside inherits matplotlib, which a process of its own would have to import again.
         beside = [_beside({name: plots[name] for name in names[i::hands]}) for i in range(1, hands)]
-        told = threading.Lock()
-        threads = [threading.Thread(target=_pass_on, args=(drawn, told)) for drawn in beside]
+        lock = threading.Lock()
+        threads = [threading.Thread(target=_pass_on, args=(drawn, lock)) for drawn in beside]
         for thread in threads:
             thread.start()
         for name in names[::hands]:
-            _tell(name, draw(plots[name]), told)
+            _tell(name, draw(plots[name]), lock)
         for thread in threads:
             thread.join()
 

@@ -25,15 +25,17 @@ def content_hash(filled: Filled, template: Template) -> str:
     table with such a value is hashed by its other values, not as a row of cells.)
     """
     passing = {*_OF_THE_DAY, *filled.of_the_run}
-    told = {
+    printed = {
         "template": template.sha256,
-        "values": [[one.tag, one.text, one.part] for one in filled.manifest if one.tag not in passing],
+        "values": [
+            [entry.tag, entry.text, entry.part] for entry in filled.manifest if entry.tag not in passing
+        ],
         "cells": [row for at, row in enumerate(filled.cells) if at not in filled.rows_of_the_run],
         "figures": [[tag, alt] for tag, alt in filled.figures],
         "pictures": filled.pictures,
         "contents": [[entry.text, entry.level] for entry in filled.contents.entries],
     }
-    return sha256_bytes(json.dumps(told, ensure_ascii=False, separators=(",", ":")).encode())
+    return sha256_bytes(json.dumps(printed, ensure_ascii=False, separators=(",", ":")).encode())
 
 
 def manifest_json(
@@ -47,7 +49,7 @@ def manifest_json(
 
     ``provenance`` holds what the caller knows: the inputs and the software.
     """
-    told = {
+    manifest = {
         "generator": GENERATOR,
         "schema": 1,
         "report": content.identity,
@@ -63,4 +65,4 @@ def manifest_json(
             for output in outputs
         ],
     }
-    return json.dumps(told, ensure_ascii=False, indent=2) + "\n"
+    return json.dumps(manifest, ensure_ascii=False, indent=2) + "\n"

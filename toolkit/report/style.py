@@ -121,7 +121,7 @@ def read_style(path: Path | None) -> Style:
         decimal_comma=_typed(table, "decimal_comma", bool, False, path),
         dates=_typed(table, "dates", str, "%Y-%m-%d", path),
         missing=missing,
-        required=tuple(dict.fromkeys([*_DEFAULT_REQUIRED, *(str(one) for one in required)])),
+        required=tuple(dict.fromkeys([*_DEFAULT_REQUIRED, *(str(tag) for tag in required)])),
         styles=tuple((str(k), str(v)) for k, v in parts["styles"].items()),
         decimals=tuple(parts["decimals"].items()),
         words=tuple((key, str(_text(parts["words"], key, path))) for key in parts["words"]),

@@ -74,8 +74,8 @@ def format_problem(kind: str, spec: str | None) -> str | None:
 
 def width_emu(spec: str | None) -> int | None:
     """Return the width that a figure's tag asks for, in EMU (914 400 an inch)."""
-    found = _WIDTH.fullmatch(spec) if spec else None
-    return round(float(found[1]) * _EMU[found[2]]) if found else None
+    match = _WIDTH.fullmatch(spec) if spec else None
+    return round(float(match[1]) * _EMU[match[2]]) if match else None
 
 
 def format_number(value: float, spec: str, *, decimal_comma: bool = False) -> str:

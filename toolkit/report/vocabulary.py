@@ -174,20 +174,20 @@ class Vocabulary:
 
         ``tk:if.figure.gough`` and ``tk:if.gough`` ask the same.
         """
-        family, _, rest = name.partition(".")
+        family, _, member = name.partition(".")
         members: Mapping[str, object] = {"figure": self.figures, "table": self.tables}.get(family, {})
-        return name in self.conditions or rest in members or self._is_member(name) or self.knows(name)
+        return name in self.conditions or member in members or self._is_member(name) or self.knows(name)
 
     def _is_member(self, name: str) -> bool:
         return name in self.figures or name in self.tables
 
-    def demanded(self, asked: Iterable[str]) -> tuple[str, ...]:
+    def demanded(self, tags: Iterable[str]) -> tuple[str, ...]:
         """Return the tags that a template must hold: the kind's own, and those that a style file asks for.
 
         One style file serves an organisation's reports and its certificates: a tag of another kind of
         document is not asked of this one.
         """
-        return tuple(dict.fromkeys([*self.required, *(tag for tag in asked if self.of_kind(tag))]))
+        return tuple(dict.fromkeys([*self.required, *(tag for tag in tags if self.of_kind(tag))]))
 
     def of_kind(self, tag: str) -> bool:
         """Tell whether a required tag can be meant for this kind of document."""

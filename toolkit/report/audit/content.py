@@ -46,9 +46,9 @@ class Summary:
     @property
     def id(self) -> str:
         """Identification: the same archive, registry and day of knowledge give the same."""
-        made = self.view.made
-        key = f"{self.name}|{made.known_at}|{self.heads}|{dict(made.grades)}"
-        return f"AUDIT-{made.known_at.isoformat()}-{sha256_bytes(key.encode())[:8]}"
+        audit = self.view.made
+        key = f"{self.name}|{audit.known_at}|{self.heads}|{dict(audit.grades)}"
+        return f"AUDIT-{audit.known_at.isoformat()}-{sha256_bytes(key.encode())[:8]}"
 
     @property
     def unreadable(self) -> int:
@@ -98,11 +98,11 @@ def build_audit_content(view: AuditView, style: Style | None = None) -> ReportCo
     )
 
 
-def audit_plots(made: ArchiveAudit, style: Style | None = None) -> dict[str, Plot]:
+def audit_plots(audit: ArchiveAudit, style: Style | None = None) -> dict[str, Plot]:
     """Return the figures of an audit by name; none where the files are of one year."""
     from toolkit.report.audit.page import AuditView
 
-    view = AuditView(made=made, rules={}, timelines=(), traces=())
+    view = AuditView(made=audit, rules={}, timelines=(), traces=())
     return AUDIT.plots(_summary(view), style or Style())
 
 
@@ -305,8 +305,8 @@ def findings(summary: Summary, _style: Style) -> Rows:
     """Return how often each rule was found, and what it means."""
     rules = summary.view.rules
     for rule, count in Counter(finding.rule for finding in summary.view.made.findings).most_common():
-        told = rules.get(rule, {})
-        yield rule, str(count), told.get("means"), told.get("do")
+        meaning = rules.get(rule, {})
+        yield rule, str(count), meaning.get("means"), meaning.get("do")
 
 
 @AUDIT.figures({"audit_years": "files by the year of their test: right, and not right"})

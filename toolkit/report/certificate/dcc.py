@@ -54,8 +54,8 @@ def build_dcc(certificate: Certificate) -> bytes:
     root.set(place, f"https://ptb.de/dcc https://ptb.de/dcc/v{VERSION}/dcc.xsd")
     root.insert(0, etree.Comment(f" {OWN_OUTPUT}; toolkit {__version__} "))
     etree.indent(root, " ")
-    made: bytes = etree.tostring(root, xml_declaration=True, encoding="UTF-8")
-    return made + b"\n"
+    xml: bytes = etree.tostring(root, xml_declaration=True, encoding="UTF-8")
+    return xml + b"\n"
 
 
 def _administrative(c: Certificate) -> Node:
@@ -121,20 +121,20 @@ def _administrative(c: Certificate) -> Node:
 
 def _persons(c: Certificate) -> list[Node]:
     roles = [("calibrated", c.entered_by), ("checked", c.checked_by), ("approved", c.approved_by)]
-    told = [(role, name) for role, name in roles if name]
+    persons = [(role, name) for role, name in roles if name]
     return [
         node(
             "dcc:respPerson",
             node("dcc:person", text("dcc:name", name)),
             node("dcc:role", role),
-            node("dcc:mainSigner", "true" if at == len(told) - 1 and not c.draft else "false"),
+            node("dcc:mainSigner", "true" if at == len(persons) - 1 and not c.draft else "false"),
         )
-        for at, (role, name) in enumerate(told)
+        for at, (role, name) in enumerate(persons)
     ]
 
 
 def _statements(c: Certificate) -> list[Node]:
-    told: list[tuple[str, str | None]] = [
+    statements: list[tuple[str, str | None]] = [
         ("State", words.draft_text(c) if c.draft else None),
         ("Simulation", words.SIMULATED if c.simulated else None),
         ("Withdrawal", c.withdrawn),
@@ -153,7 +153,7 @@ def _statements(c: Certificate) -> list[Node]:
     ]
     nodes = [
         node("dcc:statement", text("dcc:name", name), rich("dcc:declaration", words_))
-        for name, words_ in told
+        for name, words_ in statements
         if words_
     ]
     outside = dict.fromkeys(
@@ -162,11 +162,11 @@ def _statements(c: Certificate) -> list[Node]:
     nodes += [
         node(
             "dcc:statement",
-            text("dcc:name", f"Unit {one} of the record"),
-            node("dcc:nonSIDefinition", f"1 {one} = {dsi(one).factor!r} {dsi(one).text}"),
-            node("dcc:nonSIUnit", f"|{one}"),
+            text("dcc:name", f"Unit {text_unit} of the record"),
+            node("dcc:nonSIDefinition", f"1 {text_unit} = {dsi(text_unit).factor!r} {dsi(text_unit).text}"),
+            node("dcc:nonSIUnit", f"|{text_unit}"),
         )
-        for one in outside
+        for text_unit in outside
     ]
     return nodes
 
@@ -249,10 +249,18 @@ def _equation(c: Certificate, load: LoadResult) -> Node:
     units = {cell.name: cell.unit for cell in c.cells}
     lines = []
     for term in load.terms:
-        made = dsi_of_term(load.unit, term.term, units)
-        u = f"{abs(term.standard_error * made.factor):.2g}"
-        told = f"issued: {term.issued!r} {term.unit}; full: {term.full!r} {term.unit}"
-        lines.append(quantity(term.term, repr(term.full * made.factor), made.text, told=told, standard=u))
+        coefficient_unit = dsi_of_term(load.unit, term.term, units)
+        u = f"{abs(term.standard_error * coefficient_unit.factor):.2g}"
+        comment = f"issued: {term.issued!r} {term.unit}; full: {term.full!r} {term.unit}"
+        lines.append(
+            quantity(
+                term.term,
+                repr(term.full * coefficient_unit.factor),
+                coefficient_unit.text,
+                told=comment,
+                standard=u,
+            )
+        )
     return node(
         "dcc:result",
         text("dcc:name", f"Coefficients of {load.load}"),
@@ -262,9 +270,9 @@ def _equation(c: Certificate, load: LoadResult) -> Node:
 
 
 def _range(load: LoadResult) -> Node:
-    made = dsi(load.unit)
-    at = [e.at * made.factor for e in load.range]
-    U = [e.U * made.factor for e in load.range]
+    load_unit = dsi(load.unit)
+    at = [e.at * load_unit.factor for e in load.range]
+    U = [e.U * load_unit.factor for e in load.range]
     return node(
         "dcc:result",
         text("dcc:name", f"Expanded uncertainty of {load.load} over the calibrated range"),
@@ -273,7 +281,7 @@ def _range(load: LoadResult) -> Node:
             quantity_list(
                 load.load,
                 [round_to_uncertainty(v, u) for v, u in zip(at, U, strict=True)],
-                made.text,
+                load_unit.text,
                 U=[round_uncertainty(u) for u in U],
                 k=[f"{e.k:.2f}" for e in load.range],
                 p=[f"{e.probability:g}" for e in load.range],
@@ -284,19 +292,19 @@ def _range(load: LoadResult) -> Node:
 
 
 def _check(load: LoadResult) -> Node:
-    made = dsi(load.unit)
-    U = [line.uncertainty.U * made.factor for line in load.checks]
+    load_unit = dsi(load.unit)
+    U = [line.uncertainty.U * load_unit.factor for line in load.checks]
     rounded_U = [round_uncertainty(u) for u in U]
     k = [f"{line.uncertainty.k:.2f}" for line in load.checks]
     p = [f"{line.uncertainty.probability:g}" for line in load.checks]
 
     def rounded(values: list[float]) -> list[str]:
-        return [round_to_uncertainty(v * made.factor, u) for v, u in zip(values, U, strict=True)]
+        return [round_to_uncertainty(v * load_unit.factor, u) for v, u in zip(values, U, strict=True)]
 
     deviation = quantity_list(
         f"Deviation of {load.load}",
         rounded([line.deviation for line in load.checks]),
-        made.text,
+        load_unit.text,
         kind="basic_measurementError",
         U=rounded_U,
         k=k,
@@ -326,14 +334,14 @@ def _check(load: LoadResult) -> Node:
                 "dcc:list",
                 quantity_list(
                     f"Reference {load.load}",
-                    [f"{line.reference * made.factor:.10g}" for line in load.checks],
-                    made.text,
+                    [f"{line.reference * load_unit.factor:.10g}" for line in load.checks],
+                    load_unit.text,
                     kind="basic_referenceValue",
                 ),
                 quantity_list(
                     f"Result {load.load}",
                     rounded([line.result for line in load.checks]),
-                    made.text,
+                    load_unit.text,
                     kind="basic_measuredValue",
                     U=rounded_U,
                     k=k,
@@ -346,12 +354,12 @@ def _check(load: LoadResult) -> Node:
 
 
 def _adjustment(load: LoadResult) -> Node:
-    told = load.adjustment
-    assert told is not None  # noqa: S101  the caller asked
-    made = dsi(load.unit)
-    lines = [("as found", told.as_found, told.found, "basic_beforeAdjustment")]
-    if told.as_left is not None and told.left is not None:
-        lines.append(("as left", told.as_left, told.left, "basic_afterAdjustment"))
+    change = load.adjustment
+    assert change is not None  # noqa: S101  the caller asked
+    load_unit = dsi(load.unit)
+    lines = [("as found", change.as_found, change.found, "basic_beforeAdjustment")]
+    if change.as_left is not None and change.left is not None:
+        lines.append(("as left", change.as_left, change.left, "basic_afterAdjustment"))
     return node(
         "dcc:result",
         text("dcc:name", f"Largest deviation of {load.load} before and after adjustment"),
@@ -360,11 +368,11 @@ def _adjustment(load: LoadResult) -> Node:
             *(
                 quantity(
                     name,
-                    round_to_uncertainty(value * made.factor, of.U * made.factor),
-                    made.text,
+                    round_to_uncertainty(value * load_unit.factor, of.U * load_unit.factor),
+                    load_unit.text,
                     kind=kind,
                     expanded=(
-                        round_uncertainty(of.U * made.factor),
+                        round_uncertainty(of.U * load_unit.factor),
                         f"{of.k:.2f}",
                         f"{of.probability:g}",
                     ),

@@ -136,17 +136,19 @@ def _checks(
     lines = []
     cells = check.matrix(record.indications).tolist()
     for row, (point, reference) in enumerate(zip(cells, check.column(load.load).tolist(), strict=True), 1):
-        told = predict(record, loads, check, load.load, dict(zip(record.indications, point, strict=True)))
-        uncertainty = _expanded(told.budget)
-        stated = rule is not None and not told.beyond
+        prediction = predict(
+            record, loads, check, load.load, dict(zip(record.indications, point, strict=True))
+        )
+        uncertainty = _expanded(prediction.budget)
+        stated = rule is not None and not prediction.beyond
         lines.append(
             CheckLine(
                 row=row,
                 reference=reference,
-                result=told.budget.at,
+                result=prediction.budget.at,
                 uncertainty=uncertainty,
-                beyond=told.beyond,
-                verdict=decide(rule, told.budget.at - reference, tolerance, uncertainty.U)
+                beyond=prediction.beyond,
+                verdict=decide(rule, prediction.budget.at - reference, tolerance, uncertainty.U)
                 if stated and rule
                 else None,
             )
@@ -176,20 +178,20 @@ def _left(
 
 
 def _adjustment(
-    load: LoadFit, session: FoundSession | None, left: tuple[float, Expanded] | None
+    load: LoadFit, session: FoundSession | None, as_left: tuple[float, Expanded] | None
 ) -> Adjustment | None:
-    told = next((o for o in session.result.loads if o.load == load.load), None) if session else None
-    if told is None or session is None or session.result.record is None:
+    deviation = next((o for o in session.result.loads if o.load == load.load), None) if session else None
+    if deviation is None or session is None or session.result.record is None:
         return None
     # The item's deviation under the reference is judged by what the as-found session knows of both: the
     # coefficients of the record in force are a given there, and have no share in it.
-    at = told.reference[told.worst_row - 1]
+    at = deviation.reference[deviation.worst_row - 1]
     return Adjustment(
         found_by=session.result.record,
-        as_found=told.max_error,
+        as_found=deviation.max_error,
         found=_expanded(calibration_budget(session.session, session.loads, session.check, load.load, at)),
-        as_left=None if left is None else left[0],
-        left=None if left is None else left[1],
+        as_left=None if as_left is None else as_left[0],
+        left=None if as_left is None else as_left[1],
     )
 
 

@@ -133,7 +133,7 @@ class LoadResult:
         stated = [check.verdict for check in self.checks]
         if not stated or None in stated:
             return None
-        return max((one for one in stated if one), key=order.index)
+        return max((verdict for verdict in stated if verdict), key=order.index)
 
     @property
     def not_stated(self) -> tuple[str, ...]:

@@ -221,16 +221,16 @@ def adjustment(c: Certificate) -> Texts:
     for load in c.loads:
         if (change := load.adjustment) is None:
             continue
-        left, left_U = "not measured", "-"
+        as_left, left_U = "not measured", "-"
         if change.as_left is not None and change.left is not None:
-            left, left_U = (
+            as_left, left_U = (
                 round_to_uncertainty(change.as_left, change.left.U),
                 round_uncertainty(change.left.U),
             )
         U = change.found.U
         yield (
             load.load, change.found_by, round_to_uncertainty(change.as_found, U), f"{change.found.at:.6g}",
-            left, f"{load.tolerance:.4g}", shown(load.unit), round_uncertainty(U), left_U,
+            as_left, f"{load.tolerance:.4g}", shown(load.unit), round_uncertainty(U), left_U,
         )  # fmt: skip
 
 

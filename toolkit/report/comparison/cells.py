@@ -57,7 +57,7 @@ def shown_rows(comparison: Comparison, part: Part) -> tuple[tuple[Difference, ..
     Characteristics: all of them while they are few. Forces at slip angles: the significant ones.
     """
     mine = tuple(difference for difference in comparison.differences if difference.part == part)
-    certain = tuple(one for one in mine if one.significant)
+    certain = tuple(difference for difference in mine if difference.significant)
     if part == "characteristics" and len(mine) <= MOST_ROWS:
         return mine, f"all {len(mine)} rows"
     which = f"the {len(certain)} significant" if certain else "none is significant"

@@ -65,12 +65,12 @@ DIAGNOSIS: Document[Told] = Document(
 
 def _summary(source: Told, style: Style) -> str:
     sentences = []
-    for one in source.answer.held_out:
+    for fit in source.answer.held_out:
         if source.answer.effects:
-            ends = f"from {_n(one.refitted_rmse, style)} to {_n(one.augmented_rmse, style)} {_unit(one.unit)}"
+            ends = f"from {_n(fit.refitted_rmse, style)} to {_n(fit.augmented_rmse, style)} {_unit(fit.unit)}"
         else:
-            ends = f"is {_n(one.refitted_rmse, style)} {_unit(one.unit)}"
-        sentences.append(f"{one.channel} {ends} (noise {_n(one.noise_floor, style)})")
+            ends = f"is {_n(fit.refitted_rmse, style)} {_unit(fit.unit)}"
+        sentences.append(f"{fit.channel} {ends} (noise {_n(fit.noise_floor, style)})")
     fell = "With the effects the error on held-out rows falls: " if source.answer.effects else None
     text = f"{fell or 'Error on held-out rows: '}{'; '.join(sentences)}."
     return " ".join([text if sentences else "Nothing was fitted.", *_rests_on(source)])
@@ -96,16 +96,16 @@ def _opinion(source: Told, _style: Style) -> str | None:
 
 def _where(source: Told, style: Style) -> str | None:
     sentences = []
-    for one in source.answer.mismatch:
-        share = _n(100 * one.share_of_variance, style)
-        text = f"{one.channel}: {share} % of the residual's variance is structure"
-        if one.share_of_variance < 0.005:
-            text = f"{one.channel}: the residual is more than noise, and no variable alone explains it"
-        for at in one.where[:1]:
+    for mismatch in source.answer.mismatch:
+        share = _n(100 * mismatch.share_of_variance, style)
+        text = f"{mismatch.channel}: {share} % of the residual's variance is structure"
+        if mismatch.share_of_variance < 0.005:
+            text = f"{mismatch.channel}: the residual is more than noise, and no variable alone explains it"
+        for at in mismatch.where[:1]:
             ends = at.ends(lambda value: _n(value, style, 4))
             much = f"over all of {at.variable}," if at.whole else f"most of it where {at.variable} is"
             text += f", {much} {ends} {_unit(at.unit)}".rstrip()
-        sentences.append(f"{text} ({chance(one.p_value, decimal_comma=style.decimal_comma)}).")
+        sentences.append(f"{text} ({chance(mismatch.p_value, decimal_comma=style.decimal_comma)}).")
     return " ".join(sentences) or None
 
 
@@ -122,9 +122,9 @@ def _remains(source: Told, _style: Style) -> str:
 
 def _not_observable(source: Told, _style: Style) -> str | None:
     why: dict[str, list[str]] = {}
-    for one in source.answer.not_found:
-        if not one.observable:
-            why.setdefault(one.why or "not source by these recordings", []).append(one.name)
+    for effect in source.answer.not_found:
+        if not effect.observable:
+            why.setdefault(effect.why or "not source by these recordings", []).append(effect.name)
     return " ".join(f"{reason.capitalize()}: {', '.join(names)}." for reason, names in why.items()) or None
 
 

@@ -40,19 +40,19 @@ def errors_plot(diagnosis: Diagnosis, style: Style) -> Plot:
     steps = _STEPS if diagnosis.effects else _STEPS[:2]
     names: list[str] = []
     bars: list[tuple[list[float], list[float]]] = [([], []) for _ in steps]
-    said = []
-    for one in diagnosis.held_out:
-        errors = (one.nominal_rmse, one.refitted_rmse, one.augmented_rmse)
-        if not all(map(math.isfinite, (*errors, one.noise_floor))):
+    sentences = []
+    for fit in diagnosis.held_out:
+        errors = (fit.nominal_rmse, fit.refitted_rmse, fit.augmented_rmse)
+        if not all(map(math.isfinite, (*errors, fit.noise_floor))):
             continue
-        over = [value / max(one.noise_floor, 1e-300) for value in errors][: len(steps)]
+        over = [value / max(fit.noise_floor, 1e-300) for value in errors][: len(steps)]
         for i, value in enumerate(over):
             bars[i][0].append(float(len(names)))
             bars[i][1].append(value)
-            names.append(one.channel if i == len(steps) // 2 else "")
+            names.append(fit.channel if i == len(steps) // 2 else "")
         names.append("")
         listed = ", ".join(f"{s} {_number(v, style)}" for s, v in zip(steps, over, strict=True))
-        said.append(f"{one.channel}: {listed}")
+        sentences.append(f"{fit.channel}: {listed}")
     names = names[:-1]
     curves = [
         Curve(
@@ -70,7 +70,7 @@ def errors_plot(diagnosis: Diagnosis, style: Style) -> Plot:
         curves=tuple(curves),
         caption="Root mean square error on rows that no fit has seen, over the noise of the output. A "
         "simulation that misses nothing stands at 1.",
-        alt="Error over noise: " + "; ".join(said) + ".",
+        alt="Error over noise: " + "; ".join(sentences) + ".",
         legend_title="simulation",
         decimal_comma=style.decimal_comma,
         names=tuple(names),
@@ -115,10 +115,10 @@ def _run(search: Search, diagnosis: Diagnosis, style: Style) -> Plot:
     problem, channel = search.problem, diagnosis.mismatch[0].channel
     which = worst_run(search, channel)
     rows, run = problem.slices[which], problem.runs[which]
-    some = slice(None, None, max(1, -(-run.rows // _MOST)))
-    good = np.isfinite(problem.observed[channel][rows][some])
+    stride = slice(None, None, max(1, -(-run.rows // _MOST)))
+    good = np.isfinite(problem.observed[channel][rows][stride])
     clock, seconds = time_unit(problem.case)
-    t = run.t[some] / seconds
+    t = run.t[stride] / seconds
 
     def curve(label: str, group: int, y: NDArray[np.float64], *, points: bool = False) -> Curve:
         chosen = good if points else np.ones(len(t), dtype=bool)
@@ -128,11 +128,11 @@ def _run(search: Search, diagnosis: Diagnosis, style: Style) -> Plot:
         )  # fmt: skip
 
     curves = [
-        curve("recorded", 6, problem.observed[channel][rows][some], points=True),
-        curve("refitted", 1, search.refitted.simulated[channel][rows][some]),
+        curve("recorded", 6, problem.observed[channel][rows][stride], points=True),
+        curve("refitted", 1, search.refitted.simulated[channel][rows][stride]),
     ]
     if diagnosis.effects:
-        curves.append(curve("with the effects", 0, search.augmented.simulated[channel][rows][some]))
+        curves.append(curve("with the effects", 0, search.augmented.simulated[channel][rows][stride]))
     timed = problem.case.has_time
     return Plot(
         name="diagnosis_run",

@@ -121,7 +121,7 @@ def long_rows(report: ReportedTest, style: Style) -> Rows:
             "quantity|name of the characteristic",
             "rotation|direction of rotation, or both",
             "unit|unit of the row",
-            *(f"{one.name}|{one.text}" for one in BUDGET),
+            *(f"{column.name}|{column.text}" for column in BUDGET),
             "u|standard uncertainty of all",
         ]
     ),
@@ -138,10 +138,14 @@ def budget_rows(report: ReportedTest, style: Style) -> Rows:
 
 
 def _budget(row: Row, style: Style) -> Cells:
-    one, sources = row.characteristic, dict(row.sources)
-    unit, factor = style.unit(one.printed_unit)
-    factor *= one.factor
-    cells: Cells = {"quantity": one.title, "rotation": row.rotation, "unit": str(unit).replace("*", "·")}
+    characteristic, sources = row.characteristic, dict(row.sources)
+    unit, factor = style.unit(characteristic.printed_unit)
+    factor *= characteristic.factor
+    cells: Cells = {
+        "quantity": characteristic.title,
+        "rotation": row.rotation,
+        "unit": str(unit).replace("*", "·"),
+    }
     total = math.hypot(*sources.values()) * factor
     for column in BUDGET:
         part = math.hypot(*(sources.get(name, 0.0) for name in column.sources)) * factor
@@ -172,13 +176,15 @@ def summary_estimates(result: TestResult) -> dict[str, Estimate | None]:
     """Return the values of the summary by their names, in printed units; of directions the forward run."""
     load = summary_load(result)
     estimates: dict[str, Estimate | None] = {}
-    for one in summary():
-        rotation = "forward" if one.scope == "direction" else None
-        rows = result.characteristics.of(one.name, rotation=rotation)
+    for characteristic in summary():
+        rotation = "forward" if characteristic.scope == "direction" else None
+        rows = result.characteristics.of(characteristic.name, rotation=rotation)
         near = (row for row in rows if load is not None and abs(row.load_N - load) <= _SAME_LOAD * load)
         row = next(near, None)
         estimate = None if row is None else row.estimate
-        estimates[str(one.summary)] = None if estimate is None else estimate.scaled(one.factor, "")
+        estimates[str(characteristic.summary)] = (
+            None if estimate is None else estimate.scaled(characteristic.factor, "")
+        )
     return estimates
 
 

@@ -64,25 +64,25 @@ def model_rows(comparison: Comparison | None) -> list[dict[str, Cell]]:
         return []
     floors, seconds = dict(comparison.floors), dict(comparison.seconds)
     cellses: list[dict[str, Cell]] = []
-    for condition in dict.fromkeys(one for one, _ in comparison.conditions):
+    for condition in dict.fromkeys(name for name, _ in comparison.conditions):
         for model in comparison.models:
-            found = {name: comparison.get(model, condition, name) for name in ("FY", "MZ")}
-            own = [one for one in found.values() if one is not None]
-            if not own:
+            channels = {name: comparison.get(model, condition, name) for name in ("FY", "MZ")}
+            rows = [row for row in channels.values() if row is not None]
+            if not rows:
                 continue
             row: dict[str, Cell] = {
                 "model": model,
                 "condition": condition,
                 "seconds": seconds.get(model),
-                "converged": "yes" if all(one.converged for one in own) else "no",
-                "not_determined": _open(own),
+                "converged": "yes" if all(row.converged for row in rows) else "no",
+                "not_determined": _open(rows),
             }
-            for name, one in found.items():
+            for name, fit in channels.items():
                 row[f"{name}_floor"] = floors.get(name)
-                if one is not None:
-                    row[f"{name}_parameters"] = one.parameters
-                    row[f"{name}_error"] = one.error_percent
-                    row[f"{name}_left_out"] = one.prediction_error_percent
+                if fit is not None:
+                    row[f"{name}_parameters"] = fit.parameters
+                    row[f"{name}_error"] = fit.error_percent
+                    row[f"{name}_left_out"] = fit.prediction_error_percent
             cellses.append(row)
     return cellses
 
@@ -93,8 +93,10 @@ def _open(rows: Sequence[ComparisonRow]) -> str:
     for row in rows:
         count = len(row.not_determined)
         if count:
-            named = ", ".join(row.not_determined)
-            parts.append(f"{row.channel}: {named if count <= _NAMED else f'{count} of {row.parameters}'}")
+            parameters = ", ".join(row.not_determined)
+            parts.append(
+                f"{row.channel}: {parameters if count <= _NAMED else f'{count} of {row.parameters}'}"
+            )
     return "; ".join(parts) or "-"
 
 
@@ -104,14 +106,14 @@ def model_plots(
     """Return the figures ``models_fy`` and ``models_mz`` of pure side slip, where there are two models."""
     if comparison is None or len(comparison.models) < 2:
         return {}
-    made = (
+    plots = (
         model_plot(
             comparison, "pure", channel, name=f"models_{channel.lower()}", watermark=watermark,
             decimal_comma=decimal_comma,
         )
         for channel in ("FY", "MZ")
     )  # fmt: skip
-    return {plot.name: plot for plot in made if plot is not None}
+    return {plot.name: plot for plot in plots if plot is not None}
 
 
 def model_plot(
@@ -124,24 +126,24 @@ def model_plot(
     decimal_comma: bool = False,
 ) -> Plot | None:
     """Return bars of all models' errors [%] in one channel, fitted and predicted, over the scatter floor."""
-    found = [comparison.get(model, condition, channel) for model in comparison.models]
-    rows = [one for one in found if one is not None]
+    fits = [comparison.get(model, condition, channel) for model in comparison.models]
+    rows = [fit for fit in fits if fit is not None]
     if not rows:
         return None
     places = range(len(rows))
-    said = [format_number(row.error_percent, ".2f", decimal_comma=decimal_comma) for row in rows]
+    errors = [format_number(row.error_percent, ".2f", decimal_comma=decimal_comma) for row in rows]
     curves = [
         Curve(
             label="fitted",
             x=tuple(place - _WIDTH / 2 for place in places),
             y=tuple(row.error_percent for row in rows),
             style="bars",
-            notes=tuple(said),
+            notes=tuple(errors),
         )
     ]
     away = [(place, row.prediction_error_percent) for place, row in zip(places, rows, strict=True)]
-    if known := [(place, value) for place, value in away if value is not None]:
-        x, y = zip(*known, strict=True)
+    if predicted := [(place, value) for place, value in away if value is not None]:
+        x, y = zip(*predicted, strict=True)
         curves.append(
             Curve(label="load left out", x=tuple(p + _WIDTH / 2 for p in x), y=y, group=4, style="bars")
         )
@@ -153,7 +155,7 @@ def model_plot(
                 open=True,
             )
         )  # fmt: skip
-    told = ", ".join(f"{row.model} {text} %" for row, text in zip(rows, said, strict=True))
+    listed = ", ".join(f"{row.model} {text} %" for row, text in zip(rows, errors, strict=True))
     mark = f"{watermark}. " if watermark else ""
     symbol = _SYMBOLS[channel]
     return Plot(
@@ -162,7 +164,7 @@ def model_plot(
         y_label=f"error of {symbol} / %",
         curves=tuple(curves),
         caption=f"Error of each tire model in {symbol}, fitted and where each load is predicted without it.",
-        alt=f"{mark}Error of the tire models in {symbol}, {condition} slip: {told}.",
+        alt=f"{mark}Error of the tire models in {symbol}, {condition} slip: {listed}.",
         watermark=watermark,
         decimal_comma=decimal_comma,
         names=tuple(row.model for row in rows),

@@ -264,7 +264,7 @@ def _summarised(
     return number, _text(f"summary.{name}.with_U", description, with_U)
 
 
-SUMMARY = tuple(value for one in summary() for value in _summarised(one))
+SUMMARY = tuple(value for characteristic in summary() for value in _summarised(characteristic))
 
 # The coefficients of the M-15's cells stand for those of all.
 _COEFFICIENTS = [
