@@ -297,8 +297,8 @@ def next_measurements(source: Told, _style: Style) -> Rows:
     {"diagnosis_errors": "error on held-out rows over the noise, before and after: the chart of ten seconds"}
 )
 def errors_chart(source: Told, style: Style) -> Iterator[Plot]:
-    """Return the chart, where something was fitted."""
-    if source.answer.held_out:
+    """Return the chart, where something was fitted; the document of a case without a search has none."""
+    if source.answer.held_out and (source.case is None or source.search is not None):
         yield errors_plot(source.answer, style)
 
 

@@ -59,7 +59,9 @@ def build_diagnosis_content(
 
 
 def diagnosis_plots(result: Result, style: Style) -> dict[str, Plot]:
-    """Return the figures of a diagnosis by name."""
+    """Return the figures of a diagnosis by name; none where nothing was searched."""
+    if result.search is None:
+        return {}
     return DIAGNOSIS.plots(Told(answer=result.diagnosis, search=result.search), style)
 
 
