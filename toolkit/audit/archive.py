@@ -46,7 +46,7 @@ class ArchiveAudit:
     @property
     def clean(self) -> bool:
         """Whether every file is exact or rounding and nothing else asks for a person's attention."""
-        return all(one.level == "note" for one in self.findings)
+        return all(finding.level == "note" for finding in self.findings)
 
 
 def audit_archive(

@@ -82,7 +82,7 @@ def unfit(record: CalibrationRecord, columns: Columns) -> str | None:
     for name, text in zip(record.indications, record.indication_units, strict=True):
         if unit(text).dimension != unit(have[name]).dimension:
             return f"its indications are in {text}, the file's in {have[name]}"
-    missing = [load for load in columns.loads if load not in {one.load for one in record.loads}]
+    missing = [load for load in columns.loads if load not in {fit.load for fit in record.loads}]
     return f"it has no equation for {', '.join(missing)}" if missing else None
 
 

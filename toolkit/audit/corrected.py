@@ -91,7 +91,7 @@ def check_target(archive: Path, target: Path) -> None:
 
 
 def write_copies(
-    made: ArchiveAudit,
+    audit: ArchiveAudit,
     registry: Registry,
     target: Path,
     *,
@@ -108,37 +108,37 @@ def write_copies(
     OutputError
         see `check_target`; or a copy cannot be written
     """
-    check_target(made.archive, target)
-    stands: dict[tuple[str, str], Standing] = {}
+    check_target(audit.archive, target)
+    standings: dict[tuple[str, str], Standing] = {}
     copies: list[Copy] = []
-    for plain in made.files.plain():
+    for plain in audit.files.plain():
         if plain["repair"] is None or plain["grade"] in CLEAN or not plain["units"]:
             continue
         key = (plain["in_force"], plain["date"])
-        if key not in stands:
-            stands[key] = standing(
+        if key not in standings:
+            standings[key] = standing(
                 registry,
                 instrument_of(key[0]),
                 on=dt.date.fromisoformat(key[1]),
-                known_at=made.known_at,
+                known_at=audit.known_at,
                 named=key[0],
             )
-        copies.append(_copy(made.archive, plain, stands[key], target, draft=draft))
+        copies.append(_copy(audit.archive, plain, standings[key], target, draft=draft))
         step(plain["path"])
     told = {
         "generator": GENERATOR,
         "marks": OWN_OUTPUT,
         "schema": 1,
-        "known_at": made.known_at.isoformat(),
-        "heads": dict(made.heads),
-        "files": [one.as_dict() for one in copies],
+        "known_at": audit.known_at.isoformat(),
+        "heads": dict(audit.heads),
+        "files": [copy.as_dict() for copy in copies],
     }
     write_atomic(target / INDEX, json.dumps(told, indent=2) + "\n")
     return tuple(copies)
 
 
-def _copy(archive: Path, plain: Mapping[str, Any], stands: Standing, target: Path, *, draft: bool) -> Copy:
-    record = stands.record
+def _copy(archive: Path, plain: Mapping[str, Any], standing: Standing, target: Path, *, draft: bool) -> Copy:
+    record = standing.record
     path, place = archive / plain["path"], target / plain["path"]
     failed: str | None = None
     sha256: str | None = None
@@ -146,7 +146,7 @@ def _copy(archive: Path, plain: Mapping[str, Any], stands: Standing, target: Pat
     if not place.parent.resolve().is_relative_to(target.resolve()):
         raise _refused(place.parent, "a link that leads outside", "a plain folder")
     try:
-        use = stands.use(draft=draft, where=path)
+        use = standing.use(draft=draft, where=path)
         context = context_of(path)
         recording = read_recording(path, context.machine)
         if recording.sha256 != plain["sha256"]:

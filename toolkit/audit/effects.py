@@ -89,7 +89,7 @@ class TestSums:
             "not_clean": self.dirty,
             "FY_max_abs_N": self.worst_FY_N,
             "MZ_max_abs_Nm": self.worst_MZ_Nm,
-            "effects": [asdict(one) | {"change": one.new - one.old} for one in self.effects()]
+            "effects": [asdict(effect) | {"change": effect.new - effect.old} for effect in self.effects()]
             if self.dirty
             else [],
         }

@@ -184,35 +184,35 @@ class _Judge:
         self, runs: Sequence[Run], answers: Sequence[tuple[_Answer, ...]]
     ) -> tuple[tuple[Segment, ...], tuple[_Answer | None, ...]]:
         made, single = [], []
-        for run, told in zip(runs, answers, strict=True):
-            one = told[0] if len(told) == 1 else None
+        for run, answer in zip(runs, answers, strict=True):
+            one = answer[0] if len(answer) == 1 else None
             # What all candidates of an ambiguous file share is known of it.
-            variants = {a.variant for a in told}
+            variants = {a.variant for a in answer}
             made.append(
                 Segment(
                     first_row=run.start + 1,
                     last_row=run.stop,
                     record=one.record if one else None,
                     variant=variants.pop() if len(variants) == 1 else None,
-                    grade=self._grade(one) if one else "ambiguous" if told else "unknown",
-                    candidates=tuple(sorted({a.record for a in told})) if len(told) > 1 else (),
+                    grade=self._grade(one) if one else "ambiguous" if answer else "unknown",
+                    candidates=tuple(sorted({a.record for a in answer})) if len(answer) > 1 else (),
                 )
             )
             single.append(one)
         return tuple(made), tuple(single)
 
-    def _grade(self, one: _Answer) -> Grade:
-        if one.swapped:
+    def _grade(self, answer: _Answer) -> Grade:
+        if answer.swapped:
             return "column_swap"
-        if one.variant is not None:
+        if answer.variant is not None:
             return "sign_variant"
-        if one.record in self.void:
+        if answer.record in self.void:
             return "stale"
         if self.on is None:
             return "undated"
-        if self.in_force is None or one.record != self.in_force.id:
+        if self.in_force is None or answer.record != self.in_force.id:
             return "stale"
-        return "rounding" if one.slack else "exact"
+        return "rounding" if answer.slack else "exact"
 
     def _answers(self, hits: Sequence[Hit], *, slack: bool) -> tuple[_Answer, ...]:
         # Equal coefficients are one candidate, named after the plain record or the one with fewest changes;
@@ -273,7 +273,7 @@ class _Judge:
 
     def _variant(self, hit: Hit) -> object:
         group = self.groups[hit.group]
-        return (group.record.id, group.order, tuple(self._signs(hit, *one) for one in hit.signs))
+        return (group.record.id, group.order, tuple(self._signs(hit, *sign) for sign in hit.signs))
 
     def _coefficients(self, hit: Hit) -> object:
         # By load: what each column, and the constant, is multiplied by in the file's units.

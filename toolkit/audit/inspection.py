@@ -204,12 +204,12 @@ def _impossible(
     loads = [block for block in blocks if not block.tare]
     rows = [f"rows {block.first_row}-{block.last_row}" for block in loads]
     own = [(b.FZ_N, b.SA_rad, b.FY_file_N, b.MZ_file_Nm) for b in loads]
-    found = impossible(path.name, rows, own, values="the stored Fy and Mz are impossible")
+    findings = impossible(path.name, rows, own, values="the stored Fy and Mz are impossible")
     if corrector is None:
-        return found
+        return findings
     new = [(b.FZ_N, b.SA_rad, b.FY_N, b.MZ_Nm) for b in loads]
     return (
-        *found,
+        *findings,
         *impossible(path.name, rows, new, values=f"Fy and Mz by {corrector.id} are impossible too"),
     )
 
@@ -278,19 +278,25 @@ def _means(
     )
 
 
-def _findings(path: Path, found: Identification | None, choice: Choice | None) -> tuple[Finding, ...]:
+def _findings(
+    path: Path, identification: Identification | None, choice: Choice | None
+) -> tuple[Finding, ...]:
     where = path.name
     if choice is None:
         text = "no laboratory home was found, so nobody can say which calibration computed the file"
         return (Finding(rule="no-home", where=where, message=text),)
-    made = [
+    findings = [
         Finding(rule="refused-record", where=one.id, message=f"left out as a candidate: {one.reason}")
         for one in choice.refused
     ]
     if choice.trouble is not None:
-        made.append(Finding(rule="registry-damaged", where=where, message=choice.trouble))
-    if found is not None and found.grade not in CLEAN:
-        who = f" ({found.record}{', ' + found.variant if found.variant else ''})" if found.record else ""
-        text = f"Fy and Mz were computed {TELLS[found.grade]}{who}"
-        made.append(Finding(rule=f"identified-{found.grade}", where=where, message=text))
-    return tuple(made)
+        findings.append(Finding(rule="registry-damaged", where=where, message=choice.trouble))
+    if identification is not None and identification.grade not in CLEAN:
+        who = (
+            f" ({identification.record}{', ' + identification.variant if identification.variant else ''})"
+            if identification.record
+            else ""
+        )
+        text = f"Fy and Mz were computed {TELLS[identification.grade]}{who}"
+        findings.append(Finding(rule=f"identified-{identification.grade}", where=where, message=text))
+    return tuple(findings)

@@ -88,7 +88,7 @@ class Linked:
 
     def of_test(self, test: str | None) -> list[str]:
         """Return the reports that rest on a test."""
-        return [one.report for one in self.reports if test in one.tests]
+        return [report.report for report in self.reports if test in report.tests]
 
 
 def read_reports(source: Path) -> tuple[PastReport, ...]:
@@ -104,16 +104,16 @@ def read_reports(source: Path) -> tuple[PastReport, ...]:
     return tuple(_of_csv(source))
 
 
-def link(made: ArchiveAudit, reports: tuple[PastReport, ...]) -> Linked:
+def link(audit: ArchiveAudit, reports: tuple[PastReport, ...]) -> Linked:
     """Link reports to the tests of an audited archive, each report by all that it says."""
-    reports = _but_recordings(made, reports)
+    reports = _but_recordings(audit, reports)
     by_hash: dict[str, list[PastReport]] = {}
-    for one in reports:
-        for sha256 in one.hashes:
-            by_hash.setdefault(sha256, []).append(one)
+    for report in reports:
+        for sha256 in report.hashes:
+            by_hash.setdefault(sha256, []).append(report)
     tests: dict[str, tuple[int, int]] = {}
     in_force: dict[str, set[str]] = {}
-    for plain in made.files.plain():
+    for plain in audit.files.plain():
         test = plain["test"]
         dirty = plain["grade"] not in CLEAN
         if test is not None:
@@ -129,32 +129,32 @@ def link(made: ArchiveAudit, reports: tuple[PastReport, ...]) -> Linked:
                 one.not_clean += dirty
     names: dict[str, list[str]] = {}
     for test in tests:
-        names.setdefault(_words(_last(test, made.archive)), []).append(test)
-    for one in reports:
-        for test in _by_name(one, names):
-            one.tests.add(test)
-            one.linked_by.add("test")
-        for test in one.tests:
-            one.files += tests[test][0]
-            one.not_clean += tests[test][1]
-            one.in_force |= in_force[test]
-    taken = {test for one in reports for test in one.tests}
+        names.setdefault(_words(_last(test, audit.archive)), []).append(test)
+    for report in reports:
+        for test in _by_name(report, names):
+            report.tests.add(test)
+            report.linked_by.add("test")
+        for test in report.tests:
+            report.files += tests[test][0]
+            report.not_clean += tests[test][1]
+            report.in_force |= in_force[test]
+    taken = {test for report in reports for test in report.tests}
     return Linked(reports=reports, unknown=tuple(sorted(set(tests) - taken)))
 
 
-def _but_recordings(made: ArchiveAudit, reports: tuple[PastReport, ...]) -> tuple[PastReport, ...]:
+def _but_recordings(audit: ArchiveAudit, reports: tuple[PastReport, ...]) -> tuple[PastReport, ...]:
     """Return the reports without the archive's own recordings, which may stand in the same folder."""
-    if all(one.path is None for one in reports):
+    if all(report.path is None for report in reports):
         return reports
-    archive = made.archive.resolve()
-    known = {archive / plain["path"] for plain in made.files.plain() if plain["grade"] != "unreadable"}
-    return tuple(one for one in reports if one.path is None or one.path not in known)
+    archive = audit.archive.resolve()
+    known = {archive / plain["path"] for plain in audit.files.plain() if plain["grade"] != "unreadable"}
+    return tuple(report for report in reports if report.path is None or report.path not in known)
 
 
-def _by_name(one: PastReport, names: Mapping[str, list[str]]) -> Iterator[str]:
-    if one.linked_by & {"manifest", "sha256"}:
+def _by_name(past_report: PastReport, names: Mapping[str, list[str]]) -> Iterator[str]:
+    if past_report.linked_by & {"manifest", "sha256"}:
         return  # what a report says of its files is better than what it is called
-    texts = [_words(name) for name in one.named] if one.named else [one.words or ""]
+    texts = [_words(name) for name in past_report.named] if past_report.named else [past_report.words or ""]
     for text in texts:
         for name, tests in names.items():
             if not name or not (text == name or f" {name} " in f" {text} "):
@@ -185,7 +185,7 @@ def _of_csv(source: Path) -> Iterator[PastReport]:
     check_keys(dict.fromkeys(header), _COLUMNS, where=source)
     if "report" not in header or len(header) < 2:
         raise _bad(source, ", ".join(header) or "nothing", "the columns report and test, sha256, or both")
-    found: dict[str, PastReport] = {}
+    past_reports: dict[str, PastReport] = {}
     for number, row in enumerate(rows, start=2):
         name = (row.get("report") or "").strip()
         test, sha256 = ((row.get(key) or "").strip() for key in ("test", "sha256"))
@@ -193,10 +193,10 @@ def _of_csv(source: Path) -> Iterator[PastReport]:
             raise _bad(source, f"row {number}: no report, or neither test nor sha256", "both in every row")
         if sha256 and not _SHA.fullmatch(sha256):
             raise _bad(source, f"row {number}: {sha256[:80]!r}", "64 hexadecimal digits")
-        one = found.setdefault(name, PastReport(report=name))
+        one = past_reports.setdefault(name, PastReport(report=name))
         one.named |= {test} - {""}
         one.hashes |= {sha256.lower()} - {""}
-    yield from found.values()
+    yield from past_reports.values()
 
 
 def _of_folder(folder: Path) -> Iterator[PastReport]:
@@ -205,8 +205,8 @@ def _of_folder(folder: Path) -> Iterator[PastReport]:
         manifests = [
             _manifest(Path(place) / name, folder) for name in sorted(names) if name.endswith(".json")
         ]
-        known = {name for one in manifests if one is not None for name in one[1]}
-        yield from (one[0] for one in manifests if one is not None)
+        known = {name for manifest in manifests if manifest is not None for name in manifest[1]}
+        yield from (manifest[0] for manifest in manifests if manifest is not None)
         for name in sorted(names):
             path = Path(place) / name
             if path.suffix.lower() in DOCUMENTS and name not in known and not path.is_symlink():
@@ -228,13 +228,13 @@ def _manifest(path: Path, folder: Path) -> tuple[PastReport, set[str]] | None:
     if not isinstance(told, dict) or told.get("generator") != GENERATOR or "inputs" not in told:
         return None
     outputs = {one.get("name") for one in _dicts(told.get("outputs"))}
-    made = PastReport(
+    past_report = PastReport(
         report=path.parent.relative_to(folder).as_posix(),
         id=str(told.get("report")),
         hashes={one["sha256"].lower() for one in _dicts(told["inputs"]) if _is_sha(one.get("sha256"))},
         calibrations=tuple(str(one.get("id")) for one in _dicts(told.get("calibrations"))),
     )
-    return made, {name for name in outputs if isinstance(name, str)}
+    return past_report, {name for name in outputs if isinstance(name, str)}
 
 
 def _dicts(value: Any) -> Iterator[dict[str, Any]]:

@@ -199,14 +199,14 @@ def _impossible(name: str, blocks: tuple[Change, ...], in_force: str | None) -> 
     rows = [f"rows {b.first_row}-{b.last_row}" for b in blocks]
     angles = [None if b.SA_deg is None else math.radians(b.SA_deg) for b in blocks]
     own = [(b.FZ_N, SA, b.FY_N, b.MZ_Nm) for b, SA in zip(blocks, angles, strict=True)]
-    found = impossible(name, rows, own, values="the stored Fy and Mz are impossible")
+    findings = impossible(name, rows, own, values="the stored Fy and Mz are impossible")
     if in_force is None:
-        return found
+        return findings
     new = [
         (b.FZ_N, SA, _sum(b.FY_N, b.FY_change_N), _sum(b.MZ_Nm, b.MZ_change_Nm))
         for b, SA in zip(blocks, angles, strict=True)
     ]
-    return (*found, *impossible(name, rows, new, values=f"Fy and Mz by {in_force} are impossible too"))
+    return (*findings, *impossible(name, rows, new, values=f"Fy and Mz by {in_force} are impossible too"))
 
 
 def _sum(own: float | None, change: float | None) -> float | None:

@@ -28,7 +28,7 @@ def quality(recording: Recording, where: str) -> tuple[Finding, ...]:
     """
     if recording.rows < _FEW_ROWS:
         return ()
-    found: list[Finding] = []
+    findings: list[Finding] = []
     for one in recording.series:
         text = None
         if one.role == "time":
@@ -41,12 +41,12 @@ def quality(recording: Recording, where: str) -> tuple[Finding, ...]:
             else:
                 text, rule = _saturated(one), "saturated-channel"
         if text is not None:
-            found.append(Finding(rule=rule, where=where, message=text, level="note"))
-    return tuple(found)
+            findings.append(Finding(rule=rule, where=where, message=text, level="note"))
+    return tuple(findings)
 
 
-def _saturated(one: Series) -> str | None:
-    values = one.values
+def _saturated(series: Series) -> str | None:
+    values = series.values
     same = values[1:] == values[:-1]
     if int(same.sum()) < _STUCK - 1:
         return None  # the usual case, and the cheap one
@@ -56,8 +56,8 @@ def _saturated(one: Series) -> str | None:
         elsewhere = int(same.sum()) - (length - 1)
         if length >= _STUCK and elsewhere < 0.2 * len(same):
             return (
-                f"{one.header} stands at {end:g} {one.unit}, an end of its range, in rows {start + 1} to "
-                f"{start + length}"
+                f"{series.header} stands at {end:g} {series.unit}, an end of its range, in "
+                f"rows {start + 1} to {start + length}"
             )
     return None
 
@@ -70,14 +70,14 @@ def _longest(true: NDArray[np.bool_]) -> tuple[int, int]:
     return int(starts[best]), int(lengths[best])
 
 
-def _clock(one: Series) -> str | None:
-    steps = np.diff(one.values)
+def _clock(series: Series) -> str | None:
+    steps = np.diff(series.values)
     usual = float(np.median(steps))
     bad = np.flatnonzero((steps <= 0) | (steps > _JUMP * usual))
     if not len(bad):
         return None
     row = int(bad[0])
     return (
-        f"{one.header} goes from {one.values[row]:g} to {one.values[row + 1]:g} {one.unit} after row "
-        f"{row + 1}; the usual step is {usual:g}" + (f" ({len(bad)} such places)" if len(bad) > 1 else "")
+        f"{series.header} goes from {series.values[row]:g} to {series.values[row + 1]:g} {series.unit} after "
+        f"row {row + 1}; the usual step is {usual:g}" + (f" ({len(bad)} such places)" if len(bad) > 1 else "")
     )

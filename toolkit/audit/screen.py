@@ -72,7 +72,7 @@ class Screen:
     def anywhere(self, columns: Columns) -> list[Key]:
         """Return the groups that may explain at least one row."""
         found: set[int] = set()
-        most = max((one.coefficients[..., 0].size for one in self.equations.values()), default=1)
+        most = max((equation.coefficients[..., 0].size for equation in self.equations.values()), default=1)
         for start in range(0, columns.rows, max(1, _CELLS // most)):
             rows = np.arange(start, min(start + max(1, _CELLS // most), columns.rows))
             good = np.arange(len(self.linear))
@@ -147,18 +147,18 @@ def screen_of(records: Sequence[CalibrationRecord], columns: Columns) -> Screen:
     reasons = tuple((record.id, unfit(record, columns)) for record in records)
     fitting = tuple(r for r, (_, reason) in zip(records, reasons, strict=True) if reason is None)
     linear: list[Key] = []
-    other: list[Key] = []
+    keys: list[Key] = []
     for index, record in enumerate(fitting if columns.loads else ()):
-        forms = (False,) if all(one.issued == one.coefficients for one in record.loads) else (False, True)
+        forms = (False,) if all(load.issued == load.coefficients for load in record.loads) else (False, True)
         simple = all(_is_linear(record, record.load(load)) for load in columns.loads)
-        (linear if simple else other).extend(
+        (linear if simple else keys).extend(
             (index, issued, order) for order in orders(len(record.indications)) for issued in forms
         )
     return Screen(
         records=fitting,
         reasons=reasons,
         linear=tuple(linear),
-        other=tuple(other),
+        other=tuple(keys),
         equations={load: _equations(fitting, linear, columns, load) for load in columns.loads}
         if linear
         else {},

@@ -18,22 +18,22 @@ SHAPE = 5
 """Of what is written here; results of another one are not used again."""
 
 
-def to_plain(one: FileAudit) -> dict[str, Any]:
+def to_plain(file_audit: FileAudit) -> dict[str, Any]:
     """Return a file's audit under the keys of the answer; what it does not have is None or empty."""
-    found = one.found
+    found = file_audit.found
     repair = None if found is None else found.repair
     return {
-        "path": one.path,
-        "sha256": one.sha256,
-        "size": one.size,
-        "instrument": one.instrument,
-        "date": _day(one.date),
-        "test": one.test,
-        "rotation": one.rotation,
-        "to_SAE": dict(one.to_SAE),
-        "own_protocol": one.own_protocol,
-        "rows": one.rows,
-        "grade": one.grade,
+        "path": file_audit.path,
+        "sha256": file_audit.sha256,
+        "size": file_audit.size,
+        "instrument": file_audit.instrument,
+        "date": _day(file_audit.date),
+        "test": file_audit.test,
+        "rotation": file_audit.rotation,
+        "to_SAE": dict(file_audit.to_SAE),
+        "own_protocol": file_audit.own_protocol,
+        "rows": file_audit.rows,
+        "grade": file_audit.grade,
         "record": None if found is None else found.record,
         "variant": None if found is None else found.variant,
         "issued": None if found is None else found.issued,
@@ -43,15 +43,15 @@ def to_plain(one: FileAudit) -> dict[str, Any]:
         "repair": None
         if repair is None
         else {"FY_max_abs_N": repair.FY_max_abs_N, "MZ_max_abs_Nm": repair.MZ_max_abs_Nm},
-        "conditions": [_change(change) for change in one.changes],
-        "estimate": None if one.estimate is None else _estimate(one.estimate),
+        "conditions": [_change(change) for change in file_audit.changes],
+        "estimate": None if file_audit.estimate is None else _estimate(file_audit.estimate),
         "skipped": [] if found is None else [{"id": s.id, "reason": s.reason} for s in found.skipped],
-        "reason": one.reason,
-        "test_toml": one.context,
-        "units": dict(one.units),
-        "values_sha256": one.values_sha256,
-        "modified": _day(one.modified),
-        "notes": [{"rule": note.rule, "message": note.message} for note in one.notes],
+        "reason": file_audit.reason,
+        "test_toml": file_audit.context,
+        "units": dict(file_audit.units),
+        "values_sha256": file_audit.values_sha256,
+        "modified": _day(file_audit.modified),
+        "notes": [{"rule": note.rule, "message": note.message} for note in file_audit.notes],
     }
 
 
@@ -95,18 +95,18 @@ def _date(text: str | None) -> dt.date | None:
     return None if text is None else dt.date.fromisoformat(text)
 
 
-def _change(one: Change) -> dict[str, Any]:
-    return {name: getattr(one, name) for name in _CHANGE}
+def _change(change: Change) -> dict[str, Any]:
+    return {name: getattr(change, name) for name in _CHANGE}
 
 
 def _changed(plain: Mapping[str, Any]) -> Change:
     return Change(**plain)
 
 
-def _estimate(one: Estimate) -> dict[str, Any]:
+def _estimate(estimate: Estimate) -> dict[str, Any]:
     return {
-        "first_row": one.first_row,
-        "last_row": one.last_row,
+        "first_row": estimate.first_row,
+        "last_row": estimate.last_row,
         "equations": {
             equation.load: {
                 "unit": equation.unit,
@@ -117,9 +117,9 @@ def _estimate(one: Estimate) -> dict[str, Any]:
                     c.name: {"value": c.value, "low": c.low, "high": c.high} for c in equation.coefficients
                 },
             }
-            for equation in one.equations
+            for equation in estimate.equations
         },
-        "nearest": None if one.nearest is None else asdict(one.nearest),
+        "nearest": None if estimate.nearest is None else asdict(estimate.nearest),
     }
 
 
@@ -142,14 +142,14 @@ def _estimated(plain: Mapping[str, Any]) -> Estimate:
     )
 
 
-def _segment(one: Segment) -> dict[str, Any]:
+def _segment(segment: Segment) -> dict[str, Any]:
     return {
-        "first_row": one.first_row,
-        "last_row": one.last_row,
-        "record": one.record,
-        "variant": one.variant,
-        "grade": one.grade,
-        "candidates": list(one.candidates),
+        "first_row": segment.first_row,
+        "last_row": segment.last_row,
+        "record": segment.record,
+        "variant": segment.variant,
+        "grade": segment.grade,
+        "candidates": list(segment.candidates),
     }
 
 

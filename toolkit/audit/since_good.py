@@ -142,11 +142,11 @@ class DriftedTest:
         }
 
 
-def drifted_tests(made: ArchiveAudit, files: Sequence[DriftedFile]) -> tuple[DriftedTest, ...]:
+def drifted_tests(audit: ArchiveAudit, files: Sequence[DriftedFile]) -> tuple[DriftedTest, ...]:
     """Return the tests that recordings of the stretch belong to, by date and folder."""
-    by_path = {one.path: one for one in files}
+    by_path = {file.path: file for file in files}
     tests: dict[str, list[DriftedFile]] = {}
-    for plain in made.files.plain():
+    for plain in audit.files.plain():
         if plain["path"] in by_path:
             tests.setdefault(plain["test"], []).append(by_path[plain["path"]])
     return tuple(
@@ -191,7 +191,7 @@ def drift_since(registry: Registry, good: str) -> Drift:
 
 
 def drifted_files(
-    made: ArchiveAudit,
+    audit: ArchiveAudit,
     registry: Registry,
     drift: Drift,
     *,
@@ -201,14 +201,14 @@ def drifted_files(
 ) -> Iterator[DriftedFile]:
     """Yield the recordings of the stretch, in the order in which they are done."""
     days: dict[str, dt.date] = {}
-    for plain in made.files.plain():
+    for plain in audit.files.plain():
         if plain["instrument"] == drift.instrument and plain["date"] is not None:
             day = dt.date.fromisoformat(plain["date"])
             if drift.share(day) is not None:
                 days[plain["path"]] = day
     # A worker may have another working folder.
-    archive, records = (Path(os.path.abspath(one)) for one in (made.archive, registry.folder))  # noqa: PTH100
-    make = partial(_Drifted, archive, Registry(records), made.known_at, drift)
+    archive, records = (Path(os.path.abspath(one)) for one in (audit.archive, registry.folder))  # noqa: PTH100
+    make = partial(_Drifted, archive, Registry(records), audit.known_at, drift)
     names = tuple(days)
     for name, result in (
         run_isolated(make, names, workers=workers)
@@ -236,7 +236,7 @@ class _Drifted:
         context = context_of(path)
         day = context.date or self.drift.good_date
         share = self.drift.share(day) or 0.0
-        found = DriftedFile(path=name, date=day, share=share)
+        file = DriftedFile(path=name, date=day, share=share)
         try:
             recording = read_recording(path, context.machine)
             blocks = () if context.is_tare else split_blocks(recording, context.machine)[0]
@@ -251,7 +251,7 @@ class _Drifted:
         old, new = recompute(columns, used), recompute(columns, self.true)
         FY, MZ = (share * (new[load] - old[load]) for load in ("FY", "MZ"))
         return DriftedFile(
-            path=found.path,
+            path=file.path,
             date=day,
             share=share,
             FY_N=float(np.abs(FY).max()),

@@ -49,13 +49,13 @@ def sum_up(files: Iterable[Mapping[str, Any]]) -> Sums:
     instruments: set[str] = set()
     findings: list[Finding] = []
     notes: list[Finding] = []
-    for one in files:
-        grades[one["grade"]] += 1
-        undated += one["grade"] != "unreadable" and one["date"] is None
-        if one["instrument"] is not None:
-            instruments.add(one["instrument"])
-        findings += _of_file(one)
-        notes += across.add(one)
+    for file in files:
+        grades[file["grade"]] += 1
+        undated += file["grade"] != "unreadable" and file["date"] is None
+        if file["instrument"] is not None:
+            instruments.add(file["instrument"])
+        findings += _of_file(file)
+        notes += across.add(file)
     notes += across.rest()
     return Sums(
         grades={grade: grades[grade] for grade in GRADES},
@@ -92,10 +92,10 @@ def read_sums(folder: Path, key: str) -> Sums | None:
             if head["key"] != key:
                 return None
             whole = hashlib.sha256(first)
-            found: list[Finding] = []
+            findings: list[Finding] = []
             for line in itertools.islice(stream, head["findings"] + head["notes"]):
                 whole.update(line)
-                found.append(Finding(**json.loads(line)))
+                findings.append(Finding(**json.loads(line)))
             tests = Lines()
             for line in itertools.islice(stream, head["tests"]):
                 whole.update(line)
@@ -106,8 +106,8 @@ def read_sums(folder: Path, key: str) -> Sums | None:
                 grades={grade: head["grades"][grade] for grade in GRADES},
                 undated=head["undated"],
                 instruments=tuple(head["instruments"]),
-                findings=tuple(found[: head["findings"]]),
-                notes=tuple(found[head["findings"] :]),
+                findings=tuple(findings[: head["findings"]]),
+                notes=tuple(findings[head["findings"] :]),
                 tests=tests,
             )
     except (OSError, ValueError, KeyError, TypeError):
@@ -138,19 +138,19 @@ def _lines(sums: Sums, key: str) -> Iterator[bytes]:
         "tests": len(sums.tests),
     }
     yield json.dumps(head).encode() + b"\n"
-    for one in (*sums.findings, *sums.notes):
-        yield json.dumps(one.as_dict()).encode() + b"\n"
+    for finding in (*sums.findings, *sums.notes):
+        yield json.dumps(finding.as_dict()).encode() + b"\n"
     yield from sums.tests.raw()
 
 
 def _of_file(one: Mapping[str, Any]) -> list[Finding]:
-    made = []
+    findings = []
     path, grade, reason = one["path"], one["grade"], one["reason"]
     if one["test_toml"] is not None:
         message = f"its test.toml cannot be used, the file counts as undated: {one['test_toml']}"
-        made.append(Finding(rule="test-toml", where=path, message=message))
+        findings.append(Finding(rule="test-toml", where=path, message=message))
     if grade == "unreadable":
-        made.append(Finding(rule="unreadable-file", where=path, message=reason or ""))
+        findings.append(Finding(rule="unreadable-file", where=path, message=reason or ""))
     elif grade not in CLEAN:
-        made.append(Finding(rule=f"identified-{grade}", where=path, message=reason or told(one)))
-    return made
+        findings.append(Finding(rule=f"identified-{grade}", where=path, message=reason or told(one)))
+    return findings

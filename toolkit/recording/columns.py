@@ -57,12 +57,12 @@ def assign_columns(headers: Sequence[str], machine: Machine, *, where: object) -
     >>> [(one.symbol, one.unit) for one in assign_columns(row, load_machine("m15"), where="doctest")]
     [('SA', 'deg'), ('FZ', 'lbf'), ('D51', 'lbf'), ('D52', 'lbf'), ('E5', 'lbf'), ('t', 's')]
     """
-    found = tuple(
+    assigneds = tuple(
         _assign(index, header, machine, where) for index, header in enumerate(headers) if header.strip()
     )
-    _check_once(found, where)
-    _check_whole(found, machine, headers, where)
-    return found
+    _check_once(assigneds, where)
+    _check_whole(assigneds, machine, headers, where)
+    return assigneds
 
 
 def header_of(machine: Machine) -> Callable[[str], bool]:
@@ -184,27 +184,27 @@ def _no_unit(header: str, name: str, column: Column | None, machine: Machine, wh
     )
 
 
-def _check_once(found: tuple[Assigned, ...], where: object) -> None:
+def _check_once(assigneds: tuple[Assigned, ...], where: object) -> None:
     first: dict[str, Assigned] = {}
-    for one in found:
+    for assigned in assigneds:
         # `t` and `T` are two channels; everything else is the same in either case.
-        key = one.symbol if one.symbol in CHANNELS else one.symbol.casefold()
+        key = assigned.symbol if assigned.symbol in CHANNELS else assigned.symbol.casefold()
         if key in first:
             raise ColumnError(
-                f"channel {one.symbol} has two columns",
+                f"channel {assigned.symbol} has two columns",
                 where=where,
-                got=f"{first[key].header!r} and {one.header!r}",
+                got=f"{first[key].header!r} and {assigned.header!r}",
                 expected="one column a channel",
                 next_step="remove or rename one of them in a copy of the file",
                 rule="doubled-column",
             )
-        first[key] = one
+        first[key] = assigned
 
 
 def _check_whole(
-    found: tuple[Assigned, ...], machine: Machine, headers: Sequence[str], where: object
+    assigneds: tuple[Assigned, ...], machine: Machine, headers: Sequence[str], where: object
 ) -> None:
-    have = {one.symbol for one in found}
+    have = {assigned.symbol for assigned in assigneds}
     missing = [c for c in machine.columns if c.role not in _OPTIONAL and c.symbol not in have]
     if missing:
         raise ColumnError(

@@ -139,17 +139,17 @@ def _layout(path: Path, machine: Machine, columns: Mapping[str, NDArray[np.float
 
 def _check(path: Path, names: list[str], values: list[NDArray[np.float64]]) -> None:
     rows = values[0].shape
-    for name, one in zip(names, values, strict=True):
-        if one.shape != rows or one.ndim != 1 or not len(one):
+    for name, value in zip(names, values, strict=True):
+        if value.shape != rows or value.ndim != 1 or not len(value):
             raise OutputError(
-                f"column {name} has another shape than the rest", where=path, got=one.shape, expected=rows,
+                f"column {name} has another shape than the rest", where=path, got=value.shape, expected=rows,
                 next_step="give one value a row for every column",
             )  # fmt: skip
-        if not np.isfinite(one).all():
+        if not np.isfinite(value).all():
             raise OutputError(
                 f"column {name} has a value that is not finite",
                 where=path,
-                got=one[~np.isfinite(one)][0],
+                got=value[~np.isfinite(value)][0],
                 expected="finite numbers; the reader refuses anything else",
                 next_step="find out where it was computed",
             )

@@ -120,23 +120,25 @@ def _array(cells: list[Any]) -> NDArray[np.float64] | None:
     return values if np.isfinite(values).all() else None
 
 
-def _series(one: Assigned, cells: list[Any], where: str, first_row: int) -> Series:
+def _series(assigned: Assigned, cells: list[Any], where: str, first_row: int) -> Series:
     values = _array(cells)
     if values is None:
-        _refuse_first(one, cells, where, first_row)
+        _refuse_first(assigned, cells, where, first_row)
     values.setflags(write=False)
-    return _named(one, values)
+    return _named(assigned, values)
 
 
-def _named(one: Assigned, values: NDArray[np.float64]) -> Series:
-    return Series(symbol=one.symbol, header=one.header, unit=one.unit, role=one.role, values=values)
+def _named(assigned: Assigned, values: NDArray[np.float64]) -> Series:
+    return Series(
+        symbol=assigned.symbol, header=assigned.header, unit=assigned.unit, role=assigned.role, values=values
+    )
 
 
-def _refuse_first(one: Assigned, cells: list[Any], where: str, first_row: int) -> NoReturn:
+def _refuse_first(assigned: Assigned, cells: list[Any], where: str, first_row: int) -> NoReturn:
     for offset, cell in enumerate(cells):
         rule, got = judge(cell)
         if rule:
-            refuse_cell(rule, got, where, first_row + offset, one.index + 1, one.header)
+            refuse_cell(rule, got, where, first_row + offset, assigned.index + 1, assigned.header)
     raise AssertionError("a column was refused although all its cells are numbers")
 
 

@@ -83,12 +83,12 @@ def _around_grid(gated: Gated, errors: _Errors) -> list[tuple[str, Table]]:
     except ToolkitError:
         return []
     made: list[tuple[str, Table]] = []
-    for name, one in sheets:
-        if one.rows:  # of the part with the cells: there is no other
-            if len(one.rows) != grid.first_row - 1 or len(one.rows[-1]) != numbers.shape[1]:
+    for name, table in sheets:
+        if table.rows:  # of the part with the cells: there is no other
+            if len(table.rows) != grid.first_row - 1 or len(table.rows[-1]) != numbers.shape[1]:
                 return []
-            one = Table(where=one.where, rows=one.rows, errors=one.errors, numbers=numbers)
-        made.append((name, one))
+            table = Table(where=table.where, rows=table.rows, errors=table.errors, numbers=numbers)
+        made.append((name, table))
     return made if any(one.rows for _, one in made) else []
 
 
@@ -162,7 +162,7 @@ def _sheet_parts(members: Mapping[str, bytes]) -> dict[str, str]:
         workbook = ET.fromstring(members["xl/workbook.xml"])  # noqa: S314
     except (KeyError, ET.ParseError, ValueError, LookupError):
         return {}
-    targets = {one.get("Id"): one.get("Target", "") for one in links}
+    targets = {link.get("Id"): link.get("Target", "") for link in links}
     sheets = [*workbook.iter(f"{_MAIN}sheet"), *workbook.iter(f"{_STRICT_MAIN}sheet")]
     return {
         sheet.get("name", ""): posixpath.normpath(

@@ -51,7 +51,7 @@ def compare(
     channels = [s for s in recording.series if s.role == "acquired" and _computes(record, s.symbol)]
     if not channels:
         return ()
-    wanted = [one.symbol for one in channels]
+    wanted = [channel.symbol for channel in channels]
 
     def reading(offset: Mapping[str, float] | None, *, issued: bool) -> Mapping[str, NDArray[np.float64]]:
         return apply_record(record, indications, units=units, tare=offset, issued=issued, only=wanted)
@@ -63,14 +63,14 @@ def compare(
     ]
     halves = {name: rounding(recording[name]) for name in indications}
     found = []
-    for one in channels:
-        bound = _moved(record, one.symbol, indications, units, halves, plain=readings[0][one.symbol])
-        bound = bound + rounding(one) * si_scale(one.unit) + 1e-9 * np.abs(one.si)
-        misses = [np.abs(reading[one.symbol] - one.si) for reading in readings]
+    for channel in channels:
+        bound = _moved(record, channel.symbol, indications, units, halves, plain=readings[0][channel.symbol])
+        bound = bound + rounding(channel) * si_scale(channel.unit) + 1e-9 * np.abs(channel.si)
+        misses = [np.abs(reading[channel.symbol] - channel.si) for reading in readings]
         found.append(
             Difference(
                 file=file,
-                channel=one.symbol,
+                channel=channel.symbol,
                 largest=float(np.max(misses[0])),
                 explained=any(bool(np.all(miss <= bound)) for miss in misses),
             )

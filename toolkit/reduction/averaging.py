@@ -92,7 +92,9 @@ def revolutions(
     drum = machine.drum.circumference_m
     wanted = tire if machine.protocol.revolutions_of == "tire" else drum
     shafts = (("TIRE_ANGLE", tire, "tire"), ("DRUM_ANGLE", drum, "drum"))
-    for symbol, around, shaft in sorted(shafts, key=lambda one: one[2] != machine.protocol.revolutions_of):
+    for symbol, around, shaft in sorted(
+        shafts, key=lambda shaft: shaft[2] != machine.protocol.revolutions_of
+    ):
         if not recording.has(symbol):
             continue
         angle = np.unwrap(recording[symbol].si[block.rows])

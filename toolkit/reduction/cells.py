@@ -98,7 +98,9 @@ def checked(reduced: ReducedTest) -> ReducedTest:
     """
     if reduced.impossible or not reduced.conditions:
         return reduced
-    found = tuple(one.finding() for one in departures(_readings(reduced.conditions, reduced.info)))
+    found = tuple(
+        departure.finding() for departure in departures(_readings(reduced.conditions, reduced.info))
+    )
     return dataclasses.replace(reduced, findings=(*found, *reduced.findings)) if found else reduced
 
 
@@ -187,8 +189,8 @@ def _cells(
         per_MX=_overturning(record, per_FY, levers),
         radius_m=free_radius_m(info.tire_size),
         tares=np.array([zeros[c.file] for c in conditions]),
-        FY_sign=np.array([float(one["FY"]) for one in turns]),
-        MZ_sign=np.array([float(one["MZ"]) for one in turns]),
+        FY_sign=np.array([float(turn["FY"]) for turn in turns]),
+        MZ_sign=np.array([float(turn["MZ"]) for turn in turns]),
     )
 
 
@@ -198,7 +200,7 @@ def _overturning(
     # By the drawing, which the record did not touch; else by the record's own fit.
     if set(record.indications) <= set(levers):
         return per_FY * [levers[name] for name in record.indications]
-    return _linear(record, "MX") if any(one.load == "MX" for one in record.loads) else None
+    return _linear(record, "MX") if any(load.load == "MX" for load in record.loads) else None
 
 
 def _linear(record: CalibrationRecord, load: str) -> NDArray[np.float64]:

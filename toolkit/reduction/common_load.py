@@ -36,8 +36,8 @@ def at_one_angle(conditions: Sequence[Condition]) -> tuple[tuple[int, ...], ...]
     the protocol's step, those at no step by a gap in the angle, and a load that stands twice by its turn.
     """
     places: dict[tuple[str, float | None], list[int]] = {}
-    for index, one in enumerate(conditions):
-        places.setdefault((one.file, one.step_SA), []).append(index)
+    for index, condition in enumerate(conditions):
+        places.setdefault((condition.file, condition.step_SA), []).append(index)
     groups: dict[tuple[str, float | None, int, int], list[int]] = {}
     for (file, step), mine in places.items():
         angles = sorted({conditions[index].SA for index in mine})
@@ -48,10 +48,10 @@ def at_one_angle(conditions: Sequence[Condition]) -> tuple[tuple[int, ...], ...]
             cluster[SA], last = number, SA
         seen: Counter[tuple[int, float | None]] = Counter()
         for index in sorted(mine, key=lambda i: conditions[i].first_row):
-            one = conditions[index]
-            turn = seen[cluster[one.SA], one.step_FZ]
-            seen[cluster[one.SA], one.step_FZ] += one.step_FZ is not None
-            groups.setdefault((file, step, cluster[one.SA], turn), []).append(index)
+            condition = conditions[index]
+            turn = seen[cluster[condition.SA], condition.step_FZ]
+            seen[cluster[condition.SA], condition.step_FZ] += condition.step_FZ is not None
+            groups.setdefault((file, step, cluster[condition.SA], turn), []).append(index)
     return tuple(tuple(sorted(group)) for group in groups.values())
 
 
@@ -83,8 +83,8 @@ def slopes(FZ: NDArray[np.float64], y: NDArray[np.float64]) -> tuple[Slope | Non
     x, values = FZ[order], y[order]
     secants = np.diff(values) / np.diff(x)
     if n == 2:
-        one = Slope(value=float(secants[0]), u=float(abs(secants[0])) / 2)
-        return (one, one)
+        slope = Slope(value=float(secants[0]), u=float(abs(secants[0])) / 2)
+        return (slope, slope)
     for place, block in enumerate(order):
         middle = min(max(place, 1), n - 2)
         terms = _terms(x, values, _nodes(x, place, middle))

@@ -30,15 +30,15 @@ def corrected(
     offset; ``steer_compliance``: alpha = SA - compliance * MZ, with the corrected moment.
     """
     made = dict(channels)
-    for one in machine.corrections:
-        if one.effect == "crosstalk":
-            name, source = str(one.channel), str(one.source)
-            made[name] = made[name] - one.value * one.factor * channels[source]
-    for one in machine.corrections:
-        if one.effect == "steer_offset":
-            made["SA"] = made["SA"] - one.value * one.factor
-        elif one.effect == "steer_compliance":
-            made["SA"] = made["SA"] - one.value * one.factor * made["MZ"]
+    for correction in machine.corrections:
+        if correction.effect == "crosstalk":
+            name, source = str(correction.channel), str(correction.source)
+            made[name] = made[name] - correction.value * correction.factor * channels[source]
+    for correction in machine.corrections:
+        if correction.effect == "steer_offset":
+            made["SA"] = made["SA"] - correction.value * correction.factor
+        elif correction.effect == "steer_compliance":
+            made["SA"] = made["SA"] - correction.value * correction.factor * made["MZ"]
     return made
 
 
@@ -49,11 +49,11 @@ def u_SA(machine: Machine, MZ: NDArray[np.float64]) -> float:
     """
     parts = [0.0]
     largest = float(np.max(np.abs(MZ))) if len(MZ) else 0.0
-    for one in machine.corrections:
-        if one.effect == "steer_offset":
-            parts.append(one.u * one.factor)
-        elif one.effect == "steer_compliance":
-            parts.append(one.u * one.factor * largest)
+    for correction in machine.corrections:
+        if correction.effect == "steer_offset":
+            parts.append(correction.u * correction.factor)
+        elif correction.effect == "steer_compliance":
+            parts.append(correction.u * correction.factor * largest)
     return math.hypot(*parts)
 
 
@@ -63,8 +63,8 @@ def correction_findings(machine: Machine) -> list[Finding]:
         Finding(
             rule="machine-corrected",
             where=f"{machine.name}, version {machine.version}",
-            message=one.as_text(),
+            message=correction.as_text(),
             level="note",
         )
-        for one in machine.corrections
+        for correction in machine.corrections
     ]

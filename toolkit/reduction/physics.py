@@ -177,7 +177,7 @@ def _moment(r: Readings, share: float) -> list[Departure]:
 
 
 def _slopes(r: Readings) -> list[Departure]:
-    found = []
+    departures = []
     for reverse in (False, True):
         run = r.part(r.reverse == reverse)
         slopes = [one for one in (_slope(run, load) for load in {b for _, b in run.block}) if one]
@@ -194,7 +194,7 @@ def _slopes(r: Readings) -> list[Departure]:
                 if stiffness < 0
                 else "forces, loads or angles are in another unit, or a cell is dead"
             )
-            found.append(
+            departures.append(
                 Departure(
                     rule="impossible-slope",
                     where=f"{where}, FY",
@@ -204,7 +204,7 @@ def _slopes(r: Readings) -> list[Departure]:
                 )
             )
         elif not 0.0 <= trail <= r.trail_m:
-            found.append(
+            departures.append(
                 Departure(
                     rule="impossible-slope",
                     where=f"{where}, MZ",
@@ -215,7 +215,7 @@ def _slopes(r: Readings) -> list[Departure]:
                     "sign",
                 )
             )
-    return found
+    return departures
 
 
 def _slope(run: Readings, load: float | None) -> tuple[float, float, float] | None:

@@ -85,11 +85,11 @@ def check(
 
 
 def _missing(placed: Sequence[Placed], protocol: Protocol, rotations: Sequence[Rotation]) -> list[Finding]:
-    found: list[Finding] = []
+    findings: list[Finding] = []
     for rotation in rotations:
         there = Counter((p.step_SA, p.step_FZ) for p in placed if p.rotation == rotation)
         if not there:
-            found.append(
+            findings.append(
                 Finding(
                     rule="missing",
                     where=f"drum {rotation}",
@@ -100,7 +100,7 @@ def _missing(placed: Sequence[Placed], protocol: Protocol, rotations: Sequence[R
         steps = list(dict.fromkeys(protocol.slip_angles_rad))
         gone = [step for step in steps if not any(step == s for s, _ in there)]
         if gone:
-            found.append(
+            findings.append(
                 Finding(
                     rule="missing",
                     where=f"drum {rotation}",
@@ -114,15 +114,15 @@ def _missing(placed: Sequence[Placed], protocol: Protocol, rotations: Sequence[R
             loads = [load for load in protocol.loads_N if (step, load) not in there]
             if step not in gone and loads:
                 message = f"no block at load {_loads_told(loads)}"
-                found.append(Finding(rule="missing", where=where, message=message))
+                findings.append(Finding(rule="missing", where=where, message=message))
             few = [load for load in protocol.loads_N if 0 < there[step, load] < protocol.times(step)]
             if few:
                 message = (
                     f"{min(there[step, load] for load in few)} of {protocol.times(step)} declared repeats "
                     f"at load {_loads_told(few)}"
                 )
-                found.append(Finding(rule="missing-repeat", where=where, message=message))
-    return found
+                findings.append(Finding(rule="missing-repeat", where=where, message=message))
+    return findings
 
 
 def _doubled(placed: Sequence[Placed], later: Sequence[int]) -> list[Finding]:
@@ -130,8 +130,8 @@ def _doubled(placed: Sequence[Placed], later: Sequence[int]) -> list[Finding]:
     for index in later:
         files.setdefault(placed[index].file, []).append(placed[index])
 
-    def angles(some: Sequence[Placed]) -> str:
-        return _angles_told(list(dict.fromkeys(one.step_SA or 0.0 for one in some)))
+    def angles(placeds: Sequence[Placed]) -> str:
+        return _angles_told(list(dict.fromkeys(placed.step_SA or 0.0 for placed in placeds)))
 
     return [
         Finding(
@@ -146,7 +146,7 @@ def _doubled(placed: Sequence[Placed], later: Sequence[int]) -> list[Finding]:
 
 
 def _angles(placed: Sequence[Placed], protocol: Protocol) -> list[Finding]:
-    found: list[Finding] = []
+    findings: list[Finding] = []
     for file, step in dict.fromkeys((p.file, p.step_SA) for p in placed):
         SA = float(np.mean([p.SA for p in placed if (p.file, p.step_SA) == (file, step)]))
         if step is None:
@@ -160,12 +160,12 @@ def _angles(placed: Sequence[Placed], protocol: Protocol) -> list[Finding]:
             )
         else:
             continue
-        found.append(Finding(rule="slip-angle-tolerance", where=file, message=message))
-    return found
+        findings.append(Finding(rule="slip-angle-tolerance", where=file, message=message))
+    return findings
 
 
 def _loads(placed: Sequence[Placed], protocol: Protocol) -> list[Finding]:
-    found: list[Finding] = []
+    findings: list[Finding] = []
     for file in dict.fromkeys(p.file for p in placed):
         mine = [p for p in placed if p.file == file]
         unknown = [p.FZ for p in mine if p.step_FZ is None]
@@ -175,7 +175,7 @@ def _loads(placed: Sequence[Placed], protocol: Protocol) -> list[Finding]:
             if p.step_FZ is not None and abs(p.FZ - p.step_FZ) > protocol.load_tolerance * p.step_FZ
         ]
         if unknown:
-            found.append(
+            findings.append(
                 Finding(
                     rule="unplanned-load",
                     where=file,
@@ -183,7 +183,7 @@ def _loads(placed: Sequence[Placed], protocol: Protocol) -> list[Finding]:
                 )
             )
         if off:
-            found.append(
+            findings.append(
                 Finding(
                     rule="load-tolerance",
                     where=file,
@@ -192,7 +192,7 @@ def _loads(placed: Sequence[Placed], protocol: Protocol) -> list[Finding]:
                     f"{_loads_told([p.step_FZ for p in off if p.step_FZ is not None])}",
                 )
             )
-    return found
+    return findings
 
 
 def _feeds_of_direction(rotation: Rotation) -> str:

@@ -68,9 +68,9 @@ def reduce_test(
     )
     files = [
         open_file(
-            name, recording, rotation, blocks=loads, tare=own, info=info, machine=machine, record=record
+            name, recording, rotation, blocks=loads, tare=tare, info=info, machine=machine, record=record
         )
-        for (name, recording, rotation), (loads, _), own in zip(recordings, blocks, tares, strict=True)
+        for (name, recording, rotation), (loads, _), tare in zip(recordings, blocks, tares, strict=True)
     ]
     measured, placed, later = _conditions(files, machine=machine, record=record, reversal=info.reversal)
     conditions = _ordered(_at_common_load(_own_loads(measured)), machine)

@@ -143,7 +143,7 @@ def record_findings(record: CalibrationRecord) -> list[Finding]:
 
 def range_findings(conditions: Sequence[Condition], record: CalibrationRecord) -> list[Finding]:
     """Name the cells that left the range of the record's reference loads: the record extrapolates there."""
-    found = []
+    findings = []
     for place, cell in enumerate(record.cells):
         if cell.minimum is None or cell.maximum is None:
             continue
@@ -157,8 +157,8 @@ def range_findings(conditions: Sequence[Condition], record: CalibrationRecord) -
                 f"{cell.name} reads {min(values):.4g} to {max(values):.4g} {cell.unit} in {len(outside)} "
                 f"blocks; the reference loads of {record.id} reached {cell.minimum:.4g} to {cell.maximum:.4g}"
             )
-            found.append(Finding(rule="beyond-range", where=_some(_files(outside)), message=message))
-    return found
+            findings.append(Finding(rule="beyond-range", where=_some(_files(outside)), message=message))
+    return findings
 
 
 def _files(conditions: Sequence[Condition]) -> list[str]:

@@ -28,7 +28,7 @@ def drift_findings(conditions: Sequence[Condition], protocol: Protocol) -> list[
     The tolerance is a part of the largest value of the channel at that load and direction. First repeat
     against last, in the order of the files' names.
     """
-    found = []
+    findings = []
     for rotation in dict.fromkeys(c.rotation for c in conditions):
         for channel, unit in (("FY", "N"), ("MZ", "N*m")):
             worst: tuple[float, float, Condition] | None = None
@@ -47,8 +47,8 @@ def drift_findings(conditions: Sequence[Condition], protocol: Protocol) -> list[
                 f"{in_both(one.step_FZ or 0.0, 'lbf', '.0f')} by {in_both(difference, unit, '.3g')}; "
                 f"{in_both(limit, unit, '.3g')} are tolerated"
             )
-            found.append(Finding(rule="repeat-drift", where=f"drum {rotation}", message=message))
-    return found
+            findings.append(Finding(rule="repeat-drift", where=f"drum {rotation}", message=message))
+    return findings
 
 
 def _drifts(
@@ -56,11 +56,11 @@ def _drifts(
 ) -> list[tuple[Condition, float, float]]:
     """Return (last repeat, drift, tolerated drift) of every repeated condition of one direction."""
 
-    def value(one: Condition) -> float:
-        return one.FY_common if channel == "FY" else one.MZ_common
+    def value(condition: Condition) -> float:
+        return condition.FY_common if channel == "FY" else condition.MZ_common
 
-    def u(one: Condition) -> float:
-        return one.u_FY_common if channel == "FY" else one.u_MZ_common
+    def u(condition: Condition) -> float:
+        return condition.u_FY_common if channel == "FY" else condition.u_MZ_common
 
     found = []
     used = [c for c in conditions if c.used and c.rotation == rotation and c.step_SA is not None]

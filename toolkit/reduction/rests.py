@@ -51,7 +51,7 @@ def find_rests(
     """
     ends = _ends(SA, FZ, band_SA=band_SA, band_FZ=band_FZ, floor_FZ=floor_FZ)
     row = float(turns[-1] - turns[0]) / max(len(turns) - 1, 1)
-    found: list[Block] = []
+    blocks: list[Block] = []
     open_parts = [(0, len(SA))]
     while open_parts:
         first, last = open_parts.pop()
@@ -65,9 +65,9 @@ def find_rests(
         if lengths[start - first] + row < least_turns * (1 - 1e-9):
             continue
         if turns[b - 1] - turns[a] + row >= least_turns * (1 - 1e-9):
-            found.append(Block(start=a, stop=b, mean_FZ=float(FZ[a:b].mean())))
+            blocks.append(Block(start=a, stop=b, mean_FZ=float(FZ[a:b].mean())))
         open_parts += [(first, start), (stop, last)]
-    return tuple(sorted(found, key=lambda one: one.start))
+    return tuple(sorted(blocks, key=lambda block: block.start))
 
 
 def _ends(

@@ -22,8 +22,8 @@ if TYPE_CHECKING:
 
 def tare_of_file(recording: Recording) -> Tare:
     """Return the tare from a recording that holds nothing else: the mean of every row."""
-    whole = Block(start=0, stop=recording.rows, mean_FZ=0.0)
-    return _tare([(recording, [whole])], source=f"file {recording.name}")
+    block = Block(start=0, stop=recording.rows, mean_FZ=0.0)
+    return _tare([(recording, [block])], source=f"file {recording.name}")
 
 
 def choose_tares(
@@ -95,9 +95,9 @@ def _tare(files: Sequence[tuple[Recording, Sequence[Block]]], *, source: str) ->
         for recording, blocks in files
     ]
     everything = np.concatenate(rows, axis=1)
-    u = np.array([one.u for one in means(everything)])
+    u = np.array([mean.u for mean in means(everything)])
     if len(rows) > 1:
-        own = np.array([one.mean(axis=1) for one in rows])
+        own = np.array([row.mean(axis=1) for row in rows])
         u = np.maximum(u, own.std(axis=0, ddof=1) / np.sqrt(len(rows)))
     values = everything.mean(axis=1)
     unit = next(one.unit for one in first.series if one.role == "indication")

@@ -65,7 +65,7 @@ def read_lvm(gated: Gated, machine: Machine) -> Vectors:
     head, start, separator = _header(lines, gated)
     decimal = head.get("Decimal_Separator", ".")[:1] or "."
     segments = _segments(lines, start, separator, head.get("Multi_Headings", "No"), gated)
-    filled = [one for one in segments if one.rows]
+    filled = [segment for segment in segments if segment.rows]
     if not filled:
         raise UnreadableError(
             "the LVM file has no data", where=gated.path, got=f"{len(segments)} segments without rows",
@@ -126,10 +126,10 @@ def _header(lines: list[str], gated: Gated) -> tuple[dict[str, str], int, str]:
 
 
 def _segments(lines: list[str], place: int, separator: str, multi: str, gated: Gated) -> list[_Segment]:
-    found: list[_Segment] = []
+    segments: list[_Segment] = []
     while (place := _skip(lines, place, separator, gated)) < len(lines):
         fields = _split(lines[place], separator)
-        if fields[0] == "Channels" or (not found and _ahead(lines, place)):
+        if fields[0] == "Channels" or (not segments and _ahead(lines, place)):
             segment = _Segment({})
             while not lines[place].startswith(_END):
                 fields = _split(lines[place], separator)
@@ -143,17 +143,19 @@ def _segments(lines: list[str], place: int, separator: str, multi: str, gated: G
             if place == len(lines):
                 truncated(gated.path, "the LVM file ends before a segment's names", f"line {place}", _X)
             segment.names = [name.strip() for name in _split(lines[place], separator)]
-            found.append(segment)
+            segments.append(segment)
             place += 1
-        elif not found:
-            found.append(_Segment({}, [name.strip() for name in fields]))  # names without a segment's header
+        elif not segments:
+            segments.append(
+                _Segment({}, [name.strip() for name in fields])
+            )  # names without a segment's header
             place += 1
         else:
-            found[-1].rows.append((place + 1, fields))
+            segments[-1].rows.append((place + 1, fields))
             place += 1
-    for one in found:
+    for one in segments:
         _check_rows(one, exact=multi.casefold() == "yes", gated=gated)
-    return found
+    return segments
 
 
 def _ahead(lines: Sequence[str], place: int) -> bool:
@@ -175,33 +177,35 @@ def _skip(lines: list[str], place: int, separator: str, gated: Gated) -> int:
     return place
 
 
-def _check_rows(one: _Segment, *, exact: bool, gated: Gated) -> None:
-    claims = [text.strip() for text in one.tags.get("Samples", [])]
+def _check_rows(segment: _Segment, *, exact: bool, gated: Gated) -> None:
+    claims = [text.strip() for text in segment.tags.get("Samples", [])]
     most = max((int(text) for text in claims if re.fullmatch("[0-9]{1,9}", text)), default=None)
     if most is None:
         return
-    if len(one.rows) < most:
-        truncated(gated.path, "the LVM file has fewer rows than it says", len(one.rows), f"{most} samples")
-    if exact and len(one.rows) > most:
-        damaged(gated.path, "the LVM file has more rows than it says", len(one.rows), f"{most} samples")
+    if len(segment.rows) < most:
+        truncated(
+            gated.path, "the LVM file has fewer rows than it says", len(segment.rows), f"{most} samples"
+        )
+    if exact and len(segment.rows) > most:
+        damaged(gated.path, "the LVM file has more rows than it says", len(segment.rows), f"{most} samples")
 
 
-def _columns(one: _Segment, saved: str, gated: Gated) -> list[tuple[int, str, str | None]]:
+def _columns(segment: _Segment, saved: str, gated: Gated) -> list[tuple[int, str, str | None]]:
     """Return (place in the row, name, unit) of the channels of a segment."""
     found: list[tuple[int, str, str | None]] = []
     channels = 0
-    for place, name in enumerate(one.names):
+    for place, name in enumerate(segment.names):
         # The tags of a channel stand in its column; one field, the tag's own name, was taken off.
         if name == _X:
             if saved.casefold() != "no":
-                dimension = one.tag("X_Dimension", place) or "Time"
-                label = _label(one.tag("X_Unit_Label", place))
+                dimension = segment.tag("X_Dimension", place) or "Time"
+                label = _label(segment.tag("X_Unit_Label", place))
                 is_time = dimension.casefold() == "time"
                 found.append((place, "t" if is_time else dimension, label or ("s" if is_time else None)))
         elif name and name != _COMMENT:
             channels += 1
-            found.append((place, name, _label(one.tag("Y_Unit_Label", place - 1))))
-    said = one.tag("Channels", 0)
+            found.append((place, name, _label(segment.tag("Y_Unit_Label", place - 1))))
+    said = segment.tag("Channels", 0)
     if said and said != str(channels):
         damaged(gated.path, "the LVM file names more or fewer channels than it says", channels, said)
     return found
@@ -227,9 +231,9 @@ def _values(
 
 def _one_time(vectors: list[Vector], gated: Gated) -> list[Vector]:
     # With `X_Columns Multi` every channel brings its own; they must be the same to be one recording's rows.
-    times = [one for one in vectors if one.name == "t"]
-    for one in times[1:]:
-        if one.unit != times[0].unit or not np.array_equal(one.values, times[0].values):
+    times = [vector for vector in vectors if vector.name == "t"]
+    for time in times[1:]:
+        if time.unit != times[0].unit or not np.array_equal(time.values, times[0].values):
             raise ColumnError(
                 "the channels of the LVM file were not sampled together",
                 where=gated.path,
@@ -238,7 +242,7 @@ def _one_time(vectors: list[Vector], gated: Gated) -> list[Vector]:
                 next_step="resample the channels to one time when they are saved",
                 rule="doubled-column",
             )
-    return [one for one in vectors if one.name != "t" or one is times[0]]
+    return [vector for vector in vectors if vector.name != "t" or vector is times[0]]
 
 
 def _split(line: str, separator: str) -> list[str]:

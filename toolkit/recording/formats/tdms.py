@@ -41,7 +41,7 @@ def read_tdms(gated: Gated, machine: Machine) -> Vectors:
     counts = walk_tdms(gated.data, gated.path)
     try:
         with nptdms.TdmsFile.open(io.BytesIO(gated.data), raw_timestamps=True) as file:
-            channels = [(group.name, one) for group in file.groups() for one in group.channels()]
+            channels = [(group.name, channel) for group in file.groups() for channel in group.channels()]
             _check_counts(channels, counts, gated)
             names = dict.fromkeys(name for name, _ in channels)
             tables = [

@@ -90,7 +90,7 @@ def walk_mdf(data: bytes, where: object) -> None:
 
 def _blocks(data: bytes, where: object) -> dict[int, _Block]:
     # Depth first, with a colour for what is on the way down: a link back to it would never end.
-    found: dict[int, _Block] = {}
+    blocks: dict[int, _Block] = {}
     open_: set[int] = set()
     stack: list[tuple[int, bytes, bool]] = [(_FIRST, b"HD", True)]
     while stack:
@@ -101,8 +101,8 @@ def _blocks(data: bytes, where: object) -> dict[int, _Block]:
         if place in open_:
             damaged(where, "a chain of blocks in the MDF file leads back to itself", f"byte {place}",
                     "chains that end")  # fmt: skip
-        new = place not in found
-        block = found[place] = _block(data, place, where) if new else found[place]
+        new = place not in blocks
+        block = blocks[place] = _block(data, place, where) if new else blocks[place]
         if kind and block.id not in kind.split():
             damaged(where, "a link in the MDF file leads to another kind of block", repr(block.id),
                     kind.decode())  # fmt: skip
@@ -110,7 +110,7 @@ def _blocks(data: bytes, where: object) -> dict[int, _Block]:
             open_.add(place)
             stack.append((place, b"", False))
             stack += [(*link, True) for link in block.down()]
-    return found
+    return blocks
 
 
 def _block(data: bytes, place: int, where: object) -> _Block:
