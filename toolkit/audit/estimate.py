@@ -76,7 +76,7 @@ def estimate(columns: Columns, segments: Sequence[Segment], screen: Screen) -> E
     unknown = [segment for segment in segments if segment.grade == "unknown"]
     if not unknown or not columns.loads or not columns.names:
         return None
-    longest = max(unknown, key=lambda one: one.last_row - one.first_row)
+    longest = max(unknown, key=lambda segment: segment.last_row - segment.first_row)
     rows = slice(longest.first_row - 1, longest.last_row)
     part = columns.part(rows)
     if part.rows < len(columns.names) + 1 + _MARGIN:

@@ -203,8 +203,8 @@ def _impossible(
     """Return what no tire can do, of the file's own values and of the corrected ones."""
     loads = [block for block in blocks if not block.tare]
     rows = [f"rows {block.first_row}-{block.last_row}" for block in loads]
-    own = [(b.FZ_N, b.SA_rad, b.FY_file_N, b.MZ_file_Nm) for b in loads]
-    findings = impossible(path.name, rows, own, values="the stored Fy and Mz are impossible")
+    stored_blocks = [(b.FZ_N, b.SA_rad, b.FY_file_N, b.MZ_file_Nm) for b in loads]
+    findings = impossible(path.name, rows, stored_blocks, values="the stored Fy and Mz are impossible")
     if corrector is None:
         return findings
     new = [(b.FZ_N, b.SA_rad, b.FY_N, b.MZ_Nm) for b in loads]
@@ -216,8 +216,10 @@ def _impossible(
 
 def withdrawal(inspection: Inspection) -> RecordStatus | None:
     """Return the status of the record that computed a file where it was withdrawn, else None."""
-    found, choice = inspection.identification, inspection.choice
-    status = choice.status(found.record) if found is not None and choice is not None else None
+    identification, choice = inspection.identification, inspection.choice
+    status = (
+        choice.status(identification.record) if identification is not None and choice is not None else None
+    )
     return status if status is not None and status.state == "withdrawn" else None
 
 
@@ -225,11 +227,16 @@ def wrong_signs(inspection: Inspection) -> str | None:
     """Return how the record that computed a file differs in sign from the one that corrects it, in words."""
     from toolkit.audit.candidates import turned_against
 
-    found, choice = inspection.identification, inspection.choice
-    if found is None or choice is None or found.variant is not None or inspection.corrected_by is None:
+    identification, choice = inspection.identification, inspection.choice
+    if (
+        identification is None
+        or choice is None
+        or identification.variant is not None
+        or inspection.corrected_by is None
+    ):
         return None
     by_id = {record.id: record for record in choice.records}
-    mine, right = by_id.get(found.record or ""), by_id.get(inspection.corrected_by)
+    mine, right = by_id.get(identification.record or ""), by_id.get(inspection.corrected_by)
     if mine is None or right is None:
         return None
     return turned_against(mine, right, inspection.columns.loads)
@@ -286,8 +293,8 @@ def _findings(
         text = "no laboratory home was found, so nobody can say which calibration computed the file"
         return (Finding(rule="no-home", where=where, message=text),)
     findings = [
-        Finding(rule="refused-record", where=one.id, message=f"left out as a candidate: {one.reason}")
-        for one in choice.refused
+        Finding(rule="refused-record", where=record.id, message=f"left out as a candidate: {record.reason}")
+        for record in choice.refused
     ]
     if choice.trouble is not None:
         findings.append(Finding(rule="registry-damaged", where=where, message=choice.trouble))

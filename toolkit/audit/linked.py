@@ -44,7 +44,7 @@ class PastReport:
     id: str | None = None
     path: Path | None = None  # of a document that was found in a folder
     words: str | None = None
-    named: set[str] = field(default_factory=set)
+    names: set[str] = field(default_factory=set)
     hashes: set[str] = field(default_factory=set)
     calibrations: tuple[str, ...] = ()
     linked_by: set[str] = field(default_factory=set)
@@ -120,13 +120,13 @@ def link(audit: ArchiveAudit, reports: tuple[PastReport, ...]) -> Linked:
             n, bad = tests.get(test, (0, 0))
             tests[test] = (n + 1, bad + dirty)
             in_force.setdefault(test, set()).update({plain["in_force"]} - {None})
-        for one in by_hash.get(plain["sha256"] or "", ()):
-            one.linked_by.add("sha256" if one.id is None else "manifest")
+        for same_report in by_hash.get(plain["sha256"] or "", ()):
+            same_report.linked_by.add("sha256" if same_report.id is None else "manifest")
             if test is not None:
-                one.tests.add(test)
+                same_report.tests.add(test)
             else:
-                one.files += 1
-                one.not_clean += dirty
+                same_report.files += 1
+                same_report.not_clean += dirty
     names: dict[str, list[str]] = {}
     for test in tests:
         names.setdefault(_words(_last(test, audit.archive)), []).append(test)
@@ -138,8 +138,8 @@ def link(audit: ArchiveAudit, reports: tuple[PastReport, ...]) -> Linked:
             report.files += tests[test][0]
             report.not_clean += tests[test][1]
             report.in_force |= in_force[test]
-    taken = {test for report in reports for test in report.tests}
-    return Linked(reports=reports, unknown=tuple(sorted(set(tests) - taken)))
+    with_report = {test for report in reports for test in report.tests}
+    return Linked(reports=reports, unknown=tuple(sorted(set(tests) - with_report)))
 
 
 def _but_recordings(audit: ArchiveAudit, reports: tuple[PastReport, ...]) -> tuple[PastReport, ...]:
@@ -147,14 +147,14 @@ def _but_recordings(audit: ArchiveAudit, reports: tuple[PastReport, ...]) -> tup
     if all(report.path is None for report in reports):
         return reports
     archive = audit.archive.resolve()
-    known = {archive / plain["path"] for plain in audit.files.plain() if plain["grade"] != "unreadable"}
-    return tuple(report for report in reports if report.path is None or report.path not in known)
+    recordings = {archive / plain["path"] for plain in audit.files.plain() if plain["grade"] != "unreadable"}
+    return tuple(report for report in reports if report.path is None or report.path not in recordings)
 
 
 def _by_name(past_report: PastReport, names: Mapping[str, list[str]]) -> Iterator[str]:
     if past_report.linked_by & {"manifest", "sha256"}:
         return  # what a report says of its files is better than what it is called
-    texts = [_words(name) for name in past_report.named] if past_report.named else [past_report.words or ""]
+    texts = [_words(name) for name in past_report.names] if past_report.names else [past_report.words or ""]
     for text in texts:
         for name, tests in names.items():
             if not name or not (text == name or f" {name} " in f" {text} "):
@@ -193,9 +193,9 @@ def _of_csv(source: Path) -> Iterator[PastReport]:
             raise _bad(source, f"row {number}: no report, or neither test nor sha256", "both in every row")
         if sha256 and not _SHA.fullmatch(sha256):
             raise _bad(source, f"row {number}: {sha256[:80]!r}", "64 hexadecimal digits")
-        one = past_reports.setdefault(name, PastReport(report=name))
-        one.named |= {test} - {""}
-        one.hashes |= {sha256.lower()} - {""}
+        report = past_reports.setdefault(name, PastReport(report=name))
+        report.names |= {test} - {""}
+        report.hashes |= {sha256.lower()} - {""}
     yield from past_reports.values()
 
 
@@ -205,11 +205,11 @@ def _of_folder(folder: Path) -> Iterator[PastReport]:
         manifests = [
             _manifest(Path(place) / name, folder) for name in sorted(names) if name.endswith(".json")
         ]
-        known = {name for manifest in manifests if manifest is not None for name in manifest[1]}
+        output_names = {name for manifest in manifests if manifest is not None for name in manifest[1]}
         yield from (manifest[0] for manifest in manifests if manifest is not None)
         for name in sorted(names):
             path = Path(place) / name
-            if path.suffix.lower() in DOCUMENTS and name not in known and not path.is_symlink():
+            if path.suffix.lower() in DOCUMENTS and name not in output_names and not path.is_symlink():
                 shown = path.relative_to(folder)
                 yield PastReport(
                     report=shown.as_posix(),
@@ -222,17 +222,19 @@ def _manifest(path: Path, folder: Path) -> tuple[PastReport, set[str]] | None:
     if path.is_symlink() or path.stat().st_size > MAX_FILE_BYTES:
         return None
     try:
-        told = json.loads(path.read_bytes())
+        manifest = json.loads(path.read_bytes())
     except (OSError, ValueError, RecursionError):
         return None
-    if not isinstance(told, dict) or told.get("generator") != GENERATOR or "inputs" not in told:
+    if not isinstance(manifest, dict) or manifest.get("generator") != GENERATOR or "inputs" not in manifest:
         return None
-    outputs = {one.get("name") for one in _dicts(told.get("outputs"))}
+    outputs = {output.get("name") for output in _dicts(manifest.get("outputs"))}
     past_report = PastReport(
         report=path.parent.relative_to(folder).as_posix(),
-        id=str(told.get("report")),
-        hashes={one["sha256"].lower() for one in _dicts(told["inputs"]) if _is_sha(one.get("sha256"))},
-        calibrations=tuple(str(one.get("id")) for one in _dicts(told.get("calibrations"))),
+        id=str(manifest.get("report")),
+        hashes={
+            entry["sha256"].lower() for entry in _dicts(manifest["inputs"]) if _is_sha(entry.get("sha256"))
+        },
+        calibrations=tuple(str(entry.get("id")) for entry in _dicts(manifest.get("calibrations"))),
     )
     return past_report, {name for name in outputs if isinstance(name, str)}
 
@@ -243,8 +245,8 @@ def _dicts(value: Any) -> Iterator[dict[str, Any]]:
         yield value
         value = list(value.values())
     if isinstance(value, list):
-        for one in value:
-            yield from _dicts(one)
+        for entry in value:
+            yield from _dicts(entry)
 
 
 def _is_sha(value: object) -> bool:

@@ -29,17 +29,17 @@ def quality(recording: Recording, where: str) -> tuple[Finding, ...]:
     if recording.rows < _FEW_ROWS:
         return ()
     findings: list[Finding] = []
-    for one in recording.series:
+    for channel in recording.series:
         text = None
-        if one.role == "time":
-            text, rule = _clock(one), "clock-jump"
-        elif one.role in _MEASURED:
-            first = one.values[0]
-            if bool(np.all(one.values == first)):
-                text = f"{one.header} is {first:g} {one.unit} in all {recording.rows} rows"
+        if channel.role == "time":
+            text, rule = _clock(channel), "clock-jump"
+        elif channel.role in _MEASURED:
+            first = channel.values[0]
+            if bool(np.all(channel.values == first)):
+                text = f"{channel.header} is {first:g} {channel.unit} in all {recording.rows} rows"
                 rule = "constant-channel"
             else:
-                text, rule = _saturated(one), "saturated-channel"
+                text, rule = _saturated(channel), "saturated-channel"
         if text is not None:
             findings.append(Finding(rule=rule, where=where, message=text, level="note"))
     return tuple(findings)

@@ -56,7 +56,7 @@ def sum_up(files: Iterable[Mapping[str, Any]]) -> Sums:
             instruments.add(file["instrument"])
         findings += _of_file(file)
         notes += across.add(file)
-    notes += across.rest()
+    notes += across.at_end()
     return Sums(
         grades={grade: grades[grade] for grade in GRADES},
         undated=undated,
@@ -76,11 +76,11 @@ def write_sums(folder: Path, sums: Sums, key: str) -> None:
         the folder cannot be written to
     """
     with atomic_path(folder / SUMS) as temporary, temporary.open("wb") as stream:
-        whole = hashlib.sha256()
+        digest = hashlib.sha256()
         for line in _lines(sums, key):
-            whole.update(line)
+            digest.update(line)
             stream.write(line)
-        stream.write(whole.hexdigest().encode() + b"\n")
+        stream.write(digest.hexdigest().encode() + b"\n")
 
 
 def read_sums(folder: Path, key: str) -> Sums | None:
@@ -91,16 +91,16 @@ def read_sums(folder: Path, key: str) -> Sums | None:
             head = json.loads(first)
             if head["key"] != key:
                 return None
-            whole = hashlib.sha256(first)
+            digest = hashlib.sha256(first)
             findings: list[Finding] = []
             for line in itertools.islice(stream, head["findings"] + head["notes"]):
-                whole.update(line)
+                digest.update(line)
                 findings.append(Finding(**json.loads(line)))
             tests = Lines()
             for line in itertools.islice(stream, head["tests"]):
-                whole.update(line)
+                digest.update(line)
                 tests.take(line)
-            if stream.read() != whole.hexdigest().encode() + b"\n":
+            if stream.read() != digest.hexdigest().encode() + b"\n":
                 return None
             return Sums(
                 grades={grade: head["grades"][grade] for grade in GRADES},
@@ -114,14 +114,14 @@ def read_sums(folder: Path, key: str) -> Sums | None:
         return None  # none yet, of another version, or damaged: they are made again
 
 
-def told(one: Mapping[str, Any]) -> str:
+def sentence(line: Mapping[str, Any]) -> str:
     """Return in one sentence what computed a file, from its plain answer."""
-    grade: Grade = one["grade"]
+    grade: Grade = line["grade"]
     who = ""
-    if one["record"]:
-        who = f" ({one['record']}{', ' + one['variant'] if one['variant'] else ''})"
-    elif one["candidates"]:
-        who = f" ({', '.join(one['candidates'])})"
+    if line["record"]:
+        who = f" ({line['record']}{', ' + line['variant'] if line['variant'] else ''})"
+    elif line["candidates"]:
+        who = f" ({', '.join(line['candidates'])})"
     return f"Fy and Mz were computed {TELLS[grade]}{who}"
 
 
@@ -143,14 +143,14 @@ def _lines(sums: Sums, key: str) -> Iterator[bytes]:
     yield from sums.tests.raw()
 
 
-def _of_file(one: Mapping[str, Any]) -> list[Finding]:
+def _of_file(line: Mapping[str, Any]) -> list[Finding]:
     findings = []
-    path, grade, reason = one["path"], one["grade"], one["reason"]
-    if one["test_toml"] is not None:
-        message = f"its test.toml cannot be used, the file counts as undated: {one['test_toml']}"
+    path, grade, reason = line["path"], line["grade"], line["reason"]
+    if line["test_toml"] is not None:
+        message = f"its test.toml cannot be used, the file counts as undated: {line['test_toml']}"
         findings.append(Finding(rule="test-toml", where=path, message=message))
     if grade == "unreadable":
         findings.append(Finding(rule="unreadable-file", where=path, message=reason or ""))
     elif grade not in CLEAN:
-        findings.append(Finding(rule=f"identified-{grade}", where=path, message=reason or told(one)))
+        findings.append(Finding(rule=f"identified-{grade}", where=path, message=reason or sentence(line)))
     return findings

@@ -38,7 +38,7 @@ class Table:
     errors: tuple[tuple[str, str], ...] = ()
     numbers: NDArray[np.float64] | None = None
 
-    def whole(self) -> Table:
+    def in_rows(self) -> Table:
         """Return the same table with all of its cells in ``rows``."""
         if self.numbers is None:
             return self
@@ -60,7 +60,7 @@ def read_table(table: Table, machine: Machine) -> tuple[Series, ...]:
     """
     first = next((i for i, row in enumerate(table.rows) if not _blank(row)), None)
     if table.numbers is not None and (first != len(table.rows) - 1 or _nameless(table.rows[-1])):
-        table = table.whole()  # a row of numbers above them, or a column to be told with its first cell
+        table = table.in_rows()  # a row of numbers above them, or a column to be told with its first cell
     if first is None:
         _no_data(table, "an empty sheet")
     header_row = table.rows[first]
@@ -82,17 +82,18 @@ def read_table(table: Table, machine: Machine) -> tuple[Series, ...]:
     if table.numbers is not None:
         columns = np.ascontiguousarray(table.numbers.T)
         columns.setflags(write=False)
-        return tuple(_named(one, columns[one.index]) for one in assigned)
+        return tuple(_as_series(column, columns[column.index]) for column in assigned)
     if last == first + 1:
         _no_data(table, "a header row and nothing below it")
     body = table.rows[first + 1 : last]
     _check_nameless(table, body, headers, first + 2)
-    found = _numbers(body)
-    if found is None:  # one by one, for the first cell that is to blame
+    matrix = _numbers(body)
+    if matrix is None:  # one by one, for the first cell that is to blame
         return tuple(
-            _series(one, [row[one.index] for row in body], table.where, first + 2) for one in assigned
+            _series(column, [row[column.index] for row in body], table.where, first + 2)
+            for column in assigned
         )
-    return tuple(_named(one, found[one.index]) for one in assigned)
+    return tuple(_as_series(column, matrix[column.index]) for column in assigned)
 
 
 def _numbers(body: Sequence[Sequence[Any]]) -> NDArray[np.float64] | None:
@@ -125,10 +126,10 @@ def _series(assigned: Assigned, cells: list[Any], where: str, first_row: int) ->
     if values is None:
         _refuse_first(assigned, cells, where, first_row)
     values.setflags(write=False)
-    return _named(assigned, values)
+    return _as_series(assigned, values)
 
 
-def _named(assigned: Assigned, values: NDArray[np.float64]) -> Series:
+def _as_series(assigned: Assigned, values: NDArray[np.float64]) -> Series:
     return Series(
         symbol=assigned.symbol, header=assigned.header, unit=assigned.unit, role=assigned.role, values=values
     )

@@ -46,11 +46,11 @@ def at_one_angle(conditions: Sequence[Condition]) -> tuple[tuple[int, ...], ...]
         for SA in angles:
             number = cluster.get(last, 0) + (step is None and SA - last > _GAP_RAD)
             cluster[SA], last = number, SA
-        seen: Counter[tuple[int, float | None]] = Counter()
+        count_by_place: Counter[tuple[int, float | None]] = Counter()
         for index in sorted(mine, key=lambda i: conditions[i].first_row):
             condition = conditions[index]
-            turn = seen[cluster[condition.SA], condition.step_FZ]
-            seen[cluster[condition.SA], condition.step_FZ] += condition.step_FZ is not None
+            turn = count_by_place[cluster[condition.SA], condition.step_FZ]
+            count_by_place[cluster[condition.SA], condition.step_FZ] += condition.step_FZ is not None
             groups.setdefault((file, step, cluster[condition.SA], turn), []).append(index)
     return tuple(tuple(sorted(group)) for group in groups.values())
 
@@ -77,9 +77,9 @@ def slopes(FZ: NDArray[np.float64], y: NDArray[np.float64]) -> tuple[Slope | Non
     """
     n = len(FZ)
     order = np.argsort(FZ, kind="stable")
-    found: list[Slope | None] = [None] * n
+    slopes_found: list[Slope | None] = [None] * n
     if n < 2 or np.min(np.diff(FZ[order])) <= 0:
-        return tuple(found)
+        return tuple(slopes_found)
     x, values = FZ[order], y[order]
     secants = np.diff(values) / np.diff(x)
     if n == 2:
@@ -91,15 +91,15 @@ def slopes(FZ: NDArray[np.float64], y: NDArray[np.float64]) -> tuple[Slope | Non
         # The parabola ends with the second term, the cubic with the third.
         last = 3 if n >= 5 else 2
         u = abs(terms[last]) if n > 3 else abs(secants[middle] - secants[middle - 1]) / 2
-        found[block] = Slope(value=float(sum(terms[:last])), u=float(u) / np.sqrt(3))
-    return tuple(found)
+        slopes_found[block] = Slope(value=float(sum(terms[:last])), u=float(u) / np.sqrt(3))
+    return tuple(slopes_found)
 
 
 def _nodes(x: NDArray[np.float64], place: int, middle: int) -> list[int]:
     """Return up to five blocks in the order in which a polynomial at one of them takes them up."""
     nodes = [place, *(i for i in (middle - 1, middle, middle + 1) if i != place)]
-    rest = sorted(set(range(len(x))) - set(nodes), key=lambda i: abs(x[i] - x[place]))
-    return nodes + rest[:2]
+    outer = sorted(set(range(len(x))) - set(nodes), key=lambda i: abs(x[i] - x[place]))
+    return nodes + outer[:2]
 
 
 def _terms(x: NDArray[np.float64], y: NDArray[np.float64], nodes: Sequence[int]) -> list[float]:

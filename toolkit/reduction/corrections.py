@@ -29,17 +29,17 @@ def corrected(
     ``crosstalk``: load = shown - coefficient * other, the others as shown; ``steer_offset``: alpha = SA -
     offset; ``steer_compliance``: alpha = SA - compliance * MZ, with the corrected moment.
     """
-    made = dict(channels)
+    result = dict(channels)
     for correction in machine.corrections:
         if correction.effect == "crosstalk":
             name, source = str(correction.channel), str(correction.source)
-            made[name] = made[name] - correction.value * correction.factor * channels[source]
+            result[name] = result[name] - correction.value * correction.factor * channels[source]
     for correction in machine.corrections:
         if correction.effect == "steer_offset":
-            made["SA"] = made["SA"] - correction.value * correction.factor
+            result["SA"] = result["SA"] - correction.value * correction.factor
         elif correction.effect == "steer_compliance":
-            made["SA"] = made["SA"] - correction.value * correction.factor * made["MZ"]
-    return made
+            result["SA"] = result["SA"] - correction.value * correction.factor * result["MZ"]
+    return result
 
 
 def u_SA(machine: Machine, MZ: NDArray[np.float64]) -> float:

@@ -82,9 +82,9 @@ def split_blocks(recording: Recording, machine: Machine) -> tuple[tuple[Block, .
     """
     smallest = min(machine.protocol.loads_N)
     FZ = recording["FZ"].si
-    found = find_blocks(FZ)
-    tare = tuple(block for block in found if is_tare(block, smallest_load=smallest))
-    loads = tuple(block for block in found if not is_tare(block, smallest_load=smallest))
+    blocks = find_blocks(FZ)
+    tare = tuple(block for block in blocks if is_tare(block, smallest_load=smallest))
+    loads = tuple(block for block in blocks if not is_tare(block, smallest_load=smallest))
     if not loads or any(block.mean_FZ < 0 for block in loads):
         raise RecordingError(
             "the file has no load block" if not loads else "the load is negative",

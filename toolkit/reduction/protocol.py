@@ -43,8 +43,8 @@ def nearest_step(SA: float, protocol: Protocol) -> float | None:
     """
     steps = sorted(set(protocol.slip_angles_rad))
     best = min(steps, key=lambda step: abs(step - SA))
-    others = [abs(step - best) for step in steps if step != best]
-    reach = max(protocol.slip_angle_tolerance_rad, min(others) / 2) if others else math.inf
+    distances = [abs(step - best) for step in steps if step != best]
+    reach = max(protocol.slip_angle_tolerance_rad, min(distances) / 2) if distances else math.inf
     return best if abs(best - SA) <= reach else None
 
 
@@ -59,16 +59,16 @@ def doubled(placed: Sequence[Placed], protocol: Protocol) -> tuple[int, ...]:
 
     Of more blocks than it asks for, the earlier files count.
     """
-    seen: Counter[tuple[Rotation, float, float]] = Counter()
+    counts: Counter[tuple[Rotation, float, float]] = Counter()
     later: list[int] = []
     for index in sorted(range(len(placed)), key=lambda i: placed[i].file_order):
-        one = placed[index]
-        if one.step_SA is None or one.step_FZ is None:
+        recording = placed[index]
+        if recording.step_SA is None or recording.step_FZ is None:
             continue
-        key = (one.rotation, one.step_SA, one.step_FZ)
-        if seen[key] >= protocol.times(one.step_SA):
+        key = (recording.rotation, recording.step_SA, recording.step_FZ)
+        if counts[key] >= protocol.times(recording.step_SA):
             later.append(index)
-        seen[key] += 1
+        counts[key] += 1
     return tuple(sorted(later))
 
 
@@ -98,21 +98,21 @@ def _missing(placed: Sequence[Placed], protocol: Protocol, rotations: Sequence[R
             )
             continue
         steps = list(dict.fromkeys(protocol.slip_angles_rad))
-        gone = [step for step in steps if not any(step == s for s, _ in there)]
-        if gone:
+        absent = [step for step in steps if not any(step == s for s, _ in there)]
+        if absent:
             findings.append(
                 Finding(
                     rule="missing",
                     where=f"drum {rotation}",
-                    message=f"no file at slip angle {_angles_told(gone)}: the curves"
-                    + (", the +-1 deg secant" if _has_one_degree(gone) else "")
+                    message=f"no file at slip angle {_angles_told(absent)}: the curves"
+                    + (", the +-1 deg secant" if _has_one_degree(absent) else "")
                     + " and what they feed lack it",
                 )
             )
         for step in steps:
             where = f"drum {rotation}, slip angle {_angles_told([step])}"
             loads = [load for load in protocol.loads_N if (step, load) not in there]
-            if step not in gone and loads:
+            if step not in absent and loads:
                 message = f"no block at load {_loads_told(loads)}"
                 findings.append(Finding(rule="missing", where=where, message=message))
             few = [load for load in protocol.loads_N if 0 < there[step, load] < protocol.times(step)]
@@ -137,11 +137,11 @@ def _doubled(placed: Sequence[Placed], later: Sequence[int]) -> list[Finding]:
         Finding(
             rule="doubled",
             where=file,
-            message=f"slip angle {angles(some)}, drum {some[0].rotation}: "
-            f"{len(some)} block(s) of a condition that earlier files hold as often as "
+            message=f"slip angle {angles(doubles)}, drum {doubles[0].rotation}: "
+            f"{len(doubles)} block(s) of a condition that earlier files hold as often as "
             "the protocol declares; unused",
         )
-        for file, some in files.items()
+        for file, doubles in files.items()
     ]
 
 

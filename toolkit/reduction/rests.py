@@ -137,11 +137,11 @@ def _arrived(
     floor_FZ: float,
 ) -> tuple[int, int]:
     """Return the run without the rows at its ends in which the machine still moves."""
-    rest = slice(start, stop)
-    middle_SA, middle_FZ = float(np.median(SA[rest])), float(np.median(FZ[rest]))
+    stretch = slice(start, stop)
+    middle_SA, middle_FZ = float(np.median(SA[stretch])), float(np.median(FZ[stretch]))
     room_FZ = max(band_FZ * middle_FZ, floor_FZ)
-    there = (np.abs(SA[rest] - middle_SA) <= _ARRIVED * band_SA) & (
-        np.abs(FZ[rest] - middle_FZ) <= _ARRIVED * room_FZ
+    there = (np.abs(SA[stretch] - middle_SA) <= _ARRIVED * band_SA) & (
+        np.abs(FZ[stretch] - middle_FZ) <= _ARRIVED * room_FZ
     )
     rows = np.flatnonzero(there)
     return (start + int(rows[0]), start + int(rows[-1]) + 1) if rows.size else (start, stop)

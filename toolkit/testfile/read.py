@@ -179,9 +179,11 @@ def _as(kind: Any, value: Any) -> Any:
 
 def _condition(row: Cells) -> Condition:
     hints = get_type_hints(Condition)
-    given = {name: _as(hints[name], row[header(name)]) for name in CONDITION_FIELDS if name != "indications"}
+    conditions = {
+        name: _as(hints[name], row[header(name)]) for name in CONDITION_FIELDS if name != "indications"
+    }
     cells = tuple(number(value) for key, value in row.items() if key.startswith("indication_"))
-    return Condition(**given, indications=cells)
+    return Condition(**conditions, indications=cells)
 
 
 def _findings(rows: list[Cells]) -> tuple[Finding, ...]:
@@ -262,7 +264,7 @@ def _characteristics(sheets: dict[str, list[Cells]], reduced: ReducedTest) -> Ch
         for cells in described
         if cells["name"] == "group"
     )
-    groups = {(one.load_N, one.rotation): one for one in group(reduced)}
+    groups = {(entry.load_N, entry.rotation): entry for entry in group(reduced)}
     directions = [
         Direction(group=groups[fit.load_N, fit.rotation], fit=fit)
         for fit in fitted

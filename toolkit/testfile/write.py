@@ -138,9 +138,9 @@ def _provenance(result: TestResult, digest: str) -> Rows:
         yield (f"tare.values.{name}", value)
     for name, value in reduced.tare.u:
         yield (f"tare.u.{name}", value)
-    for one in reduced.stated:
-        for field in dataclasses.fields(one)[1:]:
-            yield (f"stated.{one.symbol}.{field.name}", getattr(one, field.name))
+    for statement in reduced.stated:
+        for field in dataclasses.fields(statement)[1:]:
+            yield (f"stated.{statement.symbol}.{field.name}", getattr(statement, field.name))
     for field in dataclasses.fields(reduced.info):
         yield (f"info.{field.name}", getattr(reduced.info, field.name))
 
@@ -180,8 +180,8 @@ def _fits(result: TestResult) -> Rows:
     for rotation, load, fit in fits:
         flat = [getattr(fit, name) for name in plain]
         flat = [" ".join(value) if isinstance(value, tuple) else value for value in flat]
-        given = [part for name in estimates for part in _parts(getattr(fit, name))]
-        yield [rotation, load, *flat, *given]
+        numbers = [part for name in estimates for part in _parts(getattr(fit, name))]
+        yield [rotation, load, *flat, *numbers]
 
 
 def _parts(estimate: Estimate | None) -> list[Any]:
@@ -211,8 +211,8 @@ def _covariances(result: TestResult) -> Rows:
     yield ("fit", "parameter", "with", "covariance")
     for index, (_, _, fit) in enumerate(_all_fits(result)):
         for parameter, row in zip(fit.parameters, fit.covariance, strict=False):
-            for other, value in zip(fit.parameters, row, strict=False):
-                yield (index, parameter.name, other.name, value)
+            for partner, value in zip(fit.parameters, row, strict=False):
+                yield (index, parameter.name, partner.name, value)
 
 
 def _characteristics(result: TestResult) -> Rows:

@@ -73,17 +73,17 @@ def read_lvm(gated: Gated, machine: Machine) -> Vectors:
             next_step="repeat the recording, or leave the file out of the test", rule="no-data",
         )  # fmt: skip
     columns = _columns(filled[0], head.get("X_Columns", "One"), gated)
-    for other in filled[1:]:
-        if _columns(other, head.get("X_Columns", "One"), gated) != columns:
+    for table in filled[1:]:
+        if _columns(table, head.get("X_Columns", "One"), gated) != columns:
             raise RecordingError(
                 "the segments of the LVM file have different channels",
-                where=f"{gated.path}, line {other.rows[0][0] - 1}",
-                got=", ".join(other.names)[:300],
+                where=f"{gated.path}, line {table.rows[0][0] - 1}",
+                got=", ".join(table.names)[:300],
                 expected=", ".join(filled[0].names)[:300],
                 next_step="save each segment as a file of its own",
                 rule="several-sheets",
             )
-    rows = [row for one in filled for row in one.rows]
+    rows = [row for filled_table in filled for row in filled_table.rows]
     vectors = [
         Vector(name=name, unit=unit, values=_values(rows, place, name, decimal, gated))
         for place, name, unit in columns
@@ -108,12 +108,12 @@ def _header(lines: list[str], gated: Gated) -> tuple[dict[str, str], int, str]:
     separator = "\t"
     for line in lines[:end]:
         if line.startswith("Separator"):
-            said = line.removeprefix("Separator")
-            separator = said[:1] or "\t"
-            word = said[1:].strip(said[:1] + " ").casefold()
+            mark = line.removeprefix("Separator")
+            separator = mark[:1] or "\t"
+            word = mark[1:].strip(mark[:1] + " ").casefold()
             if _SEPARATORS.get(word, separator) != separator or separator not in _SEPARATORS.values():
                 raise UnreadableError(
-                    "the LVM file has a separator that is not read", where=gated.path, got=repr(said),
+                    "the LVM file has a separator that is not read", where=gated.path, got=repr(mark),
                     expected="a tab, comma or semicolon",
                     next_step="save it again with tabs", rule="unreadable",
                 )  # fmt: skip
@@ -153,8 +153,8 @@ def _segments(lines: list[str], place: int, separator: str, multi: str, gated: G
         else:
             segments[-1].rows.append((place + 1, fields))
             place += 1
-    for one in segments:
-        _check_rows(one, exact=multi.casefold() == "yes", gated=gated)
+    for member in segments:
+        _check_rows(member, exact=multi.casefold() == "yes", gated=gated)
     return segments
 
 
@@ -192,7 +192,7 @@ def _check_rows(segment: _Segment, *, exact: bool, gated: Gated) -> None:
 
 def _columns(segment: _Segment, saved: str, gated: Gated) -> list[tuple[int, str, str | None]]:
     """Return (place in the row, name, unit) of the channels of a segment."""
-    found: list[tuple[int, str, str | None]] = []
+    columns: list[tuple[int, str, str | None]] = []
     channels = 0
     for place, name in enumerate(segment.names):
         # The tags of a channel stand in its column; one field, the tag's own name, was taken off.
@@ -201,14 +201,14 @@ def _columns(segment: _Segment, saved: str, gated: Gated) -> list[tuple[int, str
                 dimension = segment.tag("X_Dimension", place) or "Time"
                 label = _label(segment.tag("X_Unit_Label", place))
                 is_time = dimension.casefold() == "time"
-                found.append((place, "t" if is_time else dimension, label or ("s" if is_time else None)))
+                columns.append((place, "t" if is_time else dimension, label or ("s" if is_time else None)))
         elif name and name != _COMMENT:
             channels += 1
-            found.append((place, name, _label(segment.tag("Y_Unit_Label", place - 1))))
-    said = segment.tag("Channels", 0)
-    if said and said != str(channels):
-        damaged(gated.path, "the LVM file names more or fewer channels than it says", channels, said)
-    return found
+            columns.append((place, name, _label(segment.tag("Y_Unit_Label", place - 1))))
+    count = segment.tag("Channels", 0)
+    if count and count != str(channels):
+        damaged(gated.path, "the LVM file names more or fewer channels than it says", channels, count)
+    return columns
 
 
 def _label(text: str) -> str | None:

@@ -56,12 +56,14 @@ def one_table(tables: Sequence[Vectors], machine: Machine, *, where: object) -> 
             "the file has no channels", where=where, got="no channel", expected="channels with values",
             next_step="repeat the recording, or leave the file out of the test", rule="no-data",
         )  # fmt: skip
-    fitting = [one for one in filled if any(map(header_of(machine), (v.name for v in one.vectors)))]
+    fitting = [
+        candidate for candidate in filled if any(map(header_of(machine), (v.name for v in candidate.vectors)))
+    ]
     if len(fitting) > 1:
         raise RecordingError(
             "more than one group of channels looks like a recording",
             where=where,
-            got="; ".join(one.where for one in fitting)[:300],
+            got="; ".join(candidate.where for candidate in fitting)[:300],
             expected="one",
             next_step="save each group as a file of its own",
             rule="several-sheets",
@@ -92,14 +94,14 @@ def series_of(table: Vectors, machine: Machine) -> tuple[Series, ...]:
         )  # fmt: skip
     return tuple(
         Series(
-            symbol=one.symbol,
-            header=one.header,
-            unit=one.unit,
-            role=one.role,
-            values=_numbers(table.vectors[one.index], one.header, rows, table.where),
-            half=table.vectors[one.index].half,
+            symbol=column.symbol,
+            header=column.header,
+            unit=column.unit,
+            role=column.role,
+            values=_numbers(table.vectors[column.index], column.header, rows, table.where),
+            half=table.vectors[column.index].half,
         )
-        for one in assigned
+        for column in assigned
     )
 
 

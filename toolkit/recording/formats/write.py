@@ -37,8 +37,8 @@ class Written:
 def lvm_bytes(columns: Sequence[Written], title: str) -> bytes:
     """Return an LVM file of one segment; a time channel is its column of x values."""
     time = next((column for column in columns if column.symbol == "t"), None)
-    rest = [column for column in columns if column is not time]
-    rows, many = len(columns[0].values), len(rest)
+    others_than_time = [column for column in columns if column is not time]
+    rows, many = len(columns[0].values), len(others_than_time)
 
     def line(*texts: str) -> str:
         return "\t".join(texts)
@@ -56,14 +56,17 @@ def lvm_bytes(columns: Sequence[Written], title: str) -> bytes:
         "",
         line("Channels", str(many), *[""] * many),
         line("Samples", *[str(rows)] * many, ""),
-        line("Y_Unit_Label", *[one.unit for one in rest], ""),
+        line("Y_Unit_Label", *[column.unit for column in others_than_time], ""),
         line("X_Dimension", *["Time"] * many, ""),
         line("X_Unit_Label", *["s" if time is None else time.unit] * many, ""),
         line("***End_of_Header***", *[""] * (many + 1)),
-        line("X_Value", *[one.name for one in rest], "Comment"),
+        line("X_Value", *[column.name for column in others_than_time], "Comment"),
     ]
     x = [""] * rows if time is None else [repr(float(v)) for v in time.values]
-    body = [line(x[row], *[repr(float(one.values[row])) for one in rest], "") for row in range(rows)]
+    body = [
+        line(x[row], *[repr(float(column.values[row])) for column in others_than_time], "")
+        for row in range(rows)
+    ]
     return ("\r\n".join([*head, *body]) + "\r\n").encode()
 
 

@@ -45,10 +45,10 @@ class _Block:
 
     def down(self) -> tuple[tuple[int, bytes], ...]:
         """Return (place, what should stand there) of the blocks that this one leads to."""
-        wanted = _LINKS.get(self.id, ())
+        expected = _LINKS.get(self.id, ())
         if self.id in _ALL:
-            wanted += (b"",) * (len(self.links) - len(wanted))
-        return tuple((link, kind) for link, kind in zip(self.links, wanted, strict=False) if link)
+            expected += (b"",) * (len(self.links) - len(expected))
+        return tuple((link, kind) for link, kind in zip(self.links, expected, strict=False) if link)
 
 
 def walk_mdf(data: bytes, where: object) -> None:
@@ -130,7 +130,7 @@ def _block(data: bytes, place: int, where: object) -> _Block:
     return _Block(data[place + 2 : place + 4], links, body, place + length)
 
 
-def _inflated(data: bytes, block: _Block, left: int, where: object) -> int:
+def _inflated(data: bytes, block: _Block, budget: int, where: object) -> int:
     if block.body + 24 > block.end:
         damaged(where, "a packed block of the MDF file is too short", block.end - block.body, "24 bytes")
     kind, claimed, size = struct.unpack_from("<2xBx4xQQ", data, block.body)
@@ -140,7 +140,7 @@ def _inflated(data: bytes, block: _Block, left: int, where: object) -> int:
                 "save it without compression, or with deflate")  # fmt: skip
     if begin + size > block.end:
         truncated(where, "a packed block of the MDF file ends early", f"{block.end - begin} bytes", size)
-    if claimed > left:
+    if claimed > budget:
         too_large(where, f"{claimed} bytes", MAX_TOTAL_BYTES)
     engine = zlib.decompressobj()
     try:
@@ -169,11 +169,11 @@ def _check_group(
         claimed += cycles * (prefix + size + invalid)
         _check_channels(data, block.links[1], blocks, size, where)
         place = block.links[0]
-    held = _length(group.links[2], blocks, inflated, where)
-    if held < claimed:
-        truncated(where, "the MDF file has less data than it claims", f"{held} bytes", claimed)
-    if held > claimed:
-        damaged(where, "the MDF file has more data than it claims", f"{held} bytes", claimed)
+    present = _length(group.links[2], blocks, inflated, where)
+    if present < claimed:
+        truncated(where, "the MDF file has less data than it claims", f"{present} bytes", claimed)
+    if present > claimed:
+        damaged(where, "the MDF file has more data than it claims", f"{present} bytes", claimed)
 
 
 def _check_channels(data: bytes, place: int, blocks: dict[int, _Block], size: int, where: object) -> None:
