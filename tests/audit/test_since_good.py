@@ -79,9 +79,9 @@ def test_it_tells_what_the_failing_session_found(home):
     drift = drift_since(home[1], "m15-r2")
     FY_off = next(one for one in drift.failed.loads if one.load == "FY")
     assert abs(FY_off.max_error) > FY_off.tolerance
-    assert drift.told.startswith("on 2021-01-01, m15-r3 found m15-r1: FY off by ")
-    assert f"(tolerance {FY_off.tolerance:.4g} lbf)" in drift.told
-    assert "MZ" not in drift.told
+    assert drift.statement.startswith("on 2021-01-01, m15-r3 found m15-r1: FY off by ")
+    assert f"(tolerance {FY_off.tolerance:.4g} lbf)" in drift.statement
+    assert "MZ" not in drift.statement
 
 
 @pytest.fixture(scope="module")

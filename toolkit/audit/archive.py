@@ -46,7 +46,7 @@ class ArchiveAudit:
     @property
     def clean(self) -> bool:
         """Whether every file is exact or rounding and nothing else asks for a person's attention."""
-        return all(one.level == "note" for one in self.findings)
+        return all(finding.level == "note" for finding in self.findings)
 
 
 def audit_archive(
@@ -95,17 +95,17 @@ def audit_archive(
         run = partial(run_isolated, make, workers=workers)
     else:
         run = partial(run_on_cluster, _remote(archive, registry, day, digest), address=scheduler)
-    with Results(out, archive=archive, registry_hash=digest) as kept:
+    with Results(out, archive=archive, registry_hash=digest) as results:
         reused: set[str] = set()
-        for name in kept.known(todo):
+        for name in results.known(todo):
             reused.add(name)
             step(name)
         new = tuple(name for name in todo if name not in reused)
         for name, result in run(new):
-            kept.put(name, done(unreadable(name, result.reason)) if isinstance(result, Lost) else result)
+            results.put(name, done(unreadable(name, result.reason)) if isinstance(result, Lost) else result)
             step(name)
-        files = kept.files(todo)
-        sums = _sums(out, files, kept.digest(todo))
+        files = results.files(todo)
+        sums = _sums(out, files, results.digest(todo))
         return _judged(archive, registry, day, files, sums, reused=len(reused))
 
 
@@ -179,11 +179,11 @@ def _sums(out: Path | None, files: Files, key: str | None) -> Sums:
     """Return what the files amount to, and keep it where their results are kept."""
     if out is None or key is None:
         return sum_up(files.plain())
-    kept = read_sums(out, key)
-    if kept is None:
-        kept = sum_up(files.plain())
-        write_sums(out, kept, key)
-    return kept
+    sums = read_sums(out, key)
+    if sums is None:
+        sums = sum_up(files.plain())
+        write_sums(out, sums, key)
+    return sums
 
 
 def _hash(registry: Registry, day: dt.date) -> str:
@@ -193,6 +193,6 @@ def _hash(registry: Registry, day: dt.date) -> str:
 
 def _refusals(refused: list[Refused]) -> list[Finding]:
     return [
-        Finding(rule="refused-record", where=one.id, message=f"left out as a candidate: {one.reason}")
-        for one in refused
+        Finding(rule="refused-record", where=record.id, message=f"left out as a candidate: {record.reason}")
+        for record in refused
     ]

@@ -30,37 +30,40 @@ class Across:
     _units: dict[str, Counter[tuple[tuple[str, str], ...]]] = field(default_factory=dict)
     _with: dict[tuple[tuple[str, str], ...], list[str]] = field(default_factory=dict)
 
-    def add(self, one: Mapping[str, Any]) -> Iterator[Finding]:
+    def add(self, line: Mapping[str, Any]) -> Iterator[Finding]:
         """Take a file and yield what can be said at once."""
-        path = one["path"]
-        for note in one["notes"]:
+        path = line["path"]
+        for note in line["notes"]:
             yield noted(note, path)
-        yield from self._copies(one)
-        if one["units"]:
-            units = tuple(sorted(one["units"].items()))
-            self._units.setdefault(one["instrument"], Counter())[units] += 1
+        yield from self._copies(line)
+        if line["units"]:
+            units = tuple(sorted(line["units"].items()))
+            self._units.setdefault(line["instrument"], Counter())[units] += 1
             if len(few := self._with.setdefault(units, [])) < 4:
                 few.append(path)
-        if one["date"] is not None and one["modified"] is not None:
-            late = _days(one["modified"]) - _days(one["date"])
+        if line["date"] is not None and line["modified"] is not None:
+            late = _days(line["modified"]) - _days(line["date"])
             if late > _LATE_DAYS:
                 message = (
-                    f"by its own properties the file was last saved on {one['modified']}, {late} days after "
-                    f"the test of {one['date']}"
+                    f"by its own properties the file was last saved on {line['modified']}, {late} days after "
+                    f"the test of {line['date']}"
                 )
                 yield Finding(rule="edited-after-test", where=path, message=message, level="note")
         # Sorted by path, all files of a test's folder come in one stretch.
         for name in [name for name in self._open if name != "." and not path.startswith(name + "/")]:
             yield from self._closed(name)
-        key = one["test"]
-        if key is not None and one["date"] is not None and one["grade"] != "unreadable":
+        key = line["test"]
+        if key is not None and line["date"] is not None and line["grade"] != "unreadable":
             if key not in self._open:
                 self._open[key] = TestSums(
-                    test=key, instrument=one["instrument"], date=one["date"], own_protocol=one["own_protocol"]
+                    test=key,
+                    instrument=line["instrument"],
+                    date=line["date"],
+                    own_protocol=line["own_protocol"],
                 )
-            self._open[key].add(one)
+            self._open[key].add(line)
 
-    def rest(self) -> Iterator[Finding]:
+    def at_end(self) -> Iterator[Finding]:
         """Yield what only the whole archive can say."""
         for name in list(self._open):
             yield from self._closed(name)
@@ -70,10 +73,10 @@ class Across:
             against = [name for name, sign in signs if sign != most]
             if len(against) >= len(signs) / 2:
                 continue  # no convention to depart from
-            usual, here = ("rises", "falls") if most > 0 else ("falls", "rises")
+            usual, direction = ("rises", "falls") if most > 0 else ("falls", "rises")
             for name in against:
                 message = (
-                    f"drum {rotation}: Fy {here} with the slip angle, and {usual} in "
+                    f"drum {rotation}: Fy {direction} with the slip angle, and {usual} in "
                     f"{len(signs) - len(against)} of {len(signs)} tests of {instrument}: an axis has another "
                     "sign here"
                 )
@@ -86,30 +89,32 @@ class Across:
             self._slopes.setdefault((test.instrument, rotation), []).append((name, sign))
         self.tests.add(test.summary())
 
-    def _copies(self, one: Mapping[str, Any]) -> Iterator[Finding]:
-        told = False
-        for key, what in ((one["sha256"], "byte for byte"), (one["values_sha256"], "in every number")):
+    def _copies(self, line: Mapping[str, Any]) -> Iterator[Finding]:
+        reported = False
+        for key, what in ((line["sha256"], "byte for byte"), (line["values_sha256"], "in every number")):
             if key is None:
                 continue
             short = bytes.fromhex(key[:32])
-            first = self._first.setdefault(short, one["path"])
-            if first != one["path"] and not told:
-                told = True
+            first = self._first.setdefault(short, line["path"])
+            if first != line["path"] and not reported:
+                reported = True
                 message = f"the same as {first}, {what}"
-                yield Finding(rule="duplicate-file", where=one["path"], message=message, level="note")
+                yield Finding(rule="duplicate-file", where=line["path"], message=message, level="note")
 
     def _conventions(self) -> Iterator[Finding]:
         for instrument, kinds in sorted(self._units.items()):
             usual = dict(kinds.most_common(1)[0][0])
             for units, count in kinds.items():
-                other = {symbol: unit for symbol, unit in units if symbol in usual and usual[symbol] != unit}
-                if other:
-                    told = ", ".join(f"{s} in {unit} for {usual[s]}" for s, unit in other.items())
-                    some = self._with[units]
+                differing = {
+                    symbol: unit for symbol, unit in units if symbol in usual and usual[symbol] != unit
+                }
+                if differing:
+                    text = ", ".join(f"{s} in {unit} for {usual[s]}" for s, unit in differing.items())
+                    paths = self._with[units]
                     message = (
-                        f"{told}: {count} file{'s' if count > 1 else ''} of {instrument}, such as {some[0]}"
+                        f"{text}: {count} file{'s' if count > 1 else ''} of {instrument}, such as {paths[0]}"
                     )
-                    yield Finding(rule="units-changed", where=some[0], message=message, level="note")
+                    yield Finding(rule="units-changed", where=paths[0], message=message, level="note")
 
 
 def noted(note: Mapping[str, str], path: str) -> Finding:

@@ -74,18 +74,18 @@ def run_on_cluster(
 
 def _client(distributed: Any, address: str) -> Any:
     security = security_of(distributed, address)
-    told = unreachable(distributed, address, security)
-    if told is None:
+    why = unreachable(distributed, address, security)
+    if why is None:
         try:
             return distributed.Client(
                 address, timeout=CONNECT_S, set_as_default=False, name="toolkit-audit", security=security
             )
         except (OSError, ValueError, TypeError) as error:
-            told = str(error) or type(error).__name__
+            why = str(error) or type(error).__name__
         gc.collect()  # a client that failed, found later while another one starts, would wait for it for ever
     raise trouble(
         address,
-        told[:300],
+        why[:300],
         "a scheduler at an address such as tcp://host:8786, or tls:// with dask's own certificates",
         "start it with 'dask scheduler', and workers with 'dask worker ADDRESS'",
     )
@@ -105,12 +105,12 @@ def _batches(
     token = uuid.uuid4().hex
     todo = (names[i : i + batch] for i in range(0, len(names), batch))
     flying: dict[Any, Sequence[str]] = {}
-    seen = time.monotonic()  # when there was a worker
+    last_worker = time.monotonic()  # when there was a worker
     while True:
         threads = _threads(client, address)
         if threads:
-            seen = time.monotonic()
-        elif time.monotonic() - seen > empty_s:
+            last_worker = time.monotonic()
+        elif time.monotonic() - last_worker > empty_s:
             raise _no_workers(address, empty_s)
         for part in islice(todo, max(_AHEAD * max(threads, 1) - len(flying), 0)):
             task = client.submit(_several, make, tuple(part), token, timeout_s, pure=False, retries=0)
@@ -121,13 +121,13 @@ def _batches(
         for task in ready:
             part = flying.pop(task)
             try:
-                found = _result(distributed, task, address)
+                answer = _result(distributed, task, address)
             except _LostResultError:
-                found = None
-            if found is None:
+                answer = None
+            if answer is None:
                 doubtful.extend(part)
             else:
-                yield from zip(part, found, strict=True)
+                yield from zip(part, answer, strict=True)
             task.release()
 
 
@@ -143,15 +143,15 @@ def _alone(
 ) -> Result | Lost:
     token = uuid.uuid4().hex
     task = client.submit(_several, make, (name,), token, timeout_s, pure=False, retries=0)
-    began = seen = time.monotonic()
+    began = last_worker = time.monotonic()
     started = False
     late = f"timeout: no answer within {timeout_s:g} s"
     try:
         while not _wait(client, distributed, [task]):
             now = time.monotonic()
             if _threads(client, address):
-                seen = now
-            elif now - seen > empty_s:
+                last_worker = now
+            elif now - last_worker > empty_s:
                 raise _no_workers(address, empty_s)
             if not started and any(client.processing().values()):
                 started = True
@@ -160,14 +160,14 @@ def _alone(
             if started and now - began > timeout_s + _GRACE_S:
                 return Lost(reason=late)
         try:
-            found = _result(distributed, task, address)
+            answer = _result(distributed, task, address)
         except _LostResultError:
             # It was done, and the worker that held it is no more: by what, nothing tells the first time.
             if tries <= 1:
                 return Lost(reason=DIED)
             return _alone(client, distributed, make, name, timeout_s, empty_s, address, tries - 1)
-        if found is not None:
-            result: Result = found[0]
+        if answer is not None:
+            result: Result = answer[0]
             return result
         # The worker ends itself where the time is up.
         return Lost(reason=late if started and time.monotonic() - began >= timeout_s else DIED)
@@ -197,7 +197,7 @@ def _result(distributed: Any, task: Any, address: str) -> list[Any] | None:
     if task.status in ("cancelled", "lost"):
         raise _lost(distributed, address)
     try:
-        found: list[Any] = task.result(timeout=CONNECT_S)
+        answers: list[Any] = task.result(timeout=CONNECT_S)
     except distributed.KilledWorker:
         return None
     except (ImportError, AttributeError) as error:
@@ -209,7 +209,7 @@ def _result(distributed: Any, task: Any, address: str) -> list[Any] | None:
         ) from error
     except (OSError, TimeoutError) as error:
         raise _lost(distributed, address) from error
-    return found
+    return answers
 
 
 class _LostResultError(Exception):
@@ -217,15 +217,15 @@ class _LostResultError(Exception):
 
 
 def _lost(distributed: Any, address: str) -> Exception:
-    told = unreachable(distributed, address, security_of(distributed, address))
-    return _LostResultError() if told is None else _gone(address)
+    trouble = unreachable(distributed, address, security_of(distributed, address))
+    return _LostResultError() if trouble is None else _lost_scheduler(address)
 
 
 def _threads(client: Any, address: str) -> int:
     try:
         return sum(client.nthreads().values())
     except (OSError, TimeoutError) as error:
-        raise _gone(address) from error
+        raise _lost_scheduler(address) from error
 
 
 def _several(
@@ -248,7 +248,7 @@ def _timed(work: Callable[[str], Result], name: str, timeout_s: float) -> Result
         watch.cancel()
 
 
-def _gone(address: str) -> ConfigError:
+def _lost_scheduler(address: str) -> ConfigError:
     return trouble(
         address,
         "the connection was lost",

@@ -128,23 +128,23 @@ class _Judge:
         usual = self._usual()
         if usual is not None:
             return usual
-        self._let_in(self.screen.whole(self.columns))
+        self._let_in(self.screen.for_all_rows(self.columns))
         for slack in (False, True):
             hits = whole_file(self._fits(slack=slack))
             if hits:
-                told = self._answers(hits, slack=slack)
-                if len(told) == 1:  # and does nothing else come near?
+                answers = self._answers(hits, slack=slack)
+                if len(answers) == 1:  # and does nothing else come near?
                     accepted = self.groups[hits[0].group]
                     self._let_in(self.screen.close_to(accepted, self.columns, dict(hits[0].signs)))
-                    told = self._answers(distinct_rivals(self.groups, hits[0], slack=slack), slack=slack)
-                return self._told([Run(start=0, stop=self.columns.rows, hits=hits)], [told])
+                    answers = self._answers(distinct_rivals(self.groups, hits[0], slack=slack), slack=slack)
+                return self._conclusion([Run(start=0, stop=self.columns.rows, hits=hits)], [answers])
         self._let_in(self.screen.anywhere(self.columns))
         parts = [
             (slack, without_chance(partition(self._fits(slack=slack), self.columns.rows)))
             for slack in (False, True)
         ]
         slack, runs = min(parts, key=lambda part: (_unknown_rows(part[1]), len(part[1]), part[0]))
-        return self._told(runs, [self._answers(run.hits, slack=slack) for run in runs])
+        return self._conclusion(runs, [self._answers(run.hits, slack=slack) for run in runs])
 
     def _usual(self) -> tuple[tuple[Segment, ...], tuple[_Answer | None, ...]] | None:
         # Most files are what they should be: by the record in force, as it is, and by nothing else.
@@ -160,10 +160,10 @@ class _Judge:
                 return None
         hit = Hit(group=0, signs=tuple((load, 0) for load in self.groups[0].families))
         self._let_in(self.screen.close_to(self.groups[0], self.columns, dict(hit.signs)))
-        told = self._answers(distinct_rivals(self.groups, hit, slack=False), slack=False)
-        if len(told) > 1:
+        answers = self._answers(distinct_rivals(self.groups, hit, slack=False), slack=False)
+        if len(answers) > 1:
             return None
-        return self._told([Run(start=0, stop=self.columns.rows, hits=(hit,))], [told])
+        return self._conclusion([Run(start=0, stop=self.columns.rows, hits=(hit,))], [answers])
 
     def _let_in(self, keys: Sequence[Key]) -> None:
         new = [key for key in keys if key not in self._keys]
@@ -180,39 +180,39 @@ class _Judge:
             for group in self.groups
         ]
 
-    def _told(
+    def _conclusion(
         self, runs: Sequence[Run], answers: Sequence[tuple[_Answer, ...]]
     ) -> tuple[tuple[Segment, ...], tuple[_Answer | None, ...]]:
-        made, single = [], []
-        for run, told in zip(runs, answers, strict=True):
-            one = told[0] if len(told) == 1 else None
+        segments, single = [], []
+        for run, answer in zip(runs, answers, strict=True):
+            only = answer[0] if len(answer) == 1 else None
             # What all candidates of an ambiguous file share is known of it.
-            variants = {a.variant for a in told}
-            made.append(
+            variants = {a.variant for a in answer}
+            segments.append(
                 Segment(
                     first_row=run.start + 1,
                     last_row=run.stop,
-                    record=one.record if one else None,
+                    record=only.record if only else None,
                     variant=variants.pop() if len(variants) == 1 else None,
-                    grade=self._grade(one) if one else "ambiguous" if told else "unknown",
-                    candidates=tuple(sorted({a.record for a in told})) if len(told) > 1 else (),
+                    grade=self._grade(only) if only else "ambiguous" if answer else "unknown",
+                    candidates=tuple(sorted({a.record for a in answer})) if len(answer) > 1 else (),
                 )
             )
-            single.append(one)
-        return tuple(made), tuple(single)
+            single.append(only)
+        return tuple(segments), tuple(single)
 
-    def _grade(self, one: _Answer) -> Grade:
-        if one.swapped:
+    def _grade(self, answer: _Answer) -> Grade:
+        if answer.swapped:
             return "column_swap"
-        if one.variant is not None:
+        if answer.variant is not None:
             return "sign_variant"
-        if one.record in self.void:
+        if answer.record in self.void:
             return "stale"
         if self.on is None:
             return "undated"
-        if self.in_force is None or one.record != self.in_force.id:
+        if self.in_force is None or answer.record != self.in_force.id:
             return "stale"
-        return "rounding" if one.slack else "exact"
+        return "rounding" if answer.slack else "exact"
 
     def _answers(self, hits: Sequence[Hit], *, slack: bool) -> tuple[_Answer, ...]:
         # Equal coefficients are one candidate, named after the plain record or the one with fewest changes;
@@ -224,9 +224,9 @@ class _Judge:
             for key in (self._coefficients(hit), self._variant(hit)):
                 by_key.setdefault(key, set()).add(hit)
         answers: list[_Answer] = []
-        left = set(hits)
-        while left:
-            same, queue = set(), [next(hit for hit in hits if hit in left)]
+        remaining = set(hits)
+        while remaining:
+            same, queue = set(), [next(hit for hit in hits if hit in remaining)]
             while queue:
                 hit = queue.pop()
                 if hit in same:
@@ -234,17 +234,17 @@ class _Judge:
                 same.add(hit)
                 for key in (self._coefficients(hit), self._variant(hit)):
                     queue += by_key[key]
-            left -= same
+            remaining -= same
             answers.append(self._simplest(same, slack=slack))
         return tuple(answers)
 
     def _simplest(self, same: set[Hit], *, slack: bool) -> _Answer:
         def rank(hit: Hit) -> tuple[object, ...]:
             group = self.groups[hit.group]
-            other = self.in_force is None or group.record.id != self.in_force.id
+            not_in_force = self.in_force is None or group.record.id != self.in_force.id
             return (
-                self._changes(hit), other, group.record.id in self.void, group.record.id, not group.issued,
-                group.order, hit.signs,
+                self._changes(hit), not_in_force, group.record.id in self.void, group.record.id,
+                not group.issued, group.order, hit.signs,
             )  # fmt: skip
 
         hit = min(same, key=rank) if len(same) > 1 else next(iter(same))
@@ -273,17 +273,17 @@ class _Judge:
 
     def _variant(self, hit: Hit) -> object:
         group = self.groups[hit.group]
-        return (group.record.id, group.order, tuple(self._signs(hit, *one) for one in hit.signs))
+        return (group.record.id, group.order, tuple(self._signs(hit, *sign) for sign in hit.signs))
 
     def _coefficients(self, hit: Hit) -> object:
         # By load: what each column, and the constant, is multiplied by in the file's units.
         group = self.groups[hit.group]
-        told = []
+        texts = []
         for load, variant in hit.signs:
             fit = group.record.load(load)
             names = [_in_columns(group, term) for term in fit.terms]
             values = group.families[load].coefficients[variant].tolist()
-            told.append(
+            texts.append(
                 (
                     load,
                     tuple(
@@ -295,7 +295,7 @@ class _Judge:
                     ),
                 )
             )
-        return tuple(told)
+        return tuple(texts)
 
 
 def _in_columns(group: Group, term: str) -> str:

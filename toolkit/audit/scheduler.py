@@ -47,16 +47,16 @@ def security_of(distributed: Any, address: str) -> Any:
 
 def _check_files(security: Any, address: str) -> None:
     lacking = [f"{_SECTION}.{key}" for field, key in _NEEDED if not getattr(security, field)]
-    told = f"dask's configuration without {' and '.join(lacking)}"
+    lack = f"dask's configuration without {' and '.join(lacking)}"
     if not lacking:
-        named = [(key, str(getattr(security, field) or "")) for field, key in _FILES]
-        absent = [f"{key} {text}" for key, text in named if text and "\n" not in text and not _there(text)]
+        files = [(key, str(getattr(security, field) or "")) for field, key in _FILES]
+        absent = [f"{key} {text}" for key, text in files if text and "\n" not in text and not _there(text)]
         if not absent:
             return
-        told = f"no such file: {', '.join(absent)}"
+        lack = f"no such file: {', '.join(absent)}"
     raise trouble(
         address,
-        told,
+        lack,
         "for tls://, the certificate authority and the client's certificate and key in dask's configuration",
         f"name {_SECTION}.ca-file, .client.cert and .client.key in ~/.config/dask/distributed.yaml, or set "
         "DASK_DISTRIBUTED__COMM__TLS__CA_FILE, ..__CLIENT__CERT and ..__CLIENT__KEY",

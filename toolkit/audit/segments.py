@@ -59,10 +59,10 @@ def partition(fits: Sequence[dict[str, NDArray[np.bool_]]], rows: int) -> tuple[
     runs: list[Run] = []
     row = 0
     while row < rows:
-        here = reaches[:, row]
-        longest = int(here.max(initial=0))
+        reach_here = reaches[:, row]
+        longest = int(reach_here.max(initial=0))
         hits: list[Hit] = []
-        for index in np.flatnonzero(here == longest).tolist() if longest else ():
+        for index in np.flatnonzero(reach_here == longest).tolist() if longest else ():
             choices = [
                 [(load, int(v)) for v in np.flatnonzero(length[:, row] >= longest)]
                 for load, length in lengths[index].items()
@@ -89,25 +89,25 @@ def without_chance(runs: Sequence[Run]) -> tuple[Run, ...]:
     for run in runs:
         explained.update(dict.fromkeys(run.hits, run.stop - run.start))
     enough = max(_LUCKY, runs[-1].stop / 50)
-    kept: list[Run] = []
+    kept_runs: list[Run] = []
     for run in runs:
         lucky = run.stop - run.start <= _LUCKY and all(explained[hit] < enough for hit in run.hits)
         if run.hits and not lucky:
-            kept.append(run)
-        elif kept and not kept[-1].hits:
-            kept[-1] = Run(start=kept[-1].start, stop=run.stop, hits=())
+            kept_runs.append(run)
+        elif kept_runs and not kept_runs[-1].hits:
+            kept_runs[-1] = Run(start=kept_runs[-1].start, stop=run.stop, hits=())
         else:
-            kept.append(Run(start=run.start, stop=run.stop, hits=()))
-    return tuple(kept)
+            kept_runs.append(Run(start=run.start, stop=run.stop, hits=()))
+    return tuple(kept_runs)
 
 
 def _run_lengths(fit: NDArray[np.bool_]) -> NDArray[np.int64]:
     # How many rows from this one on fit without a break, variants x rows.
     rows = fit.shape[1]
-    here = np.arange(rows)
-    breaks = np.where(fit, rows, here)
+    position = np.arange(rows)
+    breaks = np.where(fit, rows, position)
     next_break = np.minimum.accumulate(breaks[:, ::-1], axis=1)[:, ::-1]
-    return np.asarray(next_break - here)
+    return np.asarray(next_break - position)
 
 
 def _products(index: int, choices: list[list[tuple[str, int]]]) -> list[Hit]:
@@ -124,16 +124,16 @@ def distinct_rivals(groups: Sequence[Group], accepted: Hit, *, slack: bool) -> t
     Two candidates are told apart where their predictions differ, in some row of FY or MZ, by more than the
     sum of their two bounds (twice the bound): then not both could fit.
     """
-    one = groups[accepted.group]
+    accepted_group = groups[accepted.group]
     close: list[Hit] = []
     for index, group in enumerate(groups):
         choices = []
         for load, variant in accepted.signs:
-            mine, other = one.families[load], group.families[load]
-            limit = mine.bound + other.bound
+            mine, rival = accepted_group.families[load], group.families[load]
+            limit = mine.bound + rival.bound
             if slack:
-                limit = limit + mine.slack + other.slack
-            apart = np.abs(other.predicted - mine.predicted[variant]) > limit
+                limit = limit + mine.slack + rival.slack
+            apart = np.abs(rival.predicted - mine.predicted[variant]) > limit
             choices.append([(load, int(v)) for v in np.flatnonzero(~apart.any(axis=1))])
         close += _products(index, choices)
     return tuple(close)

@@ -31,20 +31,20 @@ def impossible(
     blocks : their means
     values : what the values are, such as ``stored Fy and Mz``
     """
-    known = [
+    loaded = [
         (name, block)
         for name, block in zip(rows, blocks, strict=True)
         if block[0] > 0 and block[2] is not None
     ]
-    if not known:
+    if not loaded:
         return ()
     table = np.array(
-        [[math.nan if one is None else one for one in block] for _, block in known], dtype=np.float64
+        [[math.nan if value is None else value for value in block] for _, block in loaded], dtype=np.float64
     )
     FZ, SA, FY, MZ = table.T
-    found = departures(
+    broken = departures(
         of_sizes(
-            [f"{where}, {name}" for name, _ in known], FZ=FZ, SA=SA, FY=FY, MZ=np.nan_to_num(MZ, nan=0.0)
+            [f"{where}, {name}" for name, _ in loaded], FZ=FZ, SA=SA, FY=FY, MZ=np.nan_to_num(MZ, nan=0.0)
         )
     )
-    return tuple(one.finding(level="error", of=values) for one in found)
+    return tuple(departure.finding(level="error", of=values) for departure in broken)

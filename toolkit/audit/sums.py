@@ -49,14 +49,14 @@ def sum_up(files: Iterable[Mapping[str, Any]]) -> Sums:
     instruments: set[str] = set()
     findings: list[Finding] = []
     notes: list[Finding] = []
-    for one in files:
-        grades[one["grade"]] += 1
-        undated += one["grade"] != "unreadable" and one["date"] is None
-        if one["instrument"] is not None:
-            instruments.add(one["instrument"])
-        findings += _of_file(one)
-        notes += across.add(one)
-    notes += across.rest()
+    for file in files:
+        grades[file["grade"]] += 1
+        undated += file["grade"] != "unreadable" and file["date"] is None
+        if file["instrument"] is not None:
+            instruments.add(file["instrument"])
+        findings += _of_file(file)
+        notes += across.add(file)
+    notes += across.at_end()
     return Sums(
         grades={grade: grades[grade] for grade in GRADES},
         undated=undated,
@@ -76,11 +76,11 @@ def write_sums(folder: Path, sums: Sums, key: str) -> None:
         the folder cannot be written to
     """
     with atomic_path(folder / SUMS) as temporary, temporary.open("wb") as stream:
-        whole = hashlib.sha256()
+        digest = hashlib.sha256()
         for line in _lines(sums, key):
-            whole.update(line)
+            digest.update(line)
             stream.write(line)
-        stream.write(whole.hexdigest().encode() + b"\n")
+        stream.write(digest.hexdigest().encode() + b"\n")
 
 
 def read_sums(folder: Path, key: str) -> Sums | None:
@@ -91,37 +91,37 @@ def read_sums(folder: Path, key: str) -> Sums | None:
             head = json.loads(first)
             if head["key"] != key:
                 return None
-            whole = hashlib.sha256(first)
-            found: list[Finding] = []
+            digest = hashlib.sha256(first)
+            findings: list[Finding] = []
             for line in itertools.islice(stream, head["findings"] + head["notes"]):
-                whole.update(line)
-                found.append(Finding(**json.loads(line)))
+                digest.update(line)
+                findings.append(Finding(**json.loads(line)))
             tests = Lines()
             for line in itertools.islice(stream, head["tests"]):
-                whole.update(line)
+                digest.update(line)
                 tests.take(line)
-            if stream.read() != whole.hexdigest().encode() + b"\n":
+            if stream.read() != digest.hexdigest().encode() + b"\n":
                 return None
             return Sums(
                 grades={grade: head["grades"][grade] for grade in GRADES},
                 undated=head["undated"],
                 instruments=tuple(head["instruments"]),
-                findings=tuple(found[: head["findings"]]),
-                notes=tuple(found[head["findings"] :]),
+                findings=tuple(findings[: head["findings"]]),
+                notes=tuple(findings[head["findings"] :]),
                 tests=tests,
             )
     except (OSError, ValueError, KeyError, TypeError):
         return None  # none yet, of another version, or damaged: they are made again
 
 
-def told(one: Mapping[str, Any]) -> str:
+def sentence(line: Mapping[str, Any]) -> str:
     """Return in one sentence what computed a file, from its plain answer."""
-    grade: Grade = one["grade"]
+    grade: Grade = line["grade"]
     who = ""
-    if one["record"]:
-        who = f" ({one['record']}{', ' + one['variant'] if one['variant'] else ''})"
-    elif one["candidates"]:
-        who = f" ({', '.join(one['candidates'])})"
+    if line["record"]:
+        who = f" ({line['record']}{', ' + line['variant'] if line['variant'] else ''})"
+    elif line["candidates"]:
+        who = f" ({', '.join(line['candidates'])})"
     return f"Fy and Mz were computed {TELLS[grade]}{who}"
 
 
@@ -138,19 +138,19 @@ def _lines(sums: Sums, key: str) -> Iterator[bytes]:
         "tests": len(sums.tests),
     }
     yield json.dumps(head).encode() + b"\n"
-    for one in (*sums.findings, *sums.notes):
-        yield json.dumps(one.as_dict()).encode() + b"\n"
+    for finding in (*sums.findings, *sums.notes):
+        yield json.dumps(finding.as_dict()).encode() + b"\n"
     yield from sums.tests.raw()
 
 
-def _of_file(one: Mapping[str, Any]) -> list[Finding]:
-    made = []
-    path, grade, reason = one["path"], one["grade"], one["reason"]
-    if one["test_toml"] is not None:
-        message = f"its test.toml cannot be used, the file counts as undated: {one['test_toml']}"
-        made.append(Finding(rule="test-toml", where=path, message=message))
+def _of_file(line: Mapping[str, Any]) -> list[Finding]:
+    findings = []
+    path, grade, reason = line["path"], line["grade"], line["reason"]
+    if line["test_toml"] is not None:
+        message = f"its test.toml cannot be used, the file counts as undated: {line['test_toml']}"
+        findings.append(Finding(rule="test-toml", where=path, message=message))
     if grade == "unreadable":
-        made.append(Finding(rule="unreadable-file", where=path, message=reason or ""))
+        findings.append(Finding(rule="unreadable-file", where=path, message=reason or ""))
     elif grade not in CLEAN:
-        made.append(Finding(rule=f"identified-{grade}", where=path, message=reason or told(one)))
-    return made
+        findings.append(Finding(rule=f"identified-{grade}", where=path, message=reason or sentence(line)))
+    return findings

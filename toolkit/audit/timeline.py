@@ -38,19 +38,19 @@ class Timeline:
     last: dt.date
 
 
-def timelines(made: ArchiveAudit, registry: Registry) -> tuple[Timeline, ...]:
+def timelines(audit: ArchiveAudit, registry: Registry) -> tuple[Timeline, ...]:
     """Return the timeline of every instrument that the archive has dated files of."""
     counts: dict[str, Counter[tuple[str, str, str]]] = {}
     days: dict[str, tuple[str, str]] = {}
-    for one in made.files.plain():
-        instrument, date = one["instrument"], one["date"]
+    for line in audit.files.plain():
+        instrument, date = line["instrument"], line["date"]
         if instrument is None or date is None:
             continue
-        who = one["record"] or one["grade"]
-        counts.setdefault(instrument, Counter())[who, date[:7], one["grade"]] += 1
+        who = line["record"] or line["grade"]
+        counts.setdefault(instrument, Counter())[who, date[:7], line["grade"]] += 1
         first, last = days.get(instrument, (date, date))
         days[instrument] = (min(first, date), max(last, date))
-    choices = Choices(registry=registry, known_at=made.known_at)
+    choices = Choices(registry=registry, known_at=audit.known_at)
     return tuple(
         Timeline(
             instrument=name,
@@ -67,12 +67,16 @@ def _stretches(choices: Choices, instrument: str) -> tuple[Stretch, ...]:
     offered = choices.on(instrument, None)
     edges = choices.days(instrument)
     force = [choices.on(instrument, day).in_force for day in edges]
-    made: list[Stretch] = []
-    for status in sorted(offered.statuses, key=lambda one: (one.in_force_from or dt.date.max, one.id)):
+    stretches: list[Stretch] = []
+    for status in sorted(
+        offered.statuses, key=lambda statuse: (statuse.in_force_from or dt.date.max, statuse.id)
+    ):
         if status.void_always:
-            made.append(Stretch(record=status.id, begin=status.in_force_from, end=None, void=True))
+            stretches.append(Stretch(record=status.id, begin=status.in_force_from, end=None, void=True))
             continue
-        held = [i for i, record in enumerate(force) if record is not None and record.id == status.id]
-        end = edges[held[-1] + 1] if held and held[-1] + 1 < len(edges) else None
-        made.append(Stretch(record=status.id, begin=edges[held[0]] if held else None, end=end))
-    return tuple(made)
+        in_force_at = [i for i, record in enumerate(force) if record is not None and record.id == status.id]
+        end = edges[in_force_at[-1] + 1] if in_force_at and in_force_at[-1] + 1 < len(edges) else None
+        stretches.append(
+            Stretch(record=status.id, begin=edges[in_force_at[0]] if in_force_at else None, end=end)
+        )
+    return tuple(stretches)

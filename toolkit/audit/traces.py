@@ -31,11 +31,11 @@ class Trace:
     new: dict[str, NDArray[np.float64]]
 
 
-def worst_files(made: ArchiveAudit, count: int) -> list[dict[str, Any]]:
+def worst_files(audit: ArchiveAudit, count: int) -> list[dict[str, Any]]:
     """Return the files with the largest repair of FY, largest first; those that are right are left out."""
     bad = (
         (plain["repair"]["FY_max_abs_N"], number, plain)
-        for number, plain in enumerate(made.files.plain())
+        for number, plain in enumerate(audit.files.plain())
         if plain["repair"] is not None
         and plain["repair"]["FY_max_abs_N"] is not None
         and plain["grade"] not in CLEAN
@@ -43,10 +43,10 @@ def worst_files(made: ArchiveAudit, count: int) -> list[dict[str, Any]]:
     return [plain for _, _, plain in heapq.nlargest(count, bad)]
 
 
-def traces(made: ArchiveAudit, registry: Registry, count: int) -> Iterator[Trace]:
+def traces(audit: ArchiveAudit, registry: Registry, count: int) -> Iterator[Trace]:
     """Yield the rows of the worst files; one that can no longer be read is left out."""
-    for plain in worst_files(made, count):
-        path = made.archive / plain["path"]
+    for plain in worst_files(audit, count):
+        path = audit.archive / plain["path"]
         try:
             recording = read_recording(path, context_of(path).machine)
             record = registry.load(plain["in_force"])

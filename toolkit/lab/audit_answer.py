@@ -123,7 +123,7 @@ def _asked(answer: AuditAnswer) -> Iterator[str]:
     if answer.drift is not None:
         drift = answer.drift
         yield ""
-        yield drift.told
+        yield drift.statement
         yield (
             f"since {drift.good} ({drift.good_date}) {len(answer.drifted)} files were recorded; an estimate "
             "of the effect, interpolated by days:"

@@ -8,7 +8,6 @@ turns into a DataFrame; and its figures are those that a report prints, drawn by
 
 from __future__ import annotations
 
-import html
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -72,13 +71,9 @@ class Face:
         return f"<{type(self).__name__} {' | '.join(text for text in texts if text)}>"
 
     def _repr_html_(self) -> str:
-        rows = "".join(
-            f'<tr><th style="text-align:left">{html.escape(name)}</th>'
-            f'<td style="text-align:left">{html.escape(text)}</td></tr>'
-            for name, value in self._facts().items()
-            if (text := _text(value))
-        )
-        return f"<table><caption>{html.escape(type(self).__name__)}</caption>{rows}</table>"
+        from toolkit.report.pages.kit import facts
+
+        return facts(type(self).__name__, {name: _text(value) for name, value in self._facts().items()})
 
 
 def _text(value: object) -> str:

@@ -25,18 +25,20 @@ def cross_check(gated: Gated, sheet: str, table: Table) -> None:
     UnreadableError
         rule ``readers-differ``: openpyxl cannot read the file at all
     """
-    table = table.whole()
-    other = _openpyxl_rows(gated, sheet)
-    height = max(len(table.rows), len(other))
-    width = max((len(row) for row in (*table.rows, *other)), default=0)
+    table = table.in_rows()
+    second = _openpyxl_rows(gated, sheet)
+    height = max(len(table.rows), len(second))
+    width = max((len(row) for row in (*table.rows, *second)), default=0)
     for row in range(height):
         for column in range(width):
-            one, two = _cell(table.rows, row, column), _cell(other, row, column)
-            if one != two and not (one == "" and isinstance(two, str) and two.startswith("#")):
+            first_value, two = _cell(table.rows, row, column), _cell(second, row, column)
+            if first_value != two and not (
+                first_value == "" and isinstance(two, str) and two.startswith("#")
+            ):
                 raise CellError(
                     f"cell {reference(row + 1, column + 1)}: two readers disagree",
                     where=f"{table.where}, cell {reference(row + 1, column + 1)}",
-                    got=f"read {one!r}, openpyxl {two!r}"[:200],
+                    got=f"read {first_value!r}, openpyxl {two!r}"[:200],
                     expected="the same value from both",
                     next_step="look at that cell in the file; save a copy of it with Excel",
                     rule="readers-differ",

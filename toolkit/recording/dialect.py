@@ -59,7 +59,7 @@ def decode(data: bytes, *, where: Path) -> str:
         ) from error
 
 
-def separator_of(head: str, known: Callable[[str], bool], *, where: Path) -> str | None:
+def separator_of(head: str, is_header: Callable[[str], bool], *, where: Path) -> str | None:
     """Return what splits a header row into the most headers that are ``known``; None where nothing does.
 
     Raises
@@ -67,9 +67,9 @@ def separator_of(head: str, known: Callable[[str], bool], *, where: Path) -> str
     UnreadableError
         rule ``ambiguous-text``: two separators do as well
     """
-    found = {mark: _headers(head, mark, known) for mark in SEPARATORS}
-    most = max(found.values())
-    best = [mark for mark, count in found.items() if count == most]
+    counts = {mark: _headers(head, mark, is_header) for mark in SEPARATORS}
+    most = max(counts.values())
+    best = [mark for mark, count in counts.items() if count == most]
     if most == 0:
         return None
     if len(best) > 1:
@@ -123,9 +123,9 @@ def number_or_text(cell: str, decimal: str = ".") -> float | str:
     return float(text) if text.lower() in _NO_NUMBER else text
 
 
-def _headers(head: str, separator: str, known: Callable[[str], bool]) -> int:
+def _headers(head: str, separator: str, is_header: Callable[[str], bool]) -> int:
     try:
         headers = next(csv.reader([head], delimiter=separator), [])
     except csv.Error:
         return 0
-    return sum(map(known, headers)) if len(headers) > 1 else 0
+    return sum(map(is_header, headers)) if len(headers) > 1 else 0

@@ -45,8 +45,8 @@ class TestFolder:
 
     def rotation_of(self, path: Path) -> Rotation:
         """Return the direction of the drum in a file: its own, else that of the test."""
-        for own, rotation in self.rotations:
-            if own == path:
+        for sense, rotation in self.rotations:
+            if sense == path:
                 return rotation
         return self.rotation
 
@@ -254,8 +254,8 @@ def _tare(
 
 def _tare_value(name: str, value: float, machine: Machine, source: Source) -> tuple[str, float, str]:
     cell_unit = machine.column(name).unit
-    number, written = (value.value, value.unit) if isinstance(value, Quantity) else (value, "")
-    if not written or unit(written).text == cell_unit:
+    number, unit_name = (value.value, value.unit) if isinstance(value, Quantity) else (value, "")
+    if not unit_name or unit(unit_name).text == cell_unit:
         return name, float(number), cell_unit
-    scale = si_scale(written, unit(cell_unit).dimension, where=f"{source.where}, [tare] values.{name}")
+    scale = si_scale(unit_name, unit(cell_unit).dimension, where=f"{source.where}, [tare] values.{name}")
     return name, float(from_si(float(number) * scale, cell_unit)), cell_unit

@@ -94,14 +94,14 @@ def _check_origin(path: Path, keywords: tuple[str, ...], machine: Machine) -> No
             next_step="give the recording that it was computed from",
             rule="own-output",
         )
-    named = machine_named(keywords)
+    origin = machine_named(keywords)
     # The headers print no units: read by another machine's definition, mV/V would become lbf.
-    if named is not None and named != machine.name:
+    if origin is not None and origin != machine.name:
         raise RecordingError(
             "the recording comes from another machine",
             where=path,
-            got=named,
+            got=origin,
             expected=machine.name,
-            next_step=f"read it with the machine {named!r} (in test.toml: machine = {named!r})",
+            next_step=f"read it with the machine {origin!r} (in test.toml: machine = {origin!r})",
             rule="other-machine",
         )

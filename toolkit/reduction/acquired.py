@@ -51,10 +51,10 @@ def compare(
     channels = [s for s in recording.series if s.role == "acquired" and _computes(record, s.symbol)]
     if not channels:
         return ()
-    wanted = [one.symbol for one in channels]
+    symbols = [channel.symbol for channel in channels]
 
     def reading(offset: Mapping[str, float] | None, *, issued: bool) -> Mapping[str, NDArray[np.float64]]:
-        return apply_record(record, indications, units=units, tare=offset, issued=issued, only=wanted)
+        return apply_record(record, indications, units=units, tare=offset, issued=issued, only=symbols)
 
     readings = [
         reading(offset, issued=issued)
@@ -62,20 +62,20 @@ def compare(
         for issued in (False, True)
     ]
     halves = {name: rounding(recording[name]) for name in indications}
-    found = []
-    for one in channels:
-        bound = _moved(record, one.symbol, indications, units, halves, plain=readings[0][one.symbol])
-        bound = bound + rounding(one) * si_scale(one.unit) + 1e-9 * np.abs(one.si)
-        misses = [np.abs(reading[one.symbol] - one.si) for reading in readings]
-        found.append(
+    differences = []
+    for channel in channels:
+        bound = _moved(record, channel.symbol, indications, units, halves, plain=readings[0][channel.symbol])
+        bound = bound + rounding(channel) * si_scale(channel.unit) + 1e-9 * np.abs(channel.si)
+        misses = [np.abs(reading[channel.symbol] - channel.si) for reading in readings]
+        differences.append(
             Difference(
                 file=file,
-                channel=one.symbol,
+                channel=channel.symbol,
                 largest=float(np.max(misses[0])),
                 explained=any(bool(np.all(miss <= bound)) for miss in misses),
             )
         )
-    return tuple(found)
+    return tuple(differences)
 
 
 def _moved(
@@ -99,7 +99,7 @@ def _moved(
         apply_record(record, {**indications, name: indications[name] + half}, units=units, only=(load,))
         for name, half in halves.items()
     ]
-    return np.asarray(np.sum([np.abs(one[load] - plain) for one in moved], axis=0))
+    return np.asarray(np.sum([np.abs(values[load] - plain) for values in moved], axis=0))
 
 
 def _computes(record: CalibrationRecord, symbol: str) -> bool:

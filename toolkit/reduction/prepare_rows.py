@@ -82,9 +82,9 @@ def split_blocks(recording: Recording, machine: Machine) -> tuple[tuple[Block, .
     """
     smallest = min(machine.protocol.loads_N)
     FZ = recording["FZ"].si
-    found = find_blocks(FZ)
-    tare = tuple(block for block in found if is_tare(block, smallest_load=smallest))
-    loads = tuple(block for block in found if not is_tare(block, smallest_load=smallest))
+    blocks = find_blocks(FZ)
+    tare = tuple(block for block in blocks if is_tare(block, smallest_load=smallest))
+    loads = tuple(block for block in blocks if not is_tare(block, smallest_load=smallest))
     if not loads or any(block.mean_FZ < 0 for block in loads):
         raise RecordingError(
             "the file has no load block" if not loads else "the load is negative",
@@ -112,9 +112,9 @@ def split_rests(
         the file has no load block, its load is negative, or nothing in it rests long enough
     """
     protocol = machine.protocol
-    whole = Block(start=0, stop=recording["FZ"].si.size, mean_FZ=0.0)
+    block = Block(start=0, stop=recording["FZ"].si.size, mean_FZ=0.0)
     turns = (
-        revolutions(recording, whole, machine=machine, rolling_radius_m=rolling_radius_m(info))
+        revolutions(recording, block, machine=machine, rolling_radius_m=rolling_radius_m(info))
         if protocol.acquisition == "continuous"
         else None
     )
@@ -132,7 +132,7 @@ def split_rests(
     )
     tare = tuple(rest for rest in rests if is_tare(rest, smallest_load=smallest))
     loads = tuple(rest for rest in rests if not is_tare(rest, smallest_load=smallest))
-    if not loads or any(rest.mean_FZ < 0 for rest in loads):
+    if not loads or any(load.mean_FZ < 0 for load in loads):
         low, high = from_si([np.min(recording["SA"].si), np.max(recording["SA"].si)], "deg")
         raise RecordingError(
             "the load is negative" if loads else "the recording does not rest at any slip angle and load",

@@ -51,7 +51,7 @@ def find_rests(
     """
     ends = _ends(SA, FZ, band_SA=band_SA, band_FZ=band_FZ, floor_FZ=floor_FZ)
     row = float(turns[-1] - turns[0]) / max(len(turns) - 1, 1)
-    found: list[Block] = []
+    blocks: list[Block] = []
     open_parts = [(0, len(SA))]
     while open_parts:
         first, last = open_parts.pop()
@@ -65,9 +65,9 @@ def find_rests(
         if lengths[start - first] + row < least_turns * (1 - 1e-9):
             continue
         if turns[b - 1] - turns[a] + row >= least_turns * (1 - 1e-9):
-            found.append(Block(start=a, stop=b, mean_FZ=float(FZ[a:b].mean())))
+            blocks.append(Block(start=a, stop=b, mean_FZ=float(FZ[a:b].mean())))
         open_parts += [(first, start), (stop, last)]
-    return tuple(sorted(found, key=lambda one: one.start))
+    return tuple(sorted(blocks, key=lambda block: block.start))
 
 
 def _ends(
@@ -137,11 +137,11 @@ def _arrived(
     floor_FZ: float,
 ) -> tuple[int, int]:
     """Return the run without the rows at its ends in which the machine still moves."""
-    rest = slice(start, stop)
-    middle_SA, middle_FZ = float(np.median(SA[rest])), float(np.median(FZ[rest]))
+    stretch = slice(start, stop)
+    middle_SA, middle_FZ = float(np.median(SA[stretch])), float(np.median(FZ[stretch]))
     room_FZ = max(band_FZ * middle_FZ, floor_FZ)
-    there = (np.abs(SA[rest] - middle_SA) <= _ARRIVED * band_SA) & (
-        np.abs(FZ[rest] - middle_FZ) <= _ARRIVED * room_FZ
+    there = (np.abs(SA[stretch] - middle_SA) <= _ARRIVED * band_SA) & (
+        np.abs(FZ[stretch] - middle_FZ) <= _ARRIVED * room_FZ
     )
     rows = np.flatnonzero(there)
     return (start + int(rows[0]), start + int(rows[-1]) + 1) if rows.size else (start, stop)

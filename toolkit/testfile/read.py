@@ -148,21 +148,21 @@ def _result(sheets: dict[str, list[Cells]], items: Cells) -> TestResult:
 
 
 def _stated(items: Cells) -> tuple[TypeB, ...]:
-    found: dict[str, Cells] = {}
+    cellses: dict[str, Cells] = {}
     for key, value in items.items():
         if key.startswith("stated."):
             _, symbol, name = key.split(".")
-            found.setdefault(symbol, {})[name] = value
+            cellses.setdefault(symbol, {})[name] = value
     return tuple(
         TypeB(
             symbol=symbol,
-            u=number(one["u"]),
-            relative=number(one["relative"]),
-            effect=number(one["effect"]),
-            source=str(one["source"]),
-            common=one["common"],
+            u=number(cellse["u"]),
+            relative=number(cellse["relative"]),
+            effect=number(cellse["effect"]),
+            source=str(cellse["source"]),
+            common=cellse["common"],
         )
-        for symbol, one in found.items()
+        for symbol, cellse in cellses.items()
     )
 
 
@@ -179,9 +179,11 @@ def _as(kind: Any, value: Any) -> Any:
 
 def _condition(row: Cells) -> Condition:
     hints = get_type_hints(Condition)
-    given = {name: _as(hints[name], row[header(name)]) for name in CONDITION_FIELDS if name != "indications"}
+    conditions = {
+        name: _as(hints[name], row[header(name)]) for name in CONDITION_FIELDS if name != "indications"
+    }
     cells = tuple(number(value) for key, value in row.items() if key.startswith("indication_"))
-    return Condition(**given, indications=cells)
+    return Condition(**conditions, indications=cells)
 
 
 def _findings(rows: list[Cells]) -> tuple[Finding, ...]:
@@ -211,26 +213,26 @@ def _interval(row: Cells) -> tuple[float | None, float | None] | None:
 
 def _fit(row: Cells, parameters: list[Cells], covariances: dict[tuple[str, str], float]) -> CurveFit:
     hints = get_type_hints(CurveFit)
-    given: Cells = {}
+    cells: Cells = {}
     for field in dataclasses.fields(CurveFit):
         if field.name in row:
             value = row[field.name]
             is_list = "tuple" in str(hints[field.name])
-            given[field.name] = tuple(str(value).split()) if is_list else _as(hints[field.name], value)
-    given["message"] = given["message"] or ""
-    names = [str(one["parameter"]) for one in parameters]
+            cells[field.name] = tuple(str(value).split()) if is_list else _as(hints[field.name], value)
+    cells["message"] = cells["message"] or ""
+    names = [str(parameter["parameter"]) for parameter in parameters]
     return CurveFit(
-        **given,
+        **cells,
         parameters=tuple(
             Parameter(
-                name=str(one["parameter"]),
-                value=number(one["value"]),
-                unit=str(one["unit"]),
-                standard_error=optional(one["standard_error"]),
-                dof=optional(one["dof"]),
-                interval95=_interval(one),
+                name=str(parameter["parameter"]),
+                value=number(parameter["value"]),
+                unit=str(parameter["unit"]),
+                standard_error=optional(parameter["standard_error"]),
+                dof=optional(parameter["dof"]),
+                interval95=_interval(parameter),
             )
-            for one in parameters
+            for parameter in parameters
         ),
         covariance=tuple(tuple(covariances[a, b] for b in names) for a in names) if covariances else (),
         slope_at_zero=_estimate(*(row[f"slope_at_zero {p}"] for p in ("value", "u", "dof", "unit"))),
@@ -262,7 +264,7 @@ def _characteristics(sheets: dict[str, list[Cells]], reduced: ReducedTest) -> Ch
         for cells in described
         if cells["name"] == "group"
     )
-    groups = {(one.load_N, one.rotation): one for one in group(reduced)}
+    groups = {(entry.load_N, entry.rotation): entry for entry in group(reduced)}
     directions = [
         Direction(group=groups[fit.load_N, fit.rotation], fit=fit)
         for fit in fitted
@@ -298,7 +300,7 @@ def _row(cells: Cells, budgets: _Budgets, directions: Sequence[Direction]) -> Ro
     SA = number(cells["SA_rad"]) if "SA_rad" in cells else None
     estimate = _estimate(cells["value"], cells["u"], cells["dof"], cells["unit"])
     if estimate is None:
-        there = [one for one in directions if one.group.load_N == load]
+        there = [direction for direction in directions if direction.group.load_N == load]
         return lacking_row(by_name()[name], (load, rotation, SA), there)
     return Row(
         name=by_name()[name].name,

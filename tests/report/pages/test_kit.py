@@ -15,7 +15,7 @@ import pytest
 
 import toolkit
 from toolkit.report.pages.drawing import Drawing
-from toolkit.report.pages.kit import Column, Figure, Table, environment, page_parts, quantity, table
+from toolkit.report.pages.kit import Column, Figure, Table, environment, facts, page_parts, quantity, table
 
 TOOLKIT = Path(toolkit.__file__).parent
 CONCEALED = Path(__file__).parents[2] / "concealed"
@@ -140,6 +140,13 @@ def test_a_table_sets_its_columns_by_their_kind(folder):
     # It scrolls by itself where it is wider than the window.
     assert '<div class="wide"><table>' in shown
     assert '<div class="scroll"><table>' in str(parts.table(cells, scroll=True))
+
+
+def test_facts_for_a_notebook_are_texts():
+    shown = facts("Record", {"id": "<b>m15</b>", "reason": ""})
+    assert "<b>" not in shown
+    assert "&lt;b&gt;m15&lt;/b&gt;" in shown
+    assert "reason" not in shown
 
 
 def test_a_quantity_keeps_its_unit_on_the_line():

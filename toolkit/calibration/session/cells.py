@@ -127,7 +127,7 @@ def _sheet(gated: Any, known: Callable[[str], bool]) -> Cells:
             "cell", "correct the cell, or remove the whole row with a reason in the laboratory's notes",
         )  # fmt: skip
     merged = any(b"<mergeCell " in xml for xml in gated.members.values())
-    return _cells(table.whole().rows, where=table.where, separator="", merged=merged)
+    return _cells(table.in_rows().rows, where=table.where, separator="", merged=merged)
 
 
 def _cells(rows: Sequence[Sequence[Any]], *, where: str, separator: str, merged: bool = False) -> Cells:

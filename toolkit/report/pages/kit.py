@@ -11,10 +11,10 @@ from __future__ import annotations
 import base64
 import hashlib
 import math
-from collections.abc import Container, Iterable, Iterator, Sequence
+from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
@@ -94,6 +94,12 @@ def page_parts(folder: Path, **context: object) -> Iterator[str]:
         )
     )
     return template.generate(policy=policy, style=style, script=script, **context)
+
+
+def facts(title: str, texts: Mapping[str, str]) -> Markup:
+    """Return named texts as a small table for a notebook; a fact without a text is left out."""
+    parts: Any = environment(KIT).get_template("parts.html.j2").module
+    return Markup(parts.facts(title, texts))  # noqa: S704  a template's result
 
 
 def environment(folder: Path) -> Environment:
