@@ -94,5 +94,5 @@ def _curve(
     E = (a6 * kN**2 + a7 * kN + a8) / (1 - a13 * np.abs(gamma))
     x = np.degrees(np.asarray(slip, dtype=np.float64)) + a9 * gamma
     phi = (1 - E) * x + E / B * np.arctan(B * x)
-    made: NDArray[np.float64] = D * np.sin(table.C * np.arctan(B * phi)) + (a10 * kN**2 + a11 * kN) * gamma
-    return made
+    force: NDArray[np.float64] = D * np.sin(table.C * np.arctan(B * phi)) + (a10 * kN**2 + a11 * kN) * gamma
+    return force

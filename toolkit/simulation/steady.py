@@ -29,16 +29,18 @@ def steady_of(plan: Plan, *, rotation: Rotation, facing: float, pressure_Pa: flo
     file = plan.tire_file
     if file is None:
 
-        def published(SA: NDArray[np.float64], one: Drive) -> TireForces:
-            made = bakker.forces(plan.tire, SA=SA, FZ=one.FZ, rotation=rotation, camber=one.IA, facing=facing)
-            return TireForces(FY=made.FY, MZ=made.MZ)
+        def published(SA: NDArray[np.float64], drive: Drive) -> TireForces:
+            forces = bakker.forces(
+                plan.tire, SA=SA, FZ=drive.FZ, rotation=rotation, camber=drive.IA, facing=facing
+            )
+            return TireForces(FY=forces.FY, MZ=forces.MZ)
 
         return published
 
-    def from_file(SA: NDArray[np.float64], one: Drive) -> TireForces:
-        pressure = pressure_Pa + one.pressure_error
+    def from_file(SA: NDArray[np.float64], drive: Drive) -> TireForces:
+        pressure = pressure_Pa + drive.pressure_error
         return file_forces(
-            file, SA=SA, FZ=one.FZ, IA=one.IA, V=one.V, pressure_Pa=pressure, rotation=rotation
+            file, SA=SA, FZ=drive.FZ, IA=drive.IA, V=drive.V, pressure_Pa=pressure, rotation=rotation
         )
 
     return from_file

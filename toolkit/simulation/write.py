@@ -121,7 +121,7 @@ def _turned_on_the_hub(test: VirtualTest) -> list[str]:
 def session_toml(session: VirtualSession) -> str:
     """Return SESSION.toml for `toolkit calibrate`."""
     plan, sd = session.plan, reference_sd(session.plan)
-    quoted = {name: ", ".join(_text(one) for one in names) for name, names in (("i", CELLS), ("l", LOADS))}
+    quoted = {name: ", ".join(_text(name) for name in names) for name, names in (("i", CELLS), ("l", LOADS))}
     lines = [
         "schema = 1",
         f"instrument = {_text(plan.machine.name)}",

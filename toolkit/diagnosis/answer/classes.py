@@ -15,26 +15,26 @@ from toolkit.effects.catalogue import effects as catalogue
 
 def equivalent_to(problem: Problem, step: Step) -> tuple[str, ...]:
     """Return the other names that explain a step as well, without the step's own."""
-    names = [one.active.effect.name for one in step.rivals if one.difference > -VERDICT.close]
+    names = [rival.active.effect.name for rival in step.rivals if rival.difference > -VERDICT.close]
     names += _always(problem, step.active)
     own = step.active.effect.name
     return tuple(dict.fromkeys(name for name in names if name != own))
 
 
-def apart(found: FoundEffect) -> str:
+def apart(effect: FoundEffect) -> str:
     """Return the measurements that would tell an effect from its class, and of which names each speaks."""
-    told: dict[str, list[str]] = {}
-    for name in (found.name, *found.equivalent_to):
-        told.setdefault(catalogue()[name].separates, []).append(name)
-    return "; ".join(f"{text} ({', '.join(names)})" for text, names in told.items() if text)
+    statements: dict[str, list[str]] = {}
+    for name in (effect.name, *effect.equivalent_to):
+        statements.setdefault(catalogue()[name].separates, []).append(name)
+    return "; ".join(f"{text} ({', '.join(names)})" for text, names in statements.items() if text)
 
 
-def parted(found: FoundEffect) -> str:
+def parted(effect: FoundEffect) -> str:
     """Return the sentence that says what would tell an effect from its class, or from what is like it."""
-    others = found.equivalent_to or _akin(found.name)
+    others = effect.equivalent_to or _akin(effect.name)
     if not others:
         return ""
-    return f"To tell {found.name} from {', '.join(others)}: {apart(replace(found, equivalent_to=others))}."
+    return f"To tell {effect.name} from {', '.join(others)}: {apart(replace(effect, equivalent_to=others))}."
 
 
 def _akin(name: str) -> tuple[str, ...]:

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 def refined(
-    problem: Problem, folds: Folds, base: Fit, held: HeldOut, listed: Sequence[CandidateEffect]
+    problem: Problem, folds: Folds, base: Fit, held_out: HeldOut, listed: Sequence[CandidateEffect]
 ) -> tuple[Fit, HeldOut]:
     """Return the hypothesis that a search found with what its effects' sizes depend on.
 
@@ -36,23 +36,23 @@ def refined(
     with_zeros = _better(problem, base, _with_zeros(base, listed), -sys.float_info.max)
     if with_zeros is not base:
         with contextlib.suppress(FitError):
-            held = hold_out(problem, folds, with_zeros.active, with_zeros)
+            held_out = hold_out(problem, folds, with_zeros.active, with_zeros)
             base = with_zeros
     # Rows inside a band have no noise, so that a fold's noise, and its score, hang on which rows it has: the
     # noise before a band is for the band's width alone, and the score stays that of the sharp one.
-    for one in base.active:
-        base = _better(problem, base, _with_noise(base, one), STEP.band_noise)
-    return base, held
+    for applied in base.active:
+        base = _better(problem, base, _with_noise(base, applied), STEP.band_noise)
+    return base, held_out
 
 
-def without(active: Sequence[AppliedEffect], one: AppliedEffect) -> tuple[AppliedEffect, ...]:
+def without(active: Sequence[AppliedEffect], effect: AppliedEffect) -> tuple[AppliedEffect, ...]:
     """Return effects without one of them; a drift with the temperature goes with its zero."""
-    zero = (one.channel, None, None)
+    zero = (effect.channel, None, None)
 
-    def belongs(each: AppliedEffect) -> bool:
-        return one.effect.frees_zero and each.effect.is_zero and each.key[1:] == zero
+    def belongs(effect: AppliedEffect) -> bool:
+        return effect.effect.frees_zero and effect.effect.is_zero and effect.key[1:] == zero
 
-    return tuple(each for each in active if each.key != one.key and not belongs(each))
+    return tuple(applied for applied in active if applied.key != effect.key and not belongs(applied))
 
 
 def _better(problem: Problem, base: Fit, active: tuple[AppliedEffect, ...] | None, least: float) -> Fit:
@@ -60,28 +60,32 @@ def _better(problem: Problem, base: Fit, active: tuple[AppliedEffect, ...] | Non
     if active is None:
         return base
     try:
-        made = fit(problem, active, start=base.p)
+        refitted = fit(problem, active, start=base.p)
     except FitError:
         return base
-    return made if made.log_posterior >= base.log_posterior + least else base
+    return refitted if refitted.log_posterior >= base.log_posterior + least else base
 
 
 def _with_zeros(base: Fit, listed: Sequence[CandidateEffect]) -> tuple[AppliedEffect, ...] | None:
-    there = {one.channel for one in base.active if one.effect.is_zero}
-    wanted = {one.channel for one in base.active if one.effect.frees_zero} - there
+    there = {applied.channel for applied in base.active if applied.effect.is_zero}
+    free_zeros = {applied.channel for applied in base.active if applied.effect.frees_zero} - there
     zeros = tuple(
-        replace(one.active, values=one.starts[0].values | {one.active.effect.names[0]: 0.0})
-        for one in listed
-        if one.active.effect.is_zero and one.active.channel in wanted and one.active.runs is None
+        replace(channel.active, values=channel.starts[0].values | {channel.active.effect.names[0]: 0.0})
+        for channel in listed
+        if channel.active.effect.is_zero
+        and channel.active.channel in free_zeros
+        and channel.active.runs is None
     )
     return (*base.active, *zeros) if zeros else None
 
 
-def _with_noise(base: Fit, one: AppliedEffect) -> tuple[AppliedEffect, ...] | None:
-    noise, key = base.noise.get(str(one.channel)), one.effect.noise_key
+def _with_noise(base: Fit, effect: AppliedEffect) -> tuple[AppliedEffect, ...] | None:
+    noise, key = base.noise.get(str(effect.channel)), effect.effect.noise_key
     if key is None or noise is None:
         return None
     return tuple(
-        replace(each, values={**each.values, key: noise.marginal_sd}) if each.key == one.key else each
-        for each in base.active
+        replace(applied, values={**applied.values, key: noise.marginal_sd})
+        if applied.key == effect.key
+        else applied
+        for applied in base.active
     )

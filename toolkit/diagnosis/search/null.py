@@ -49,7 +49,7 @@ def search_p_values(
     smallest = np.full(SCREENING.draws, math.inf)
     starts = np.cumsum([0, *widths[:-1]])
     for width in sorted(set(widths) - {0}):
-        chosen = starts[[i for i, one in enumerate(widths) if one == width]]
+        chosen = starts[[i for i, start_width in enumerate(widths) if start_width == width]]
         part = sum(z[:, chosen + k] ** 2 for k in range(width))
         share = np.asarray(part) / total[:, None]
         statistic = -n * np.log1p(-np.minimum(share, 1 - 1e-9))

@@ -39,19 +39,19 @@ def look(problem: Problem, base: Fit, listed: Sequence[CandidateEffect], *, turn
     seed : of the null's draws
     """
     screen = LinearisedFit.of(problem, base)
-    taken = {applied.key for applied in base.active}
+    present = {applied.key for applied in base.active}
     candidates = [
-        candidate for candidate in listed if candidate.key not in taken and _is_sought(candidate, turn)
+        candidate for candidate in listed if candidate.key not in present and _is_sought(candidate, turn)
     ]
     screen.prepare(candidates)
     scored = screen.sharpened(
-        [one for candidate in candidates for one in screen.score(candidate)], SCREENING.sharpened
+        [score for candidate in candidates for score in screen.score(candidate)], SCREENING.sharpened
     )
     p_values = search_p_values(
         screen, [trial.block for trial in scored], [trial.gain * trial.trust for trial in scored], seed
     )
     p_of = {id(trial): p for trial, p in zip(scored, p_values, strict=True)}
-    significant = tuple(one for one in best_of(scored) if p_of[id(one)] < SCREENING.alpha)
+    significant = tuple(score for score in best_of(scored) if p_of[id(score)] < SCREENING.alpha)
     return Look(screen, tuple(candidates), tuple(scored), significant, p_of)
 
 
@@ -91,5 +91,5 @@ def masked(problem: Problem, base: Fit, candidates: Sequence[CandidateEffect]) -
         return frozenset()
     residual = {name: problem.observed[name] - values for name, values in simulated.items()}
     screen = LinearisedFit.of(problem, replace(base, p=declared, simulated=simulated, residual=residual))
-    ranked = best_of([one for candidate in candidates for one in screen.score(candidate)])
+    ranked = best_of([score for candidate in candidates for score in screen.score(candidate)])
     return frozenset(trial.candidate.key for trial in ranked[: PRIORS.masked])

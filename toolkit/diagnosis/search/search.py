@@ -138,11 +138,13 @@ def _is_nuisance(step: Step, steps: Sequence[Step]) -> bool:
         return True
     if not effect.is_zero:
         return False
-    beside = [other.active for other in steps if other.active.channel == step.active.channel]
+    beside = [
+        step_before.active for step_before in steps if step_before.active.channel == step.active.channel
+    ]
     offset = abs(step.active.values[effect.names[0]])
     return any(
-        other.effect.zero_beside is not None and offset <= other.effect.zero_beside(other.values)
-        for other in beside
+        active.effect.zero_beside is not None and offset <= active.effect.zero_beside(active.values)
+        for active in beside
     )
 
 
@@ -167,13 +169,13 @@ def _stepped(
         )
         steps = [*steps, step]
         with_steps = replace_effects(problem, base, (*base.active, active))
-        held = HeldOut(
+        held_out = HeldOut(
             scores=held_base.scores,
             simulated={**held_base.simulated, name: _rounded(held_base.simulated[name], lattice.step)},
             fits=held_base.fits,
         )
-        if matters(problem, held_base, held, STEP.first):
-            held_base = held
+        if matters(problem, held_base, held_out, STEP.first):
+            held_base = held_out
         base = with_steps
     return base, held_base, steps
 
@@ -192,11 +194,11 @@ def _pruned(
         remaining = without(base.active, steps[i].active)
         try:
             pruned = fit(problem, remaining, start=base.p)
-            held = hold_out(problem, folds, pruned.active, pruned)
+            scores = hold_out(problem, folds, pruned.active, pruned)
         except FitError:  # what is left cannot be simulated: the effect is needed
             continue
-        if held_base.total - held.total < STEP.least_gain:
-            base, held_base = pruned, held
+        if held_base.total - scores.total < STEP.least_gain:
+            base, held_base = pruned, scores
             keys = {applied.key for applied in remaining}
             steps = [step for step in steps if step.active.key in keys]
             return _pruned(problem, folds, base, held_base, steps)

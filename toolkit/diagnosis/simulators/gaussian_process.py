@@ -146,7 +146,7 @@ def likeliest(points: NDArray[np.float64], values: NDArray[np.float64]) -> Shape
     tried = {
         "bend": _BENDS,
         "length": _LENGTHS,
-        "load": tuple(one * reach for one in _LOADS),
+        "load": tuple(load * reach for load in _LOADS),
         "even": _EVENS,
         "noise": _NOISES,
     }

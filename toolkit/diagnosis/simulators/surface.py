@@ -67,23 +67,23 @@ class Surface:
         few = thinned(points, _TRIED)
         shape = likeliest(points[few], y[few] / over[few])
         many = thinned(points, _POINTS)
-        found = Process(shape, points[many], y[many] / over[many])
-        self._fits[name, way] = _FineGrid(found, self._slips, self._loads)
+        process = Process(shape, points[many], y[many] / over[many])
+        self._fits[name, way] = _FineGrid(process, self._slips, self._loads)
         missed = float(np.sqrt(np.mean((over * self._fits[name, way].at(points) - y) ** 2)))
         if missed > SURFACE.missed * max(float(np.std(y)), 1e-300):
             self.good = False
-        left_out = over[many] * found.left_out()
+        left_out = over[many] * process.left_out()
         between = float(np.sqrt(np.mean(left_out**2))) / SURFACE.closer
         self.between[name] = max(between, self.between.get(name, 0.0))
 
     def too_coarse(self) -> tuple[Finding, ...]:
         """Return a finding for each output that is known worse between slip angles than it is measured."""
-        made = []
+        findings = []
         for name, between in self.between.items():
             noise = scatter(self._case, name, self._load)
             if noise is not None and between > noise and self.good:
                 self.unsure[name] = between
-                made.append(
+                findings.append(
                     Finding(
                         rule="case-few-slip-angles",
                         where=f"{self._case.path.name}: simulation.simulated",
@@ -93,7 +93,7 @@ class Surface:
                         "the table; simulate at more slip angles, or give the simulation as kind python",
                     )
                 )
-        return tuple(made)
+        return tuple(findings)
 
     def _points(self, SA: NDArray[np.float64], FZ: NDArray[np.float64]) -> NDArray[np.float64]:
         loads = np.full(len(SA), self._loads[0]) if self._steady_load else FZ / self._load
@@ -135,7 +135,7 @@ class _FineGrid:
         from scipy.interpolate import RectBivariateSpline
 
         self._bend = found.shape.bend
-        low, high = (float(np.arcsinh(one / self._bend)) for one in slips)
+        low, high = (float(np.arcsinh(slip / self._bend)) for slip in slips)
         u = np.linspace(low, high, _FINE)
         z = np.linspace(loads[0], max(loads[1], loads[0] + 1e-3), _LOADS)
         SA, load = np.meshgrid(np.sinh(u) * self._bend, z, indexing="ij")
@@ -167,6 +167,6 @@ def scatter(case: Case, name: str, load_N: float) -> float | None:
         for cell, value in zip(cells.tolist(), away.tolist(), strict=True):
             if np.isfinite(value):
                 places.setdefault((state, *cell), []).append(value)
-    several = [np.asarray(one) for one in places.values() if len(one) > 1]
-    rows = sum(len(one) - 1 for one in several)
-    return float(np.sqrt(sum(float(one.var() * len(one)) for one in several) / rows)) if rows else None
+    several = [np.asarray(place) for place in places.values() if len(place) > 1]
+    rows = sum(len(group) - 1 for group in several)
+    return float(np.sqrt(sum(float(group.var() * len(group)) for group in several) / rows)) if rows else None

@@ -68,5 +68,7 @@ class TirTire:
                 values, SA=SA, FZ=load, FNOMIN=self.FNOMIN, IA=IA, KAPPA=0.0, pressure_change=change,
                 V=V, V0=self._speed if self._version == "6.x" else None, angles="star",
             )  # fmt: skip
-            made = (mf52 if self._version == "5.2" else mf61).forces(values, q, UNLOADED_RADIUS=self._radius)
-        return np.where(loaded, made.FY, 0.0), np.where(loaded, made.MZ, 0.0)
+            responses = (mf52 if self._version == "5.2" else mf61).forces(
+                values, q, UNLOADED_RADIUS=self._radius
+            )
+        return np.where(loaded, responses.FY, 0.0), np.where(loaded, responses.MZ, 0.0)

@@ -33,7 +33,7 @@ def tire_signs(source: Axes, target: Axes, run: Run) -> dict[str, int]:
 
 def first_of(case: Case, run: Run, *names: str, outputs: bool = True) -> NDArray[np.float64] | None:
     """Return the first of these drivers, or of these outputs, in SI; None where the run has none."""
-    among = {one.name for one in (case.channels if outputs else case.drivers)}
+    among = {channel.name for channel in (case.channels if outputs else case.drivers)}
     for name in names:
         if name in run.columns and name in among:
             values = si(case, name, run.columns[name])
