@@ -115,6 +115,8 @@ def test_loads_are_those_of_the_record_each_with_the_budget_of_its_row(record: t
         expected["MZ"][0] / 1.3558179483314
     )
     assert record.budget("FY", 500.0).U > 0
+    assert "FY_residuals" in record.figures
+    assert record.plot("MZ_normal").axes[0].get_title(loc="left").startswith("m15-virtual-r1, MZ")
 
 
 @pytest.mark.parametrize(

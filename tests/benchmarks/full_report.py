@@ -21,8 +21,8 @@ def content(test: Path, home: Path) -> Any:
     """Return the content of a test with its figures and tables repeated."""
     from toolkit.lab.resolve import resolve_test
     from toolkit.report.style import Style
-    from toolkit.report.test.content import build_content
-    from toolkit.report.vocabulary import REPORT
+    from toolkit.report.test.content import REPORT, build_content
+    from toolkit.report.vocabulary import TableEntry
 
     resolved = resolve_test(test, home=home)
     made = build_content(
@@ -33,10 +33,9 @@ def content(test: Path, home: Path) -> Any:
     figures = {f"f{i}": plots[i % len(plots)] for i in range(FIGURES)}
     tables = {f"t{i}": filled[i % len(filled)] for i in range(TABLES)}
     vocabulary = dataclasses.replace(
-        REPORT,
+        REPORT.vocabulary,
         figures=dict.fromkeys(figures, "a figure"),
-        tables={name: ("a table", table.columns) for name, table in tables.items()},
-        conditions={**REPORT.conditions, **dict.fromkeys(tables, "a table")},
+        tables={name: TableEntry(description="a table", columns=t.columns) for name, t in tables.items()},
     )
     return dataclasses.replace(
         made,

@@ -17,7 +17,7 @@ from tire_factory import LOAD, M15, PLYSTEER, Key, at_load, reduced_test, rows_o
 
 from toolkit.characteristics.characterise import characterise, characteristic_rows
 from toolkit.characteristics.model import Row
-from toolkit.characteristics.shared import root_of
+from toolkit.characteristics.shared_errors import root_of
 from toolkit.characteristics.uncertain import Part, Uncertain, weighted
 from toolkit.reduction.model import ReducedTest, Tare
 

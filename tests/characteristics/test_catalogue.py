@@ -30,7 +30,7 @@ from toolkit.characteristics.characteristic import PRINTED, Characteristic
 from toolkit.characteristics.groups import CHANNELS
 from toolkit.characteristics.layout import PULL, STIFFNESS
 from toolkit.lab.home import packaged_home
-from toolkit.report.vocabulary import REPORT
+from toolkit.report.test.content import REPORT
 from toolkit.simulation.plan import Plan
 from toolkit.simulation.run import simulate
 from toolkit.simulation.write import write_test
@@ -114,11 +114,11 @@ def test_the_german_words_of_the_report_make_the_german_titles() -> None:
 
 
 def test_every_table_figure_and_value_of_the_catalogue_is_a_tag() -> None:
-    tags = {one.path for one in REPORT.catalogue}
+    tags = {entry.path for entry in REPORT.vocabulary.entries}
     assert {f"figure.{figure.name}" for figure in figures()} <= tags
     assert {f"summary.{one.summary}" for one in summary()} <= tags
     for table in tables():
-        names = [column.name for column in REPORT.tables[table.name][1]]
+        names = [column.name for column in REPORT.vocabulary.tables[table.name].columns]
         for declared in columns(table):
             assert {declared.column_name, f"U_{declared.column_name}"} <= set(names)
 
@@ -201,7 +201,7 @@ import json, sys
 from pathlib import Path
 import toolkit.characteristics.catalogue as catalogue
 catalogue.__path__.append(sys.argv[1])
-from toolkit.report.build import build_content
+from toolkit.report.test.content import build_content
 from toolkit.testfile import read_test_file
 content = build_content(read_test_file(Path(sys.argv[2])))
 table = content.tables["stiffness"]

@@ -29,7 +29,7 @@ from weighted_sums import calibration_u
 from toolkit.characteristics.characterise import characterise
 from toolkit.characteristics.groups import group
 from toolkit.characteristics.model import Characteristics
-from toolkit.characteristics.shared import Shared
+from toolkit.characteristics.shared_errors import SharedErrors
 from toolkit.estimate import Estimate
 from toolkit.machine import TypeB
 from toolkit.pipeline import TestResult, process, read_test
@@ -211,7 +211,7 @@ def test_a_common_zero_of_the_cells_is_certain_in_plysteer_and_not_in_conicity(
         name: TypeB(symbol=name, u=0.0, relative=0.0, source="")
         for name in ("SA", "SA_scale", "FZ", "P", "zero")
     }
-    shared = Shared(record=record, machine_axes="machine", tared=True, **none)
+    shared = SharedErrors(record=record, machine_axes="machine", tared=True, **none)
     forward = next(c for c in result.reduced.conditions if c.rotation == "forward")
     reverse = next(c for c in result.reduced.conditions if c.rotation == "reverse")
     # SAE axes that follow the travel: conicity is (F - R)/2 and plysteer (F + R)/2 there.

@@ -18,9 +18,9 @@ def all_on(text: str) -> str:
 
 def test_a_starter_is_valid_and_so_is_every_entry_switched_on() -> None:
     text = starter(Sample)
-    made = read_text(Sample, text.encode(), where="starter.toml")
-    assert made.title == "a sample"
-    assert made.share == 0.5
+    instance = read_text(Sample, text.encode(), where="starter.toml")
+    assert instance.title == "a sample"
+    assert instance.share == 0.5
     keys = {line.lstrip("#").split(" = ")[0] for line in text.splitlines()}
     assert {*table_of(Sample).keys} - {"channel", "cells"} <= keys
     # Names that another entry declares cannot be invented.

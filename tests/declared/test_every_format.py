@@ -21,9 +21,9 @@ FORMATS = [Machine, Protocol, SessionFile, StatedTest]
 @pytest.mark.parametrize("cls", FORMATS)
 def test_the_starter_file_is_valid_and_what_is_written_reads_back_equal(cls: type) -> None:
     text = starter(cls)
-    stated = read_text(cls, text.encode(), where="starter.toml")
-    assert read_text(cls, toml_text(stated).encode(), where="written.toml") == stated
-    assert json.dumps(plain(stated), default=str)
+    instance = read_text(cls, text.encode(), where="starter.toml")
+    assert read_text(cls, toml_text(instance).encode(), where="written.toml") == instance
+    assert json.dumps(plain(instance), default=str)
 
 
 @pytest.mark.parametrize("cls", FORMATS)

@@ -30,25 +30,25 @@ def refused(text: str) -> ConfigError:
 
 
 def test_every_entry_as_it_is_held() -> None:
-    whole = sample(WHOLE)
-    assert whole.day == dt.date(2026, 3, 31)
-    assert whole.since == "2026-01-01"
-    assert whole.speed_m_s == 72 * (1 / 3.6)
-    assert isinstance(whole.speed_m_s, Quantity)
-    assert (whole.speed_m_s.value, whole.speed_m_s.unit) == (72, "km/h")
-    assert whole.angles_rad == tuple(angle * (math.pi / 180) for angle in (0, 1.5, -2))
-    assert whole.number == "17"
-    assert whole.pitch_m == 0.2
-    assert whole.folder == Path("data/raw")
-    assert whole.bounds == (-1.0, 2.5)
-    assert whole.signs == {"FY": 1, "MZ": -1}
-    assert [channel.unit for channel in whole.channels] == ["lbf", "deg"]
-    assert (whole.cells[0].name, whole.cells[0].u) == ("D51", 15 * 0.45359237 * 9.80665)
-    assert isinstance(whole.rate, Sweep)
-    assert whole.rate.limits == (1.0, 20.0)
-    assert isinstance(whole.check, Check)
-    assert [name for name, _ in whole.check.tolerance] == ["FY", "MZ"]
-    assert whole.extra == {"any": ["thing"]}
+    sample_file = sample(WHOLE)
+    assert sample_file.day == dt.date(2026, 3, 31)
+    assert sample_file.since == "2026-01-01"
+    assert sample_file.speed_m_s == 72 * (1 / 3.6)
+    assert isinstance(sample_file.speed_m_s, Quantity)
+    assert (sample_file.speed_m_s.value, sample_file.speed_m_s.unit) == (72, "km/h")
+    assert sample_file.angles_rad == tuple(angle * (math.pi / 180) for angle in (0, 1.5, -2))
+    assert sample_file.number == "17"
+    assert sample_file.pitch_m == 0.2
+    assert sample_file.folder == Path("data/raw")
+    assert sample_file.bounds == (-1.0, 2.5)
+    assert sample_file.signs == {"FY": 1, "MZ": -1}
+    assert [channel.unit for channel in sample_file.channels] == ["lbf", "deg"]
+    assert (sample_file.cells[0].name, sample_file.cells[0].u) == ("D51", 15 * 0.45359237 * 9.80665)
+    assert isinstance(sample_file.rate, Sweep)
+    assert sample_file.rate.limits == (1.0, 20.0)
+    assert isinstance(sample_file.check, Check)
+    assert [name for name, _ in sample_file.check.tolerance] == ["FY", "MZ"]
+    assert sample_file.extra == {"any": ["thing"]}
 
 
 def test_defaults_and_forms() -> None:

@@ -23,23 +23,23 @@ from toolkit.findings import Finding
 from toolkit.units import unit
 
 
-def again(made: Sample) -> Sample:
-    return read_text(Sample, toml_text(made).encode(), where="written.toml")
+def again(instance: Sample) -> Sample:
+    return read_text(Sample, toml_text(instance).encode(), where="written.toml")
 
 
 def test_units_are_kept() -> None:
-    whole = read_text(Sample, WHOLE.encode(), where="sample.toml")
-    written, stated = plain(whole), tomllib.loads(WHOLE)
+    sample_file = read_text(Sample, WHOLE.encode(), where="sample.toml")
+    written, source = plain(sample_file), tomllib.loads(WHOLE)
     for key in ("speed", "angles", "check", "cells", "bounds", "signs", "extra", "rate"):
-        assert written[key] == stated[key], key
+        assert written[key] == source[key], key
     assert written["channel"][0] == {"symbol": "D51", "unit": "lbf", "role": "load"}
     assert (written["schema"], written["day"], written["pitch"]) == (
         2,
         dt.date(2026, 3, 31),
         {"value": 200, "unit": "mm"},
     )
-    assert again(whole) == whole
-    assert toml_text(again(whole)) == toml_text(whole)
+    assert again(sample_file) == sample_file
+    assert toml_text(again(sample_file)) == toml_text(sample_file)
 
 
 def quantities(low: float, high: float, *units: str) -> st.SearchStrategy[float]:
@@ -65,8 +65,10 @@ FREQUENCIES = quantities(0, 1e6, "Hz", "kHz", "1/min")
 @st.composite
 def samples(draw: st.DrawFn) -> Sample:
     loads = tuple(draw(st.lists(TEXTS, min_size=1, max_size=3, unique=True)))
-    channels = tuple(draw(st.lists(CHANNELS, min_size=1, max_size=3, unique_by=lambda one: one.symbol)))
-    cells = [one.symbol for one in channels if one.role == "load"]
+    channels = tuple(
+        draw(st.lists(CHANNELS, min_size=1, max_size=3, unique_by=lambda channel: channel.symbol))
+    )
+    cells = [channel.symbol for channel in channels if channel.role == "load"]
     bounds = sorted(draw(st.lists(st.floats(-1e300, 1e300), min_size=2, max_size=2, unique=True)))
     forces = quantities(1e-3, 1e9, "N", "lbf", "kN", "N*m")
     return Sample(
@@ -111,8 +113,8 @@ def samples(draw: st.DrawFn) -> Sample:
 
 
 @given(samples())
-def test_what_is_written_reads_back_equal(made: Sample) -> None:
-    assert again(made) == made
+def test_what_is_written_reads_back_equal(instance: Sample) -> None:
+    assert again(instance) == instance
 
 
 class Colour(enum.Enum):
@@ -132,13 +134,13 @@ class Repair:
 
 
 def test_an_answer_is_json() -> None:
-    made = Repair(
+    instance = Repair(
         FY_max=np.float64(0.1), path=Path("a/b"), day=dt.date(2026, 3, 1), colour=Colour.RED,
         finding=Finding(rule="r", where="w", message="m"),
         rows={"x": np.array([[1.5, math.nan]]), "n": np.int64(3), "flag": np.bool_(True)},
         pairs=(("FY", math.inf), ("MZ", Quantity(2.0, value=2, unit="N*m"))), cache=object(),
     )  # fmt: skip
-    document = answer(made)
+    document = answer(instance)
     assert json.loads(json.dumps(document, allow_nan=False)) == {
         "schema": 1,
         "FY_max_abs_N": 0.1,
@@ -150,7 +152,7 @@ def test_an_answer_is_json() -> None:
         "pairs": [["FY", None], ["MZ", 2.0]],
     }
     assert next(iter(document)) == "schema"
-    assert answer(dataclasses.replace(made, day=None))["day"] is None
+    assert answer(dataclasses.replace(instance, day=None))["day"] is None
 
 
 def test_a_declared_format_as_an_answer() -> None:

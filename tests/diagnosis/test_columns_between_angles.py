@@ -10,9 +10,9 @@ from toolkit.diagnosis.case.reader import read_case
 from toolkit.diagnosis.diagnose import diagnose
 from toolkit.diagnosis.fit.problem import problem_of
 from toolkit.diagnosis.simulators.columns import ColumnsModel
-from toolkit.diagnosis.simulators.simulator import Active
 from toolkit.diagnosis.simulators.surface import Surface, scatter
 from toolkit.diagnosis.simulators.tire import base_drive
+from toolkit.effects.applied import AppliedEffect
 from toolkit.effects.catalogue import effects
 from toolkit.errors import ConfigError
 
@@ -156,7 +156,7 @@ def test_a_drum_against_a_table_of_columns_is_the_shorter_patch(tmp_path):
 
 def test_an_effect_of_no_size_leaves_the_columns_as_they_are(tmp_path):
     case = written(tmp_path, table())
-    curved = Active(effect=effects()["drum_curvature"], values={"reduction": 0.0})
+    curved = AppliedEffect(effect=effects()["drum_curvature"], values={"reduction": 0.0})
     made = ColumnsModel(case).simulate(case.runs[0], {}, [curved])
     np.testing.assert_allclose(made["FY"], case.runs[0].simulated["FY"], atol=1e-9)
 

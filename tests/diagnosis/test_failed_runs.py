@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import pytest
 
 from toolkit.diagnosis.answer.failed_runs import FailedRuns
-from toolkit.diagnosis.simulators.simulator import Active
+from toolkit.effects.applied import AppliedEffect
 from toolkit.effects.catalogue import effects
 from toolkit.errors import FitError
 
@@ -21,12 +21,12 @@ def _simulate(run, p, active):
 
 
 def _friction(size):
-    return Active(effect=effects()["coulomb_friction"], channel="v", values={"coulomb": size})
+    return AppliedEffect(effect=effects()["coulomb_friction"], channel="v", values={"coulomb": size})
 
 
 def test_an_effect_that_never_could_be_simulated_is_told_and_one_that_sometimes_could_is_not():
     failed = FailedRuns(_simulate)
-    drag = Active(effect=effects()["quadratic_drag"], channel="v", values={"drag": 1.0})
+    drag = AppliedEffect(effect=effects()["quadratic_drag"], channel="v", values={"drag": 1.0})
     for active in ([_friction(3.0)], [_friction(1.0), drag], [drag]):
         with pytest.raises(FitError):
             failed(RUN, {"m": 1.0}, active)

@@ -74,4 +74,4 @@ file = "r1.csv"
     assert made is not None
     (tmp_path / "again.toml").write_text(made, encoding="utf-8")
     (again,) = read_model(tmp_path / "again.toml").effects
-    assert again.effect.name == "nonlinearity"
+    assert again.applied.effect.name == "nonlinearity"

@@ -22,8 +22,8 @@ NO_RESULT = frozenset(
     """.split()
 )
 """Keys of answers that hold times, versions, ledger heads, layout and hashes of whole documents."""
-NO_RESULT_TAGS = frozenset(("tk:table.models.seconds", "tk:certificate.ledger_head"))
-"""Tags of documents that print a time, or a ledger's head, which has times in it."""
+NO_RESULT_TAGS = frozenset(("tk:report.date", "tk:table.models.seconds", "tk:certificate.ledger_head"))
+"""Tags of documents that print the day, a time, or a ledger's head, which has times in it."""
 
 
 @dataclass(slots=True)

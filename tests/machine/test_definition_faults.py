@@ -120,8 +120,8 @@ def test_a_wrong_entry_is_named_with_its_line(
     last = re.findall(r"[A-Za-z_0-9]+", key.split("[", maxsplit=1)[0] if key.endswith("]") else key)[-1]
     assert error.line is not None or new == ""
     if new:
-        shown = str(error.line).split(" | ", 1)[1]
-        assert last in shown or key.split(".")[-2].split("[", maxsplit=1)[0] in shown
+        line_text = str(error.line).split(" | ", 1)[1]
+        assert last in line_text or key.split(".")[-2].split("[", maxsplit=1)[0] in line_text
 
 
 @pytest.mark.parametrize(

@@ -16,9 +16,9 @@ from lxml import etree
 from report_factory import make_record, make_result
 
 from toolkit.report.deliver import Delivered, deliver
+from toolkit.report.kinds import check as check_template
 from toolkit.report.style import Style
 from toolkit.report.test.content import build_content
-from toolkit.report.word.check import check_template
 from toolkit.report.word.contents_pages import pdf_outline, pdf_text, printed_pages
 from toolkit.report.word.fill import fill
 from toolkit.report.word.package import read_template

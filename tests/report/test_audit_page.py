@@ -202,11 +202,11 @@ class TestSummary:
         assert headings == (["Grades", "Findings"] if archive else [])
 
     def test_a_template_is_known_by_its_tags_and_asks_for_no_reports_tags(self):
-        from toolkit.report.audit.vocabulary import AUDIT
-        from toolkit.report.certificate.vocabulary import CERTIFICATE
-        from toolkit.report.vocabulary import REPORT
+        from toolkit.report.audit.content import AUDIT
+        from toolkit.report.certificate.content import CERTIFICATE
+        from toolkit.report.test.content import REPORT
 
         asked = ("tk:test.name", "tk:certificate.id", "tk:audit.id")
-        assert AUDIT.demanded(asked) == ("tk:audit.heads", "tk:audit.id")
-        assert "tk:audit.id" not in REPORT.demanded(asked)
-        assert "tk:audit.id" not in CERTIFICATE.demanded(asked)
+        assert AUDIT.vocabulary.demanded(asked) == ("tk:audit.heads", "tk:audit.id")
+        assert "tk:audit.id" not in REPORT.vocabulary.demanded(asked)
+        assert "tk:audit.id" not in CERTIFICATE.vocabulary.demanded(asked)

@@ -14,7 +14,7 @@ from toolkit.machine import TypeB
 from toolkit.pipeline import TestResult
 from toolkit.report.style import Style
 from toolkit.report.test.characteristics import summary_load
-from toolkit.report.test.tables import build_tables
+from toolkit.report.test.content import build_content
 
 
 def with_budget(load: float, name: str, **sources: float) -> TestResult:
@@ -31,7 +31,7 @@ def with_budget(load: float, name: str, **sources: float) -> TestResult:
 
 
 def rows(result: TestResult, style: Style | None = None) -> list[dict[str, object]]:
-    table = build_tables(result, None, (), style or Style())["budget"]
+    table = build_content(result, style=style or Style()).tables["budget"]
     return [dict(zip([c.name for c in table.columns], row, strict=True)) for row in table.rows]
 
 
@@ -74,7 +74,7 @@ def test_values_at_slip_angles_have_their_uncertainty() -> None:
     )  # fmt: skip
     lacking = dataclasses.replace(at, name="MZ", estimate=None, lacking="no fitted curve of MZ")
     chars = dataclasses.replace(result.characteristics, rows=(at, lacking))
-    made = build_tables(dataclasses.replace(result, characteristics=chars), None, (), Style())["at_angles"]
+    made = build_content(dataclasses.replace(result, characteristics=chars)).tables["at_angles"]
     row = dict(zip([c.name for c in made.columns], made.rows[0], strict=True))
     assert row["SA"] == pytest.approx(-2.0)
     assert (row["FY"], row["MZ"]) == (2000.0, None)
@@ -91,7 +91,7 @@ STATED = (
 def stated(style: Style, *given: TypeB) -> list[tuple[object, ...]]:
     result = make_result()
     result = dataclasses.replace(result, reduced=dataclasses.replace(result.reduced, stated=given))
-    return list(build_tables(result, None, (), style)["stated"].rows)
+    return list(build_content(result, style=style).tables["stated"].rows)
 
 
 def test_what_the_machine_states_is_told_with_its_source() -> None:

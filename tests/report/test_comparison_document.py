@@ -17,9 +17,8 @@ from toolkit.comparison.model import Comparison, Entry
 from toolkit.estimate import Estimate
 from toolkit.findings import Finding
 from toolkit.report.comparison.cells import conclusion, named, p_text, shown_rows, with_U
-from toolkit.report.comparison.content import build_comparison_content
+from toolkit.report.comparison.content import COMPARISON, build_comparison_content
 from toolkit.report.comparison.plots import comparison_plots
-from toolkit.report.comparison.vocabulary import COMPARISON, TABLES
 from toolkit.report.style import Style
 
 CHECKOUT = Path(__file__).resolve().parents[2]
@@ -63,10 +62,10 @@ def content(found: Comparison, style: Style | None = None, findings: tuple[Findi
 def test_every_table_has_the_columns_of_its_vocabulary() -> None:
     made = content(pair(), findings=(Finding(rule="r", where="w", message="m"),))
     for name, table in made.tables.items():
-        assert table.columns == TABLES[name][1]
+        assert table.columns == COMPARISON.vocabulary.tables[name].columns
         assert all(len(row) == len(table.columns) for row in table.rows)
-    assert set(made.tables) == set(TABLES)
-    assert set(made.conditions) >= set(COMPARISON.conditions)
+    assert set(made.tables) == set(COMPARISON.vocabulary.tables)
+    assert set(made.conditions) >= set(COMPARISON.vocabulary.asked)
 
 
 def test_numbers_are_those_of_the_comparison() -> None:

@@ -18,8 +18,7 @@ from toolkit.lab.resolve import Resolved
 from toolkit.report.content import ReportContent
 from toolkit.report.figures import draw, draw_svg
 from toolkit.report.handover import content_hash
-from toolkit.report.tags import catalogue
-from toolkit.report.test.content import build_content
+from toolkit.report.test.content import REPORT, build_content
 from toolkit.report.test.models import model_plots, model_rows
 from toolkit.report.word.fill import fill, needed_figures
 from toolkit.report.word.package import read_template
@@ -83,7 +82,7 @@ def test_a_report_can_ask_for_them_and_the_catalogue_lists_them() -> None:
     made = content(COMPARISON)
     assert all(made.holds(one) for one in ("models", "models_fy", "figure.models_mz", "table.models"))
     assert made.values["caption.models_fy"].value == made.plots["models_fy"].caption
-    listed = {one.path for one in catalogue()}
+    listed = {one.path for one in REPORT.vocabulary.entries}
     assert {"table.models", "figure.models_fy", "figure.models_mz", "if.models", "row.FY_left_out"} <= listed
 
 

@@ -15,9 +15,9 @@ from report_factory import make_record, make_result
 from toolkit.errors import ToolkitError
 from toolkit.report.content import ReportContent
 from toolkit.report.deliver import Delivered, Job, deliver_all
+from toolkit.report.kinds import check as check_template
 from toolkit.report.style import Style
 from toolkit.report.test.content import build_content
-from toolkit.report.word.check import check_template
 from toolkit.report.word.contents_pages import pdf_text
 from toolkit.report.word.controls import kept_whole
 from toolkit.report.word.package import read_template

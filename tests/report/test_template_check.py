@@ -10,8 +10,9 @@ from hypothesis import strategies as st
 from template_factory import FOLDER, make, opened, p, run, sdt, tbl
 
 from toolkit.errors import TemplateError, ToolkitError
+from toolkit.report.kinds import check as check_template
 from toolkit.report.style import Style
-from toolkit.report.word.check import RULES, check_template
+from toolkit.report.word.check import RULES
 from toolkit.report.word.package import read_template
 
 CHECKOUT = Path(__file__).resolve().parents[2]

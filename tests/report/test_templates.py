@@ -32,16 +32,15 @@ from toolkit.report.audit.content import build_audit_content
 from toolkit.report.audit.page import AuditView
 from toolkit.report.certificate.collect import collect
 from toolkit.report.certificate.content import build_content as certified
-from toolkit.report.content import ReportContent
+from toolkit.report.content import ReportContent, say
 from toolkit.report.deliver import Delivered, Job, deliver_all
 from toolkit.report.diagnosis.content import build_diagnosis_content
+from toolkit.report.kinds import check as check_template
 from toolkit.report.style import Style, read_style, style_file
 from toolkit.report.test.content import build_content, report_id
-from toolkit.report.word.check import check_template
 from toolkit.report.word.contents_pages import pdf_outline, pdf_text
 from toolkit.report.word.package import read_template
 from toolkit.report.word.xml import q
-from toolkit.report.words import say
 
 DAY = dt.date(2026, 11, 21)
 DETAILS = {

@@ -11,7 +11,7 @@ import numpy as np
 from toolkit.characteristics.groups import Direction, DirectionFit, Group, directions_of, group
 from toolkit.characteristics.model import Characteristics, Point, Row
 from toolkit.characteristics.rows import point_u, rows_of
-from toolkit.characteristics.shared import shared_of
+from toolkit.characteristics.shared_errors import shared_errors_of
 from toolkit.findings import Finding
 from toolkit.tires.evaluate import estimate_at
 from toolkit.tires.fit import fit_curves, why_not
@@ -35,7 +35,7 @@ def characterise(
     groups = group(reduced)
     fits, findings = _fit(groups)
     directions = directions_of(reduced, fits)
-    shared = shared_of(reduced, machine=machine, record=record)
+    shared = shared_errors_of(reduced, machine=machine, record=record)
     return Characteristics(
         fits=fits,
         rows=tuple(replace(row, parts=()) for row in rows_of(directions, shared=shared)),
@@ -57,7 +57,7 @@ def characteristic_rows(
     """Return the rows that have a value, with the parts of their uncertainty, to compare them."""
     rows = rows_of(
         directions_of(reduced, characteristics.fits),
-        shared=shared_of(reduced, machine=machine, record=record),
+        shared=shared_errors_of(reduced, machine=machine, record=record),
     )
     return tuple(row for row in rows if row.estimate is not None)
 

@@ -127,7 +127,8 @@ class Characteristics:
         """Return the rows as a table, SI: value, u, U and its interval at 95 %, k, dof, unit."""
         import pandas as pd
 
-        return pd.DataFrame([_record(row) for row in self.rows], columns=_COLUMNS)
+        table = pd.DataFrame([_record(row) for row in self.rows], columns=_COLUMNS)
+        return table.astype(dict.fromkeys(_NUMBERS, float))
 
 
 def in_order(rows: Iterable[Row], fits: Iterable[DirectionFit]) -> tuple[Row, ...]:
@@ -160,6 +161,7 @@ def answer_lists(rows: Iterable[Row]) -> dict[str, list[dict[str, Any]]]:
     return {answer: list(entries.values()) for answer, entries in lists.items()}
 
 
+_NUMBERS = ("load_N", "SA_rad", "value", "u", "U", "k", "dof", "low_95", "high_95")
 _COLUMNS = (
     "characteristic", "title", "channel", "load_N", "rotation", "SA_rad", "value", "u", "U", "k", "dof",
     "low_95", "high_95", "unit", "lacking",

@@ -14,7 +14,7 @@ import numpy as np
 
 from toolkit.characteristics.groups import CHANNELS, Channel, Direction
 from toolkit.characteristics.scatter import Scatter, weights_of
-from toolkit.characteristics.shared import Shared
+from toolkit.characteristics.shared_errors import SharedErrors
 from toolkit.characteristics.uncertain import Part, Uncertain, merged
 from toolkit.estimate import Estimate
 from toolkit.tires.catalog import model
@@ -46,7 +46,12 @@ class Reader:
     """
 
     def __init__(
-        self, direction: Direction, *, shared: Shared, scatter: Scatter | None = None, stepped: bool = True
+        self,
+        direction: Direction,
+        *,
+        shared: SharedErrors,
+        scatter: Scatter | None = None,
+        stepped: bool = True,
     ) -> None:
         self.direction, self.shared, self.scatter, self.stepped = direction, shared, scatter, stepped
         self.group = direction.group

@@ -13,7 +13,7 @@ from toolkit.characteristics.groups import CHANNELS, Channel, Direction
 from toolkit.characteristics.model import Row
 from toolkit.characteristics.reading import Reader
 from toolkit.characteristics.scatter import Scatter, scatter_of
-from toolkit.characteristics.shared import Shared
+from toolkit.characteristics.shared_errors import SharedErrors
 from toolkit.characteristics.uncertain import Part, Uncertain
 from toolkit.reduction.common_load import at_one_angle, slopes
 
@@ -24,7 +24,7 @@ _REACH_RAD = math.radians(0.5)
 _Key = tuple[Characteristic, float, str, float | None]
 
 
-def rows_of(directions: Sequence[Direction], *, shared: Shared) -> tuple[Row, ...]:
+def rows_of(directions: Sequence[Direction], *, shared: SharedErrors) -> tuple[Row, ...]:
     """Return every characteristic of a test, with parts: of its loads, its directions, its slip angle steps.
 
     What the test cannot give is a row without an estimate that says what lacks.
@@ -97,7 +97,7 @@ def lacking_row(
 
 
 def _with_load_and_pressure(
-    numbers: Mapping[_Key, Uncertain | None], shared: Shared
+    numbers: Mapping[_Key, Uncertain | None], shared: SharedErrors
 ) -> dict[_Key, Uncertain | None]:
     """Add what an error of the load cell and of the pressure does to each value.
 
@@ -124,7 +124,9 @@ def _with_load_and_pressure(
     return complete
 
 
-def point_u(directions: Sequence[Direction], *, shared: Shared) -> Mapping[tuple[str, int], dict[str, float]]:
+def point_u(
+    directions: Sequence[Direction], *, shared: SharedErrors
+) -> Mapping[tuple[str, int], dict[str, float]]:
     """Return the whole standard uncertainty of every condition as measured: (file, first row) -> channel.
 
     Sources: the record, the cells' zeros or tares, the scatter of the rows and about the curves, and through
@@ -153,7 +155,7 @@ def point_u(directions: Sequence[Direction], *, shared: Shared) -> Mapping[tuple
 
 
 def _squares(
-    directions: Sequence[Direction], channel: Channel, shared: Shared, scatter: Scatter
+    directions: Sequence[Direction], channel: Channel, shared: SharedErrors, scatter: Scatter
 ) -> dict[int, np.ndarray]:
     """Return the variance of each condition of each direction but for load and pressure."""
     from toolkit.tires.evaluate import slope_at

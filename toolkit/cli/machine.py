@@ -43,7 +43,7 @@ def correct(
         Path, typer.Argument(metavar="ANSWER", help="Folder of toolkit diagnose --out, or its model.toml.")
     ],
     effect: Annotated[
-        str, typer.Option("--effect", help="What is corrected: steer_offset, steer_compliance or crosstalk.")
+        str, typer.Option("--effect", help="What is corrected: an effect that the answer names.")
     ],
     reason: Annotated[str, typer.Option("--reason", help="Why it is taken for the machine's own.")],
     by: Annotated[str, typer.Option("--by", help="Who decides it.")],

@@ -22,8 +22,8 @@ def check(
 
     Example: toolkit template check report_templates/org.docx
     """
+    from toolkit.report.kinds import check as check_template
     from toolkit.report.style import read_style, style_file
-    from toolkit.report.word.check import check_template
     from toolkit.report.word.package import open_package, read_template
     from toolkit.report.word.scan import scan
     from toolkit.report.word.xml import stories
@@ -71,20 +71,13 @@ def tags(
     Example: toolkit template tags --test tests/2019-06-04
     """
     from toolkit.lab.answers import table
-    from toolkit.report.audit.vocabulary import AUDIT
-    from toolkit.report.certificate.vocabulary import CERTIFICATE
-    from toolkit.report.comparison.vocabulary import COMPARISON
-    from toolkit.report.diagnosis.vocabulary import DIAGNOSIS
-    from toolkit.report.listing import list_tags
+    from toolkit.report.kinds import VOCABULARIES
+    from toolkit.report.reference import list_tags
     from toolkit.report.style import read_style, style_file
     from toolkit.report.test.content import build_content
-    from toolkit.report.vocabulary import REPORT
 
-    kinds = {
-        vocabulary.name: vocabulary for vocabulary in (REPORT, CERTIFICATE, COMPARISON, DIAGNOSIS, AUDIT)
-    }
-    if kind not in kinds or (kind != "report" and test is not None):
-        raise typer.BadParameter(f"{', '.join(kinds)}; only report with --test", param_hint="--kind")
+    if kind not in VOCABULARIES or (kind != "report" and test is not None):
+        raise typer.BadParameter(f"{', '.join(VOCABULARIES)}; only report with --test", param_hint="--kind")
     style = read_style(style_file(template)) if template else read_style(None)
     content = None
     if test is not None:
@@ -94,7 +87,7 @@ def tags(
             test, calibration=calibration, calibrations=calibrations, home=home, draft=draft
         )
         content = build_content(resolved.result, resolved.record, findings=resolved.findings, style=style)
-    listed = list_tags(content, style, kinds[kind])
+    listed = list_tags(content, style, VOCABULARIES[kind])
     rows = [
         [tag["tag"], tag["kind"], tag["unit"] or "", str(tag["value"] or "")[:40], tag["description"]]
         for tag in listed

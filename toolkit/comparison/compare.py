@@ -9,7 +9,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from toolkit.characteristics.characterise import characteristic_rows
-from toolkit.characteristics.shared import identity_of
+from toolkit.characteristics.shared_errors import identity_of
 from toolkit.comparison.differences import differences, pattern_effects
 from toolkit.comparison.model import MODES, Comparison, Entry, Mode, Repeats
 from toolkit.comparison.precision import repeats_of

@@ -19,7 +19,7 @@ from toolkit.characteristics.groups import CHANNELS, Direction, DirectionFit, Gr
 from toolkit.characteristics.model import Row
 from toolkit.characteristics.reading import Reader
 from toolkit.characteristics.rows import at_angles
-from toolkit.characteristics.shared import Shared
+from toolkit.characteristics.shared_errors import SharedErrors
 from toolkit.errors import FitError
 from toolkit.findings import Finding
 from toolkit.machine import TypeB
@@ -141,11 +141,11 @@ def _direction(load: float, channels: dict[str, tuple[Curve, CurveFit]], path: P
     )
 
 
-def _nothing_shared(identity: str) -> Shared:
+def _nothing_shared(identity: str) -> SharedErrors:
     def none(symbol: str) -> TypeB:
         return TypeB(symbol=symbol, u=0.0, relative=0.0, source="a maker's table states none")
 
-    return Shared(
+    return SharedErrors(
         record=None,
         machine_axes="SAE",
         tared=True,

@@ -83,7 +83,6 @@ reads back equal.
 from toolkit.declared.declaration import table_of
 from toolkit.declared.describe import json_schema, reference, starter
 from toolkit.declared.faults import Fault, Source, nearest, refuse
-from toolkit.declared.lines import lines_of
 from toolkit.declared.marks import (
     Above,
     AtLeast,
@@ -129,7 +128,6 @@ __all__ = [
     "build",
     "json_schema",
     "json_value",
-    "lines_of",
     "nearest",
     "plain",
     "read",

@@ -62,8 +62,8 @@ def table_of(cls: type) -> TableKind:
 
 def form_of(cls: type) -> Format | None:
     """Return the class's own `Format`, None where it goes by that of the table around it."""
-    own = vars(cls).get("FORMAT")
-    return own if isinstance(own, Format) else None
+    form = vars(cls).get("FORMAT")
+    return form if isinstance(form, Format) else None
 
 
 @functools.cache
@@ -119,7 +119,7 @@ def kind_of(annotation: Any, marks: Marks = ()) -> tuple[Kind, bool]:
     entry = _mark(marks, Entry) or Entry()
     origin, arguments = get_origin(annotation), get_args(annotation)
     if origin in (Union, types.UnionType):
-        forms = [one for one in arguments if one is not type(None)]
+        forms = [argument for argument in arguments if argument is not type(None)]
         optional = len(forms) < len(arguments)
         if len(forms) == 1:
             return kind_of(forms[0], marks)[0], optional
@@ -165,9 +165,9 @@ def _several(origin: type, arguments: tuple[Any, ...], entry: Entry, marks: Mark
     return ListKind(entry=entry, item=item, size=size, distinct=_mark(marks, Distinct))
 
 
-def _number(entry: Entry, marks: Marks, *, whole: bool) -> Kind:
+def _number(entry: Entry, marks: Marks, *, integer: bool) -> Kind:
     limits = tuple(mark for mark in marks if isinstance(mark, Above | AtLeast | Below | AtMost))
-    number, unit = NumberKind(entry=entry, limits=limits, whole=whole), _mark(marks, Unit)
+    number, unit = NumberKind(entry=entry, limits=limits, integer=integer), _mark(marks, Unit)
     return number if unit is None else QuantityKind(entry=entry, number=number, unit=unit)
 
 
@@ -181,8 +181,8 @@ def _text(entry: Entry, marks: Marks) -> Kind:
 
 _SINGLE: dict[Any, Any] = {
     bool: lambda entry, _: BoolKind(entry=entry),
-    int: lambda entry, marks: _number(entry, marks, whole=True),
-    float: lambda entry, marks: _number(entry, marks, whole=False),
+    int: lambda entry, marks: _number(entry, marks, integer=True),
+    float: lambda entry, marks: _number(entry, marks, integer=False),
     str: _text,
     dt.date: lambda entry, _: DateKind(entry=entry),
     pathlib.Path: lambda entry, _: FileKind(entry=entry),
@@ -191,10 +191,10 @@ _SINGLE: dict[Any, Any] = {
 
 def _form(annotation: Any, marks: Marks) -> Kind:
     """Return the kind of one of several forms; of single values all say what the field expects."""
-    annotation, own = _bare(annotation)
+    annotation, inner_marks = _bare(annotation)
     several = dataclasses.is_dataclass(annotation) or get_origin(annotation) is not None
     inner = tuple(mark for mark in marks if not (several and isinstance(mark, Entry)))
-    return kind_of(annotation, (*own, *inner))[0]
+    return kind_of(annotation, (*inner_marks, *inner))[0]
 
 
 def _tag(kinds: tuple[Kind, ...]) -> str | None:
@@ -202,7 +202,7 @@ def _tag(kinds: tuple[Kind, ...]) -> str | None:
     tables = [kind for kind in kinds if isinstance(kind, TableKind)]
     if len(tables) < 2:
         return None
-    names = [{one.name for one in table.fields if isinstance(one.kind, ChoiceKind)} for table in tables]
+    names = [{field.name for field in table.fields if isinstance(field.kind, ChoiceKind)} for table in tables]
     shared = sorted(set.intersection(*names))
     if not shared:
         raise TypeError("tables that may stand in one place need a Literal field that tells them apart")

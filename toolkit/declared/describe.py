@@ -37,16 +37,16 @@ def _starter_table(kind: TableKind, path: tuple[str, ...], *, on: bool) -> Itera
         if _inner_table(declared.kind) is not None and declared.kind.entry.example is None:
             below.append(declared)
             continue
-        shown = on and declared.required
+        enabled = on and declared.required
         yield from _comment(_sentence(declared))
-        yield f"{'' if shown else '#'}{key_of(declared.key)} = {_example(declared)}"
+        yield f"{'' if enabled else '#'}{key_of(declared.key)} = {_example(declared)}"
         if declared.beside is not None and declared.beside not in kind.own_keys:
-            yield f'{"" if shown else "#"}{declared.beside} = "{declared.unit}"'
+            yield f'{"" if enabled else "#"}{declared.beside} = "{declared.unit}"'
     for declared in below:
         inner = _inner_table(declared.kind)
         if inner is None:
             continue
-        shown, names = on and declared.required, (*path, declared.key)
+        enabled, names = on and declared.required, (*path, declared.key)
         yield ""
         yield from _comment(_sentence(declared))
         header, inside = ".".join(map(key_of, names)), names
@@ -54,8 +54,8 @@ def _starter_table(kind: TableKind, path: tuple[str, ...], *, on: bool) -> Itera
             inside = (*names, next(iter(declared.kind.example())))
             header = ".".join(map(key_of, inside))
         brackets = ("[[", "]]") if isinstance(declared.kind, ListKind) else ("[", "]")
-        yield f"{'' if shown else '#'}{brackets[0]}{header}{brackets[1]}"
-        yield from _starter_table(inner, inside, on=shown)
+        yield f"{'' if enabled else '#'}{brackets[0]}{header}{brackets[1]}"
+        yield from _starter_table(inner, inside, on=enabled)
 
 
 def _inner_table(kind: Kind) -> TableKind | None:
@@ -131,10 +131,10 @@ def _reference_row(declared: Field) -> str:
     return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
 
 
-def _sections(kind: TableKind, header: str, seen: set[type]) -> Iterator[tuple[str, TableKind]]:
-    if kind.cls in seen:
+def _sections(kind: TableKind, header: str, described: set[type]) -> Iterator[tuple[str, TableKind]]:
+    if kind.cls in described:
         return
-    seen.add(kind.cls)
+    described.add(kind.cls)
     yield header, kind
     for declared in kind.fields:
         name = f"{header.strip('[]')}.{declared.key}".lstrip(".")
@@ -143,7 +143,7 @@ def _sections(kind: TableKind, header: str, seen: set[type]) -> Iterator[tuple[s
             if table is not None:
                 name_text = f"{name}.NAME" if isinstance(inner, KeyedKind) else name
                 yield from _sections(
-                    table, f"[[{name}]]" if isinstance(inner, ListKind) else f"[{name_text}]", seen
+                    table, f"[[{name}]]" if isinstance(inner, ListKind) else f"[{name_text}]", described
                 )
 
 

@@ -9,8 +9,7 @@ from collections.abc import Container, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
-from toolkit.declared.lines import Path, lines_of
-from toolkit.declared.marks import Format, Quantity
+from toolkit.declared.marks import Format, Path, Quantity
 from toolkit.errors import ConfigError
 
 LIKE = 0.5  # of `difflib`: what is less alike was not meant
@@ -63,7 +62,7 @@ class Fault:
             return f"{name}: unknown key; {self.hint}"
         if self.kind == "missing":
             return f"{name}: missing; expected {self.expected}"
-        problem = self.what or f"{shown(self.got, quoted=True)} cannot be used"
+        problem = self.what or f"{display(self.got, quoted=True)} cannot be used"
         return f"{name}: {problem}; expected {self.expected}"
 
 
@@ -79,10 +78,10 @@ def key_text(path: Path) -> str:
     return text
 
 
-def shown(value: Any, *, quoted: bool = False) -> str:
+def display(value: Any, *, quoted: bool = False) -> str:
     """Return a value as a settings file writes it, cut where it is long.
 
-    >>> shown({"value": 80, "unit": "km/h"})
+    >>> display({"value": 80, "unit": "km/h"})
     '{ value = 80, unit = "km/h" }'
     """
     if value is None:
@@ -110,7 +109,7 @@ def _inline(value: Any) -> str:
     return value.isoformat() if isinstance(value, dt.date | dt.time) else str(value)
 
 
-def nearest(name: str, known: Sequence[str], present: Container[str] = ()) -> str | None:
+def nearest(name: str, candidates: Sequence[str], present: Container[str] = ()) -> str | None:
     """Return the known name that was meant, None where none is alike.
 
     Case does not count: ``dot`` is DOT. Of two that are as near, that which is not there yet was meant.
@@ -123,7 +122,7 @@ def nearest(name: str, known: Sequence[str], present: Container[str] = ()) -> st
         ratio = difflib.SequenceMatcher(None, name.lower(), candidate.lower()).ratio()
         return ratio, candidate not in present, candidate
 
-    near = max(known, key=likeness, default=None)
+    near = max(candidates, key=likeness, default=None)
     return None if near is None or likeness(near)[0] < LIKE else near
 
 
@@ -143,6 +142,8 @@ class Source:
         """Return the source and the line of an entry, or of the nearest table above it."""
         if self.base is not None and any(path[:size] in self.inherited for size in range(1, len(path) + 1)):
             return self.base.place(path)
+        from toolkit.declared.lines import lines_of
+
         lines = {} if self.text is None else lines_of(self.text)
         while path:
             if path in lines:
@@ -187,7 +188,7 @@ def refuse(faults: Sequence[Fault], source: Source) -> None:
         f"{name} {what}" if fault.what is None else f"{name}: {what}",
         where=f"{document.where}: {fault.name}" if fault.name else document.where,
         line=None if line is None else document.excerpt(line),
-        got=shown(fault.got),
+        got=display(fault.got),
         expected=fault.expected,
         next_step=_next_step(fault),
         rule=fault.rule_id,

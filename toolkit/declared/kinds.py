@@ -13,9 +13,8 @@ from dataclasses import dataclass, field
 from pathlib import Path as FilePath
 from typing import Any, ClassVar
 
-from toolkit.declared.faults import Fault, nearest, shown
-from toolkit.declared.lines import Path
-from toolkit.declared.marks import Above, AtLeast, AtMost, Below, Entry, Format, Names, Text
+from toolkit.declared.faults import Fault, display, nearest
+from toolkit.declared.marks import Above, AtLeast, AtMost, Below, Entry, Format, Names, Path, Text
 from toolkit.files import is_number
 
 
@@ -27,7 +26,7 @@ REFUSED = _Refused.REFUSED
 Limit = Above | AtLeast | Below | AtMost
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Place:
     """Where a value is read: the path of its keys, the format in force, the file's faults and its root."""
 
@@ -50,7 +49,7 @@ class Place:
         return REFUSED
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Kind:
     """What one entry holds. ``entry`` is what its field says of it."""
 
@@ -143,19 +142,19 @@ class BoolKind(Kind):
         return bool(self.entry.example)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class NumberKind(Kind):
     """A finite number inside its limits; ``whole``: without a decimal part."""
 
     shape = (int, float)
     limits: tuple[Limit, ...] = ()
-    whole: bool = False
+    integer: bool = False
 
     def form(self) -> str:
         """Return what may stand there: ``a number above 0 and below 90``."""
-        noun = "whole number" if self.whole else "number"
+        noun = "whole number" if self.integer else "number"
         if not self.limits:
-            return f"a {noun}" if self.whole else "a finite number"
+            return f"a {noun}" if self.integer else "a finite number"
         if self.limits == (Above(0),):
             return f"a positive {noun}"
         return f"a {noun} {self.range()}"
@@ -177,13 +176,13 @@ class NumberKind(Kind):
 
     def read(self, value: Any, place: Place) -> Any:
         """Return a float, or an int where it is whole."""
-        if not is_number(value) or not self.inside(value) or (self.whole and not isinstance(value, int)):
+        if not is_number(value) or not self.inside(value) or (self.integer and not isinstance(value, int)):
             return self.wrong(value, place)
-        return value if self.whole else float(value)
+        return value if self.integer else float(value)
 
     def write(self, value: Any) -> Any:
         """Return a number of Python; numpy's are turned into one."""
-        return int(value) if self.whole else float(value)
+        return int(value) if self.integer else float(value)
 
     def schema(self) -> dict[str, Any]:
         """Return the schema of the number with its limits."""
@@ -191,7 +190,7 @@ class NumberKind(Kind):
             Above: "exclusiveMinimum", AtLeast: "minimum", Below: "exclusiveMaximum", AtMost: "maximum",
         }  # fmt: skip
         limits = {words[type(limit)]: limit.limit for limit in self.limits}
-        return {"type": "integer" if self.whole else "number", **limits}
+        return {"type": "integer" if self.integer else "number", **limits}
 
     def example(self) -> Any:
         """Return the example, else the smallest handy number that is inside the limits."""
@@ -202,10 +201,10 @@ class NumberKind(Kind):
         if number is None:
             low, high = self.limits[0].limit, self.limits[-1].limit
             number = (low + high) / 2
-        return int(number) if self.whole else float(number)
+        return int(number) if self.integer else float(number)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class TextKind(Kind):
     """A text; ``names`` are those that may stand there."""
 
@@ -226,8 +225,8 @@ class TextKind(Kind):
         return isinstance(value, str) or self._from_number(value) is not None
 
     def _from_number(self, value: Any) -> str | None:
-        whole, decimal = type(value) is int, type(value) is float
-        taken = (whole and self.text.numbers != "") or (decimal and self.text.numbers == "any")
+        integer, decimal = type(value) is int, type(value) is float
+        taken = (integer and self.text.numbers != "") or (decimal and self.text.numbers == "any")
         return str(value) if taken else None
 
     def read(self, value: Any, place: Place) -> Any:
@@ -240,7 +239,7 @@ class TextKind(Kind):
             near = nearest(text, names)
             return place.refuse(
                 value, ", ".join(names), rule=self.entry.rule,
-                what=f"{shown(value, quoted=True)} is not known, did you mean {near!r}?" if near else None,
+                what=f"{display(value, quoted=True)} is not known, did you mean {near!r}?" if near else None,
             )  # fmt: skip
         return text.strip() if self.text.strip else text
 
@@ -268,7 +267,7 @@ class TextKind(Kind):
         return self.names.fixed[0] if self.names is not None and self.names.fixed else "..."
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class ChoiceKind(Kind):
     """One of a few words or whole numbers."""
 
@@ -288,7 +287,7 @@ class ChoiceKind(Kind):
                 near = nearest(value, [choice for choice in self.choices if isinstance(choice, str)])
             return place.refuse(
                 value, self.expected, rule=self.entry.rule,
-                what=f"{shown(value, quoted=True)} is not known, did you mean {near!r}?" if near else None,
+                what=f"{display(value, quoted=True)} is not known, did you mean {near!r}?" if near else None,
             )  # fmt: skip
         return value
 
@@ -301,7 +300,7 @@ class ChoiceKind(Kind):
         return self.choices[0] if self.entry.example is None else self.entry.example
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class DateKind(Kind):
     """A day, as a TOML date or as ISO 8601 text; held as a date, or as text where ``text`` is set."""
 

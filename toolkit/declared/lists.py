@@ -6,14 +6,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from toolkit.declared.faults import nearest, shown
+from toolkit.declared.faults import display, nearest
 from toolkit.declared.kinds import REFUSED, Kind, Place
 from toolkit.declared.marks import Distinct, Names, Quantity, Size
 from toolkit.declared.quantities import QuantityKind
 from toolkit.declared.tables import TableKind
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class ListKind(Kind):
     """A list, held as a tuple; of quantities ``{ value = [..], unit = ".." }``, of tables ``[[name]]``.
 
@@ -76,14 +76,14 @@ class ListKind(Kind):
         values = []
         for number, item in enumerate(items):
             kind = self.fixed[number] if self.fixed else self.item
-            here = place.at("value").at(number) if unit is not None else place.at(number)
+            item_place = place.at("value").at(number) if unit is not None else place.at(number)
             if unit is not None and isinstance(kind, QuantityKind):
                 # Of a unit that cannot be, one fault is enough.
                 if number == 0 and kind.scale(unit, place.at("unit")) is None:
                     return REFUSED
-                values.append(kind.held(item, unit, here))
+                values.append(kind.in_si(item, unit, item_place))
             else:
-                values.append(kind.read(item, here))
+                values.append(kind.read(item, item_place))
         if any(entry is REFUSED for entry in values) or not self._once(values, value, place):
             return REFUSED
         return tuple(values)
@@ -95,9 +95,9 @@ class ListKind(Kind):
         marks = values if by is None else [getattr(entry, by) for entry in values]
         for number, mark in enumerate(marks):
             if mark in marks[:number]:
-                text = shown(mark.value if isinstance(mark, Quantity) else mark, quoted=True)
-                here = place if by is None else place.at(number).at(by)
-                here.refuse(
+                text = display(mark.value if isinstance(mark, Quantity) else mark, quoted=True)
+                item_place = place if by is None else place.at(number).at(by)
+                item_place.refuse(
                     value if by is None else mark, self.expected, rule=self.entry.rule,
                     what=f"{text} stands twice",
                 )  # fmt: skip
@@ -160,7 +160,7 @@ class ListKind(Kind):
         return [self.item.example()] * count
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class KeyedKind(Kind):
     """A table whose keys are names; held as pairs, a mapping, or classes with the name in ``by``."""
 
@@ -186,15 +186,15 @@ class KeyedKind(Kind):
         names = () if self.names is None else self.names.names(place.root)
         entries = []
         for key, entry in value.items():
-            here = place.at(key)
+            item_place = place.at(key)
             if names and key not in names:
                 near = nearest(key, names, value)
-                here.refuse(key, ", ".join(names), kind="unknown", near=near)
+                item_place.refuse(key, ", ".join(names), kind="unknown", near=near)
                 entries.append((key, REFUSED))
             elif self.by is not None and isinstance(self.item, TableKind):
-                entries.append((key, self.item.read(entry, here, {self.by: key})))
+                entries.append((key, self.item.read(entry, item_place, {self.by: key})))
             else:
-                entries.append((key, self.item.read(entry, here)))
+                entries.append((key, self.item.read(entry, item_place)))
         if any(entry is REFUSED for _, entry in entries):
             return REFUSED
         if self.by is not None:

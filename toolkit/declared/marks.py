@@ -7,8 +7,10 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, Self
 
+Path = tuple[str | int, ...]
 
-@dataclass(frozen=True, slots=True)
+
+@dataclass(frozen=True)
 class Entry:
     """What a field says for people, and how its entry is written.
 
@@ -27,35 +29,35 @@ class Entry:
     output: bool = True
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Above:
     """The number is larger than this, in the unit of the field's `Unit`."""
 
     limit: float
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class AtLeast:
     """The number is this or larger."""
 
     limit: float
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Below:
     """The number is smaller than this."""
 
     limit: float
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class AtMost:
     """The number is this or smaller."""
 
     limit: float
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Text:
     """How a text may be: empty, stripped of spaces at its ends, of a pattern, or written as a number.
 
@@ -78,7 +80,7 @@ class Text:
         )
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Day:
     """A text that is a date: a TOML date or ISO 8601 text is read, ISO 8601 text is held.
 
@@ -88,21 +90,21 @@ class Day:
     moment: bool = False
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Short:
     """A value alone stands for a table with this one entry: ``"a text"`` for ``{ statement = "a text" }``."""
 
     key: str
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class UnitName:
     """A text that names a unit, of one of ``dimensions`` where some are given; held in its one spelling."""
 
     dimensions: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True, slots=True, init=False)
+@dataclass(frozen=True, init=False)
 class Unit:
     """A number with a unit: written ``{ value = 80, unit = "km/h" }``, held in SI.
 
@@ -126,7 +128,7 @@ class Unit:
             object.__setattr__(self, name, value)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Size:
     """How many entries a list or a table of names has at least, and at most."""
 
@@ -134,14 +136,14 @@ class Size:
     most: int | None = None
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Distinct:
     """No entry of a list stands twice; of tables, no value of this field."""
 
     by: str | None = None
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Keyed:
     """A table whose keys are names, ``[cells.D51]``.
 
@@ -151,7 +153,7 @@ class Keyed:
     by: str | None = None
 
 
-@dataclass(frozen=True, slots=True, init=False)
+@dataclass(frozen=True, init=False)
 class Names:
     """A text, or the keys of a `Keyed` table, are among names: those given, or what another entry declares.
 

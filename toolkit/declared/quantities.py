@@ -6,14 +6,14 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
-from toolkit.declared.faults import nearest, shown
+from toolkit.declared.faults import display, nearest
 from toolkit.declared.kinds import REFUSED, Kind, NumberKind, Place
 from toolkit.declared.marks import Quantity, Unit, UnitName
 from toolkit.errors import UnitError
 from toolkit.files import is_number
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class QuantityKind(Kind):
     """A number with its unit, held in SI as a `Quantity`; limits are in the mark's first unit."""
 
@@ -43,7 +43,7 @@ class QuantityKind(Kind):
     def read(self, value: Any, place: Place) -> Any:
         """Return the `Quantity` of ``{ value, unit }``, or of a number alone."""
         pair = self.pair(value, place)
-        return REFUSED if pair is None else self.held(pair[0], pair[1], place)
+        return REFUSED if pair is None else self.in_si(pair[0], pair[1], place)
 
     def pair(self, value: Any, place: Place) -> tuple[Any, str] | None:
         """Return value and unit as written; None where the entry has no such form."""
@@ -58,11 +58,11 @@ class QuantityKind(Kind):
         elif self.unit.plain and self.number.suits(value):
             return value, self.name
         place.refuse(
-            value, self.expected, rule="no-unit", what=f"{shown(value)} has no unit" if value else None
+            value, self.expected, rule="no-unit", what=f"{display(value)} has no unit" if value else None
         )
         return None
 
-    def held(self, number: Any, text: str, place: Place) -> Any:
+    def in_si(self, number: Any, text: str, place: Place) -> Any:
         """Return the `Quantity` of a number in a unit."""
         if not is_number(number):
             return place.refuse(number, f"a finite number in {text}", rule=self.entry.rule)
@@ -70,28 +70,29 @@ class QuantityKind(Kind):
         if scale is None:
             return REFUSED
         factor, offset = scale
-        held = Quantity(float(number) * factor + offset, value=number, unit=text)
-        if self.number.limits and not self.number.inside(self.plain(held)):
-            return place.refuse(held, self.number.entry.expected or self.expected, rule=self.entry.rule)
-        return held
+        quantity = Quantity(float(number) * factor + offset, value=number, unit=text)
+        if self.number.limits and not self.number.inside(self.plain(quantity)):
+            return place.refuse(quantity, self.number.entry.expected or self.expected, rule=self.entry.rule)
+        return quantity
 
     def scale(self, text: str, place: Place) -> tuple[float, float] | None:
         """Return factor and offset to SI of a unit of a dimension that may stand here."""
         from toolkit.units import unit
 
         try:
-            known = unit(text)
+            si_unit = unit(text)
         except UnitError as error:
             place.refuse(text, self.examples() or str(error.expected), what=error.what, rule="unknown-unit")
             return None
         dimensions = [unit(name).dimension for name in self.unit.units]
-        if dimensions and known.dimension not in dimensions:
+        if dimensions and si_unit.dimension not in dimensions:
             place.refuse(
-                f"{text} ({known.dimension})", f"{' or '.join(dimensions)}: a unit such as {self.examples()}",
-                what=f"{text} is a unit of {known.dimension}", rule="unit-dimension",
+                f"{text} ({si_unit.dimension})",
+                f"{' or '.join(dimensions)}: a unit such as {self.examples()}",
+                what=f"{text} is a unit of {si_unit.dimension}", rule="unit-dimension",
             )  # fmt: skip
             return None
-        return known.factor, 0.0 if self.unit.difference else known.offset
+        return si_unit.factor, 0.0 if self.unit.difference else si_unit.offset
 
     def examples(self) -> str:
         """Return units that may stand here, for people."""
@@ -105,16 +106,16 @@ class QuantityKind(Kind):
         """Return an SI value in the mark's first unit, or in that of its dimension; SI where it has none."""
         from toolkit.units import unit
 
-        named = list(self.unit.units)
+        units = list(self.unit.units)
         if isinstance(si, Quantity):
             dimension = unit(si.unit).dimension
-            named = [name for name in named if unit(name).dimension == dimension]
-            if si.unit in named[:1]:
+            units = [name for name in units if unit(name).dimension == dimension]
+            if si.unit in units[:1]:
                 return float(si.value)
-        if not named:
+        if not units:
             return float(si)
-        known = unit(named[0])
-        return (float(si) - (0.0 if self.unit.difference else known.offset)) / known.factor
+        si_unit = unit(units[0])
+        return (float(si) - (0.0 if self.unit.difference else si_unit.offset)) / si_unit.factor
 
     def written(self, si: float) -> tuple[Any, str]:
         """Return value and unit: as it was read, else in a unit that gives the same float again."""
@@ -124,15 +125,15 @@ class QuantityKind(Kind):
             return si.value, si.unit
         if not self.unit.units:
             return float(si), "1"
-        known = unit(self.unit.units[0])
-        offset = 0.0 if self.unit.difference else known.offset
-        number = (float(si) - offset) / known.factor
+        si_unit = unit(self.unit.units[0])
+        offset = 0.0 if self.unit.difference else si_unit.offset
+        number = (float(si) - offset) / si_unit.factor
         for candidate in (number, math.nextafter(number, math.inf), math.nextafter(number, -math.inf)):
             short = float(f"{candidate:.15g}")
             for value in (short, candidate):
-                if value * known.factor + offset == float(si):
+                if value * si_unit.factor + offset == float(si):
                     return value, self.unit.units[0]
-        return float(si), known.si
+        return float(si), si_unit.si
 
     def holds(self, value: Any) -> bool:
         """Tell whether it is a number."""
@@ -163,7 +164,7 @@ class QuantityKind(Kind):
         return number if self.unit.beside is not None else {"value": number, "unit": self.name or "N"}
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class UnitKind(Kind):
     """The name of a unit, held in its one spelling."""
 
@@ -181,15 +182,15 @@ class UnitKind(Kind):
         if not isinstance(value, str):
             return self.wrong(value, place)
         try:
-            known = unit(value)
+            si_unit = unit(value)
         except UnitError as error:
             return place.refuse(value, str(error.expected), what=error.what, rule="unknown-unit")
-        if self.mark.dimensions and known.dimension not in self.mark.dimensions:
+        if self.mark.dimensions and si_unit.dimension not in self.mark.dimensions:
             return place.refuse(
-                f"{value} ({known.dimension})", self.expected, rule="unit-dimension",
-                what=f"{value} is a unit of {known.dimension}",
+                f"{value} ({si_unit.dimension})", self.expected, rule="unit-dimension",
+                what=f"{value} is a unit of {si_unit.dimension}",
             )  # fmt: skip
-        return known.text
+        return si_unit.text
 
     def schema(self) -> dict[str, Any]:
         """Return the schema of a unit's name."""

@@ -15,7 +15,7 @@ from toolkit.files import is_number
 MISSING: Any = object()
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Field:
     """One field of a declared class: its name, the key of its entry, its kind, and its default."""
 
@@ -41,7 +41,7 @@ class Field:
         return self.kind.unit.beside if isinstance(self.kind, QuantityKind) else None
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class TableKind(Kind):
     """A table that a dataclass declares. Fields are looked up when first needed: classes may nest."""
 
@@ -78,7 +78,7 @@ class TableKind(Kind):
         """Return what may stand there."""
         return f"a table with {', '.join(self.keys)}"
 
-    def read(self, value: Any, place: Place, stated: Mapping[str, Any] | None = None) -> Any:
+    def read(self, value: Any, place: Place, name_entry: Mapping[str, Any] | None = None) -> Any:
         """Return an object of the class; ``stated`` are fields that no entry holds."""
         if self.short is not None and not isinstance(value, dict):
             value = {self.short: value}
@@ -96,32 +96,32 @@ class TableKind(Kind):
             if not place.path:
                 place = replace(place, root=value)
         fields = self.fields
-        held, meant, before = dict(stated or {}), set(), len(place.faults)
+        values, nearest_keys, before = dict(name_entry or {}), set(), len(place.faults)
         by_key = {key: field for field in fields for key in (field.key, *field.kind.entry.old)}
         keys = self.keys
         for key, entry in value.items():
             declared = by_key.get(key)
             if declared is not None:
                 if declared.beside is None:
-                    held[declared.name] = declared.kind.read(entry, place.at(key))
+                    values[declared.name] = declared.kind.read(entry, place.at(key))
             elif key not in keys:
                 near = nearest(str(key), keys, value)
-                meant.add(near)
+                nearest_keys.add(near)
                 place.at(key).refuse(key, ", ".join(sorted(keys)), kind="unknown", near=near)
         for declared in fields:
             if declared.beside is not None and declared.key in value:
-                held[declared.name] = _with_unit_beside(declared, value, place)
-            elif declared.name not in held and declared.required and declared.key not in meant:
+                values[declared.name] = _with_unit_beside(declared, value, place)
+            elif declared.name not in values and declared.required and declared.key not in nearest_keys:
                 # A key that was misspelt is not missing too.
                 kind = declared.kind
                 place.at(declared.key).refuse(None, kind.expected, kind="missing", rule=kind.entry.rule)
         if len(place.faults) > before:
             return REFUSED
-        made = self.cls(**held)
-        for fault in getattr(made, "faults", tuple)():
+        instance = self.cls(**values)
+        for fault in getattr(instance, "faults", tuple)():
             key = (*place.path, *fault.key)
             place.faults.append(replace(fault, key=key, form=place.form))
-        return made if len(place.faults) == before else REFUSED
+        return instance if len(place.faults) == before else REFUSED
 
     def suits(self, value: Any) -> bool:
         """Tell whether a value is a table, or stands for one."""
@@ -160,22 +160,22 @@ def _of_newest(table: dict[str, Any], form: Format, place: Place) -> dict[str, A
     """Return the entries in the newest form; None where their schema is not known."""
     if form.schema is None:
         return table
-    stated = table.get("schema", None if form.schema_required else form.schema)
-    if stated is None:
+    name_entry = table.get("schema", None if form.schema_required else form.schema)
+    if name_entry is None:
         place.at("schema").refuse(None, f"schema = {form.schema}", kind="missing")
         return None
     older = dict(form.older or {})
-    if type(stated) is not int or (stated != form.schema and stated not in older):
-        newer = type(stated) is int and stated > form.schema
+    if type(name_entry) is not int or (name_entry != form.schema and name_entry not in older):
+        newer = type(name_entry) is int and name_entry > form.schema
         place.at("schema").refuse(
-            stated,
+            name_entry,
             " or ".join(map(str, sorted({form.schema, *older}))),
             what=f"this {form.title} was written by a newer version of the toolkit" if newer else None,
         )
         return None
-    while stated != form.schema:
-        table = {**older[stated](table), "schema": stated + 1}
-        stated += 1
+    while name_entry != form.schema:
+        table = {**older[name_entry](table), "schema": name_entry + 1}
+        name_entry += 1
     return table
 
 
@@ -202,11 +202,11 @@ def _with_unit_beside(declared: Field, table: Mapping[str, Any], place: Place) -
 def _in_unit(kind: QuantityKind, si: float, text: str) -> float:
     from toolkit.units import unit
 
-    known = unit(text)
-    return (float(si) - (0.0 if kind.unit.difference else known.offset)) / known.factor
+    si_unit = unit(text)
+    return (float(si) - (0.0 if kind.unit.difference else si_unit.offset)) / si_unit.factor
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class FormsKind(Kind):
     """One of several forms: told apart by shape (a text or a table), tables by the word in ``tag``."""
 
@@ -219,7 +219,7 @@ class FormsKind(Kind):
         by_word: dict[Any, TableKind] = {}
         for form in self.forms:
             if isinstance(form, TableKind):
-                kind = next((one.kind for one in form.fields if one.name == self.tag), None)
+                kind = next((declared.kind for declared in form.fields if declared.name == self.tag), None)
                 words = kind.choices if isinstance(kind, ChoiceKind) else ()
                 by_word.update(dict.fromkeys(words, form))
         return by_word

@@ -18,20 +18,20 @@ _BARE = re.compile(r"[A-Za-z0-9_-]+")
 _WIDE = 100
 
 
-def plain(made: Any) -> dict[str, Any]:
+def plain(instance: Any) -> dict[str, Any]:
     """Return a declared object as its file holds it: texts, numbers, dates, lists and dicts.
 
     Quantities keep the unit in which they were read; what is None is left out.
     """
-    kind = table_of(type(made))
+    kind = table_of(type(instance))
     schema = {} if kind.form_of is None or kind.form_of.schema is None else {"schema": kind.form_of.schema}
-    table: dict[str, Any] = kind.write(made)
+    table: dict[str, Any] = kind.write(instance)
     return schema | table
 
 
-def toml_text(made: Any) -> str:
+def toml_text(instance: Any) -> str:
     """Return the TOML file of a declared object; `reading.read_text` gives an equal object again."""
-    table = plain(made) if dataclasses.is_dataclass(made) else made
+    table = plain(instance) if dataclasses.is_dataclass(instance) else instance
     return "\n".join(_table(table, ())).strip() + "\n"
 
 
@@ -93,14 +93,14 @@ def _quoted(text: str) -> str:
     return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007F")
 
 
-def answer(made: Any) -> dict[str, Any]:
+def answer(instance: Any) -> dict[str, Any]:
     """Return the JSON document of a declared object: ``schema`` first, then every field by its key.
 
     Unlike a file it has every field: numbers in the unit that the key names, None and what is no number
     (NaN, infinity) as null, dates as ISO 8601, paths as texts; numpy's scalars and arrays, enumerations and
     objects inside become plain.
     """
-    document = json_value(made)
+    document = json_value(instance)
     return {"schema": document.pop("schema", 1), **document}
 
 
@@ -109,9 +109,9 @@ def json_value(value: Any) -> Any:
     if value is None or (isinstance(value, bool | str) and not isinstance(value, enum.Enum)):
         return value
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
-        own = getattr(value, "as_dict", None)
-        if callable(own):
-            return json_value(own())
+        as_dict = getattr(value, "as_dict", None)
+        if callable(as_dict):
+            return json_value(as_dict())
         return {key: json_value(getattr(value, name)) for name, key in keys_of(type(value))}
     if isinstance(value, enum.Enum):
         return json_value(value.value)

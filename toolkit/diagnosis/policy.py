@@ -1,7 +1,8 @@
 """The policy of the verdict: every number that decides what is searched, named, withdrawn, held out or told.
 
 A number stands in the section of what it decides, with its unit and the reason for it, and nowhere else in
-the search and the answer. Tolerances of one algorithm (an integrator's, a descent's) stand beside it.
+the search and the answer. Tolerances of one algorithm (an integrator's, a descent's) stand beside it,
+and what holds of one effect alone stands in that effect's own file.
 """
 
 from __future__ import annotations
@@ -103,24 +104,7 @@ class _Starts:
     subsets: int = _set(
         8, "groups of runs by one condition", "each is a test more; the first are the likeliest"
     )
-    loads: float = _set(
-        0.2, "of the largest load", "a smaller range tells nothing of what goes with the load"
-    )
     late: tuple[int, ...] = _set((1, 4, 12), "rows", "delays of a plant whose rows are far apart")
-    bristle: float = _set(
-        0.05, "of the way", "the longest over which dry friction builds up: a longer bristle is a spring"
-    )
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Ripple:
-    """Which periods are tried of a force that repeats with the position."""
-
-    step: float = _set(0.5, "cycles over the way", "periods further apart have nothing in common")
-    longest: float = _set(2.0, "cycles over the way", "fewer do not repeat: that is a stiffness")
-    shortest: float = _set(200.0, "cycles over the way", "the end of the list, where rows stand close enough")
-    work: int = _set(4_000_000, "rows times periods", "as many linear responses as a look may cost")
-    least: int = _set(40, "periods", "are tried however many rows there are")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -156,9 +140,6 @@ class _Step:
     signal: float = _set(0.5, "of an output in its right unit", "what else it may have in it")
     visible: float = _set(0.01, "of the noise", "an effect that never moves an output by more is not there")
     band_noise: float = _set(2.0, "of the log posterior", "noise before a dead band is taken for more likely")
-    loop_offset: float = _set(
-        0.5, "of a loop's width", "where in its loop a channel stands at first: no zero"
-    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -250,10 +231,10 @@ class _Surface:
 
 
 BUDGET, ROWS, PRIORS, NOISE = _Budget(), _Rows(), _Priors(), _Noise()
-SCREENING, STARTS, RIPPLE, STEP, LATTICE = _Screening(), _Starts(), _Ripple(), _Step(), _Lattice()
+SCREENING, STARTS, STEP, LATTICE = _Screening(), _Starts(), _Step(), _Lattice()
 STRUCTURE, VERDICT, LOCATION, SURFACE = _Structure(), _Verdict(), _Location(), _Surface()
 SECTIONS = (
-    BUDGET, ROWS, PRIORS, NOISE, SCREENING, STARTS, RIPPLE, STEP, LATTICE, STRUCTURE, VERDICT, LOCATION,
+    BUDGET, ROWS, PRIORS, NOISE, SCREENING, STARTS, STEP, LATTICE, STRUCTURE, VERDICT, LOCATION,
     SURFACE,
 )  # fmt: skip
 

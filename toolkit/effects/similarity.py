@@ -26,8 +26,8 @@ def similar(steady: Steady, drive: Drive) -> TireForces:
     steady : (slip angle [rad], drive) -> forces of the nominal steady tire
     drive : with what the effects have made of friction, stiffness, trail and forces on top
     """
-    made = steady(drive.SA * drive.stiffness / drive.friction, drive)
+    nominal = steady(drive.SA * drive.stiffness / drive.friction, drive)
     return TireForces(
-        FY=drive.friction * made.FY + drive.FY,
-        MZ=drive.friction * drive.trail * made.MZ + drive.MZ,
+        FY=drive.friction * nominal.FY + drive.FY,
+        MZ=drive.friction * drive.trail * nominal.MZ + drive.MZ,
     )

@@ -85,7 +85,7 @@ class Diagnosis(Face):
         }
 
     def _plots(self) -> Mapping[str, Plot]:
-        from toolkit.report.diagnosis.plots import diagnosis_plots
+        from toolkit.report.diagnosis.content import diagnosis_plots
         from toolkit.report.style import Style
 
         return diagnosis_plots(self.result.result, Style())

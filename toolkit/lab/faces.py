@@ -8,7 +8,7 @@ turns into a DataFrame; and its figures are those that a report prints, drawn by
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -32,7 +32,7 @@ class Face:
         """Return what is worth saying, by name; the first says which result it is."""
         raise NotImplementedError
 
-    def _plots(self) -> Mapping[str, Plot]:
+    def _plots(self) -> Mapping[str, Plot | Callable[[], Figure]]:
         """Return the figures of the report by name, not yet drawn; the first is the one to look at."""
         return {}
 
@@ -63,7 +63,8 @@ class Face:
                 expected=", ".join(plots) or "nothing here can be drawn", rule="no-figure",
                 next_step="see `figures` for the names",
             )  # fmt: skip
-        return figure_of(plots[chosen])
+        drawing = plots[chosen]
+        return drawing() if callable(drawing) else figure_of(drawing)
 
     def __repr__(self) -> str:
         texts = [_text(value) for value in self._facts().values()]

@@ -306,7 +306,7 @@ def fit_options(loss: str, weights: str, rated_load: float | None, radius: float
 def write_figures(fitted: Fitted, folder: Path) -> list[str]:
     """Write the figures of all fits into a folder; return their names."""
     from toolkit.files import write_atomic
-    from toolkit.report.test.fit_figures import fit_figures
+    from toolkit.report.fit_figures import fit_figures
 
     word = fitted.use.word if fitted.use else None
     pictures = fit_figures(fitted.data, fitted.curves, fitted.globals, fitted.comparison, word)

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from toolkit.findings import Finding
     from toolkit.lab.resolve import Resolved
     from toolkit.recording.details import ReportDetails
-    from toolkit.report.diagnosis.in_report import Told
+    from toolkit.report.diagnosis.answer import Told
 
 WHOLE, TYDEX, TIR = "test.xlsx", "test.tdx", "tire.tir"
 
@@ -68,7 +68,7 @@ def diagnosis_of(source: Path | None, by: str | None, tests: Sequence[Path]) -> 
         return None
     from toolkit.diagnosis.answer.reader import read_answer
     from toolkit.errors import ConfigError
-    from toolkit.report.diagnosis.in_report import Told
+    from toolkit.report.diagnosis.answer import Told
 
     if source is None:
         raise ConfigError(

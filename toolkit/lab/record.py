@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import datetime as dt
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, overload
 
@@ -13,6 +13,7 @@ from toolkit.lab.faces import Face, Facts
 if TYPE_CHECKING:
     import numpy as np
     import pandas as pd
+    from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
     from toolkit.calibration.records.record import CalibrationRecord
@@ -172,6 +173,19 @@ class Record(Face):
             "session": self.result.date,
             "sha256": self.result.sha256[:12],
         }
+
+    def _plots(self) -> Mapping[str, Plot | Callable[[], Figure]]:
+        from toolkit.calibration.fit.report import report_session
+        from toolkit.calibration.fit.session_fit import fit_session
+        from toolkit.calibration.registry.stored import stored_session
+        from toolkit.report.calibration.figures import open_figures
+
+        if not self.result.verified:  # a legacy import has no rows to draw
+            return {}
+        figures: dict[str, Plot | Callable[[], Figure]] = {}
+        for report in report_session(fit_session(stored_session(self.registry.folder, self.result))):
+            figures |= open_figures(report, title=self.id)
+        return figures
 
     def _expanded(self, points: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
         import numpy as np

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from toolkit.errors import ToolkitError
     from toolkit.lab.resolve import Resolved
     from toolkit.report.deliver import Delivered, Job
-    from toolkit.report.diagnosis.in_report import Told
+    from toolkit.report.diagnosis.answer import Told
     from toolkit.report.drawer import Drawer
     from toolkit.report.style import Style
     from toolkit.report.word.office import Office

@@ -100,14 +100,13 @@ def effect_keys(effect: Effect) -> dict[str, Any]:
 
 
 def _facts(effect: Effect) -> dict[str, str]:
-    needs = [*effect.needs, *([" or ".join(effect.any_of)] if effect.any_of else [])]
     return {
         "means": effect.statement,
         "stage": effect.stage.replace("_", " "),
         "equation": effect.equation,
         "signature": effect.signature,
         "separates": effect.separates,
-        "needs": ", ".join(needs),
+        "needs": " or ".join(effect.any_of),
         "source": effect.reference,
     }
 

@@ -13,7 +13,6 @@ if TYPE_CHECKING:
     from toolkit.errors import ToolkitError
     from toolkit.simulation.acquisition import OwnProgram
     from toolkit.simulation.plan import Plan
-    from toolkit.simulation.switched import Switched
 
 
 def simulate_plan(
@@ -154,17 +153,7 @@ def _common(plan: Plan, out: Path, files: tuple[Path, ...]) -> dict[str, Any]:
 
 
 def _effects(plan: Plan) -> str:
-    return "".join(f"\n  effect       {_effect(effect)}" for effect in plan.effects)
-
-
-def _effect(effect: Switched) -> str:
-    place = "" if effect.channel is None else f" on {effect.channel}"
-    place += "" if effect.source is None else f" with {effect.source}"
-    units = dict(effect.units)
-    settings = [f"{name} = {value:g} {units[name]}" for name, value in effect.values]
-    settings += [] if effect.record is None else [f"record {effect.record}"]
-    settings += [] if effect.only is None else [f"where {effect.only[0]} is {' or '.join(effect.only[1])}"]
-    return f"{effect.effect.name}{place}{': ' if settings else ''}{', '.join(settings)}"
+    return "".join(f"\n  effect       {effect.as_text()}" for effect in plan.effects)
 
 
 def _program(plan: Plan, registry: Registry | None) -> OwnProgram | None:

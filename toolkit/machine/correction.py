@@ -8,22 +8,28 @@ definition that it was made from stays as it is.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated, ClassVar
 
 from toolkit.declared import AtLeast, Entry, Fault, Format, Names, UnitName
+from toolkit.effects.applied import AppliedEffect, EffectKey
+from toolkit.effects.catalogue import effects
+from toolkit.effects.effect import Effect
 from toolkit.estimate import plus_minus
 from toolkit.units import unit
 
-_LOADS = ("FY", "MZ")
-_SOURCES = ("FZ", "FY", "MZ")
-# Effect -> its parameter and the unit in which it computes; crosstalk's follows from its two loads.
-CORRECTABLE: dict[str, tuple[str, str]] = {
-    "steer_offset": ("offset", "rad"),
-    "steer_compliance": ("compliance", "rad/(N*m)"),
-    "crosstalk": ("coefficient", ""),
-}
 _SI = {"FZ": "N", "FY": "N", "MZ": "N*m"}
+
+
+def correctable() -> dict[str, Effect]:
+    """Return the effects that a machine can be corrected for by name, those of the whole machine first."""
+    chosen = [effect for effect in effects().values() if effect.correctable is not None]
+    chosen.sort(key=lambda effect: effect.correctable is not None and bool(effect.correctable.channels))
+    return {effect.name: effect for effect in chosen}
+
+
+_CORRECTABLE = correctable()
+_EXAMPLE = next(iter(_CORRECTABLE.values()))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -40,10 +46,10 @@ class Correction:
         next_step="write corrections with 'toolkit machine correct', never by hand",
     )  # fmt: skip
 
-    effect: Annotated[str, Names(*CORRECTABLE), Entry("what is put right")]
-    channel: Annotated[str | None, Entry("of a crosstalk: the load that is put right")] = None
-    source: Annotated[str | None, Entry("of a crosstalk: the load that leaks into it")] = None
-    parameter: Annotated[str, Entry("the effect's parameter", example="offset")]
+    effect: Annotated[str, Names(*_CORRECTABLE), Entry("what is put right")]
+    channel: Annotated[str | None, Entry("of a leak between two loads: the one that is put right")] = None
+    source: Annotated[str | None, Entry("of a leak between two loads: the one that leaks into it")] = None
+    parameter: Annotated[str, Entry("the effect's first parameter", example=_EXAMPLE.names[0])]
     value: Annotated[float, Entry("its value, machine axes")]
     unit: Annotated[str, UnitName(), Entry("of value and standard uncertainty", example="rad")]
     u: Annotated[float, AtLeast(0), Entry("standard uncertainty", key="standard_uncertainty")]
@@ -63,7 +69,20 @@ class Correction:
     @property
     def label(self) -> str:
         """Name and place: ``crosstalk FZ to FY``."""
-        return f"{self.effect} {self.source} to {self.channel}" if self.source else self.effect
+        return EffectKey(self.effect, self.channel, self.source).label
+
+    @property
+    def applied(self) -> AppliedEffect:
+        """The effect at its place, with its value in ``unit``."""
+        return AppliedEffect(
+            effect=effects()[self.effect], channel=self.channel, source=self.source,
+            values={self.parameter: self.value}, units={self.parameter: self.unit},
+        )  # fmt: skip
+
+    @property
+    def in_SI(self) -> AppliedEffect:
+        """The effect at its place, with its value in SI."""
+        return replace(self.applied, values={self.parameter: self.value * self.factor}, units={})
 
     def as_text(self) -> str:
         """Return it in one line for people: what, how large, from which answer, why."""
@@ -75,18 +94,26 @@ class Correction:
 
     def faults(self) -> Iterator[Fault]:
         """Yield a parameter, a place or a unit that is not the effect's."""
-        parameter, expected = CORRECTABLE[self.effect]
+        effect = _CORRECTABLE[self.effect]
+        way = effect.correctable
+        if way is None:
+            return
+        expected, parameter = way.unit, effect.names[0]
         if self.parameter != parameter:
             yield Fault(key=("parameter",), got=self.parameter, expected=parameter)
-        if self.effect == "crosstalk":
-            if self.channel not in _LOADS or self.source not in _SOURCES or self.channel == self.source:
+        if way.channels:
+            if (
+                self.channel not in way.channels
+                or self.source not in way.sources
+                or self.channel == self.source
+            ):
                 yield Fault(
                     key=("channel",), got=f"{self.source} to {self.channel}",
-                    what="the crosstalk of these channels is not corrected in a reduction",
-                    expected=f"from {', '.join(_SOURCES)} to {' or '.join(_LOADS)}",
+                    what=f"the {self.effect} of these channels is not corrected in a reduction",
+                    expected=f"from {', '.join(way.sources)} to {' or '.join(way.channels)}",
                 )  # fmt: skip
                 return
-            expected = f"({_SI[self.channel]})/({_SI[self.source]})"
+            expected = way.unit.format_map({"channel": _SI[self.channel], "from": _SI[str(self.source)]})
         elif self.channel or self.source:
             key = "channel" if self.channel else "source"
             yield Fault(

@@ -246,9 +246,9 @@ class Machine:
 
     def stated_uncertainty(self, symbol: str) -> TypeB:
         """Return the stated uncertainty of a channel, zero where none is stated."""
-        for stated in self.type_b:
-            if stated.symbol == symbol:
-                return stated
+        for statement in self.type_b:
+            if statement.symbol == symbol:
+                return statement
         return TypeB(symbol=symbol, u=0.0, relative=0.0, source="not stated")
 
     def faults(self) -> Iterator[Fault]:
@@ -328,18 +328,18 @@ def _extended(data: bytes, path: Path, extending: tuple[Path, ...]) -> tuple[dic
     name, names = table["extends"], machine_names()
     circle = isinstance(name, str) and _PACKAGED / f"{name}.toml" in (*extending, path)
     if circle or name not in names:
-        what = "a definition extends itself" if circle else None
+        circle_text = "a definition extends itself" if circle else None
         fault = Fault(
-            key=("extends",), got=name, expected=", ".join(names), what=what, form=Machine.FORMAT,
+            key=("extends",), got=name, expected=", ".join(names), what=circle_text, form=Machine.FORMAT,
             rule="unknown-machine",
         )  # fmt: skip
         refuse([fault], source)
     base_path = machine_file(name)
     base, base_source = _extended(read_bytes(base_path), base_path, (*extending, path))
     inherited: set[tuple[str, ...]] = {(key,) for key in base if key not in table}
-    stated, base_stated = table.get("type_b", {}), base.get("type_b", {})
-    if isinstance(stated, dict):  # one new figure must not silently drop the others
-        inherited |= {("type_b", symbol) for symbol in base_stated if symbol not in stated}
-        table["type_b"] = {**base_stated, **stated}
+    statement, base_stated = table.get("type_b", {}), base.get("type_b", {})
+    if isinstance(statement, dict):  # one new figure must not silently drop the others
+        inherited |= {("type_b", symbol) for symbol in base_stated if symbol not in statement}
+        table["type_b"] = {**base_stated, **statement}
     merged = Source(where=path, text=source.text, base=base_source, inherited=frozenset(inherited))
     return {**base, **table}, merged

@@ -5,7 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from toolkit.declared import lines_of, plain, toml_text
+from toolkit.declared import plain, toml_text
+from toolkit.declared.lines import lines_of
 from toolkit.errors import ConfigError
 from toolkit.files import read_bytes, sha256_bytes
 from toolkit.machine.correction import Correction

@@ -97,15 +97,15 @@ def read_test_folder(folder: Path) -> TestFolder:
             rule="no-test",
         )
     data = read_bytes(toml)
-    stated = read_text(StatedTest, data, where=toml)
+    entries = read_text(StatedTest, data, where=toml)
     source = Source(where=toml, text=data.decode("utf-8-sig"))
-    machine_name = _machine_name(stated, toml)
+    machine_name = _machine_name(entries, toml)
     machine = _machine(machine_name, source)
     # By path, relative to the test, as a machine definition is.
-    plan = None if stated.protocol is None else toml.parent / stated.protocol
+    plan = None if entries.protocol is None else toml.parent / entries.protocol
     settings = (Path(machine_name), plan)
     files = tuple(sorted(path for path in _recordings(folder) if path not in settings))
-    tare_file, tare_values = _tare(stated.tare or Tare(), machine, folder, source)
+    tare_file, tare_values = _tare(entries.tare or Tare(), machine, folder, source)
     tests = tuple(path for path in files if path != tare_file)
     if not tests:
         raise RecordingError(
@@ -117,13 +117,13 @@ def read_test_folder(folder: Path) -> TestFolder:
             rule="no-recordings",
         )
     return TestFolder(
-        info=_info(stated, machine_name, machine, folder),
+        info=_info(entries, machine_name, machine, folder),
         folder=folder,
         files=tests,
-        rotation=stated.rotation,
+        rotation=entries.rotation,
         rotations=tuple(
             (_named_file(name, ("rotations", name), folder, files, source), rotation)
-            for name, rotation in stated.rotations
+            for name, rotation in entries.rotations
         ),
         tare_file=tare_file,
         tare_values=tare_values,
@@ -162,34 +162,34 @@ def _machine(name: str, source: Source) -> Machine:
         raise
 
 
-def _machine_name(stated: StatedTest, toml: Path) -> str:
+def _machine_name(entries: StatedTest, toml: Path) -> str:
     # A definition by path is meant relative to the test, whatever folder the command runs in.
-    return str(toml.parent / stated.machine) if stated.machine.endswith(".toml") else stated.machine
+    return str(toml.parent / entries.machine) if entries.machine.endswith(".toml") else entries.machine
 
 
-def _info(stated: StatedTest, machine_name: str, machine: Machine, folder: Path) -> TestInfo:
-    tire = stated.tire or TireLabel()
+def _info(entries: StatedTest, machine_name: str, machine: Machine, folder: Path) -> TestInfo:
+    tire = entries.tire or TireLabel()
     return TestInfo(
         name=folder.resolve().name,
         machine=machine_name,
-        date=stated.date,
-        operator=stated.operator,
-        requestor=stated.requestor,
-        surface=stated.surface,
-        special=stated.special,
-        speed_m_s=stated.speed,
-        pressure_Pa=stated.pressure,
-        rated_load_N=stated.rated_load,
+        date=entries.date,
+        operator=entries.operator,
+        requestor=entries.requestor,
+        surface=entries.surface,
+        special=entries.special,
+        speed_m_s=entries.speed,
+        pressure_Pa=entries.pressure,
+        rated_load_N=entries.rated_load,
         tire_size=tire.size,
         tire_company=tire.company,
         tire_DOT=tire.DOT,
         tire_series=tire.series,
         tire_construction=tire.construction,
         tire_rim=tire.rim,
-        simulated=stated.simulated or machine.simulated,
-        reversal=stated.reversal,
-        mounting=stated.mounting,
-        laboratory=stated.laboratory,
+        simulated=entries.simulated or machine.simulated,
+        reversal=entries.reversal,
+        mounting=entries.mounting,
+        laboratory=entries.laboratory,
         tire_belt=tire.belt,
     )
 

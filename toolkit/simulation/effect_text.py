@@ -21,9 +21,9 @@ import re
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from toolkit.effects.applied import AppliedEffect, Condition
 from toolkit.effects.catalogue import effect as find_effect
 from toolkit.effects.effect import Effect, EffectParameter
-from toolkit.effects.unit_error import factors
 from toolkit.errors import ConfigError, UnitError
 from toolkit.simulation.places import (
     can_join,
@@ -33,7 +33,6 @@ from toolkit.simulation.places import (
     sources_of,
     unit_of,
 )
-from toolkit.simulation.switched import Switched
 from toolkit.units import unit
 
 if TYPE_CHECKING:
@@ -42,7 +41,7 @@ if TYPE_CHECKING:
 _QUANTITY = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*", re.ASCII | re.DOTALL)
 
 
-def parse_effect(text: str, machine: Machine) -> tuple[Switched, ...]:
+def parse_effect(text: str, machine: Machine) -> tuple[AppliedEffect, ...]:
     """Return the effect that a text switches on, once for each signal that it acts on.
 
     Raises
@@ -53,7 +52,7 @@ def parse_effect(text: str, machine: Machine) -> tuple[Switched, ...]:
     """
     where = f"--effect {text}"
     head, equals, given = text.partition("=")
-    head, _, condition = head.partition("@")
+    head, at, confined = head.partition("@")
     name, *parts = [part.strip() for part in head.split(".")]
     effect = find_effect(name, where=where)
     if effect.stage == "dynamics":
@@ -66,26 +65,26 @@ def parse_effect(text: str, machine: Machine) -> tuple[Switched, ...]:
     if parts and parts[-1] in effect.names:
         parameter = parts.pop()
     source, channels = _signals(effect, parts, where)
-    only = _condition(condition, where) if condition or "@" in text.partition("=")[0] else None
-    if effect.name == "wrong_calibration":
+    condition = _condition(confined, where) if at else None
+    if effect.replaces_record:
         if not given.strip():
             raise _wrong(
                 "the record that was used is not named", where, "nothing", "a registry id, such as m15-r1",
-                "write --effect wrong_calibration=ID",
+                f"write --effect {effect.name}=ID",
             )  # fmt: skip
-        return (Switched(effect=effect, record=given.strip(), only=only),)
+        return (AppliedEffect(effect=effect, source=given.strip(), condition=condition),)
     made = []
     for channel in channels or (None,):
         units = {one.name: _unit(one, machine, channel, source) for one in effect.parameters}
         values = _values(effect, parameter, given if equals else None, units, where)
         made.append(
-            Switched(
+            AppliedEffect(
                 effect=effect,
                 channel=channel,
                 source=source,
-                values=tuple(values.items()),
-                units=tuple(units.items()),
-                only=only,
+                values=values,
+                units=units,
+                condition=condition,
             )
         )
     return tuple(made)
@@ -100,7 +99,7 @@ def _signals(
             raise _wrong(
                 f"effect {effect.name!r} is between two signals", where, ".".join(parts) or "none",
                 f"two of {', '.join(dict.fromkeys((*sources_of(effect), *known)))}",
-                f"write {effect.name}.{'FZ.FY=0.01' if effect.name == 'crosstalk' else 'D51.D52'}",
+                f"write {effect.name}.{'D51.D52' if effect.exchanges else 'FZ.FY=0.01'}",
             )  # fmt: skip
         # A swap names two signals, crosstalk says from which to which.
         source = _one_of(parts[0], sources_of(effect), effect, where)
@@ -137,7 +136,7 @@ def _one_of(part: str, known: Sequence[str], effect: Effect, where: str) -> str:
     )  # fmt: skip
 
 
-def _condition(text: str, where: str) -> tuple[str, tuple[str, ...]]:
+def _condition(text: str, where: str) -> Condition:
     key, colon, values = text.partition(":")
     chosen = tuple(one.strip() for one in values.split("+"))
     if not key.strip() or not colon or not all(chosen):
@@ -188,8 +187,9 @@ def _values(
 
 
 def _number(effect: Effect, one: EffectParameter, text: str, stated: str, where: str) -> float:
-    if effect.name == "unit_error" and text.strip() in factors():
-        return factors()[text.strip()]
+    words = {} if one.words is None else one.words()
+    if text.strip() in words:
+        return words[text.strip()]
     match = _QUANTITY.fullmatch(text)
     value = float(match[1]) if match else math.nan
     if not match or not math.isfinite(value):

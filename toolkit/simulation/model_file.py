@@ -8,11 +8,14 @@ a file that it names and that has changed since is refused, because the fit is n
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
 from toolkit.channels import AXES, Axes
+from toolkit.effects.applied import AppliedEffect, Condition
 from toolkit.effects.catalogue import effect as find_effect
 from toolkit.effects.effect import Effect
 from toolkit.errors import ConfigError
@@ -20,7 +23,7 @@ from toolkit.files import check_keys, is_number, parse_toml, read_bytes, sha256_
 from toolkit.units import unit
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
+    from collections.abc import Iterable
 
 CONTENT = "augmented simulation"
 FILES = ("tire", "path", "calibration", "machine")
@@ -36,7 +39,7 @@ _EFFECT = (
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ModelParameter:
-    """A fitted number in its own unit; without ``standard_error`` it was not fitted but known."""
+    """A fitted number of the simulation; without ``standard_error`` it was not fitted but known."""
 
     name: str
     value: float
@@ -46,39 +49,26 @@ class ModelParameter:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ModelEffect:
-    """An effect in the simulation: where it acts, its parameters, and in which runs.
+class FittedEffect:
+    """An applied effect in the simulation, and what an answer knows of it.
 
-    ``condition`` is a key and the values of the runs in which it acts; ``runs`` the names of those that it
-    was fitted on; None for all. ``numerics`` are numbers of the computation that no fit moves. ``axes`` are
-    those in which its parameters are told, ``origin`` the file that they come from and its hash;
-    ``of_machine`` says that it is a correction of the machine's definition.
+    ``standard_errors`` are those of its fitted parameters, in their units. ``axes`` are those in which its
+    values are stated, ``origin`` the file that they come from and its hash; ``of_machine`` says that it is a
+    correction of the machine's definition.
     """
 
-    effect: Effect
-    channel: str | None = None
-    source: str | None = None
-    parameters: tuple[ModelParameter, ...] = ()
-    numerics: tuple[tuple[str, float], ...] = ()
-    runs: tuple[str, ...] | None = None
-    condition: tuple[str, tuple[str, ...]] | None = None
+    applied: AppliedEffect
+    standard_errors: Mapping[str, float] = field(default_factory=dict)
     equivalent_to: tuple[str, ...] = ()
     nuisance: bool = False
     axes: Axes | None = None
     origin: str = ""
     of_machine: bool = False
 
-    def acts_in(self, run: str, conditions: Mapping[str, str]) -> bool:
-        """Tell whether it acts in a run: by its condition, else by the run's name."""
-        if self.condition is not None:
-            return conditions.get(self.condition[0]) in self.condition[1]
-        return self.runs is None or run in self.runs
-
     @property
     def label(self) -> str:
-        """Name and place, as people write it: ``crosstalk FZ to FY``."""
-        place = f" {self.source} to {self.channel}" if self.channel and self.source else ""
-        return self.effect.name + (place or (f" on {self.channel}" if self.channel else ""))
+        """Name and place, as people read it."""
+        return self.applied.key.label
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -105,7 +95,7 @@ class ModelFile:
     files: tuple[tuple[str, Path], ...]
     parameters: tuple[ModelParameter, ...]
     channels: Mapping[str, Any]
-    effects: tuple[ModelEffect, ...]
+    effects: tuple[FittedEffect, ...]
 
     def file(self, key: str) -> Path | None:
         """Return a file of the simulation, None where it has none of that kind."""
@@ -187,7 +177,7 @@ def _same(path: Path, key: str, name: object, known: object) -> Path:
     return file
 
 
-def _effects(entry: object, path: Path, axes: Axes, origin: str) -> tuple[ModelEffect, ...]:
+def _effects(entry: object, path: Path, axes: Axes, origin: str) -> tuple[FittedEffect, ...]:
     if not isinstance(entry, list):
         raise _wrong("effects are no list of tables", f"{path}: effect", entry, "[[effect]]")
     made = []
@@ -218,18 +208,25 @@ def _effects(entry: object, path: Path, axes: Axes, origin: str) -> tuple[ModelE
                     f"{where}.parameters.{parameter.name}", parameter.value, f"at most {limit:g}",
                 )  # fmt: skip
         condition = table.get("condition")
+        parameters = _in_order(parameters, effect)
+        numerics = {
+            name: _number(value, f"{where}.numerics.{name}")
+            for name, value in _table(table.get("numerics", {}), f"{where}.numerics").items()
+        }
         made.append(
-            ModelEffect(
-                effect=effect,
-                channel=_maybe(table.get("channel"), f"{where}.channel"),
-                source=_maybe(table.get("source"), f"{where}.source"),
-                parameters=_in_order(parameters, effect),
-                numerics=tuple(
-                    (name, _number(value, f"{where}.numerics.{name}"))
-                    for name, value in _table(table.get("numerics", {}), f"{where}.numerics").items()
+            FittedEffect(
+                applied=AppliedEffect(
+                    effect=effect,
+                    channel=_maybe(table.get("channel"), f"{where}.channel"),
+                    source=_maybe(table.get("source"), f"{where}.source"),
+                    values={each.name: each.value for each in parameters} | numerics,
+                    units={each.name: each.unit for each in parameters},
+                    runs=None if "runs" not in table else frozenset(_texts(table["runs"], f"{where}.runs")),
+                    condition=None if condition is None else _condition(condition, f"{where}.condition"),
                 ),
-                runs=None if "runs" not in table else _texts(table["runs"], f"{where}.runs"),
-                condition=None if condition is None else _condition(condition, f"{where}.condition"),
+                standard_errors={
+                    each.name: each.standard_error for each in parameters if each.standard_error is not None
+                },
                 equivalent_to=_texts(table.get("equivalent_to", []), f"{where}.equivalent_to"),
                 nuisance=table.get("nuisance") is True,
                 axes=axes,
@@ -239,11 +236,62 @@ def _effects(entry: object, path: Path, axes: Axes, origin: str) -> tuple[ModelE
     return tuple(made)
 
 
+def effect_lines(fitted: FittedEffect) -> list[str]:
+    """Return an effect as the lines of a model file that `read_model` takes."""
+    applied = fitted.applied
+    effect = applied.effect
+    entries: dict[str, Any] = {
+        "name": effect.name, "stage": effect.stage, "statement": effect.statement,
+        "equation": effect.equation,
+    }  # fmt: skip
+    entries |= {key: text for key, text in (("channel", applied.channel), ("source", applied.source)) if text}
+    if applied.runs is not None:
+        entries["runs"] = sorted(applied.runs)
+    if applied.condition is not None:
+        entries["condition"] = {applied.condition[0]: list(applied.condition[1])}
+    if fitted.equivalent_to:
+        entries["equivalent_to"] = list(fitted.equivalent_to)
+    if fitted.nuisance:
+        entries["nuisance"] = True
+    lines = ["", "[[effect]]", *toml_lines(entries)]
+    for name in effect.names:
+        lines += ["", f"[effect.parameters.{toml_key(name)}]"]
+        lines += toml_lines({"value": applied.values.get(name, 0.0), "unit": applied.units[name]})
+        if name in fitted.standard_errors:
+            lines += toml_lines({"standard_error": fitted.standard_errors[name]})
+    numerics = applied.numerics
+    return [*lines, "", "[effect.numerics]", *toml_lines(numerics)] if numerics else lines
+
+
+def toml_lines(table: Mapping[str, Any]) -> list[str]:
+    """Return the lines of a TOML table with plain values."""
+    return [f"{toml_key(name)} = {_toml(value)}" for name, value in table.items()]
+
+
+def toml_key(name: str) -> str:
+    """Return a key of a TOML table, in quotes where it needs them."""
+    plain = name.isascii() and name.replace("_", "").replace("-", "").isalnum()
+    return name if plain else _toml(name)
+
+
+def _toml(value: Any) -> str:
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, float):
+        return repr(float(value))
+    if isinstance(value, list):
+        return f"[{', '.join(map(_toml, value))}]"
+    if isinstance(value, dict):
+        return "{ " + ", ".join(f"{toml_key(name)} = {_toml(entry)}" for name, entry in value.items()) + " }"
+    # JSON's escapes are TOML's, the one of DEL excepted.
+    return json.dumps(str(value), ensure_ascii=False).replace("\x7f", "\\u007F")
+
+
 def _in_order(parameters: tuple[ModelParameter, ...], effect: Effect) -> tuple[ModelParameter, ...]:
     return tuple(sorted(parameters, key=lambda one: effect.names.index(one.name)))
 
 
-def _condition(entry: object, where: str) -> tuple[str, tuple[str, ...]]:
+def _condition(entry: object, where: str) -> Condition:
     table = _table(entry, where)
     if len(table) != 1:
         raise _wrong("a condition is one key with its values", where, entry, '{ order = ["1", "2"] }')

@@ -49,25 +49,25 @@ def other_programs(plan: Plan, registry: Registry | None) -> dict[str, OwnProgra
     """
     made = {}
     for one in plan.effects:
-        if one.record is None or one.record in made:
+        if not one.effect.replaces_record or one.source is None or one.source in made:
             continue
-        path = Path(one.record)
+        path = Path(one.source)
         if path.suffix == ".json" and path.is_file():
             record = from_bytes(read_bytes(path), where=path)
         elif registry is None:
             raise ConfigError(
                 "a wrong calibration is named and there is no registry",
-                where=f"--effect wrong_calibration={one.record}", got=one.record,
+                where=f"--effect {one.effect.name}={one.source}", got=one.source,
                 expected="a home with calibrations/, or the path of a record (.json)",
                 next_step="give --calibrations DIR", rule="effect-value",
             )  # fmt: skip
         else:
-            record = registry.load(one.record)
+            record = registry.load(one.source)
         written = unit(plan.machine.column(CELLS[0]).unit)
         for text in record.indication_units:
             if unit(text).dimension != written.dimension:
                 raise _unfit(record, f"indications in {text}", f"indications in {written.text}")
-        made[one.record] = program_from(record)
+        made[one.source] = program_from(record)
     return made
 
 

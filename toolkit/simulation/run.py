@@ -8,29 +8,30 @@ others. What a tire remembers from file to file (slip work, warmth) and the cloc
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from toolkit.channels import Rotation
+from toolkit.effects.applied import AppliedEffect, acting, in_order
+from toolkit.effects.forward import with_source
 from toolkit.effects.signals import Setting
 from toolkit.errors import ConfigError
 from toolkit.simulation import acquisition, carriage, cells, timeline, tire
 from toolkit.simulation.acquisition import OwnProgram, true_program
-from toolkit.simulation.apply_effects import through
 from toolkit.simulation.cells import CELLS
 from toolkit.simulation.chain import Before, Walked, walk
+from toolkit.simulation.places import through_machine
 from toolkit.simulation.plan import Plan
 from toolkit.simulation.steps import RunSteps
-from toolkit.simulation.switched import Switched, here
 from toolkit.simulation.timeline import Block, Timeline
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from toolkit.simulation.apply_effects import Signals
+    Signals = dict[str, NDArray[np.float64]]
 
 _TARE_FILE = 1_000_000  # the tare's place among the seeds, beyond any file's number
 _TARE_ROWS = 100  # of the lifted wheel's one revolution, however few a recording has
@@ -97,7 +98,7 @@ def simulate(
     plan : with ``kind = "test"``
     program : what the acquisition program was given, before the plan's signs are turned; None for the
         true map of the cells
-    others : record id to program, for the effect ``wrong_calibration``
+    others : record id to program, for an effect that computes with another record
 
     Raises
     ------
@@ -107,10 +108,10 @@ def simulate(
     given = (true_program(plan.cells) if program is None else program).with_negated(plan.acquisition.negated)
     known = dict(others or {})
     for one in plan.effects:
-        if one.record is not None and one.record not in known:
+        if one.effect.replaces_record and one.source not in known:
             raise ConfigError(
-                "the record of a wrong calibration is not known", where="--effect wrong_calibration",
-                got=one.record, expected=", ".join(known) or "a registry with that record",
+                "the record of a wrong calibration is not known", where=f"--effect {one.effect.name}",
+                got=one.source, expected=", ".join(known) or "a registry with that record",
                 next_step="give --calibrations DIR or --home DIR", rule="effect-value",
             )  # fmt: skip
     tare_rows, tare_dt = _tare(plan)
@@ -146,7 +147,7 @@ def _file(
     else:
         line = timeline.continuous(plan, run, rng)
     walked = walk(plan, run, line, before)
-    effects = here(plan.effects, run.conditions)
+    effects = acting(plan.effects, run.conditions)
     measured = _measured(plan, line, walked, effects)
     tared = {name: measured[name] - float(tare[name].mean()) for name in CELLS}
     own = _computed(plan, program, others, measured, effects, walked.setting)
@@ -165,18 +166,20 @@ def _file(
     ), walked.after
 
 
-def _measured(plan: Plan, line: Timeline, walked: Walked, effects: Any) -> Signals:
+def _measured(plan: Plan, line: Timeline, walked: Walked, effects: Sequence[AppliedEffect]) -> Signals:
     """Return the recorded cells [V/V], FZ [N] and SA [rad]: load cells, then the acquisition."""
     hub, machine = walked.hub, plan.machine
     loads = {"FY": hub.FY, "MZ": hub.MZ, "MX": hub.MX, "FZ": hub.FZ}
-    at_cells = [one for one in effects if one.effect.stage == "load_cells"]
-    sensed = through(loads, [one for one in at_cells if one.channel in loads], walked.setting, machine)
+    at_cells = in_order(effects, "load_cells")
+    sensed = through_machine(
+        loads, [one for one in at_cells if one.channel in loads], walked.setting, machine
+    )
     bridge = cells.sense(
         plan.cells,
         hub=carriage.HubLoads(FY=sensed["FY"], MZ=sensed["MZ"], MX=sensed["MX"], FZ=hub.FZ),
     )
     shown = {name: bridge[:, i] for i, name in enumerate(CELLS)}
-    shown = through(
+    shown = through_machine(
         {**sensed, **shown}, [one for one in at_cells if one.channel in CELLS], walked.setting, machine
     )
     channels = acquisition.digitise(
@@ -187,7 +190,7 @@ def _measured(plan: Plan, line: Timeline, walked: Walked, effects: Any) -> Signa
         noise=line.noise,
         dt=line.dt,
     )
-    return through(channels, _acquired(effects), walked.setting, machine)
+    return through_machine(channels, _acquired(effects), walked.setting, machine)
 
 
 def _computed(
@@ -195,24 +198,24 @@ def _computed(
     program: OwnProgram,
     others: Mapping[str, OwnProgram],
     channels: Signals,
-    effects: Any,
+    effects: Sequence[AppliedEffect],
     setting: Setting,
 ) -> Signals:
     """Return FY [N] and MZ [N·m] as a program makes them of recorded cells, with effects on them."""
     made = acquisition.own_columns(program, channels)
     for one in _acquired(effects):
-        if one.record is not None and one.effect.channel is not None:
-            other = acquisition.own_columns(others[one.record], channels)
+        if one.effect.replaces_record and one.effect.channel is not None:
+            other = acquisition.own_columns(others[str(one.source)], channels)
             for name in made:
-                seen = dataclasses.replace(setting, channels={**setting.channels, "from": other[name]})
-                made[name] = one.effect.channel(made[name], one.parameters, seen)
+                seen = with_source(setting, other[name])
+                made[name] = one.effect.channel(made[name], one.values, seen)
         else:
-            made = through(made, [one], setting, plan.machine)
+            made = through_machine(made, [one], setting, plan.machine)
     return made
 
 
-def _acquired(effects: Any) -> list[Switched]:
-    return [one for one in effects if one.effect.stage == "acquisition"]
+def _acquired(effects: Sequence[AppliedEffect]) -> Sequence[AppliedEffect]:
+    return in_order(effects, "acquisition")
 
 
 def _truth(name: str, run: RunSteps, line: Timeline, walked: Walked) -> tuple[BlockTruth, ...]:
@@ -262,8 +265,12 @@ def _tare(plan: Plan) -> tuple[Signals, float]:
         recorded=np.ones(rows, dtype=bool), blocks=(),
     )  # fmt: skip
     still = Walked(hub=hub, SA=none, sensed=none, setting=setting, after=Before())
-    effects = [one for one in here(plan.effects, {}) if one.effect.name != "zero_offset"]
+    effects = [applied for applied in acting(plan.effects, {}) if _is_in_tare(applied)]
     return _measured(at_rest, line, still, effects), dt
+
+
+def _is_in_tare(applied: AppliedEffect) -> bool:
+    return applied.effect.on_channel is None or applied.effect.on_channel.tare != "after"
 
 
 def _tare_values(plan: Plan, rows: Signals) -> tuple[tuple[tuple[str, float], ...], str]:

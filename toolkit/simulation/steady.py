@@ -7,12 +7,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from toolkit.channels import Rotation
+from toolkit.effects.applied import acting
+from toolkit.effects.forward import tire_forces
 from toolkit.effects.signals import Drive, Setting, TireForces, drive
-from toolkit.effects.similarity import Steady, similar
+from toolkit.effects.similarity import Steady
 from toolkit.simulation import tire as bakker
 from toolkit.simulation.file_tire import file_forces
 from toolkit.simulation.plan import Plan
-from toolkit.simulation.switched import here
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -62,13 +63,9 @@ def settled(plan: Plan, conditions: Mapping[str, str]) -> Answer:
             channels={"T_TREAD": now + plan.motion.ambient_K}, first={"T_TREAD": plan.motion.ambient_K},
         )  # fmt: skip
 
-        def tire(one: Drive) -> TireForces:
-            return similar(steady, one)
-
-        for one in here(plan.effects, {**conditions, "rotation": rotation}):
-            if one.effect.drive is not None and one.effect.stage in ("road", "tire"):
-                made = one.effect.drive(made, one.parameters, setting, tire)
-        forces = tire(made)
+        effects = acting(plan.effects, {**conditions, "rotation": rotation})
+        rolling = [applied for applied in effects if applied.effect.stage in ("road", "tire")]
+        forces = tire_forces(made, steady, rolling, setting)
         return float(forces.FY[0]), float(forces.MZ[0])
 
     return answer

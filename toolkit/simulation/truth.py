@@ -149,9 +149,9 @@ def _at(test: VirtualTest, load_N: float) -> dict[str, Any]:
     plan = test.plan
     # The road's and the tire's effects belong to the truth; a tire that no effect touches is its own.
     touched = plan.tire_file is not None or any(
-        one.effect.stage in ("road", "tire") and one.only is None for one in plan.effects
+        one.effect.stage in ("road", "tire") and one.condition is None for one in plan.effects
     )
-    general = dataclasses.replace(plan, effects=tuple(one for one in plan.effects if one.only is None))
+    general = dataclasses.replace(plan, effects=tuple(one for one in plan.effects if one.condition is None))
     tire = settled(general, {}) if touched else plan.tire
     return {
         "load_N": load_N,

@@ -26,9 +26,8 @@ from toolkit.diagnosis.fit.structure import groups
 from toolkit.diagnosis.policy import PRIORS, SCREENING, VERDICT
 from toolkit.diagnosis.search.forward_step import Step
 from toolkit.diagnosis.search.search import Search
-from toolkit.diagnosis.simulators.parameter_units import sense, unit_of
-from toolkit.diagnosis.simulators.simulator import Active
-from toolkit.effects.creep import FROM_REST
+from toolkit.diagnosis.simulators.parameter_units import unit_of
+from toolkit.effects.applied import AppliedEffect
 from toolkit.findings import Finding
 
 if TYPE_CHECKING:
@@ -88,7 +87,7 @@ def mostly_unknown(search: Search) -> bool:
     explained = sum(step.gain for step in search.steps)
     if explained < VERDICT.mostly * (explained + unexplained):
         return True
-    if all(step.active.effect.name == "quantisation" for step in search.steps):
+    if all(step.active.effect.from_digits for step in search.steps):
         return False  # read off the digits: it does not imitate anything
     # Outputs that show nothing but noise do not count: of nothing, nothing is two thirds.
     shown = [
@@ -124,9 +123,8 @@ def _effect(search: Search, step: Step) -> FoundEffect:
         if rival.active.effect.name not in (*equivalent, active.effect.name)
     }
     return FoundEffect(
-        name=active.effect.name,
+        key=active.key,
         stage=active.effect.stage,
-        channel=active.channel,
         statement=active.effect.statement,
         equation=active.effect.equation,
         reference=active.effect.reference,
@@ -138,13 +136,15 @@ def _effect(search: Search, step: Step) -> FoundEffect:
     )
 
 
-def _parameters(search: Search, active: Active, runs: tuple[str, ...] | None) -> tuple[FoundParameter, ...]:
+def _parameters(
+    search: Search, active: AppliedEffect, runs: tuple[str, ...] | None
+) -> tuple[FoundParameter, ...]:
     from scipy.stats import t as student
 
     problem, augmented = search.problem, search.augmented
     at = len(problem.free)
     for applied in augmented.active:
-        if _same(applied, active):
+        if applied.key == active.key:
             break
         at += len(applied.searched)
     n = sum(int(counted.sum()) for counted in problem.kept.values())
@@ -162,7 +162,7 @@ def _parameters(search: Search, active: Active, runs: tuple[str, ...] | None) ->
         half = active.values.get(f"_half_{parameter.name}")
         if half is not None:
             ci = (value - half, value + half)
-        turned = sense(active, parameter.name, problem.case.axes)
+        turned = parameter.sign_in(problem.case.axes)
         if turned < 0:
             value, ci = -value, None if ci is None else (-ci[1], -ci[0])
         unit = unit_of(problem.case, problem.model, active, parameter.name)
@@ -173,27 +173,17 @@ def _parameters(search: Search, active: Active, runs: tuple[str, ...] | None) ->
     return tuple(result)
 
 
-def _named(active: Active, runs: tuple[str, ...] | None) -> tuple[FoundParameter, ...]:
+def _named(active: AppliedEffect, runs: tuple[str, ...] | None) -> tuple[FoundParameter, ...]:
     """Return what of an effect is no number: the other channel or record, its history, the runs it is in."""
-    names = {"channel_swap": "with", "wrong_calibration": "record", "crosstalk": "from"}
     texts = {}
-    if active.effect.name in names and active.source is not None:
-        texts[names[active.effect.name]] = active.source
-    if active.values.get(FROM_REST):
-        texts["history"] = "unloaded before each run"
+    if active.effect.second is not None and active.source is not None:
+        texts[active.effect.second] = active.source
+    if active.history:
+        texts["history"] = active.history
     if not active.effect.parameters and runs is not None:
         texts["runs"] = ", ".join(runs)
     return tuple(
         FoundParameter(name=name, value=value, unit="", ci95=None, runs=runs) for name, value in texts.items()
-    )
-
-
-def _same(first: Active, second: Active) -> bool:
-    return (first.effect.name, first.channel, first.source, first.runs) == (
-        second.effect.name,
-        second.channel,
-        second.source,
-        second.runs,
     )
 
 

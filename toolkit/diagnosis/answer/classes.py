@@ -7,14 +7,10 @@ from dataclasses import replace
 from toolkit.diagnosis.answer.answer import FoundEffect
 from toolkit.diagnosis.fit.problem import Problem
 from toolkit.diagnosis.policy import VERDICT
+from toolkit.diagnosis.search.case_view import CaseView
 from toolkit.diagnosis.search.forward_step import Step
-from toolkit.diagnosis.simulators.simulator import Active
+from toolkit.effects.applied import AppliedEffect
 from toolkit.effects.catalogue import effects as catalogue
-
-_PULL = ("conicity", "camber_offset", "crosstalk")
-_ANGLE = ("plysteer", "steer_offset")
-# A load that is slow to come and a tire that is slow to settle: one may always be taken for the other.
-_AKIN = {"load_lag": ("viscoelastic_settling",), "viscoelastic_settling": ("load_lag",)}
 
 
 def equivalent_to(problem: Problem, step: Step) -> tuple[str, ...]:
@@ -35,23 +31,28 @@ def apart(found: FoundEffect) -> str:
 
 def parted(found: FoundEffect) -> str:
     """Return the sentence that says what would tell an effect from its class, or from what is like it."""
-    others = found.equivalent_to or _AKIN.get(found.name, ())
+    others = found.equivalent_to or _akin(found.name)
     if not others:
         return ""
     return f"To tell {found.name} from {', '.join(others)}: {apart(replace(found, equivalent_to=others))}."
 
 
-def _always(problem: Problem, active: Active) -> list[str]:
-    """Return the classes that hold on this machine whatever the recording."""
-    name = active.effect.name
-    turned = any(run.conditions.get("mounting") == "turned" for run in problem.runs)
-    if name in _ANGLE:
-        return list(_ANGLE)
-    is_load = name == "crosstalk" and active.channel == "FY" and active.source in ("FZ", "FZ_CMD")
-    if (name in ("conicity", "camber_offset") or is_load) and not turned:
-        return list(_PULL)
-    if name == "channel_sign" and active.channel in problem.model.capability.cells:
-        return ["channel_sign", "wrong_calibration"]
-    if name == "wrong_calibration":
-        return ["wrong_calibration", "channel_sign"]
-    return []
+def _akin(name: str) -> tuple[str, ...]:
+    """Return the other effects for which one may always be taken, however the recording parts them."""
+    akin = catalogue()[name].akin
+    return tuple(
+        effect.name for effect in catalogue().values() if akin and effect.akin == akin and effect.name != name
+    )
+
+
+def _always(problem: Problem, active: AppliedEffect) -> list[str]:
+    """Return the class that holds on this machine whatever the recording, the tire's effects first."""
+    alike = active.effect.alike
+    if alike is None or not alike.holds(CaseView(problem, active.channel, active.source)):
+        return []
+    members = [
+        effect.name
+        for effect in catalogue().values()
+        if effect.alike is not None and effect.alike.group == alike.group
+    ]
+    return members[::-1]

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from toolkit.diagnosis.case.case import Case, Run
-    from toolkit.diagnosis.simulators.simulator import Active
+    from toolkit.effects.applied import AppliedEffect
 
 
 class FailedRuns:
@@ -29,7 +29,7 @@ class FailedRuns:
         self._with: dict[str, list[int]] = {}  # effect -> simulations with it, and those that gave nothing
 
     def __call__(
-        self, run: Run, p: Mapping[str, float], active: Sequence[Active]
+        self, run: Run, p: Mapping[str, float], active: Sequence[AppliedEffect]
     ) -> dict[str, NDArray[np.float64]]:
         """Return the outputs of a run."""
         values = tuple(p.values())
@@ -71,5 +71,5 @@ class FailedRuns:
         return tuple(made)
 
 
-def _told(one: Active) -> str:
-    return one.effect.name if one.channel is None else f"{one.effect.name} on {one.channel}"
+def _told(one: AppliedEffect) -> str:
+    return one.key._replace(source=None).label

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 from toolkit.diagnosis.answer.answer import (
     Diagnosis,
@@ -18,6 +18,8 @@ from toolkit.diagnosis.answer.answer import (
     Place,
     Recorded,
 )
+from toolkit.effects.applied import EffectKey
+from toolkit.effects.facts import Second
 from toolkit.errors import ConfigError
 from toolkit.files import read_bytes
 from toolkit.findings import Finding
@@ -141,9 +143,8 @@ def _mismatch(mismatch: dict[str, Any]) -> Mismatch:
 
 def _effect(effect: dict[str, Any]) -> FoundEffect:
     return FoundEffect(
-        name=_text(effect["name"]),
+        key=_key(effect),
         stage=_text(effect["stage"]),
-        channel=None if effect["channel"] is None else _text(effect["channel"]),
         statement=_text(effect["statement"]),
         equation=_text(effect["equation"]),
         reference=_text(effect["reference"]),
@@ -165,6 +166,19 @@ def _effect(effect: dict[str, Any]) -> FoundEffect:
         rejected=tuple((_text(o["name"]), -_number(o["log_likelihood_less"])) for o in effect["rejected"]),
         held_out_log_score_gain=_number(effect["evidence"]["held_out_log_score_gain"]),
         p_value=_number(effect["evidence"]["p_value"]),
+    )
+
+
+def _key(effect: dict[str, Any]) -> EffectKey:
+    """Return an effect's identity; its source and its runs stand among its parameters."""
+    parameters = effect["parameters"]
+    words = {entry["name"]: entry["value"] for entry in parameters if isinstance(entry["value"], str)}
+    runs = next((entry["runs"] for entry in parameters), None)
+    return EffectKey(
+        name=_text(effect["name"]),
+        channel=None if effect["channel"] is None else _text(effect["channel"]),
+        source=next((words[word] for word in get_args(Second) if word in words), None),
+        runs=None if runs is None else frozenset(_texts(runs)),
     )
 
 

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from toolkit.simulation.model_file import ModelEffect
+    from toolkit.simulation.model_file import FittedEffect
 
 Role = Literal["time", "input", "output", "covariate"]
 Kind = Literal["machine", "python", "ode", "columns"]
@@ -102,7 +102,7 @@ class Case:
     runs: tuple[Run, ...]
     predict: tuple[Run, ...]
     sha256: str
-    effects: tuple[ModelEffect, ...] = ()
+    effects: tuple[FittedEffect, ...] = ()
     nominal_load_N: float | None = None
     model: Path | None = None
 

@@ -7,10 +7,9 @@ from pathlib import Path
 from typing import Any
 
 from toolkit.diagnosis.case.case import KINDS, CaseParameter, Simulation
-from toolkit.effects.catalogue import effect
 from toolkit.errors import ConfigError
 from toolkit.machine import load_machine
-from toolkit.simulation.model_file import ModelEffect, ModelFile, ModelParameter, read_model
+from toolkit.simulation.model_file import FittedEffect, ModelFile, read_model
 
 
 def simulation_of(model: ModelFile) -> Simulation:
@@ -74,7 +73,7 @@ def tire_model(path: Path, where: str) -> ModelFile:
     return model
 
 
-def corrections_of(simulation: Simulation) -> tuple[ModelEffect, ...]:
+def corrections_of(simulation: Simulation) -> tuple[FittedEffect, ...]:
     """Return the corrections of a case's machine as effects: the recordings still have them.
 
     None where no tire is simulated: an acquisition program's arithmetic is not the machine's.
@@ -83,18 +82,9 @@ def corrections_of(simulation: Simulation) -> tuple[ModelEffect, ...]:
         return ()
     machine = load_machine(simulation.machine)
     return tuple(
-        ModelEffect(
-            effect=effect(correction.effect, where=machine.name),
-            channel=correction.channel,
-            source=correction.source,
-            parameters=(
-                ModelParameter(
-                    name=correction.parameter,
-                    value=correction.value,
-                    unit=correction.unit,
-                    standard_error=correction.u or None,
-                ),
-            ),
+        FittedEffect(
+            applied=correction.applied,
+            standard_errors={correction.parameter: correction.u} if correction.u else {},
             axes="machine",
             of_machine=True,
             origin=f"{machine.name}, version {machine.version}: answer {correction.answer_sha256[:16]}",

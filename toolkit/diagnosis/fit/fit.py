@@ -14,7 +14,7 @@ from toolkit.diagnosis.fit.descent import Derivatives, descend
 from toolkit.diagnosis.fit.noise import Autoregression, Layout, fit_noise, log_likelihood
 from toolkit.diagnosis.fit.space import Space
 from toolkit.diagnosis.policy import NOISE
-from toolkit.diagnosis.simulators.simulator import Active
+from toolkit.effects.applied import AppliedEffect
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -36,7 +36,7 @@ class Fit:
     """
 
     p: tuple[float, ...]
-    active: tuple[Active, ...]
+    active: tuple[AppliedEffect, ...]
     residual: Stacked
     simulated: Stacked
     noise: dict[str, Autoregression]
@@ -59,7 +59,7 @@ class _Solved:
 
 def fit(
     problem: Problem,
-    active: Sequence[Active] = (),
+    active: Sequence[AppliedEffect] = (),
     *,
     start: Sequence[float] | None = None,
     rows: NDArray[np.bool_] | None = None,
@@ -171,7 +171,7 @@ def _solve(
     return _Solved(x, simulated, residual, noise, _score(space, x, residual, layouts, noise))
 
 
-def replace_effects(problem: Problem, made: Fit, active: tuple[Active, ...]) -> Fit:
+def replace_effects(problem: Problem, made: Fit, active: tuple[AppliedEffect, ...]) -> Fit:
     """Return a fit with other effects in it that nothing is fitted of: its covariance has them as known."""
     simulated = problem.simulate(made.p, active)
     before, after = _columns(problem, made.active), _columns(problem, active)
@@ -183,11 +183,11 @@ def replace_effects(problem: Problem, made: Fit, active: tuple[Active, ...]) -> 
     return replace(made, active=active, simulated=simulated, residual=residual, covariance=covariance)
 
 
-def _columns(problem: Problem, active: Sequence[Active]) -> list[tuple[object, ...]]:
+def _columns(problem: Problem, active: Sequence[AppliedEffect]) -> list[tuple[object, ...]]:
     """Return what tells the parameters of a fit apart, in the order of its covariance."""
     columns: list[tuple[object, ...]] = [(parameter.name,) for parameter in problem.free]
     for applied in active:
-        at = (applied.effect.name, applied.channel, applied.source, applied.runs)
+        at = applied.key
         columns += [(*at, parameter.name) for parameter in applied.searched]
     return columns
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from toolkit.diagnosis.fit.fit import Fit, fit, held_out_score, jacobian
 from toolkit.diagnosis.policy import ROWS
-from toolkit.diagnosis.simulators.simulator import Active
+from toolkit.effects.applied import AppliedEffect
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -85,7 +85,7 @@ class HeldOut:
         return sum(self.scores)
 
 
-def hold_out(problem: Problem, folds: Folds, active: Sequence[Active], start: Fit) -> HeldOut:
+def hold_out(problem: Problem, folds: Folds, active: Sequence[AppliedEffect], start: Fit) -> HeldOut:
     """Fit a hypothesis without each fold and score it there; the simulation is free over whole runs."""
     scores, fits = [], []
     simulated = {name: np.full(problem.rows, np.nan) for name in problem.names}

@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import dataclasses
 
-from toolkit.effects.effect import Effect, EffectParameter, Values
+from toolkit.effects.effect import Effect, EffectParameter
+from toolkit.effects.facts import Values
 from toolkit.effects.filters import lag
 from toolkit.effects.signals import Drive, Setting, Tire
 
@@ -25,6 +26,9 @@ def _smoothed(drive: Drive, values: Values, setting: Setting, tire: Tire) -> Dri
 INPUT_NOISE = Effect(
     name="input_noise",
     stage="carriage",
+    rank=0,
+    in_time=True,
+    nuisance=True,
     statement="The recorded slip angle is noisy; the wheel's own is smoother.",
     equation="SA smoothed forward and backward by one time constant",
     reference="Rauch, Tung and Striebel, AIAA J. 3 (1965)",

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from toolkit.diagnosis.case.case import Run
     from toolkit.diagnosis.fit.fit import Fit
     from toolkit.diagnosis.fit.problem import Problem
-    from toolkit.diagnosis.simulators.simulator import Active
+    from toolkit.effects.applied import AppliedEffect
 
 VARIANTS = ("nominal", "refitted", "augmented")
 
@@ -78,7 +78,7 @@ def _simulated(problem: Problem, run: Run, made: Fit | None) -> Mapping[str, NDA
     )
 
 
-def _spread_to(problem: Problem, run: Run, applied: Active) -> Active:
+def _spread_to(problem: Problem, run: Run, applied: AppliedEffect) -> AppliedEffect:
     """Return an effect that is confined to some runs with the new run in it, where a condition says so.
 
     The condition is the one whose values part the effect's runs from all the others.

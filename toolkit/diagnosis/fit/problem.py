@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -10,7 +10,9 @@ import numpy as np
 
 from toolkit.diagnosis.fit.noise import Layout, layout
 from toolkit.diagnosis.policy import ROWS
-from toolkit.diagnosis.simulators.simulator import Active, Model
+from toolkit.diagnosis.simulators.simulator import Model
+from toolkit.effects.applied import AppliedEffect
+from toolkit.errors import FitError
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -19,6 +21,9 @@ if TYPE_CHECKING:
     from toolkit.diagnosis.simulators.simulator import Pattern
 
     Stacked = dict[str, NDArray[np.float64]]
+
+
+_QUARTERS = 2  # of a cycle, by which the columns of a pattern are apart: sine and cosine make every phase
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -55,14 +60,14 @@ class Problem:
         good = self.kept[name] if rows is None else self.kept[name] & rows
         return layout([run.t for run in self.runs], [good[one] for one in self.slices])
 
-    def simulate(self, p: Sequence[float], active: Sequence[Active]) -> Stacked:
+    def simulate(self, p: Sequence[float], active: Sequence[AppliedEffect]) -> Stacked:
         """Return every output over all runs in their order; ``p`` are the free parameters."""
         values = dict(self.known)
         values.update(zip((parameter.name for parameter in self.free), map(float, p), strict=True))
         outputs = [self.model.simulate(run, values, active) for run in self.runs]
         return {name: np.concatenate([output[name] for output in outputs]) for name in self.names}
 
-    def prepare(self, wanted: Sequence[tuple[Sequence[float], Sequence[Active]]]) -> None:
+    def prepare(self, wanted: Sequence[tuple[Sequence[float], Sequence[AppliedEffect]]]) -> None:
         """Have several simulations made at once where the model can; `simulate` then finds them."""
         together = self.model.capability.together
         if together is None:
@@ -73,7 +78,12 @@ class Problem:
             together(run, sets)
 
     def pushed(
-        self, p: Sequence[float], active: Sequence[Active], applied: Active, pattern: Pattern, forces: int
+        self,
+        p: Sequence[float],
+        active: Sequence[AppliedEffect],
+        applied: AppliedEffect,
+        pattern: Pattern,
+        forces: int,
     ) -> Stacked:
         """Return linear responses of every output over all runs to small forces, (rows, forces).
 
@@ -113,6 +123,47 @@ class Problem:
         """Return how far free parameters are off their declared values, in prior sd, (free,)."""
         pairs = zip(p, self.free, strict=True)
         return np.array([(value - parameter.value) / (parameter.sd or 1.0) for value, parameter in pairs])
+
+    def patterned(
+        self,
+        p: Sequence[float],
+        active: Sequence[AppliedEffect],
+        applied: AppliedEffect,
+        starts: Sequence[Mapping[str, float]],
+    ) -> list[Stacked]:
+        """Return the responses of an output to a term with a pattern, (rows, 2) for each start.
+
+        Hundreds of starts would be too many simulations; their linear responses along one are not.
+
+        Parameters
+        ----------
+        applied : where and in which runs the term acts
+        starts : its parameters; the columns are a quarter of a cycle apart
+
+        Raises
+        ------
+        FitError
+            the simulation cannot be run, or has no linear response
+        """
+        pattern = None if applied.effect.term is None else applied.effect.term.pattern
+        if pattern is None:
+            return []
+        hook = pattern
+        responses = self.pushed(p, active, applied, lambda x: hook(x, starts), _QUARTERS * len(starts))
+        for column in responses.values():
+            if not np.isfinite(column).all():
+                raise FitError(
+                    "an equation cannot be linearised along its motion",
+                    where=str(applied.channel),
+                    got="responses without bound",
+                    expected="an equation that is smooth where it moves",
+                    next_step="look at the equation where it has corners",
+                    rule="simulator",
+                )
+        return [
+            {name: column[:, [k, k + len(starts)]] for name, column in responses.items()}
+            for k in range(len(starts))
+        ]
 
     def sd_of(self, name: str) -> float | None:
         """Return the stated noise of an output."""

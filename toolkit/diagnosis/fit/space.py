@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from toolkit.diagnosis.policy import PRIORS
-from toolkit.diagnosis.simulators.simulator import Active
+from toolkit.effects.applied import AppliedEffect
 from toolkit.errors import FitError
 
 if TYPE_CHECKING:
@@ -29,13 +29,13 @@ class Space:
     """One hypothesis as a vector with bounds."""
 
     problem: Problem
-    active: tuple[Active, ...]
+    active: tuple[AppliedEffect, ...]
     sizes: Array
     low: Array
     high: Array
 
     @staticmethod
-    def of(problem: Problem, active: tuple[Active, ...]) -> Space:
+    def of(problem: Problem, active: tuple[AppliedEffect, ...]) -> Space:
         """Return the space of a problem's free parameters and of the values that effects search."""
         sizes, low, high = [], [], []
         for one in problem.free:
@@ -69,7 +69,7 @@ class Space:
         ]
         return np.asarray(values, dtype=np.float64) / self.sizes
 
-    def split(self, x: Array) -> tuple[list[float], tuple[Active, ...]]:
+    def split(self, x: Array) -> tuple[list[float], tuple[AppliedEffect, ...]]:
         """Return free parameters and effects with their values."""
         values = (x * self.sizes).tolist()
         n = len(self.problem.free)
@@ -132,7 +132,7 @@ class Space:
         return points
 
 
-def _size(applied: Active, name: str) -> float:
+def _size(applied: AppliedEffect, name: str) -> float:
     """Return the size on which a parameter is searched: its value, or its typical one where that is off."""
     parameter = next(parameter for parameter in applied.effect.parameters if parameter.name == name)
     value = abs(applied.values.get(name, 0.0))
@@ -142,7 +142,7 @@ def _size(applied: Active, name: str) -> float:
     return scale or abs(parameter.typical[0]) or 1.0
 
 
-def _clipped(applied: Active, name: str) -> float:
+def _clipped(applied: AppliedEffect, name: str) -> float:
     parameter = next(parameter for parameter in applied.effect.parameters if parameter.name == name)
     low, high = parameter.bounds
     inside = 1e-9 * max(abs(low) if math.isfinite(low) else 0.0, 1e-9)

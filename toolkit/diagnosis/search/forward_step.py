@@ -10,30 +10,18 @@ import numpy as np
 
 from toolkit.diagnosis.fit.fit import Fit, fit
 from toolkit.diagnosis.fit.folds import Folds, HeldOut, beyond_form, hold_out, matters
-from toolkit.diagnosis.fit.nuisance import INPUT_NOISE
 from toolkit.diagnosis.fit.problem import Problem
 from toolkit.diagnosis.policy import STEP
-from toolkit.diagnosis.search.candidates import Key
 from toolkit.diagnosis.search.screen import Scored
-from toolkit.diagnosis.simulators.simulator import Active
+from toolkit.effects.applied import AppliedEffect, EffectKey
 from toolkit.errors import FitError
-
-# By how much of what it does an effect's law may be off: what it leaves then is no effect of its own. One
-# factor and one exponent for a patch on a drum are off by up to a tenth beside bristles on a carcass.
-_FORM = {"drum_curvature": 0.1} | dict.fromkeys(
-    (
-        "relaxation thermal_friction wear load_friction speed_friction viscoelastic_settling turn_slip "
-        "surface_friction pressure_change coulomb_friction viscous_damping quadratic_drag cubic_stiffness"
-    ).split(),
-    0.03,
-)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Rival:
     """A candidate fitted jointly in an effect's place: its log-likelihood less that of the chosen one."""
 
-    active: Active
+    active: AppliedEffect
     difference: float
 
 
@@ -41,7 +29,7 @@ class Rival:
 class Step:
     """An effect that was found: its evidence, and what else would explain the same."""
 
-    active: Active
+    active: AppliedEffect
     p_value: float
     held_out_gain: float
     gain: float
@@ -58,7 +46,7 @@ class Joint:
 
 
 def step_groups(
-    ranked: Sequence[Scored], hidden: frozenset[Key], least: float
+    ranked: Sequence[Scored], hidden: frozenset[EffectKey], least: float
 ) -> list[tuple[Sequence[Scored], float]]:
     """Return candidates in the order of joint fits, with the least share of the error that each must take.
 
@@ -107,7 +95,7 @@ def best_step(
     least : share of an output's held-out mean square that it must take away
     refitted : the held-out rows without any effect
     """
-    form = max((_FORM.get(one.effect.name, 0.0) for one in base.active), default=0.0)
+    form = max((one.effect.form_error for one in base.active), default=0.0)
     for one in joint[: STEP.judged]:
         made = one.fit
         try:
@@ -122,7 +110,7 @@ def best_step(
             continue
         if not beyond_form(problem, refitted, held_base, held, form):
             continue
-        if made.active[-1].effect.name == "unit_error" and not _shows(problem, held, made.active[-1]):
+        if made.active[-1].effect.needs_signal and not _shows(problem, held, made.active[-1]):
             continue
         step = Step(
             active=made.active[-1],
@@ -135,8 +123,8 @@ def best_step(
     return None
 
 
-def _shows(problem: Problem, held: HeldOut, one: Active) -> bool:
-    """Tell whether an output in another unit has the signal in it, and is not only made small by a factor."""
+def _shows(problem: Problem, held: HeldOut, one: AppliedEffect) -> bool:
+    """Tell whether an output has the simulated signal in it, and is not only made small by a factor."""
     name = str(one.channel)
     if name not in problem.names:
         return True
@@ -157,7 +145,7 @@ def rivals(problem: Problem, chosen: Joint, joint: Sequence[Joint]) -> tuple[Riv
             + weight * (_shapes(other.scored.active) - _shapes(chosen.scored.active)),
         )
         for other in joint
-        if other is not chosen and other.scored.candidate.name != INPUT_NOISE.name
+        if other is not chosen and not other.scored.active.effect.nuisance
     )
 
 
@@ -166,7 +154,7 @@ def _weight(problem: Problem) -> float:
     return 0.5 * math.log(sum(int(one.sum()) for one in problem.kept.values()))
 
 
-def _fitted(problem: Problem, base: Fit, added: Active) -> Fit | None:
+def _fitted(problem: Problem, base: Fit, added: AppliedEffect) -> Fit | None:
     """Return the joint fit with one effect more, None where the simulation runs with no part of it.
 
     Screening is linear: the size to which it leads may be beyond what a simulation can run with, where the
@@ -184,12 +172,12 @@ def _fitted(problem: Problem, base: Fit, added: Active) -> Fit | None:
     return None
 
 
-def _shapes(one: Active) -> int:
+def _shapes(one: AppliedEffect) -> int:
     """Return how many parameters only shape an effect: they make it no less able to imitate another."""
     return sum(each.off is None and not each.ends_count for each in one.searched)
 
 
-def at_bound(one: Active) -> bool:
+def at_bound(one: AppliedEffect) -> bool:
     """Tell whether a parameter ends at a bound other than zero: then the effect only imitates another."""
     for parameter in one.searched:
         if parameter.ends_count:
@@ -199,8 +187,3 @@ def at_bound(one: Active) -> bool:
             if math.isfinite(bound) and bound != 0 and abs(value - bound) < STEP.bound * abs(bound):
                 return True
     return False
-
-
-def place(one: Active) -> tuple[object, ...]:
-    """Return what tells effects of one hypothesis apart."""
-    return (one.effect.name, one.channel, one.source, one.runs)

@@ -11,13 +11,12 @@ from typing import TYPE_CHECKING
 from toolkit.diagnosis.fit.fit import Fit, fit
 from toolkit.diagnosis.fit.folds import Folds, HeldOut, hold_out
 from toolkit.diagnosis.policy import STEP
-from toolkit.effects.dead_band import NOISE
 from toolkit.errors import FitError
 
 if TYPE_CHECKING:
     from toolkit.diagnosis.fit.problem import Problem
     from toolkit.diagnosis.search.candidates import CandidateEffect
-    from toolkit.diagnosis.simulators.simulator import Active
+    from toolkit.effects.applied import AppliedEffect
 
 
 def refined(
@@ -46,17 +45,17 @@ def refined(
     return base, held
 
 
-def without(active: Sequence[Active], one: Active) -> tuple[Active, ...]:
+def without(active: Sequence[AppliedEffect], one: AppliedEffect) -> tuple[AppliedEffect, ...]:
     """Return effects without one of them; a drift with the temperature goes with its zero."""
-    gone = {(one.effect.name, one.channel, one.source, one.runs)}
-    if one.effect.name == "thermal_drift":
-        gone.add(("zero_offset", one.channel, None, None))
-    return tuple(
-        each for each in active if (each.effect.name, each.channel, each.source, each.runs) not in gone
-    )
+    zero = (one.channel, None, None)
+
+    def belongs(each: AppliedEffect) -> bool:
+        return one.effect.frees_zero and each.effect.is_zero and each.key[1:] == zero
+
+    return tuple(each for each in active if each.key != one.key and not belongs(each))
 
 
-def _better(problem: Problem, base: Fit, active: tuple[Active, ...] | None, least: float) -> Fit:
+def _better(problem: Problem, base: Fit, active: tuple[AppliedEffect, ...] | None, least: float) -> Fit:
     """Return the fit with other effects where it can be made, and gains so much."""
     if active is None:
         return base
@@ -67,24 +66,22 @@ def _better(problem: Problem, base: Fit, active: tuple[Active, ...] | None, leas
     return made if made.log_posterior >= base.log_posterior + least else base
 
 
-def _with_zeros(base: Fit, listed: Sequence[CandidateEffect]) -> tuple[Active, ...] | None:
-    there = {one.channel for one in base.active if one.effect.name == "zero_offset"}
-    wanted = {one.channel for one in base.active if one.effect.name == "thermal_drift"} - there
+def _with_zeros(base: Fit, listed: Sequence[CandidateEffect]) -> tuple[AppliedEffect, ...] | None:
+    there = {one.channel for one in base.active if one.effect.is_zero}
+    wanted = {one.channel for one in base.active if one.effect.frees_zero} - there
     zeros = tuple(
-        replace(one.active, values=one.starts[0].values | {"offset": 0.0})
+        replace(one.active, values=one.starts[0].values | {one.active.effect.names[0]: 0.0})
         for one in listed
-        if one.name == "zero_offset" and one.active.channel in wanted and one.active.runs is None
+        if one.active.effect.is_zero and one.active.channel in wanted and one.active.runs is None
     )
     return (*base.active, *zeros) if zeros else None
 
 
-def _with_noise(base: Fit, one: Active) -> tuple[Active, ...] | None:
-    noise = base.noise.get(str(one.channel))
-    if one.effect.name != "dead_band" or noise is None:
+def _with_noise(base: Fit, one: AppliedEffect) -> tuple[AppliedEffect, ...] | None:
+    noise, key = base.noise.get(str(one.channel)), one.effect.noise_key
+    if key is None or noise is None:
         return None
     return tuple(
-        replace(each, values={**each.values, NOISE: noise.marginal_sd})
-        if (each.effect.name, each.channel, each.runs) == (one.effect.name, one.channel, one.runs)
-        else each
+        replace(each, values={**each.values, key: noise.marginal_sd}) if each.key == one.key else each
         for each in base.active
     )

@@ -18,9 +18,8 @@ import numpy as np
 from toolkit.diagnosis.fit.fit import Fit, jacobian, log_prior
 from toolkit.diagnosis.fit.noise import Autoregression, Layout, fit_noise, log_likelihood, whiten
 from toolkit.diagnosis.policy import SCREENING
-from toolkit.diagnosis.search import ripple
 from toolkit.diagnosis.search.candidates import CandidateEffect, Start
-from toolkit.diagnosis.simulators.simulator import Active
+from toolkit.effects.applied import AppliedEffect
 from toolkit.errors import FitError
 
 if TYPE_CHECKING:
@@ -42,7 +41,7 @@ class Scored:
 
     candidate: CandidateEffect
     start: Start
-    active: Active
+    active: AppliedEffect
     gain: float
     directions: Stacked
     block: NDArray[np.float64]
@@ -110,7 +109,7 @@ class LinearisedFit:
         listed = [
             replace(candidate.active, values=values)
             for candidate in candidates
-            if candidate.name != ripple.NAME
+            if not candidate.has_pattern
             for start in candidate.starts
             for values in start.directions
         ]
@@ -146,10 +145,10 @@ class LinearisedFit:
 
     def _directions(self, candidate: CandidateEffect) -> Iterator[Stacked]:
         """Give the responses of every start, nothing for one that the simulation cannot run."""
-        if candidate.name == ripple.NAME:
+        if candidate.has_pattern:
             try:
                 starts = [start.values for start in candidate.starts]
-                yield from ripple.responses(self.problem, self.base, candidate.active, starts)
+                yield from self.problem.patterned(self.base.p, self.base.active, candidate.active, starts)
             except FitError:
                 yield from ({} for _ in candidate.starts)
             return

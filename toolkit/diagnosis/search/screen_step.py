@@ -8,10 +8,10 @@ from dataclasses import dataclass, replace
 from toolkit.diagnosis.fit.fit import Fit
 from toolkit.diagnosis.fit.problem import Problem
 from toolkit.diagnosis.policy import PRIORS, SCREENING
-from toolkit.diagnosis.search.candidates import CandidateEffect, Key
-from toolkit.diagnosis.search.forward_step import place
+from toolkit.diagnosis.search.candidates import CandidateEffect
 from toolkit.diagnosis.search.null import search_p_values
 from toolkit.diagnosis.search.screen import LinearisedFit, Scored, best_of
+from toolkit.effects.applied import EffectKey
 from toolkit.errors import FitError
 
 
@@ -39,11 +39,9 @@ def look(problem: Problem, base: Fit, listed: Sequence[CandidateEffect], *, turn
     seed : of the null's draws
     """
     screen = LinearisedFit.of(problem, base)
-    taken = {place(applied) for applied in base.active}
+    taken = {applied.key for applied in base.active}
     candidates = [
-        candidate
-        for candidate in listed
-        if place(candidate.active) not in taken and _is_sought(candidate, turn)
+        candidate for candidate in listed if candidate.key not in taken and _is_sought(candidate, turn)
     ]
     screen.prepare(candidates)
     scored = screen.sharpened(
@@ -60,13 +58,13 @@ def look(problem: Problem, base: Fit, listed: Sequence[CandidateEffect], *, turn
 def _is_sought(candidate: CandidateEffect, turn: int) -> bool:
     """Tell whether a candidate is searched for.
 
-    Coarse steps have a test of their own; what is there or not (a sign, a swap, a unit) is so gross that it
-    comes first or second.
+    What is read off the digits has a test of its own; what is there or not (a sign, a swap, a unit) is so
+    gross that it comes first or second.
     """
-    return candidate.name != "quantisation" and not (candidate.discrete and turn > 1)
+    return not candidate.active.effect.from_digits and not (candidate.discrete and turn > 1)
 
 
-def masked(problem: Problem, base: Fit, candidates: Sequence[CandidateEffect]) -> frozenset[Key]:
+def masked(problem: Problem, base: Fit, candidates: Sequence[CandidateEffect]) -> frozenset[EffectKey]:
     """Return the candidates that explain most from the declared parameters; none where they hold.
 
     Where a parameter left its prior far behind, it stands in for something that was left out. Seen from there

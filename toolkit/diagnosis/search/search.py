@@ -11,11 +11,10 @@ import numpy as np
 
 from toolkit.diagnosis.fit.fit import Fit, fit, noise_of, replace_effects
 from toolkit.diagnosis.fit.folds import Folds, HeldOut, folds_of, hold_out, matters
-from toolkit.diagnosis.fit.nuisance import INPUT_NOISE
 from toolkit.diagnosis.fit.problem import Problem, without_outliers
 from toolkit.diagnosis.policy import STEP
 from toolkit.diagnosis.search.candidates import candidates
-from toolkit.diagnosis.search.forward_step import Step, best_step, joint_fits, place, step_groups
+from toolkit.diagnosis.search.forward_step import Step, best_step, joint_fits, step_groups
 from toolkit.diagnosis.search.lattice import lattice_of
 from toolkit.diagnosis.search.nuisance_refit import refined, without
 from toolkit.diagnosis.search.screen import LinearisedFit, Scored
@@ -113,8 +112,8 @@ def search(problem: Problem, *, seed: int, budget: TimeBudget) -> Search:
         skipped.append(str(error))
     base, steps = _with_a_size(problem, base, steps)
     # Every effect with its values of the last joint fit, not of the step that found it.
-    values = {place(applied): applied for applied in base.active}
-    steps = [replace(step, active=values[place(step.active)]) for step in steps]
+    values = {applied.key: applied for applied in base.active}
+    steps = [replace(step, active=values[step.active.key]) for step in steps]
     return Search(
         problem=problem,
         folds=folds,
@@ -134,16 +133,15 @@ def search(problem: Problem, *, seed: int, budget: TimeBudget) -> Search:
 
 def _is_nuisance(step: Step, steps: Sequence[Step]) -> bool:
     """Tell whether a step is no physics: input noise, or the point from which a drift or a loop starts."""
-    if step.active.effect.name == INPUT_NOISE.name:
+    effect = step.active.effect
+    if effect.nuisance:
         return True
-    if step.active.effect.name != "zero_offset":
+    if not effect.is_zero:
         return False
     beside = [other.active for other in steps if other.active.channel == step.active.channel]
-    offset = abs(step.active.values["offset"])
+    offset = abs(step.active.values[effect.names[0]])
     return any(
-        other.effect.name in ("thermal_drift", "zero_drift")
-        # Where in its loop a channel stands at first depends on what came before the recording.
-        or (other.effect.name == "hysteresis" and offset <= STEP.loop_offset * other.values["width"])
+        other.effect.zero_beside is not None and offset <= other.effect.zero_beside(other.values)
         for other in beside
     )
 
@@ -154,14 +152,15 @@ def _stepped(
     """Add the outputs whose recorded values stand on a coarse lattice."""
     for candidate in candidates(problem):
         name = str(candidate.active.channel)
-        if candidate.name != "quantisation" or name not in problem.observed:
+        if not candidate.active.effect.from_digits or name not in problem.observed:
             continue
         counted = problem.kept[name]
         sd = float(np.std(base.residual[name][counted]))
         lattice = lattice_of(problem.observed[name][np.isfinite(problem.observed[name])], sd)
         if lattice is None:
             continue
-        active = replace(candidate.active, values={"step": lattice.step, "_half_step": lattice.half_width})
+        width = candidate.active.effect.names[0]
+        active = replace(candidate.active, values={width: lattice.step, f"_half_{width}": lattice.half_width})
         gain = lattice.log_score_gain
         step = Step(
             active=active, p_value=math.exp(-min(gain, 700.0)), held_out_gain=gain, gain=gain, rivals=()
@@ -198,8 +197,8 @@ def _pruned(
             continue
         if held_base.total - held.total < STEP.least_gain:
             base, held_base = pruned, held
-            places = {place(applied) for applied in remaining}
-            steps = [step for step in steps if place(step.active) in places]
+            keys = {applied.key for applied in remaining}
+            steps = [step for step in steps if step.active.key in keys]
             return _pruned(problem, folds, base, held_base, steps)
     return base, held_base, steps
 
@@ -218,8 +217,8 @@ def _with_a_size(problem: Problem, base: Fit, steps: list[Step]) -> tuple[Fit, l
             < STEP.visible * base.noise[name].marginal_sd
             for name, change in moved.items()
         ):
-            places = {place(applied) for applied in remaining}
-            remaining_steps = [step for step in steps if place(step.active) in places]
+            keys = {applied.key for applied in remaining}
+            remaining_steps = [step for step in steps if step.active.key in keys]
             return _with_a_size(problem, replace_effects(problem, base, remaining), remaining_steps)
     return base, steps
 

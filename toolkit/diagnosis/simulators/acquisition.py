@@ -10,7 +10,8 @@ import numpy as np
 from toolkit.calibration.apply import apply_record
 from toolkit.diagnosis.simulators.channels import through_channels
 from toolkit.diagnosis.simulators.setting import nominal_load, setting
-from toolkit.diagnosis.simulators.simulator import Active, Capability, Output
+from toolkit.diagnosis.simulators.simulator import Capability, Output
+from toolkit.effects.applied import AppliedEffect
 from toolkit.effects.effect import Effect
 from toolkit.errors import ConfigError, RecordError
 from toolkit.units import unit
@@ -22,16 +23,6 @@ if TYPE_CHECKING:
     from toolkit.diagnosis.case.case import Case, Run
 
 _STAGES = ("acquisition", "load_cells")
-# What needs a reading over time, or another load, cannot be told from a program's arithmetic.
-_ON_CELLS = ("channel_sign", "channel_swap", "unit_error", "sensitivity_error", "zero_offset")
-_ON_LOADS = (
-    "channel_sign",
-    "unit_error",
-    "channel_swap",
-    "rectification",
-    "sensitivity_error",
-    "zero_offset",
-)
 
 
 class AcquisitionModel:
@@ -93,14 +84,14 @@ class AcquisitionModel:
         self,
         run: Run,
         p: Mapping[str, float],
-        active: Sequence[Active],
+        active: Sequence[AppliedEffect],
     ) -> dict[str, NDArray[np.float64]]:
         """Return FY and MZ by the record on cells with effects in them, then effects on FY and MZ."""
         del p  # a record's coefficients are known exactly
         here = setting(self.case, run, nominal_load_N=nominal_load(self.case))
         record = self.record
         for one in active:
-            if one.effect.name == "wrong_calibration" and one.source is not None and one.acts_in(run):
+            if one.effect.replaces_record and one.source is not None and one.acts_in(run):
                 record = self._others[one.source]
         cells = through_channels(
             {name: run.columns[name] for name in self.record.indications}, active, run, here, run.columns
@@ -116,18 +107,18 @@ class AcquisitionModel:
 
     def places(self, effect: Effect) -> list[tuple[str | None, str | None]]:
         """Return the cells, the loads and the records on which an effect could act."""
-        if effect.stage not in _STAGES or effect.channel is None:
+        if effect.stage not in _STAGES or effect.on_channel is None:
             return []
-        if effect.name == "wrong_calibration":
+        if effect.replaces_record:
             return [(None, name) for name, record in self._others.items() if self._fits(record)]
         cells = list(self.record.indications)
         loads = [one.name for one in self.outputs]
-        if effect.name == "channel_swap":
+        if effect.exchanges:
             return [(a, b) for group in (cells, loads) for i, a in enumerate(group) for b in group[i + 1 :]]
         made: list[tuple[str | None, str | None]] = []
-        if effect.name in _ON_CELLS:
+        if "program_cell" in effect.on_channel.where:
             made += [(name, None) for name in cells]
-        if effect.name in _ON_LOADS:
+        if "program_load" in effect.on_channel.where:
             made += [(name, None) for name in loads]
         return made
 

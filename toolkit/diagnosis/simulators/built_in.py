@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING
 
 from toolkit.diagnosis.case.case import CaseParameter
 from toolkit.diagnosis.simulators.parameter_units import unit_of
-from toolkit.diagnosis.simulators.simulator import Active, Capability, Model
-from toolkit.effects.sense import computed_in
+from toolkit.diagnosis.simulators.simulator import Capability, Model
+from toolkit.effects.applied import AppliedEffect
 from toolkit.errors import ConfigError
 from toolkit.findings import Finding
 from toolkit.units import unit
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
     from toolkit.diagnosis.case.case import Case, Run
     from toolkit.effects.effect import Effect
-    from toolkit.simulation.model_file import ModelEffect, ModelParameter
+    from toolkit.simulation.model_file import FittedEffect
 
     Arrays = dict[str, NDArray[np.float64]]
 
@@ -43,10 +43,10 @@ class _Told:
 class _BuiltIn:
     """One effect with the names under which its parameters stand among those of the simulation."""
 
-    active: Active
+    active: AppliedEffect
     told: tuple[_Told, ...]
 
-    def at(self, p: Mapping[str, float]) -> Active:
+    def at(self, p: Mapping[str, float]) -> AppliedEffect:
         """Return the effect with its values of these parameters."""
         values = {one.parameter: p[one.name] * one.factor for one in self.told}
         return dataclasses.replace(self.active, values={**self.active.values, **values})
@@ -97,14 +97,14 @@ class WithEffects:
     def _parameters(self, p: Mapping[str, float]) -> dict[str, float]:
         return {name: value for name, value in p.items() if name in self._own}
 
-    def _all(self, p: Mapping[str, float], active: Sequence[Active]) -> tuple[Active, ...]:
+    def _all(self, p: Mapping[str, float], active: Sequence[AppliedEffect]) -> tuple[AppliedEffect, ...]:
         return (*(one.at(p) for one in self._effects), *active)
 
     def observed(self, run: Run) -> Arrays:
         """Return what was recorded of every output."""
         return self._plain.observed(run)
 
-    def simulate(self, run: Run, p: Mapping[str, float], active: Sequence[Active]) -> Arrays:
+    def simulate(self, run: Run, p: Mapping[str, float], active: Sequence[AppliedEffect]) -> Arrays:
         """Return every output of a run, the simulation's own effects before those that are added."""
         return self._plain.simulate(run, self._parameters(p), self._all(p, active))
 
@@ -114,61 +114,58 @@ class WithEffects:
         stepped = {
             one.active.channel
             for one in self._effects
-            if one.active.effect.name == effect.name == "quantisation"
+            if effect.from_digits and one.active.effect.name == effect.name
         }
         return [place for place in self._plain.places(effect) if place[0] not in stepped]
 
 
-def parameter_names(effects: Sequence[ModelEffect]) -> tuple[tuple[str, ...], ...]:
+def parameter_names(effects: Sequence[FittedEffect]) -> tuple[tuple[str, ...], ...]:
     """Return the names of each effect's parameters among those of the simulation, all different.
 
-    >>> from toolkit.effects.catalogue import effects
-    >>> from toolkit.simulation.model_file import ModelEffect
-    >>> parameter_names([ModelEffect(effect=effects()["zero_offset"], channel="D51")] * 2)
-    (('zero_offset.D51.offset',), ('zero_offset.D51#2.offset',))
+    Those of a second effect at one place are counted: ``NAME.CHANNEL#2.PARAMETER``.
     """
     seen: dict[str, int] = {}
     made = []
     for one in effects:
-        label = ".".join(part for part in (one.effect.name, one.source, one.channel) if part)
+        label = one.applied.key.dotted
         seen[label] = seen.get(label, 0) + 1
         label += f"#{seen[label]}" if seen[label] > 1 else ""
-        made.append(tuple(f"{label}.{name}" for name in one.effect.names))
+        made.append(tuple(f"{label}.{name}" for name in one.applied.effect.names))
     return tuple(made)
 
 
 def _built(
-    case: Case, model: Model, one: ModelEffect, names: Sequence[str]
+    case: Case, model: Model, one: FittedEffect, names: Sequence[str]
 ) -> tuple[_BuiltIn, list[CaseParameter]]:
-    effect = one.effect
-    if (one.channel, one.source) not in [tuple(place) for place in model.places(effect)]:
+    applied, effect = one.applied, one.applied.effect
+    if (applied.channel, applied.source) not in [tuple(place) for place in model.places(effect)]:
         raise ConfigError(
             "the simulation has no place for an effect of its model", where=case.path, got=one.label,
             expected="a case with the channels on which the model's effects act",
             next_step="use the model with recordings of the same channels and roles", rule="model-place",
         )  # fmt: skip
     runs = {run.name for run in (*case.runs, *case.predict)}
-    acting = frozenset(
-        run.name for run in (*case.runs, *case.predict) if one.acts_in(run.name, run.conditions)
-    )
-    active = Active(
-        effect=effect,
-        channel=one.channel,
-        source=one.source,
+    acting = frozenset(run.name for run in (*case.runs, *case.predict) if applied.acts_in(run))
+    active = dataclasses.replace(
+        applied,
         runs=None if acting == runs else acting,
-        values=dict(one.numerics),
+        condition=None,
+        values=applied.numerics,
+        units={},
     )
     told, free = [], []
-    for name, parameter, own in zip(names, one.parameters, effect.parameters, strict=True):
-        sense = computed_in(effect.name, parameter.name, one.axes or case.axes)
-        low, high = (sense * bound for bound in own.bounds)
-        scale = _scale(case, model, active, parameter)
-        sd = parameter.standard_error if active.searched and effect.name != "quantisation" else None
+    for name, parameter in zip(names, effect.parameters, strict=True):
+        sense = parameter.sign_in(one.axes or case.axes)
+        low, high = (sense * bound for bound in parameter.bounds)
+        text = applied.units[parameter.name]
+        scale = _scale(case, model, active, parameter.name, text)
+        fitted = active.searched and not effect.from_digits
+        sd = one.standard_errors.get(parameter.name) if fitted else None
         free.append(
             CaseParameter(
                 name=name,
-                value=parameter.value,
-                unit=parameter.unit,
+                value=applied.values[parameter.name],
+                unit=text,
                 sd=sd,
                 bounds=(min(low, high) / scale, max(low, high) / scale),
             )
@@ -177,16 +174,16 @@ def _built(
     return _BuiltIn(active=active, told=tuple(told)), free
 
 
-def _scale(case: Case, model: Model, active: Active, parameter: ModelParameter) -> float:
+def _scale(case: Case, model: Model, active: AppliedEffect, name: str, text: str) -> float:
     """Return the factor from a parameter's unit to that of the same parameter in this case."""
-    here = unit_of(case, model, active, parameter.name)
-    if here == parameter.unit:
+    here = unit_of(case, model, active, name)
+    if here == text:
         return 1.0
-    given, own = unit(parameter.unit), unit(here)
+    given, own = unit(text), unit(here)
     if given.dimension != own.dimension:
         raise ConfigError(
             "a parameter of the model does not fit the case's units",
-            where=f"{case.path}: {active.effect.name}.{parameter.name}", got=parameter.unit, expected=here,
+            where=f"{case.path}: {active.effect.name}.{name}", got=text, expected=here,
             next_step="give the channel the dimension that it had when the model was fitted",
             rule="model-place",
         )  # fmt: skip
@@ -197,7 +194,7 @@ def built_in_findings(case: Case) -> tuple[Finding, ...]:
     """Return notes on the effects that the simulation has from the start."""
     made = []
     for one in case.effects:
-        runs = [run.name for run in case.runs if one.acts_in(run.name, run.conditions)]
+        runs = [run.name for run in case.runs if one.applied.acts_in(run)]
         where = "all runs" if len(runs) == len(case.runs) else ", ".join(runs) or "none of the case's runs"
         made.append(
             Finding(

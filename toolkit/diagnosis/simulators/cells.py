@@ -11,9 +11,11 @@ from toolkit.calibration.apply import apply_record
 from toolkit.calibration.records.record import CalibrationRecord, from_bytes
 from toolkit.calibration.registry.registry import Registry
 from toolkit.diagnosis.policy import SURFACE
-from toolkit.diagnosis.simulators.channels import channel_places, undone
-from toolkit.diagnosis.simulators.simulator import Active, Output
+from toolkit.diagnosis.simulators.channels import channel_places
+from toolkit.diagnosis.simulators.simulator import Output
+from toolkit.effects.applied import AppliedEffect
 from toolkit.effects.effect import Effect
+from toolkit.effects.forward import undone
 from toolkit.effects.signals import Setting
 from toolkit.errors import ConfigError
 from toolkit.files import read_bytes
@@ -25,18 +27,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from toolkit.diagnosis.case.case import Case, Run
-
-
-_BY_VALUE = (
-    "sensitivity_error",
-    "hysteresis",
-    "nonlinearity",
-    "creep",
-    "dead_band",
-    "filter_lag",
-    "channel_delay",
-)
-_ON_TARE = ("channel_sign", "sensitivity_error", "unit_error")
 
 
 class CaseCells:
@@ -163,18 +153,14 @@ class CaseCells:
 
     def places(self, effect: Effect, drivers: set[str]) -> list[tuple[str | None, str | None]]:
         """Return the cells on which an effect could act: a force at the tire or the drum reaches them all."""
-        if effect.stage not in ("load_cells", "acquisition") or effect.name in (
-            "crosstalk",
-            "channel_swap",
-            "unit_error",
-        ):
+        if effect.on_channel is None or "cell" not in effect.on_channel.where:
             return []
         return channel_places(effect, [(name, self._units[name]) for name in self.names], (), drivers)
 
     def disturbed(
         self,
         values: dict[str, NDArray[np.float64]],
-        active: Sequence[Active],
+        active: Sequence[AppliedEffect],
         run: Run,
         setting: Setting,
         outputs: Sequence[Output],
@@ -184,21 +170,25 @@ class CaseCells:
         What the cells truly carried is the recording with the effect undone; the difference to what they
         showed, by the record, is what the effect adds to the simulation.
         """
-        here = [one for one in active if one.channel in self.names and one.acts_in(run)]
-        if not here:
+        acting = [
+            (one, one.effect.on_channel)
+            for one in active
+            if one.effect.on_channel is not None and one.channel in self.names and one.acts_in(run)
+        ]
+        if not acting:
             return values
         if all(name in run.columns for name in self.names):
             recorded = {name: self._cell(run, name) for name in self.names}
-            for name in {str(one.channel) for one in here if one.effect.name in _BY_VALUE}:
+            for name in {str(one.channel) for one, facts in acting if facts.by_value}:
                 recorded[name] = self._carried(run, recorded[name], values, outputs)
         else:
             recorded = self._foretold(values, outputs)
         true = dict(recorded)
         tare = None if self._tare is None else dict(self._tare)
-        for one in reversed(here):
+        for one, facts in reversed(acting):
             name = str(one.channel)
             true[name] = undone(true[name], one, setting, true)
-            if tare is not None and one.effect.name in _ON_TARE:
+            if tare is not None and facts.tare == "alike":
                 # The tare was read through the same fault; what came later (creep, drift) is not in it.
                 tare[name] = float(undone(np.array([tare[name]]), one, setting, true)[0])
         shown, without = self.loads_of(recorded), self._loads(true, tare)

@@ -17,7 +17,7 @@ import numpy as np
 from toolkit.diagnosis.simulators.channels import channel_places, through_channels
 from toolkit.diagnosis.simulators.motion import AlongMotion, Motion, motion_of
 from toolkit.diagnosis.simulators.setting import NOMINAL_SPEED, nominal_load, setting
-from toolkit.diagnosis.simulators.simulator import Active, Capability, Output
+from toolkit.diagnosis.simulators.simulator import Capability, Output
 from toolkit.diagnosis.simulators.surface import Surface
 from toolkit.diagnosis.simulators.tire import (
     base_drive,
@@ -27,6 +27,7 @@ from toolkit.diagnosis.simulators.tire import (
     tire_places,
     tire_signs,
 )
+from toolkit.effects.applied import AppliedEffect
 from toolkit.effects.effect import Effect
 from toolkit.effects.signals import Drive, Setting, TireForces
 from toolkit.errors import ConfigError
@@ -106,7 +107,7 @@ class ColumnsModel(AlongMotion):
         }
 
     def simulate(
-        self, run: Run, p: Mapping[str, float], active: Sequence[Active]
+        self, run: Run, p: Mapping[str, float], active: Sequence[AppliedEffect]
     ) -> dict[str, NDArray[np.float64]]:
         """Return every output of a run with effects in it."""
         here = self.setting(run)
@@ -159,7 +160,7 @@ class ColumnsModel(AlongMotion):
         return slip_work_before(self.case, run, lambda one, _: _whole(one, "FY") * factor, load_N=self._load)
 
     def _tire(
-        self, run: Run, made: dict[str, NDArray[np.float64]], active: Sequence[Active], here: Setting
+        self, run: Run, made: dict[str, NDArray[np.float64]], active: Sequence[AppliedEffect], here: Setting
     ) -> dict[str, NDArray[np.float64]]:
         surface, case = self._surface, self.case
         if surface is None:

@@ -14,20 +14,22 @@ from toolkit.diagnosis.simulators.acquisition import AcquisitionModel
 from toolkit.diagnosis.simulators.cells import CaseCells, record_of
 from toolkit.diagnosis.simulators.channels import channel_places, through_channels
 from toolkit.diagnosis.simulators.setting import setting, si
-from toolkit.diagnosis.simulators.simulator import Active, Capability, Output
+from toolkit.diagnosis.simulators.simulator import Capability, Output
 from toolkit.diagnosis.simulators.tir_tire import TirTire
 from toolkit.diagnosis.simulators.tire import (
     base_drive,
+    delays_load,
     first_of,
+    late,
     rotation,
     slip_work_before,
     through_tire,
     tire_places,
     tire_signs,
 )
+from toolkit.effects.applied import AppliedEffect
 from toolkit.effects.effect import Effect
-from toolkit.effects.filters import followed
-from toolkit.effects.signals import Drive, TireForces
+from toolkit.effects.signals import Drive, TireForces, drive
 from toolkit.errors import ConfigError
 from toolkit.machine import load_machine
 from toolkit.tires.tir import TirFile, read_tir
@@ -121,7 +123,7 @@ class MachineModel:
         return made
 
     def simulate(
-        self, run: Run, p: Mapping[str, float], active: Sequence[Active]
+        self, run: Run, p: Mapping[str, float], active: Sequence[AppliedEffect]
     ) -> dict[str, NDArray[np.float64]]:
         """Return every output of a run with effects in it."""
         case, here = self.case, self._setting(run)
@@ -130,21 +132,21 @@ class MachineModel:
         reverse = rotation(run) == "reverse"
         pressure = first_of(case, run, "P_INFL", "P")
 
-        def steady(SA: NDArray[np.float64], drive: Drive) -> TireForces:
+        def steady(SA: NDArray[np.float64], at: Drive) -> TireForces:
             FY, MZ = self._tire(
                 p,
                 SA=-SA,
-                FZ=drive.FZ,
-                IA=-drive.IA if reverse else drive.IA,
-                V=drive.V,
+                FZ=at.FZ,
+                IA=-at.IA if reverse else at.IA,
+                V=at.V,
                 P=pressure,
-                pressure_error=drive.pressure_error,
+                pressure_error=at.pressure_error,
             )
             return TireForces(FY=FY if reverse else -FY, MZ=-MZ)
 
         # A load that was measured is late already: its lag shows in FZ against the command, not in the tire.
         measured = first_of(case, run, "FZ") is not None
-        on_tire = [one for one in active if not (measured and one.effect.name == "load_lag")]
+        on_tire = [one for one in active if not (measured and delays_load(one))]
         forces = through_tire(start, steady, on_tire, run, here)
         turn = tire_signs("machine", case.axes, run)
         made = {}
@@ -163,7 +165,9 @@ class MachineModel:
                 return p[one.name] * unit(one.unit).factor
         return self._speed
 
-    def _shown_too_much(self, run: Run, active: Sequence[Active], here: Any) -> NDArray[np.float64] | float:
+    def _shown_too_much(
+        self, run: Run, active: Sequence[AppliedEffect], here: Any
+    ) -> NDArray[np.float64] | float:
         """Return by how much [N] a channel of FZ that is disturbed shows more than the load on the tire."""
         if not any(one.channel == "FZ" and one.acts_in(run) for one in active):
             return 0.0
@@ -174,14 +178,13 @@ class MachineModel:
         on_load = [one for one in active if one.channel == "FZ"]
         return (through_channels({"FZ": load}, on_load, run, here, run.columns)["FZ"] - load) * factor
 
-    def _load_output(self, run: Run, active: Sequence[Active]) -> NDArray[np.float64]:
+    def _load_output(self, run: Run, active: Sequence[AppliedEffect]) -> NDArray[np.float64]:
         commanded = first_of(self.case, run, "FZ_CMD")
         if commanded is None:
             return si(self.case, "FZ", run.columns["FZ"])
-        for one in active:
-            if one.effect.name == "load_lag" and one.acts_in(run):
-                commanded = followed(run.t, commanded, one.values["time_constant"])
-        return commanded
+        start = drive(run.t, np.zeros(run.rows), commanded)
+        loaded = late(start, active, run, self._setting(run), _no_tire)
+        return commanded if loaded is None else loaded.FZ
 
     def places(self, effect: Effect) -> list[tuple[str | None, str | None]]:
         """Return where an effect could act: on the machine, on an output, or on a cell."""
@@ -222,6 +225,10 @@ class MachineModel:
             )[0]
 
         return slip_work_before(self.case, run, lateral, load_N=self._load, speed_m_s=self._speed)
+
+
+def _no_tire(at: Drive) -> TireForces:
+    return TireForces(FY=np.zeros_like(at.FZ), MZ=np.zeros_like(at.FZ))
 
 
 def _check_dimension(case: Case, name: str, text: str) -> None:

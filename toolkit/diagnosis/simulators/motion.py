@@ -19,8 +19,11 @@ import numpy as np
 from toolkit.diagnosis.simulators.channels import slopes
 from toolkit.diagnosis.simulators.linear_response import integrated
 from toolkit.diagnosis.simulators.setting import dimension
-from toolkit.diagnosis.simulators.simulator import Active, MotionSizes, Moving
+from toolkit.diagnosis.simulators.simulator import Moving
+from toolkit.effects.applied import AppliedEffect
 from toolkit.effects.effect import Effect
+from toolkit.effects.forward import resisting
+from toolkit.effects.surroundings import MotionSizes
 from toolkit.units import unit
 
 if TYPE_CHECKING:
@@ -46,14 +49,12 @@ class Motion:
 
     def places(self, effect: Effect) -> list[tuple[str | None, str | None]]:
         """Return the output that a dynamic effect could enter."""
-        if effect.stage != "dynamics":
+        term = effect.term
+        if term is None or term.of == "state":
             return []
-        if effect.name in ("cubic_stiffness", "periodic_ripple") and self.position is None:
+        if term.of == "position" and self.position is None:
             return []
-        if effect.name == "overflow":
-            return []
-        needs_v = effect.name in ("coulomb_friction", "viscous_damping", "quadratic_drag")
-        if needs_v and self.velocity is None and self.kind == "force":
+        if term.of == "velocity" and self.velocity is None and self.kind == "force":
             return []
         return [(self.output, None)]
 
@@ -121,7 +122,7 @@ class Motion:
         return {name: pushes if name == self.output else none for name in made}
 
     def disturbed(
-        self, made: Mapping[str, NDArray[np.float64]], forces: Sequence[Active], run: Run
+        self, made: Mapping[str, NDArray[np.float64]], forces: Sequence[AppliedEffect], run: Run
     ) -> dict[str, NDArray[np.float64]]:
         """Return the outputs with force-like terms in the equation of motion."""
         result = dict(made)
@@ -129,12 +130,12 @@ class Motion:
             zero = np.zeros(run.rows)
             x = zero if self.position is None else run.columns[self.position]
             v = zero if self.velocity is None else run.columns[self.velocity]
-            result[self.output] = made[self.output] + _resisting(forces, run.t, x, v)
+            result[self.output] = made[self.output] + resisting(forces, run.t, x, v)
             return result
         return self._moved(result, forces, run)
 
     def _moved(
-        self, made: dict[str, NDArray[np.float64]], forces: Sequence[Active], run: Run
+        self, made: dict[str, NDArray[np.float64]], forces: Sequence[AppliedEffect], run: Run
     ) -> dict[str, NDArray[np.float64]]:
         from scipy.interpolate import CubicSpline
 
@@ -177,7 +178,7 @@ class AlongMotion(ABC):
 
     @abstractmethod
     def simulate(
-        self, run: Run, p: Mapping[str, float], active: Sequence[Active]
+        self, run: Run, p: Mapping[str, float], active: Sequence[AppliedEffect]
     ) -> dict[str, NDArray[np.float64]]:
         """Return every output of a run with effects in it."""
 
@@ -191,7 +192,7 @@ class AlongMotion(ABC):
             return motion.sizes(largest(channel), largest)
 
         def pushed(
-            run: Run, p: Mapping[str, float], active: Sequence[Active], _: str | None, pattern: Pattern
+            run: Run, p: Mapping[str, float], active: Sequence[AppliedEffect], _: str | None, pattern: Pattern
         ) -> dict[str, NDArray[np.float64]]:
             simulated = self.simulate(run, p, [one for one in active if one.effect.channel is None])
             shown = slopes(simulated, active, run, self.setting(run), run.columns)
@@ -205,10 +206,19 @@ class AlongMotion(ABC):
 
 
 def _step(
-    acceleration: Callable[[float], object], forces: Sequence[Active], t: float, h: float, x: float, v: float
+    acceleration: Callable[[float], object],
+    forces: Sequence[AppliedEffect],
+    t: float,
+    h: float,
+    x: float,
+    v: float,
 ) -> tuple[float, float]:
     """Return position and velocity after a step of Runge and Kutta's fourth order."""
-    terms = [(one.effect.force, one.values) for one in forces if one.effect.force is not None]
+    terms = [
+        (one.effect.term.force, one.values)
+        for one in forces
+        if one.effect.term is not None and one.effect.term.force is not None
+    ]
 
     def rate(at: float, position: float, speed: float) -> tuple[float, float]:
         pull = sum(force(position, speed, values) for force, values in terms)
@@ -222,26 +232,6 @@ def _step(
         x + h / 6 * (k1[0] + 2 * k2[0] + 2 * k3[0] + k4[0]),
         v + h / 6 * (k1[1] + 2 * k2[1] + 2 * k3[1] + k4[1]),
     )
-
-
-def _resisting(
-    forces: Sequence[Active], t: NDArray[np.float64], x: NDArray[np.float64], v: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    total = np.zeros(len(x))
-    for one in forces:
-        if one.effect.recorded is not None:
-            total += one.effect.recorded(t, v, one.values)
-            continue
-        force = one.effect.force
-        if force is None:
-            continue
-        # A constant is reported as the term that stands in the output's own equation.
-        sign = -1.0 if one.effect.name in ("constant_force", "periodic_ripple") else 1.0
-        values = one.values
-        total += sign * np.fromiter(
-            (force(a, b, values) for a, b in zip(x.tolist(), v.tolist(), strict=True)), np.float64, len(x)
-        )
-    return total
 
 
 def motion_of(case: Case) -> Motion | None:

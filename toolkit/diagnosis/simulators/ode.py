@@ -21,12 +21,14 @@ from toolkit.diagnosis.simulators.integrate import IntegrationError, integrate
 from toolkit.diagnosis.simulators.linear_response import propagated
 from toolkit.diagnosis.simulators.parameter_units import reduced
 from toolkit.diagnosis.simulators.setting import nominal_load, setting
-from toolkit.diagnosis.simulators.simulator import Active, Capability, MotionSizes, Moving, Output
+from toolkit.diagnosis.simulators.simulator import Capability, Moving, Output
 from toolkit.diagnosis.simulators.states import dimensions, fitting
 from toolkit.diagnosis.simulators.user_code import load_functions, silenced
+from toolkit.effects.applied import AppliedEffect
 from toolkit.effects.effect import Effect
 from toolkit.effects.filters import STRAIGHT
 from toolkit.effects.signals import Setting
+from toolkit.effects.surroundings import MotionSizes
 from toolkit.errors import ConfigError, FitError
 
 if TYPE_CHECKING:
@@ -40,7 +42,6 @@ if TYPE_CHECKING:
 ATOL = 1e-7  # of a state's spread over a run; before that is known, a hundredth of it of one
 _FINER = 4
 _MOST_HELD = 200_000_000  # bytes of simulations to remember
-_BETWEEN_ROWS = ("channel_delay", "filter_lag")  # they show what the equation did between two rows
 
 
 class OdeModel:
@@ -176,7 +177,7 @@ class OdeModel:
         self,
         run: Run,
         p: Mapping[str, float],
-        active: Sequence[Active],
+        active: Sequence[AppliedEffect],
         channel: str | None,
         pattern: Pattern,
     ) -> dict[str, NDArray[np.float64]]:
@@ -221,7 +222,7 @@ class OdeModel:
         return {one.name: run.columns[one.name] for one in self.outputs if one.name in run.columns}
 
     def simulate(
-        self, run: Run, p: Mapping[str, float], active: Sequence[Active]
+        self, run: Run, p: Mapping[str, float], active: Sequence[AppliedEffect]
     ) -> dict[str, NDArray[np.float64]]:
         """Return every output of a free simulation over the whole run."""
         key, forces = self._key(run, p, active)
@@ -234,14 +235,16 @@ class OdeModel:
             return through_channels(kept, active, run, self.setting(run), run.columns)
         # An equation's outputs have a corner at each row, where its inputs have one.
         fine = [
-            replace(one, values={**one.values, STRAIGHT: 1.0}) if one.effect.name in _BETWEEN_ROWS else one
+            replace(one, values={**one.values, STRAIGHT: 1.0}) if _between_rows(one) else one
             for one in active
         ]
         finer = self._finer(run)
         made = through_channels(kept, fine, finer, self.setting(finer), finer.columns)
         return {name: values[::_FINER] for name, values in made.items()}
 
-    def _prepare(self, run: Run, wanted: Sequence[tuple[Mapping[str, float], Sequence[Active]]]) -> None:
+    def _prepare(
+        self, run: Run, wanted: Sequence[tuple[Mapping[str, float], Sequence[AppliedEffect]]]
+    ) -> None:
         """Integrate several sets of parameters and effects at once, for `simulate` to find."""
         if not self._takes_columns or run.rows < 2:
             return
@@ -255,7 +258,7 @@ class OdeModel:
             return
         self._together(run, [(key, *one) for key, one in listed.items()])
 
-    def _together(self, run: Run, listed: list[tuple[Any, Mapping[str, float], list[Active]]]) -> None:
+    def _together(self, run: Run, listed: list[tuple[Any, Mapping[str, float], list[AppliedEffect]]]) -> None:
         """Integrate sets together; in halves where one of them stands in the way, and that one not at all."""
         if len(listed) < 2:
             return
@@ -295,11 +298,11 @@ class OdeModel:
         return self._fine[run]
 
     def _key(
-        self, run: Run, p: Mapping[str, float], active: Sequence[Active]
-    ) -> tuple[tuple[Any, ...], list[Active]]:
+        self, run: Run, p: Mapping[str, float], active: Sequence[AppliedEffect]
+    ) -> tuple[tuple[Any, ...], list[AppliedEffect]]:
         forces = [one for one in active if one.effect.stage == "dynamics" and one.acts_in(run)]
         told = tuple((one.effect.name, one.channel, tuple(one.values.values())) for one in forces)
-        between = any(one.effect.name in _BETWEEN_ROWS and one.acts_in(run) for one in active)
+        between = any(_between_rows(one) and one.acts_in(run) for one in active)
         return (run, between and run.rows > 1, tuple(p.values()), told), forces
 
     def _keep(self, key: tuple[Any, ...], made: dict[str, NDArray[np.float64]] | FitError) -> None:
@@ -309,7 +312,9 @@ class OdeModel:
         self._kept[key] = made
         self._held += 0 if isinstance(made, FitError) else sum(one.nbytes for one in made.values())
 
-    def _integrate(self, run: Run, p: Mapping[str, float], forces: Sequence[Active]) -> NDArray[np.float64]:
+    def _integrate(
+        self, run: Run, p: Mapping[str, float], forces: Sequence[AppliedEffect]
+    ) -> NDArray[np.float64]:
         acting = self._forces(forces)
         rate = self._equation.rates(run, dict(p), acting, len(self.states))
         start = self._equation.start(run, p)
@@ -332,14 +337,14 @@ class OdeModel:
         sizes = [self.scale[name][1] for name in self.states]
         return ATOL * np.array([*sizes, *(10 * one for one in acting.sizes), *[1.0] * (added - acting.added)])
 
-    def _forces(self, active: Sequence[Active]) -> Forces:
+    def _forces(self, active: Sequence[AppliedEffect]) -> Forces:
         return Forces.of(active, self.states, self._derivative_of, self.scale)
 
     def _made(
         self,
         run: Run,
         p: Mapping[str, float],
-        forces: Sequence[Active],
+        forces: Sequence[AppliedEffect],
         x: NDArray[np.float64],
         *,
         between: bool,
@@ -350,7 +355,7 @@ class OdeModel:
         return self._equation.shown(run, p, x[: len(self.states)])
 
     def _between(
-        self, run: Run, p: Mapping[str, float], forces: Sequence[Active], x: NDArray[np.float64]
+        self, run: Run, p: Mapping[str, float], forces: Sequence[AppliedEffect], x: NDArray[np.float64]
     ) -> NDArray[np.float64]:
         """Return states also between the rows, by their rates at the rows: those have no corner there."""
         from scipy.interpolate import CubicHermiteSpline
@@ -368,12 +373,12 @@ class OdeModel:
     def places(self, effect: Effect) -> list[tuple[str | None, str | None]]:
         """Return the states and outputs on which an effect could act."""
         drivers = set(self._drivers)
-        if effect.stage == "dynamics":
-            if effect.name == "overflow":
+        if effect.term is not None:
+            if effect.term.of == "state":
                 return [(name, None) for i, name in enumerate(self.states) if i not in self._derivative_of]
             at = [self.states.index(name) for name in self.force_units]
             known = {} if self.case.simulation.force_terms else self._dimensions
-            return [(self.states[i], None) for i in fitting(effect.name, at, self._derivative_of, known)]
+            return [(self.states[i], None) for i in fitting(effect.term, at, self._derivative_of, known)]
         others = [(one.name, one.unit) for one in self.case.drivers]
         return channel_places(effect, [(one.name, one.unit) for one in self.outputs], others, drivers)
 
@@ -387,3 +392,8 @@ class OdeModel:
 def build(case: Case, _: Path | None) -> OdeModel:
     """Return the simulation of a case of this kind; ConfigError where its file lacks a function."""
     return OdeModel(case, *load_functions(case.file(), "rhs", "outputs", "initial"))
+
+
+def _between_rows(applied: AppliedEffect) -> bool:
+    """Tell whether an effect shows what the equation did between two rows."""
+    return applied.effect.on_channel is not None and applied.effect.on_channel.between_rows

@@ -1,19 +1,18 @@
-"""An effect's parameters as a case has them: their units, and the signs of its axes."""
+"""Units of an effect's parameters in a case: the placeholders of the catalogue filled in."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Iterator
 
-from toolkit.channels import Axes
 from toolkit.diagnosis.case.case import Case
-from toolkit.diagnosis.simulators.simulator import Active, Model
-from toolkit.effects.sense import computed_in
+from toolkit.diagnosis.simulators.simulator import Model
+from toolkit.effects.applied import AppliedEffect
 
 
-def unit_of(case: Case, model: Model, active: Active, name: str) -> str:
+def unit_of(case: Case, model: Model, active: AppliedEffect, name: str) -> str:
     """Return the unit of one parameter of an effect at its place."""
-    text = next(one.unit for one in active.effect.parameters if one.name == name)
+    text = active.effect.parameter(name).unit
     if "{" not in text:
         return text
     if active.effect.stage == "dynamics":
@@ -23,14 +22,6 @@ def unit_of(case: Case, model: Model, active: Active, name: str) -> str:
         return reduced(text.format(force=force, velocity=velocity, position=position))
     own, other = channel_unit(case, model, active.channel), channel_unit(case, model, active.source)
     return reduced(text.format_map({"channel": _bracketed(own, text), "from": _bracketed(other, text)}))
-
-
-def sense(active: Active, parameter: str, axes: Axes) -> int:
-    """Return the factor, +1 or -1, of a parameter's value in the case's axes, the drum running forward.
-
-    Inside, values have the signs of SAE and of the machine's axes.
-    """
-    return computed_in(active.effect.name, parameter, axes)
 
 
 def _bracketed(unit: str, text: str) -> str:

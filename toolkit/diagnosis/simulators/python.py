@@ -11,7 +11,7 @@ import numpy as np
 from toolkit.diagnosis.simulators.channels import channel_places, through_channels
 from toolkit.diagnosis.simulators.motion import AlongMotion, Motion, motion_of
 from toolkit.diagnosis.simulators.setting import NOMINAL_SPEED, nominal_load, setting
-from toolkit.diagnosis.simulators.simulator import Active, Capability, Output
+from toolkit.diagnosis.simulators.simulator import Capability, Output
 from toolkit.diagnosis.simulators.tire import (
     base_drive,
     late,
@@ -21,6 +21,7 @@ from toolkit.diagnosis.simulators.tire import (
     tire_signs,
 )
 from toolkit.diagnosis.simulators.user_code import load_functions, silenced
+from toolkit.effects.applied import AppliedEffect
 from toolkit.effects.effect import Effect
 from toolkit.effects.signals import Drive, Setting, TireForces
 from toolkit.errors import FitError
@@ -70,7 +71,7 @@ class PythonModel(AlongMotion):
         return {one.name: run.columns[one.name] for one in self.outputs if one.name in run.columns}
 
     def simulate(
-        self, run: Run, p: Mapping[str, float], active: Sequence[Active]
+        self, run: Run, p: Mapping[str, float], active: Sequence[AppliedEffect]
     ) -> dict[str, NDArray[np.float64]]:
         """Return every output of a run with effects in it."""
         here = self.setting(run)
@@ -180,7 +181,7 @@ class PythonModel(AlongMotion):
         )
 
     def _tire(
-        self, run: Run, p: Mapping[str, float], active: Sequence[Active], here: Setting
+        self, run: Run, p: Mapping[str, float], active: Sequence[AppliedEffect], here: Setting
     ) -> dict[str, NDArray[np.float64]]:
         case = self.case
         start = base_drive(case, run, load_N=self._load, outputs=False)

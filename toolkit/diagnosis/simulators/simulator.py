@@ -1,4 +1,4 @@
-"""What every kind of simulation offers to the search, what it declares of itself, and an effect switched on.
+"""What every kind of simulation offers to the search, and what it declares of itself.
 
 The search and the answer ask a simulation's `Capability`, never its class: a new kind of simulation is one
 file that gives its outputs and states every fact.
@@ -7,10 +7,9 @@ file that gives its outputs and states every fact.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Protocol
 
-from toolkit.effects.effect import Effect, EffectParameter
 from toolkit.findings import Finding
 
 if TYPE_CHECKING:
@@ -18,6 +17,9 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from toolkit.diagnosis.case.case import CaseParameter, Run
+    from toolkit.effects.applied import AppliedEffect
+    from toolkit.effects.effect import Effect
+    from toolkit.effects.surroundings import MotionSizes
 
     Arrays = dict[str, NDArray[np.float64]]
     # Positions of shape (n,) to force-like terms of shape (n, forces)
@@ -27,10 +29,6 @@ if TYPE_CHECKING:
     Largest = Callable[[str | None], float]
 
 
-# Effects that are there or not: nothing of them is fitted.
-DISCRETE = frozenset(("channel_sign", "channel_swap", "unit_error", "rectification", "wrong_calibration"))
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Output:
     """A channel that is judged: name, unit, and its stated total sensor noise."""
@@ -38,48 +36,6 @@ class Output:
     name: str
     unit: str
     sd: float | None
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Active:
-    """An effect that is switched on: where it acts, with which values, in which runs.
-
-    ``channel`` is the channel or state that it acts on, ``source`` the other channel that it takes,
-    ``runs`` the names of the runs in which it acts, None for all.
-    """
-
-    effect: Effect
-    channel: str | None = None
-    source: str | None = None
-    runs: frozenset[str] | None = None
-    values: Mapping[str, float] = field(default_factory=dict)
-
-    @property
-    def searched(self) -> tuple[EffectParameter, ...]:
-        """Parameters that a fit moves: none of an effect that is there or not."""
-        return () if self.effect.name in DISCRETE else self.effect.parameters
-
-    def acts_in(self, run: Run) -> bool:
-        """Tell whether the effect acts in a run."""
-        return self.runs is None or run.name in self.runs
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class MotionSizes:
-    """Sizes of the motion that a force-like term enters, in the units of its equation.
-
-    ``force``, ``speed`` and ``place`` are what terms are scaled by; ``fastest`` and ``farthest`` the largest
-    magnitudes of speed and position, ``level`` the largest value that may run over. ``has_position`` tells
-    whether the equation has the position itself, or only its rate.
-    """
-
-    force: float
-    speed: float
-    place: float
-    fastest: float
-    farthest: float
-    level: float
-    has_position: bool
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -100,7 +56,7 @@ class Moving:
     sizes: Callable[[str | None, Largest], MotionSizes]
     units: Callable[[str | None], tuple[str, str, str]]
     way: Callable[[str | None], tuple[float, float]]
-    pushed: Callable[[Run, Parameters, Sequence[Active], str | None, Pattern], Arrays]
+    pushed: Callable[[Run, Parameters, Sequence[AppliedEffect], str | None, Pattern], Arrays]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -122,7 +78,7 @@ class Capability:
     unsure: Mapping[str, float]
     findings: tuple[Finding, ...]
     repeats: Callable[[Run, Parameters], None] | None
-    together: Callable[[Run, Sequence[tuple[Parameters, Sequence[Active]]]], None] | None
+    together: Callable[[Run, Sequence[tuple[Parameters, Sequence[AppliedEffect]]]], None] | None
     motion: Moving | None
 
 
@@ -148,7 +104,7 @@ class Model(Protocol):
         """Return what was recorded of every output, (n,), NaN where a sample is missing."""
         ...
 
-    def simulate(self, run: Run, p: Parameters, active: Sequence[Active]) -> Arrays:
+    def simulate(self, run: Run, p: Parameters, active: Sequence[AppliedEffect]) -> Arrays:
         """Return what the simulation says of every output, (n,), free over the whole run."""
         ...
 
@@ -160,7 +116,9 @@ class Model(Protocol):
 class Supervised:
     """A simulation whose runs go through a supervisor, which counts or ends them, until it is released."""
 
-    def __init__(self, plain: Model, simulate: Callable[[Run, Parameters, Sequence[Active]], Arrays]) -> None:
+    def __init__(
+        self, plain: Model, simulate: Callable[[Run, Parameters, Sequence[AppliedEffect]], Arrays]
+    ) -> None:
         self._plain, self._simulate = plain, simulate
         self.outputs, self.parameters, self.capability = plain.outputs, plain.parameters, plain.capability
 
@@ -168,7 +126,7 @@ class Supervised:
         """Return what was recorded of every output."""
         return self._plain.observed(run)
 
-    def simulate(self, run: Run, p: Parameters, active: Sequence[Active]) -> Arrays:
+    def simulate(self, run: Run, p: Parameters, active: Sequence[AppliedEffect]) -> Arrays:
         """Return every output of a run, as the supervisor lets it through."""
         return self._simulate(run, p, active)
 

@@ -17,12 +17,11 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from toolkit.diagnosis.simulators.simulator import Output
+    from toolkit.effects.facts import Term
 
 _SPEEDS = frozenset({"speed", "frequency"})
 _PLACES = frozenset({"length", "angle"})
 _OPEN = frozenset({"ratio"})  # a number without unit may be anything
-_OF_SPEED = frozenset({"coulomb_friction", "viscous_damping", "quadratic_drag"})
-_OF_PLACE = frozenset({"cubic_stiffness", "periodic_ripple"})
 
 
 def dimensions(
@@ -49,9 +48,9 @@ def dimensions(
 
 
 def fitting(
-    effect: str, states: Sequence[int], velocities: Mapping[int, int], known: Mapping[int, str]
+    term: Term, states: Sequence[int], velocities: Mapping[int, int], known: Mapping[int, str]
 ) -> list[int]:
-    """Return those of the states that an effect of a motion could act on.
+    """Return those of the states whose equation a term of a motion could enter.
 
     Parameters
     ----------
@@ -59,13 +58,13 @@ def fitting(
     known : state -> dimension, where the recording tells it; nothing where a case lists the states itself
     """
     pairs = [i for i in states if i in velocities]
-    if effect in _OF_SPEED:
+    if term.of == "velocity":
         return _motions(states, pairs, known, _SPEEDS)
-    if effect in _OF_PLACE and pairs:
+    if term.of != "position":
+        return list(states)
+    if pairs:
         return pairs
-    if effect == "cubic_stiffness":
-        return _motions(states, [], known, _PLACES)
-    return [] if effect in _OF_PLACE else list(states)
+    return _motions(states, [], known, _PLACES) if term.on_place else []
 
 
 def _motions(

@@ -76,14 +76,18 @@ def read_stated(table: Mapping[str, Any], style: Style, *, recall: str | None, w
 
 
 def _interval(
-    table: Mapping[str, Any], texts: Mapping[str, str], recall: str | None, where: str, found: list[Finding]
+    table: Mapping[str, Any],
+    texts: Mapping[str, str],
+    recall: str | None,
+    where: str,
+    findings: list[Finding],
 ) -> str | None:
     due = _date(table, "due")
     interval = texts.get("interval") or recall
     if not table.get("interval_agreed", False):
         return None
     if due is None and interval is None:
-        found.append(
+        findings.append(
             Finding(
                 rule="certificate-interval",
                 where=where,

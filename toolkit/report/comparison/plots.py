@@ -30,7 +30,7 @@ def _plot(comparison: Comparison, figure: Figure, drawn: Characteristic, style: 
     load_unit, load_factor = style.unit("N")
     scale = factor * drawn.factor
     shown_unit = str(unit).replace("*", "·")
-    curves, said = [], []
+    curves, sentences = [], []
     for place, entry in enumerate(comparison.entries):
         x, y, U = _series(entry, drawn.name)
         if not x:
@@ -46,12 +46,12 @@ def _plot(comparison: Comparison, figure: Figure, drawn: Characteristic, style: 
             f"{plus_minus(b, c, decimal_comma=style.decimal_comma)} at {_number(a, style)}"
             for a, b, c in zip(x, y, U, strict=True)
         )
-        said.append(f"{entry.label}: {listed} {load_unit}")
+        sentences.append(f"{entry.label}: {listed} {load_unit}")
     if len(curves) < 2:
         return None
-    simulated = any(one.simulated for one in comparison.entries)
-    words = (*(one.word for one in comparison.uses), "SIMULATED" if simulated else None)
-    mark = " - ".join(dict.fromkeys(one for one in words if one))
+    simulated = any(entry.simulated for entry in comparison.entries)
+    words = (*(use.word for use in comparison.uses), "SIMULATED" if simulated else None)
+    mark = " - ".join(dict.fromkeys(word for word in words if word))
     title = figure.title + (f", {drawn.series_label}, drum forward" if drawn.scope == "direction" else "")
     title = title[:1].upper() + title[1:]
     return Plot(
@@ -62,7 +62,7 @@ def _plot(comparison: Comparison, figure: Figure, drawn: Characteristic, style: 
         caption=f"{title} against load; bars: expanded uncertainty (95 %). SAE J670 axes.",
         alt=(f"{mark}. " if mark else "")
         + f"{title} [{shown_unit}] against load with expanded uncertainty. "
-        + "; ".join(said)
+        + "; ".join(sentences)
         + ". Axis system: SAE J670.",
         watermark=mark or None,
         legend_title="compared",

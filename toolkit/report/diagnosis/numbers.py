@@ -25,8 +25,8 @@ def over(channel: str, variables: Sequence[str]) -> str:
     >>> over("FY", ["SA", "FZ"]), over("FY", ["more than its stated noise"])
     ('FY over SA and FZ', 'FY is off by more than its stated noise')
     """
-    told = " and ".join(variables)
-    return f"{channel} is off by {told}" if told.startswith("more than") else f"{channel} over {told}"
+    names = " and ".join(variables)
+    return f"{channel} is off by {names}" if names.startswith("more than") else f"{channel} over {names}"
 
 
 # How small a chance is said to be: none is zero.

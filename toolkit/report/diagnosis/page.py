@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from toolkit.effects.catalogue import effects
 from toolkit.report.diagnosis import figures
 from toolkit.report.diagnosis.maps import size_maps
 from toolkit.report.diagnosis.numbers import chance, few, over
@@ -155,7 +156,7 @@ def _reason(effect: FoundEffect) -> str:
     if effect.rejected:
         rivals = ", ".join(f"{name} (by {-less:.1f})" for name, less in effect.rejected[:5])
         text += f" Rejected, as they explain the recordings worse (log-likelihood less): {rivals}."
-    elif not effect.equivalent_to and effect.name != "quantisation":
+    elif not effect.equivalent_to and not effects()[effect.name].from_digits:
         text += " No other effect came near enough in the screening to be tried in its place."
     return text
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -13,6 +13,7 @@ from toolkit.estimate import plus_minus
 from toolkit.report.content import Curve, Plot
 from toolkit.report.style import Style
 from toolkit.report.tags import format_number
+from toolkit.report.test.content import REPORT, ReportedTest
 
 if TYPE_CHECKING:
     from toolkit.characteristics.characteristic import Characteristic, Figure
@@ -40,18 +41,28 @@ def load_groups(conditions: Sequence[Condition]) -> list[tuple[float, tuple[Cond
     Blocks of one nominal load share ``FZ_common``; a gap of 4 % separates two loads.
     """
     groups: list[list[Condition]] = []
-    for one in sorted(conditions, key=lambda c: c.FZ_common):
-        if groups and one.FZ_common - groups[-1][-1].FZ_common <= 0.04 * one.FZ_common:
-            groups[-1].append(one)
+    for condition in sorted(conditions, key=lambda c: c.FZ_common):
+        if groups and condition.FZ_common - groups[-1][-1].FZ_common <= 0.04 * condition.FZ_common:
+            groups[-1].append(condition)
         else:
-            groups.append([one])
+            groups.append([condition])
     return [(float(np.mean([c.FZ_common for c in group])), tuple(group)) for group in groups]
 
 
-def build_plots(result: TestResult, style: Style, watermark: str | None) -> dict[str, Plot]:
-    """Return every figure that the test has data for, by name."""
-    maker = _Plots(result, style, watermark)
-    plots = (
+@REPORT.figures(
+    {
+        "fy_vs_slip": "lateral force against slip angle, all loads",
+        "mz_vs_slip": "aligning moment against slip angle, all loads",
+        "fy_vs_load": "lateral force against load at constant slip angles",
+        "mz_vs_load": "aligning moment against load at constant slip angles",
+        "gough": "Gough plot: lateral force against aligning moment",
+        **{figure.name: figure.text for figure in figures()},
+    }
+)
+def build_plots(report: ReportedTest, style: Style) -> Iterable[Plot | None]:
+    """Return every figure that the test has data for."""
+    maker = _Plots(report.result, style, report.watermark)
+    return (
         maker.against_slip("FY"),
         maker.against_slip("MZ"),
         maker.against_load("FY"),
@@ -59,7 +70,6 @@ def build_plots(result: TestResult, style: Style, watermark: str | None) -> dict
         maker.gough(),
         *maker.characteristics(),
     )
-    return {plot.name: plot for plot in plots if plot is not None}
 
 
 class _Plots:
@@ -90,15 +100,15 @@ class _Plots:
 
     def _fit(self, rotation: str, load: float, channel: str) -> CurveFit | None:
         index = self._group(load)
-        for one in self.fits:
-            if one.rotation == rotation and self._group(one.load_N) == index:
-                fit: CurveFit | None = getattr(one, channel)
+        for direction in self.fits:
+            if direction.rotation == rotation and self._group(direction.load_N) == index:
+                fit: CurveFit | None = getattr(direction, channel)
                 return fit
         return None
 
     def _rotations(self) -> list[str]:
-        used = {c.rotation for c in self.result.reduced.used()}
-        return [one for one in ("forward", "reverse") if one in used]
+        rotations = {c.rotation for c in self.result.reduced.used()}
+        return [rotation for rotation in ("forward", "reverse") if rotation in rotations]
 
     def _plot(
         self, name: str, x: str, y: str, curves: list[Curve], caption: str, alt: str, **more: bool | str
@@ -121,7 +131,7 @@ class _Plots:
     def against_slip(self, channel: str) -> Plot | None:
         """Measured means and fitted curves against slip angle, one colour a load."""
         unit, factor = self._scale(channel)
-        curves, said, lines = [], [], False
+        curves, sentences, lines = [], [], False
         for index, (load, group) in enumerate(self.groups):
             for rotation in self._rotations():
                 points = sorted((c for c in group if c.rotation == rotation), key=lambda c: c.SA)
@@ -131,7 +141,7 @@ class _Plots:
                 y = [getattr(c, f"{channel}_common") * factor for c in points]
                 label = self._load_text(load)
                 curves.append(_curve(label, x, y, index, "points", open_=rotation == "reverse"))
-                said.append(
+                sentences.append(
                     f"{label} {rotation}: {self._number(y[0])} to {self._number(y[-1])} {unit} "
                     f"from {self._number(x[0], '.1f')} to {self._number(x[-1], '.1f')} deg"
                 )
@@ -145,7 +155,7 @@ class _Plots:
                     )
         what = _SYMBOLS[channel]
         how = f"reversed by {TURNED}" if self.result.reduced.info.reversal == "tire" else "reversed"
-        both = f"; filled: drum forward, open and dashed: {how}" if len(self._rotations()) > 1 else ""
+        turned = f"; filled: drum forward, open and dashed: {how}" if len(self._rotations()) > 1 else ""
         curves_text = ", fitted curves as lines" if lines else ""
         return self._plot(
             f"{channel.lower()}_vs_slip",
@@ -153,9 +163,9 @@ class _Plots:
             f"{what} [{unit}]",
             curves,
             f"{_upper(what)} against slip angle at {len(self.groups)} loads, measured means as symbols"
-            f"{curves_text}{both}. {_AXES_NOTE}",
+            f"{curves_text}{turned}. {_AXES_NOTE}",
             f"{_upper(what)} [{unit}] against slip angle [deg] at {len(self.groups)} loads. "
-            f"{'; '.join(said)}.",
+            f"{'; '.join(sentences)}.",
             legend="load FZ",
             zero_x=True,
         )
@@ -182,20 +192,20 @@ class _Plots:
         """Values at +-1, 2, 4, 6, 8, 10 deg against load."""
         unit, factor = self._scale(channel)
         load_unit, load_factor = self._scale("FZ")
-        curves, said = [], []
+        curves, sentences = [], []
         for index, size in enumerate(ANGLES_DEG):
             for angle in (size, -size):
-                found = [
+                points = [
                     (load * load_factor, value[0] * factor, value[1] * factor)
                     for load, group in self.groups
                     if _covers(group, angle)
                     and (value := self._at_angle(channel, load, group, angle)) is not None
                 ]
-                if not found:
+                if not points:
                     continue
-                x, y, U = zip(*found, strict=True)
+                x, y, U = zip(*points, strict=True)
                 curves.append(_curve(f"±{size} deg", x, y, index, "both", open_=angle < 0, error=U))
-                said.append(f"{angle:+d} deg: {self._number(y[0])} to {self._number(y[-1])} {unit}")
+                sentences.append(f"{angle:+d} deg: {self._number(y[0])} to {self._number(y[-1])} {unit}")
         what = _SYMBOLS[channel]
         return self._plot(
             f"{channel.lower()}_vs_load",
@@ -206,7 +216,7 @@ class _Plots:
             "filled: positive, open and dashed: negative slip angle; bars: expanded uncertainty (95 %). "
             f"{_AXES_NOTE}",
             f"{_upper(what)} [{unit}] against load [{load_unit}] at constant slip angles of plus and minus "
-            f"{', '.join(str(a) for a in ANGLES_DEG)} deg. {'; '.join(said)}.",
+            f"{', '.join(str(a) for a in ANGLES_DEG)} deg. {'; '.join(sentences)}.",
             legend="slip angle",
         )
 
@@ -228,8 +238,8 @@ class _Plots:
             curves.append(_curve(self._load_text(load), fitted_x * mz, fitted_y * fy, index, "line"))
             for angle in (s * a for a in ANGLES_DEG for s in (1, -1)):
                 if _covers(points, angle):
-                    one = np.radians([angle])
-                    xx, yy = curve_values(fits[1], one), curve_values(fits[0], one)
+                    slip = np.radians([angle])
+                    xx, yy = curve_values(fits[1], slip), curve_values(fits[0], slip)
                     at.setdefault(angle, []).append((float(xx[0]) * mz, float(yy[0]) * fy))
         for line in sorted(at):
             if len(at[line]) > 1:
@@ -299,12 +309,12 @@ class _Plots:
             rotations = self._rotations() if members[0].scope == "direction" else [None]
             series = [
                 (
-                    one.series_label + (f", {rotation}" if rotation else ""),
-                    one,
-                    of(one.name, rotation=rotation),
+                    member.series_label + (f", {rotation}" if rotation else ""),
+                    member,
+                    of(member.name, rotation=rotation),
                 )
                 for rotation in rotations
-                for one in members
+                for member in members
             ]
             plots.append(self._against(figure, series) if series else None)
         return plots

@@ -1,107 +1,126 @@
-"""A test's tables: columns of the catalogue, rows of plain numbers in the report's units."""
+"""The tables of a test's report, each declared with what builds it: plain numbers, SAE J670."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import replace
-from functools import partial
 from typing import TYPE_CHECKING
 
-from toolkit.characteristics.catalogue import tables
-from toolkit.report.columns import TABLES, Column
-from toolkit.report.content import Cell, Table
+from toolkit.report.document import Rows
 from toolkit.report.style import Style
-from toolkit.report.test.characteristics import budget_rows, long_rows, wide_rows
-from toolkit.report.test.models import model_rows
-from toolkit.report.test.stated import stated_rows
+from toolkit.report.tags import format_number
+from toolkit.report.test.content import REPORT, ReportedTest
+from toolkit.report.vocabulary import columns_of, number_column
+from toolkit.units import from_si
 
 if TYPE_CHECKING:
-    from toolkit.calibration.records.record import CalibrationRecord
-    from toolkit.findings import Finding
-    from toolkit.pipeline import TestResult
-    from toolkit.recording.details import Opinion
-    from toolkit.tires.comparison import Comparison
+    from toolkit.machine import TypeB
+    from toolkit.report.content import Cell
 
 _DEG = math.pi / 180
-Row = dict[str, Cell]
+_STATED = {
+    "FZ": "load",
+    "zero": "zero of the cells, without a tare",
+    "SA": "zero of the slip angle",
+    "SA_scale": "scale of the slip angle",
+    "P": "inflation pressure",
+}
+_COMMON = {"machine": "all tests of the machine", "test": "this test"}
 
 
-def build_tables(
-    result: TestResult,
-    record: CalibrationRecord | None,
-    findings: Sequence[Finding],
-    style: Style,
-    opinions: Sequence[Opinion] = (),
-    comparison: Comparison | None = None,
-) -> dict[str, Table]:
-    """Return every table of the catalogue; one without data has no rows."""
-    makers: dict[str, Callable[[], list[Row]]] = {
-        "results": lambda: _results(result),
-        **{table.name: partial(wide_rows, result, table) for table in tables()},
-        "budget": lambda: budget_rows(result, style),
-        "stated": lambda: stated_rows(result.reduced.stated, style),
-        "characteristics": lambda: long_rows(result, style),
-        "fits": lambda: _fits(result, style),
-        "models": lambda: model_rows(comparison),
-        "calibration": lambda: _calibration(record),
-        "acquisition": lambda: _acquisition(result),
-        "findings": lambda: [one.as_dict() for one in findings],  # type: ignore[misc]
-        "opinions": lambda: [{"statement": one.statement, "basis": one.basis} for one in opinions],
-        "files": lambda: _files(result),
-    }
-    return {name: _table(name, makers[name](), style) for name in TABLES}
+@REPORT.table(
+    "results",
+    "one row a condition, as measured, SAE J670",
+    """
+    rotation|direction of rotation
+    SA|measured slip angle|deg|.2f
+    FZ|measured load|force|.0f
+    FY|lateral force|force|.1f|U of U_FY
+    U_FY|expanded uncertainty of FY, every source, k = 2|force|.1f|U of U_FY
+    MZ|aligning moment|moment|.2f|U of U_MZ
+    U_MZ|expanded uncertainty of MZ, every source, k = 2|moment|.2f|U of U_MZ
+    file|recording
+    """,
+)
+def results(report: ReportedTest, _style: Style) -> Rows:
+    """Return the conditions that were used."""
+    points = {(point.file, point.first_row): point for point in report.result.characteristics.points}
+    for c in report.used:
+        u = points[c.file, c.first_row]
+        yield c.rotation, c.SA / _DEG, c.FZ, c.FY, 2 * u.u_FY, c.MZ, 2 * u.u_MZ, c.file
 
 
-def _table(name: str, rows: list[Row], style: Style) -> Table:
-    columns, factors = [], []
-    for column in TABLES[name][1]:
-        unit, factor = style.unit(column.unit)
-        digits = style.digits(f"{name}.{column.name}", column.name, unit)
-        spec = f".{digits}f" if digits is not None and column.spec.endswith("f") else column.spec
-        # Decimals by the column's full name rule; those by unit are for numbers without an uncertainty.
-        own = column.U if style.digits(f"{name}.{column.name}") is None else None
-        columns.append(replace(column, unit=unit, spec=spec, U=own))
-        factors.append(factor)
-    cells = tuple(
-        tuple(_scaled(row.get(c.name), c, f) for c, f in zip(columns, factors, strict=True)) for row in rows
-    )
-    return Table(name=name, columns=tuple(columns), rows=cells)
+@REPORT.table(
+    "stated",
+    "standard uncertainties that the machine states of what has no calibration record of its own",
+    """
+    quantity|what it is the uncertainty of
+    u|standard uncertainty, in a unit and relative to the value
+    common|whether its error is the same in all tests of the machine, or another in each
+    source|where the figure comes from
+    """,
+)
+def stated(report: ReportedTest, style: Style) -> Rows:
+    """Return what the machine states; the two parts of one uncertainty add as squares."""
+    for statement in report.result.reduced.stated:
+        parts = " and ".join(_parts(statement, style))
+        name = _STATED.get(statement.symbol, statement.symbol)
+        yield name, parts, _COMMON[statement.common], statement.source
 
 
-def _scaled(cell: Cell, column: Column, factor: float) -> Cell:
-    return cell if cell is None or isinstance(cell, str) or column.quantity is None else cell * factor
+def _parts(statement: TypeB, style: Style) -> list[str]:
+    def printed(value: float, unit: str) -> str:
+        return f"{format_number(value, '.3g', decimal_comma=style.decimal_comma)} {unit}"
+
+    parts = []
+    if statement.u and statement.symbol == "FZ":
+        unit, factor = style.unit("N")
+        parts.append(printed(statement.u * factor, str(unit)))
+    elif statement.u and statement.symbol == "P":
+        parts.append(printed(float(from_si(statement.u, "kPa")), "kPa"))
+    elif statement.u:
+        parts.append(printed(math.degrees(statement.u), "deg"))
+    if statement.relative:
+        parts.append(printed(100 * statement.relative, "%"))
+    if statement.effect and parts:
+        parts[-1] += f", of which a force follows {printed(100 * statement.effect, '%')}"
+    return parts
 
 
-def _results(result: TestResult) -> list[Row]:
-    u = {(p.file, p.first_row): p for p in result.characteristics.points}
-    return [
-        {
-            "rotation": c.rotation,
-            "SA": c.SA / _DEG,
-            "FZ": c.FZ,
-            "FY": c.FY,
-            "U_FY": 2 * u[c.file, c.first_row].u_FY,
-            "MZ": c.MZ,
-            "U_MZ": 2 * u[c.file, c.first_row].u_MZ,
-            "file": c.file,
-        }
-        for c in result.reduced.used()
-    ]
-
-
-def _fits(result: TestResult, style: Style) -> list[Row]:
-    rows: list[Row] = []
+@REPORT.table(
+    "fits",
+    "Magic Formula per load, channel and direction",
+    """
+    channel|FY or MZ
+    rotation|direction of rotation
+    load|mean load of the block|force|.0f
+    B|Magic Formula B|1/rad|.3f|U of u_B
+    u_B|standard error of B|1/rad|.3f|U of u_B
+    C|Magic Formula C|1|.3f|U of u_C
+    u_C|standard error of C|1|.3f|U of u_C
+    D|Magic Formula D in the channel's unit||.1f|U of u_D
+    u_D|standard error of D in the channel's unit||.1f|U of u_D
+    E|Magic Formula E|1|.3f|U of u_E
+    u_E|standard error of E|1|.3f|U of u_E
+    Sh|Magic Formula Sh|deg|.3f|U of u_Sh
+    u_Sh|standard error of Sh|deg|.3f|U of u_Sh
+    Sv|Magic Formula Sv in the channel's unit||.2f|U of u_Sv
+    u_Sv|standard error of Sv in the channel's unit||.2f|U of u_Sv
+    error|error of the fit|%|.2f
+    floor|scatter of the measurements about their bin means|%|.2f
+    """,
+)
+def fits(report: ReportedTest, style: Style) -> Rows:
+    """Return the fitted curves, those of FY first."""
     for channel, unit in (("FY", "N"), ("MZ", "N*m")):
         factor = style.unit(unit)[1]
-        for one in result.characteristics.fits:
-            fit = getattr(one, channel)
+        for direction in report.result.characteristics.fits:
+            fit = getattr(direction, channel)
             if fit is None:
                 continue
-            row: Row = {
+            row: dict[str, Cell] = {
                 "channel": channel,
-                "rotation": one.rotation,
-                "load": one.load_N,
+                "rotation": direction.rotation,
+                "load": direction.load_N,
                 "error": fit.error_percent,
                 "floor": fit.scatter_floor_percent,
             }
@@ -109,42 +128,96 @@ def _fits(result: TestResult, style: Style) -> list[Row]:
                 scale = factor if p.name in ("D", "Sv") else 1 / _DEG if p.name == "Sh" else 1.0
                 row[p.name] = p.value * scale
                 row[f"u_{p.name}"] = None if p.standard_error is None else p.standard_error * scale
-            rows.append(row)
-    return rows
+            yield row
 
 
-def _calibration(record: CalibrationRecord | None) -> list[Row]:
-    rows: list[Row] = []
+@REPORT.table(
+    "calibration",
+    "coefficients of the calibration record",
+    """
+    load|computed load
+    term|term
+    coefficient|full-precision coefficient||.6g
+    issued|coefficient as issued on the certificate||.6g
+    standard_error|standard error||.2g
+    unit|unit of load and indication
+    """,
+)
+def calibration(report: ReportedTest, _style: Style) -> Rows:
+    """Return the terms of every load."""
+    record = report.record
     units = dict(zip(record.indications, record.indication_units, strict=True)) if record else {}
     for load in record.loads if record else ():
         for i, term in enumerate(load.terms):
             unit = units.get(term)
-            rows.append(
-                {
-                    "load": load.load,
-                    "term": term,
-                    "coefficient": load.coefficients[i],
-                    "issued": load.issued[i] if i < len(load.issued) else None,
-                    "standard_error": math.sqrt(load.covariance[i][i]) if i < len(load.covariance) else None,
-                    "unit": (f"{load.unit} per {unit}" if unit else load.unit).replace("*", "·"),
-                }
+            yield (
+                load.load,
+                term,
+                load.coefficients[i],
+                load.issued[i] if i < len(load.issued) else None,
+                math.sqrt(load.covariance[i][i]) if i < len(load.covariance) else None,
+                (f"{load.unit} per {unit}" if unit else load.unit).replace("*", "·"),
             )
-    return rows
 
 
-def _acquisition(result: TestResult) -> list[Row]:
-    worst: dict[str, dict[str, float]] = {}
-    for c in result.reduced.used():
-        row = worst.setdefault(c.file, {})
-        for name, theirs, ours in (
-            ("FY_difference", c.FY_file, c.FY),
-            ("MZ_difference", c.MZ_file, c.MZ),
-        ):
+@REPORT.table(
+    "acquisition",
+    "the acquisition program's own FY and MZ against the report's, one row a file",
+    (
+        *columns_of("file|recording"),
+        number_column("FY_difference", "largest |FY of the file - FY|", "force", ".2f"),
+        number_column("MZ_difference", "largest |MZ of the file - MZ|", "moment", ".3f"),
+    ),
+)
+def acquisition(report: ReportedTest, _style: Style) -> Rows:
+    """Return the largest differences of each file that has values of its own."""
+    files: dict[str, dict[str, float]] = {}
+    for c in report.used:
+        row = files.setdefault(c.file, {})
+        for name, theirs, ours in (("FY_difference", c.FY_file, c.FY), ("MZ_difference", c.MZ_file, c.MZ)):
             if theirs is not None:
                 row[name] = max(row.get(name, 0.0), abs(theirs - ours))
-    return [{"file": file, **row} for file, row in worst.items() if row]
+    return [{"file": file, **row} for file, row in files.items() if row]
 
 
-def _files(result: TestResult) -> list[Row]:
-    seen = {c.file: c for c in result.reduced.conditions}
-    return [{"file": c.file, "rotation": c.rotation, "sha256": c.file_sha256} for c in seen.values()]
+@REPORT.table(
+    "findings",
+    "departures from what was expected",
+    """
+    rule|rule
+    level|error, warning or note
+    where|file, block or channel
+    message|what was found
+    """,
+)
+def findings(report: ReportedTest, _style: Style) -> Rows:
+    """Return the findings that the report lists."""
+    return ((finding.rule, finding.level, finding.where, finding.message) for finding in report.findings)
+
+
+@REPORT.table(
+    "opinions",
+    "opinions and interpretations, which are not results of the test",
+    """
+    statement|opinion or interpretation
+    basis|what it rests on
+    """,
+)
+def opinions(report: ReportedTest, _style: Style) -> Rows:
+    """Return what people stated."""
+    return ((opinion.statement, opinion.basis) for opinion in report.details.opinions)
+
+
+@REPORT.table(
+    "files",
+    "the recordings and their hashes",
+    """
+    file|recording
+    rotation|direction of rotation
+    sha256|SHA-256 of the file
+    """,
+)
+def files(report: ReportedTest, _style: Style) -> Rows:
+    """Return the recordings, each once."""
+    recordings = {c.file: c for c in report.result.reduced.conditions}
+    return ((c.file, c.rotation, c.file_sha256) for c in recordings.values())

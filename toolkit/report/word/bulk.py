@@ -129,7 +129,7 @@ class Mould:
             elif element.getparent().tag == q("w:sdtPr"):
                 element.set(q("w:val"), f"{_MARK}c{_MARK}")
         self.pieces = _PLACE.split(self._xml(row))
-        self.cells = [_VALUE.split(one) for one in row_texts(row)]
+        self.cells = [_VALUE.split(text) for text in row_texts(row)]
 
     def _mark(self, tag: Tag) -> str:
         self.tags.append(tag)

@@ -9,13 +9,9 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Mapping
 
-from toolkit.report.audit.vocabulary import AUDIT
-from toolkit.report.certificate.vocabulary import CERTIFICATE
-from toolkit.report.comparison.vocabulary import COMPARISON
-from toolkit.report.diagnosis.vocabulary import DIAGNOSIS
 from toolkit.report.style import Style
 from toolkit.report.tags import format_problem, parse_tag
-from toolkit.report.vocabulary import REPORT, Vocabulary
+from toolkit.report.vocabulary import Vocabulary
 from toolkit.report.word.lint import RULES, LintFinding, missing_fonts, surroundings
 from toolkit.report.word.package import Template, open_package
 from toolkit.report.word.scan import (
@@ -46,17 +42,22 @@ from toolkit.report.word.xml import (
 )
 
 
-def check_template(template: Template, style: Style, *, fonts: bool = True) -> tuple[LintFinding, ...]:
+def check_template(
+    template: Template, style: Style, vocabularies: Mapping[str, Vocabulary], *, fonts: bool = True
+) -> tuple[LintFinding, ...]:
     """Return what is wrong with a template, errors first, in document order.
 
     Parameters
     ----------
     template : a template that is safe to open
     style : its style file, for required tags and style names
+    vocabularies : of the kinds of documents that it may be of, by their names (see `vocabulary_of`)
     fonts : also ask the system which fonts it has
     """
     package = open_package(template)
-    return check_stories(package, stories(package), template, style, fonts=fonts)
+    parts = stories(package)
+    vocabulary = vocabulary_of(scan(parts), vocabularies)
+    return check_stories(package, parts, template, style, vocabulary, fonts=fonts)
 
 
 def check_stories(
@@ -64,23 +65,19 @@ def check_stories(
     parts: list[Story],
     template: Template,
     style: Style,
+    words: Vocabulary,
     *,
     fonts: bool,
-    vocabulary: Vocabulary | None = None,
 ) -> tuple[LintFinding, ...]:
-    """Return the findings of an opened package (see `check_template`).
-
-    Without a vocabulary a template is one of a certificate where it holds a ``tk:certificate.`` tag.
-    """
+    """Return the findings of an opened package (see `check_template`)."""
     sites = scan(parts)
-    words = vocabulary or vocabulary_of(sites)
-    found = [
+    findings = [
         *_tags(sites, style, words),
         *_tables(sites, words),
         *_broken(parts),
         *surroundings(package, parts, style),
     ]
-    found += [
+    findings += [
         LintFinding(
             rule="attached-template",
             level="warning",
@@ -91,7 +88,7 @@ def check_stories(
         for target in template.dropped
     ]
     if fonts:
-        found += [
+        findings += [
             LintFinding(
                 rule="font-unavailable",
                 level="warning",
@@ -101,21 +98,28 @@ def check_stories(
             )
             for name in missing_fonts(package, parts)
         ]
-    return tuple(sorted(found, key=lambda one: one.level != "error"))
+    return tuple(sorted(findings, key=lambda finding: finding.level != "error"))
 
 
-def vocabulary_of(sites: list[Site]) -> Vocabulary:
-    """Return the vocabulary that a template was made for, by its own tags."""
-    for words in (CERTIFICATE, AUDIT, COMPARISON, DIAGNOSIS):
-        if any(site.tag.path.startswith(f"{words.name}.") for site in sites):
-            return REPORT if words is DIAGNOSIS and _of_a_test(sites) else words
-    return REPORT
+def vocabulary_of(sites: list[Site], vocabularies: Mapping[str, Vocabulary]) -> Vocabulary:
+    """Return the vocabulary that a template was made for, by its tags: the first one where none tells.
+
+    The first kind may have the tags of another one too, a report those of a diagnosis: it is meant where the
+    template also has a value that the other kind does not know.
+    """
+    first, *others = vocabularies
+    for name in others:
+        beginning = f"{name}."
+        if any(site.tag.path.startswith(beginning) for site in sites):
+            default, other = vocabularies[first], vocabularies[name]
+            shared = any(entry.path.startswith(beginning) for entry in default.values)
+            return default if shared and _beyond(sites, default, other) else other
+    return vocabularies[first]
 
 
-def _of_a_test(sites: list[Site]) -> bool:
-    # A report may tell a diagnosis too, by the same tags; a diagnosis tells nothing of a test.
+def _beyond(sites: list[Site], first: Vocabulary, vocabulary: Vocabulary) -> bool:
     paths = {site.tag.path for site in sites if site.tag.family == "value"}
-    return any(REPORT.knows(path) and not DIAGNOSIS.knows(path) for path in paths)
+    return any(first.knows(path) and not vocabulary.knows(path) for path in paths)
 
 
 def _at(site: Site, rule: str, message: str) -> LintFinding:
@@ -218,7 +222,7 @@ def _swallowed(site: Site) -> Iterator[LintFinding]:
 def _near(path: str, words: Vocabulary) -> str:
     import difflib
 
-    near = difflib.get_close_matches(path, [one.path for one in words.catalogue], n=1, cutoff=0.5)
+    near = difflib.get_close_matches(path, [entry.path for entry in words.entries], n=1, cutoff=0.5)
     return f"did you mean tk:{near[0]}?" if near else "see 'toolkit template tags'"
 
 
@@ -262,7 +266,7 @@ def _tables(sites: list[Site], words: Vocabulary) -> Iterator[LintFinding]:
                 site, "no-table", f"{site.tag}: no table inside the control, nor right after its paragraph"
             )
             continue
-        columns = [one.name for one in words.tables[site.tag.name][1]]
+        columns = [column.name for column in words.tables[site.tag.name].columns]
         rows: list[Element] = []
         for other in sites:
             row = row_in(table, other.element) if other.story is site.story else None
@@ -279,7 +283,9 @@ def _tables(sites: list[Site], words: Vocabulary) -> Iterator[LintFinding]:
                         f"{other.tag} is no column of {site.tag}; it has {', '.join(columns)}",
                     )
                 else:
-                    kind = next(c.kind for c in words.tables[site.tag.name][1] if c.name == other.tag.name)
+                    kind = next(
+                        c.kind for c in words.tables[site.tag.name].columns if c.name == other.tag.name
+                    )
                     if problem := format_problem(kind, other.tag.spec):
                         yield _at(other, "bad-format", f"{other.tag}: {problem}")
             elif other.tag.family == "table" and other is not site:

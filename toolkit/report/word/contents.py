@@ -78,7 +78,7 @@ class ContentsEntry:
 
 def contents_fields(root: Element) -> list[ContentsField]:
     """Return the TOC fields of a body, in their order."""
-    found: list[ContentsField] = []
+    fields: list[ContentsField] = []
     stack: list[list[Any]] = []
     for element in root.iter(_CHAR, _INSTR):
         kind = element.get(_TYPE)
@@ -92,8 +92,8 @@ def contents_fields(root: Element) -> list[ContentsField]:
         elif kind == "end" and stack:
             begin, code, separate = stack.pop()
             if code.split()[:1] and code.split()[0].upper() == "TOC":
-                found.append(ContentsField(code=code, begin=begin, separate=separate, end=element))
-    return found
+                fields.append(ContentsField(code=code, begin=begin, separate=separate, end=element))
+    return fields
 
 
 def can_update(field: ContentsField) -> bool:
@@ -125,7 +125,7 @@ def write_contents(package: object, root: Element) -> Contents:
     package : the opened package, for its styles
     root : the body's tree, filled, its captions numbered
     """
-    fields = [one for one in contents_fields(root) if can_update(one)]
+    fields = [contents_field for contents_field in contents_fields(root) if can_update(contents_field)]
     if not fields:
         return Contents()
     sheet, marks = StyleSheet.of(package), _Bookmarks(root)
@@ -137,7 +137,9 @@ def write_contents(package: object, root: Element) -> Contents:
     named = {id(p): name for p, name in marks.given}
     return Contents(
         entries=tuple(entries),
-        headings=tuple((named.get(id(one.element), ""), one.text) for one in headings(root, sheet)),
+        headings=tuple(
+            (named.get(id(heading.element), ""), heading.text) for heading in headings(root, sheet)
+        ),
     )
 
 
@@ -198,19 +200,19 @@ def _entries(
     inside = field.paragraphs or []  # held, so that an identity stays that of one element
     own = {id(p) for p in inside}
     found = []
-    for one in headings(root, sheet):
-        level = extra.get(sheet.names.get(style_of(one.element), ""))
-        if level is None and (one.by_style or outline) and lowest <= one.level <= highest:
-            level = one.level
-        if level is None or id(one.element) in own:
+    for heading in headings(root, sheet):
+        level = extra.get(sheet.names.get(style_of(heading.element), ""))
+        if level is None and (heading.by_style or outline) and lowest <= heading.level <= highest:
+            level = heading.level
+        if level is None or id(heading.element) in own:
             continue
         found.append(
             ContentsEntry(
-                bookmark=marks.of(one.element),
-                text=one.text,
+                bookmark=marks.of(heading.element),
+                text=heading.text,
                 level=level,
                 heading=True,
-                numbered=one.numbered,
+                numbered=heading.numbered,
                 paged=paged,
             )
         )
@@ -250,7 +252,7 @@ def _rewrite(field: ContentsField, entries: list[ContentsEntry], sheet: StyleShe
     separator = re.search(r'\\p\s+"([^"]*)"', field.code)
     width = _text_width(root)
     made = [
-        _line(one, patterns, sheet, width, linked, separator[1] if separator else "\t") for one in entries
+        _line(entry, patterns, sheet, width, linked, separator[1] if separator else "\t") for entry in entries
     ]
     if not made:
         made = [etree.Element(W_P)]

@@ -290,7 +290,7 @@ def _numbered(filled: Filled, pdf: Path | RenderError) -> bytes:
     if isinstance(pdf, RenderError):
         return filled.docx
     found = titles_of(filled.contents.headings, pdf_outline(pdf))
-    numbered = {one.bookmark for one in filled.contents.entries if one.numbered}
+    numbered = {entry.bookmark for entry in filled.contents.entries if entry.numbered}
     titles = {bookmark: title for bookmark, _, title, _ in found if bookmark in numbered}
     return with_numbers(filled.docx, filled.main_part, titles)
 

@@ -83,7 +83,7 @@ def fill(
     """
     package: Any = open_package(template)
     parts = stories(package)
-    lint = check_stories(package, parts, template, content.style, fonts=fonts, vocabulary=content.vocabulary)
+    lint = check_stories(package, parts, template, content.style, content.vocabulary, fonts=fonts)
     errors = [one for one in lint if one.level == "error"]
     if errors:
         raise _lint_error(template, errors)
@@ -96,7 +96,7 @@ def _lint_error(template: Template, errors: list[LintFinding]) -> TemplateError:
     return TemplateError(
         f"the template has errors: {first.message}{more}",
         where=f"{template.path}: {first.part}, {first.place}",
-        got="; ".join(f"{one.rule}: {one.message}" for one in errors[:10]),
+        got="; ".join(f"{error.rule}: {error.message}" for error in errors[:10]),
         expected="a template that 'toolkit template check' finds no error in",
         next_step=f"run 'toolkit template check {template.path}' and correct what it names",
         rule=first.rule,
@@ -147,7 +147,7 @@ class _Filler:
             id(site)
             for site in sites
             if site.tag.family != "table"
-            and any(one is row for one in site.element.iterancestors(W_TR) for row in patterns)
+            and any(element is row for element in site.element.iterancestors(W_TR) for row in patterns)
         }
         outside = [site for site in sites if id(site) not in kept]
         for site, table in tables:
@@ -200,7 +200,7 @@ class _Filler:
         for site in scan(self.parts):
             if site.tag.family != "if":
                 continue
-            attached = any(one is site.story.root for one in site.element.iterancestors())
+            attached = any(element is site.story.root for element in site.element.iterancestors())
             if attached:
                 apply_condition(site.element, self.content.holds(site.tag.name))
 
@@ -269,7 +269,7 @@ class _Filler:
             self.printed,
         )
         if not site.fallback:
-            passing = {f"tk:{site.tag.path}.{one.name}" for one in table.columns if one.of_the_run}
+            passing = {f"tk:{site.tag.path}.{column.name}" for column in table.columns if column.of_the_run}
             if passing:
                 self.log.of_the_run |= passing
                 self.log.rows_of_the_run |= set(range(len(self.log.rows), len(self.log.rows) + len(made)))
@@ -361,7 +361,7 @@ def _prototypes(table: Element | None, sites: list[Site]) -> list[Element]:
     """Return a table's rows that hold a ``tk:row.`` tag, through any table within."""
     if table is None:
         return []
-    rows = (row_in(table, one.element) for one in sites if one.tag.family == "row")
+    rows = (row_in(table, site.element) for site in sites if site.tag.family == "row")
     return [row for row in rows if row is not None]
 
 

@@ -77,7 +77,7 @@ def surroundings(package: object, parts: list[Story], style: Style) -> Iterator[
         )
 
     # Their elements are held, so that an identity stays that of one element.
-    written = [one.begin for one in contents_fields(parts[0].root) if can_update(one)]
+    written = [field.begin for field in contents_fields(parts[0].root) if can_update(field)]
     known = {id(one) for one in written}
     for story in parts:
         for element in story.root.iter(*_TRACKED):

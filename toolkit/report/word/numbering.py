@@ -47,8 +47,8 @@ def number_captions(body: Element) -> None:
 def _write(field: _Field, text: str) -> None:
     if field.results:
         field.results[0].text = text
-        for other in field.results[1:]:
-            other.text = ""
+        for result in field.results[1:]:
+            result.text = ""
         return
     if field.end is None:
         return
@@ -63,14 +63,14 @@ def _write(field: _Field, text: str) -> None:
 
 
 def _fields(body: Element) -> list[_Field]:
-    found: list[_Field] = []
+    fields: list[_Field] = []
     stack: list[_Field] = []
     for element in body.iter(q("w:fldSimple"), q("w:fldChar"), q("w:instrText"), W_T):
         if element.tag == q("w:fldSimple"):
-            found.append(_Field(element.get(q("w:instr")) or "", list(element.iter(W_T)), None, None))
-            if not found[-1].results:
+            fields.append(_Field(element.get(q("w:instr")) or "", list(element.iter(W_T)), None, None))
+            if not fields[-1].results:
                 run = etree.SubElement(element, W_R)
-                found[-1].results = [etree.SubElement(run, W_T)]
+                fields[-1].results = [etree.SubElement(run, W_T)]
         elif element.tag == q("w:instrText"):
             if stack and stack[-1].separate is None:
                 stack[-1].code += element.text or ""
@@ -80,12 +80,12 @@ def _fields(body: Element) -> list[_Field]:
                     field.results.append(element)
         elif (kind := element.get(q("w:fldCharType"))) == "begin":
             stack.append(_Field("", [], None, None))
-            found.append(stack[-1])
+            fields.append(stack[-1])
         elif kind == "separate" and stack:
             stack[-1].separate = element
         elif kind == "end" and stack:
             stack.pop().end = element
-    return found
+    return fields
 
 
 def _bookmarks(body: Element) -> dict[str, str]:
@@ -136,7 +136,7 @@ class StyleSheet:
         """Read the styles part of an opened package; what a style lacks comes from the one it is based on."""
         root = package.main_document_part._styles_part.element  # type: ignore[attr-defined]
         styles = {one.get(q("w:styleId")) or "": one for one in root.iter(q("w:style"))}
-        names = {identity: _value(one, "w:name").lower() for identity, one in styles.items()}
+        names = {identity: _value(style, "w:name").lower() for identity, style in styles.items()}
         levels, numbered, tabbed = {}, set(), set()
         for identity in styles:
             level: int | None = None
@@ -180,7 +180,7 @@ def headings(body: Element, sheet: StyleSheet) -> Iterator[Heading]:
     outside = {FALLBACK, q("w:txbxContent")}
     for paragraph in body.iter(W_P):
         level = level_of(paragraph, sheet)
-        if level >= _BODY or any(one.tag in outside for one in paragraph.iterancestors()):
+        if level >= _BODY or any(iterancestor.tag in outside for iterancestor in paragraph.iterancestors()):
             continue
         text = " ".join(paragraph_text(paragraph).split())
         if not text:

@@ -174,10 +174,10 @@ class Office:
                 for share, done in zip(shares, made, strict=True)
                 for source, pdf in zip(share, done, strict=True)
             }
-        return [pdfs[one] for one in documents]
+        return [pdfs[document] for document in documents]
 
     def _convert(self, documents: Sequence[Path], out: Path) -> list[Path | RenderError]:
-        wanted = [out / f"{one.stem}.pdf" for one in documents]
+        wanted = [out / f"{document.stem}.pdf" for document in documents]
         late: RenderError | None = None
         try:
             said = self._run(documents, out, wanted)
@@ -204,7 +204,7 @@ class Office:
                 _OPTIONS,
                 "--outdir",
                 str(out),
-                *(str(one) for one in documents),
+                *(str(document) for document in documents),
             ]
         )
         begun = time.monotonic()
@@ -292,7 +292,7 @@ def time_for(documents: Sequence[Path], each_s: float) -> float:
     LibreOffice lays a table of n rows out in a time that grows with n squared: five hundred pages of one
     table take minutes, and are no reason to give up.
     """
-    sizes = [_unpacked(one) for one in documents]
+    sizes = [_unpacked(document) for document in documents]
     by_bytes = max(0, sum(data for data, _ in sizes) - _SMALL) * _SECONDS_PER_BYTE
     by_rows = sum(rows * rows for _, rows in sizes) * _SECONDS_PER_ROW_2
     return each_s * max(1, len(documents)) + by_bytes + by_rows
@@ -303,9 +303,9 @@ def _unpacked(docx: Path) -> tuple[int, int]:
     try:
         with zipfile.ZipFile(docx) as archive:
             parts = [one for one in archive.infolist() if one.filename.endswith(".xml")]
-            size = sum(one.file_size for one in parts)
+            size = sum(part.file_size for part in parts)
             # Few bytes hold few rows: an ordinary report is not read for them.
-            rows = sum(archive.read(one).count(b"</w:tr>") for one in parts) if size > _SMALL else 0
+            rows = sum(archive.read(part).count(b"</w:tr>") for part in parts) if size > _SMALL else 0
             return size, rows
     except (OSError, zipfile.BadZipFile):
         return 0, 0

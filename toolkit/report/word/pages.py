@@ -129,14 +129,14 @@ def mark_pages(package: Any, text: str) -> None:
     sections = [one for one in main.element.iter(q("w:sectPr")) if one.getparent().tag != q("w:sectPrChange")]
     if not sections:
         sections = [etree.SubElement(main.element.find(q("w:body")), q("w:sectPr"))]
-    headers = {id(one): one for one in _headers(main, sections)}
+    headers = {id(element): element for element in _headers(main, sections)}
     for kind in _needed(main, sections):
         # A later section without a header of a kind shows that of the one before it.
         if _reference(sections[0], kind) is None:
             part, identity = main.add_header_part()
             sections[0].add_headerReference(kind, identity)
             headers[id(part.element)] = part.element
-    frame = _frame(text, min(_width(one) for one in sections) - _SIDES)
+    frame = _frame(text, min(_width(section) for section in sections) - _SIDES)
     for header in headers.values():
         _insert(header, frame)
 
@@ -151,7 +151,7 @@ def _headers(main: Any, sections: Sequence[Element]) -> Iterator[Element]:
 
 def _needed(main: Any, sections: Sequence[Element]) -> Iterator[WD_HEADER_FOOTER]:
     yield WD_HEADER_FOOTER.PRIMARY
-    if any(switched_on(one, "w:titlePg") for one in sections):
+    if any(switched_on(section, "w:titlePg") for section in sections):
         yield WD_HEADER_FOOTER.FIRST_PAGE
     if switched_on(getattr(settings_of(main), "element", None), "w:evenAndOddHeaders"):
         yield WD_HEADER_FOOTER.EVEN_PAGE
@@ -165,9 +165,9 @@ def _reference(section: Element, kind: WD_HEADER_FOOTER) -> Element | None:
     }[kind]
     return next(
         (
-            one
-            for one in section.findall(q("w:headerReference"))
-            if (one.get(q("w:type")) or "default") == wanted
+            element
+            for element in section.findall(q("w:headerReference"))
+            if (element.get(q("w:type")) or "default") == wanted
         ),
         None,
     )

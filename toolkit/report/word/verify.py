@@ -38,7 +38,7 @@ def verify_docx(filled: Filled) -> tuple[Check, ...]:
     absent = [
         tag
         for tag, alt in filled.figures
-        if " ".join(alt.split()) not in {" ".join(one.split()) for one in alts}
+        if " ".join(alt.split()) not in {" ".join(alt.split()) for alt in alts}
     ]
     return (
         Check(name="placeholders", ok=not left, message=", ".join(left[:5]) or "none left"),

@@ -72,7 +72,7 @@ def stories(package: Any) -> list[Story]:
     main = package.main_document_part
     found = [Story(name=_name(main), root=main.element, part=main, blob=False)]
     seen = {_name(main)}
-    for rel in sorted(main.rels.values(), key=lambda one: one.rId):
+    for rel in sorted(main.rels.values(), key=lambda rel: rel.rId):
         kind = rel.reltype.rpartition("/")[2]
         if rel.is_external or kind not in STORIES or _name(rel.target_part) in seen:
             continue
