@@ -1,17 +1,16 @@
-"""The audit of an archive: every file with its grade, and what they amount to."""
+"""The audit of an archive: its inventory, every file with its grade, and what they amount to."""
 
 from __future__ import annotations
 
 import datetime as dt
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 
+from toolkit.audit.archive_findings import Lines
 from toolkit.audit.cluster import run_on_cluster
-from toolkit.audit.inventory import inventory
-from toolkit.audit.lines import Lines
 from toolkit.audit.one_file import Auditor, unreadable
 from toolkit.audit.resume import Done, Files, Results, done
 from toolkit.audit.sums import Sums, read_sums, sum_up, write_sums
@@ -20,7 +19,52 @@ from toolkit.calibration.registry.registry import Refused, Registry
 from toolkit.errors import ConfigError, RegistryError
 from toolkit.files import sha256_bytes
 from toolkit.findings import Finding
+from toolkit.recording.folder import TEST_FILE
 from toolkit.version import __version__
+
+# The inventory of an archive: every regular file that may be a recording, and nothing else.
+
+
+def inventory(archive: Path) -> tuple[str, ...]:
+    """Return the paths of an archive's files, relative to it, with ``/``, sorted.
+
+    Raises
+    ------
+    ConfigError
+        ``archive``: it is no folder, or a folder in it cannot be read
+    """
+    if not archive.is_dir():
+        raise ConfigError(
+            "the archive cannot be used",
+            where=archive,
+            got="a file" if archive.exists() else "nothing",
+            expected="a folder with recordings",
+            next_step="check the path; a single file is for 'toolkit inspect'",
+            rule="archive",
+        )
+    return tuple(sorted(_walk(archive, "")))
+
+
+def _walk(folder: Path, prefix: str) -> Iterator[str]:
+    try:
+        entries = sorted(os.scandir(folder), key=lambda entry: entry.name)
+    except OSError as error:
+        raise ConfigError(
+            "a folder of the archive cannot be read",
+            where=folder,
+            got=error.strerror or "an error",
+            expected="a readable folder",
+            next_step="check its permissions; nothing was audited",
+            rule="archive",
+        ) from error
+    for entry in entries:
+        if entry.is_symlink():
+            continue
+        name = prefix + entry.name
+        if entry.is_dir(follow_symlinks=False):
+            yield from _walk(folder / entry.name, name + "/")
+        elif entry.is_file(follow_symlinks=False) and entry.name != TEST_FILE:
+            yield name
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

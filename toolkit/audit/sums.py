@@ -15,8 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from toolkit.audit.archive_findings import Across
-from toolkit.audit.lines import Lines
+from toolkit.audit.archive_findings import Across, Lines
 from toolkit.audit.model import CLEAN, GRADES, TELLS, Grade
 from toolkit.files import atomic_path
 from toolkit.findings import Finding

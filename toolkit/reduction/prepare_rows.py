@@ -12,10 +12,9 @@ from toolkit.channels import Rotation
 from toolkit.errors import RecordError, RecordingError
 from toolkit.reduction.acquired import Difference, compare
 from toolkit.reduction.averaging import ROLLING_RATIO, Window, free_radius_m, revolutions, window
-from toolkit.reduction.blocks import Block, find_blocks, is_tare
+from toolkit.reduction.blocks import Block, find_blocks, find_rests, is_tare
 from toolkit.reduction.corrections import corrected
 from toolkit.reduction.model import Tare
-from toolkit.reduction.rests import find_rests
 from toolkit.units import from_si
 
 if TYPE_CHECKING:
