@@ -17,11 +17,11 @@ from toolkit.errors import ConfigError
 from toolkit.files import read_bytes, write_atomic
 from toolkit.simulation.case_plan import COLUMNS, Free
 from toolkit.simulation.cells import CELLS
-from toolkit.simulation.columns import shown, unit_of
 from toolkit.simulation.file_tire import FileTire
 from toolkit.simulation.plan import Plan
 from toolkit.simulation.run import VirtualFile, VirtualTest
 from toolkit.simulation.steady import steady_of
+from toolkit.simulation.write import shown, unit_of
 from toolkit.tires.tir import read_tir
 from toolkit.tires.tir_write import file_text
 from toolkit.units import from_si

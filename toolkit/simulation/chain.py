@@ -15,9 +15,8 @@ import numpy as np
 
 from toolkit.effects.applied import acting, in_order
 from toolkit.effects.filters import lag
-from toolkit.effects.forward import driven
+from toolkit.effects.forward import driven, similar
 from toolkit.effects.signals import Drive, Setting, TireForces, drive
-from toolkit.effects.similarity import similar
 from toolkit.simulation import carriage, road
 from toolkit.simulation.places import through_machine
 from toolkit.simulation.plan import Plan

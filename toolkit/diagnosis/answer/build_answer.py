@@ -17,9 +17,8 @@ from toolkit.diagnosis.answer.answer import (
     Verdict,
     recorded,
 )
-from toolkit.diagnosis.answer.classes import equivalent_to
 from toolkit.diagnosis.answer.locate import places
-from toolkit.diagnosis.answer.next_measurements import implausible, next_measurements
+from toolkit.diagnosis.answer.next_measurements import equivalent_to, implausible, next_measurements
 from toolkit.diagnosis.answer.power import not_found
 from toolkit.diagnosis.case.case import Case
 from toolkit.diagnosis.fit.structure import groups

@@ -11,9 +11,8 @@ from toolkit.channels import Axes, Rotation, signs
 from toolkit.diagnosis.simulators.setting import NOMINAL_SPEED, si
 from toolkit.effects.applied import AppliedEffect
 from toolkit.effects.effect import Effect
-from toolkit.effects.forward import driven, tire_forces
+from toolkit.effects.forward import Steady, driven, tire_forces
 from toolkit.effects.signals import Drive, Setting, Tire, TireForces, drive
-from toolkit.effects.similarity import Steady
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
