@@ -10,7 +10,7 @@ JOBS   ?= 2
 
 APT_PACKAGES := libreoffice-writer-nogui fonts-crosextra-carlito fonts-crosextra-caladea fonts-liberation2 poppler-utils
 
-.PHONY: demo test check golden bench coverage proof setup lock clean
+.PHONY: demo test check golden house bench coverage proof setup lock clean
 
 setup: $(STAMP) $(SYSTEM)
 
@@ -29,6 +29,10 @@ check: $(STAMP)
 # Every frozen answer (records, reduced tests, tires, audits, diagnoses, documents) against the code of today.
 golden: setup
 	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m tests.golden check
+
+# The house in figures: sizes, names, commands, effects named outside their file, imports up, pages.
+house: $(STAMP)
+	$(BIN)/python -m tests.house
 
 bench: setup
 	$(BIN)/python -m tests.benchmarks

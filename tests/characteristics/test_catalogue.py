@@ -14,7 +14,6 @@ import openpyxl
 import pytest
 from tire_factory import LOAD, M15, reduced_test
 
-from toolkit.characteristics.budget import COLUMNS, CORRECTION
 from toolkit.characteristics.catalogue import (
     by_channel,
     characteristics,
@@ -26,9 +25,15 @@ from toolkit.characteristics.catalogue import (
     tables,
 )
 from toolkit.characteristics.characterise import characterise
-from toolkit.characteristics.characteristic import PRINTED, Characteristic
+from toolkit.characteristics.characteristic import (
+    COLUMNS,
+    CORRECTION,
+    PRINTED,
+    PULL,
+    STIFFNESS,
+    Characteristic,
+)
 from toolkit.characteristics.groups import CHANNELS
-from toolkit.characteristics.layout import PULL, STIFFNESS
 from toolkit.lab.home import packaged_home
 from toolkit.report.test.content import REPORT
 from toolkit.simulation.plan import Plan
@@ -144,10 +149,10 @@ def test_the_line_of_a_lacking_row_is_not_the_line_of_another_load() -> None:
 TRAIL = '''
 from dataclasses import replace
 
-from toolkit.characteristics.budget import CURVE_BUDGET
+from toolkit.characteristics.characteristic import CURVE_BUDGET
 from toolkit.characteristics.characteristic import Characteristic, Figure
 from toolkit.characteristics.derivations import SLOPE_FY, SLOPE_MZ
-from toolkit.characteristics.layout import STIFFNESS
+from toolkit.characteristics.characteristic import STIFFNESS
 from toolkit.characteristics.uncertain import weighted
 
 

@@ -12,8 +12,7 @@ from report_factory import make_record, make_result
 from template_factory import FOLDER, make, p, tbl, texts
 
 import toolkit.report.test
-from toolkit.report.kinds import VOCABULARIES, check, write_manual
-from toolkit.report.reference import list_tags, reference_page
+from toolkit.report.kinds import VOCABULARIES, check, list_tags, reference_page, write_manual
 from toolkit.report.style import Style
 from toolkit.report.test.content import REPORT, build_content
 from toolkit.report.vocabulary import Entry, TableEntry, Vocabulary, columns_of
