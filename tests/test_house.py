@@ -25,8 +25,8 @@ def test_no_import_cycles() -> None:
 
 def test_files_are_small() -> None:
     lines = {path: len(path.read_text().splitlines()) for path in ROOT.rglob("*.py")}
-    assert max(lines.values()) <= 400, max(lines, key=lines.get)  # type: ignore[arg-type]
-    assert statistics.median(n for n in lines.values() if n > 10) <= 160
+    assert max(lines.values()) <= 500, max(lines, key=lines.get)  # type: ignore[arg-type]
+    assert statistics.median(n for n in lines.values() if n > 10) <= 175
 
 
 def test_the_public_api_is_small_and_there() -> None:
@@ -46,3 +46,14 @@ def test_importing_the_package_imports_nothing_heavy() -> None:
     ).stdout.split()
     heavy = {"numpy", "scipy", "pandas", "matplotlib", "statsmodels", "pint", "openpyxl", "docx", "lxml"}
     assert heavy.isdisjoint(loaded)
+
+
+def test_every_module_of_the_command_line_holds_a_command() -> None:
+    from toolkit.cli.main import _register, app
+
+    _register()
+    groups = [app, *(group.typer_instance for group in app.registered_groups)]
+    commands = [command.callback for group in groups for command in group.registered_commands]
+    homes = {callback.__module__.rpartition(".")[2] for callback in commands if callback is not None}
+    modules = {path.stem for path in (ROOT / "cli").glob("*.py")}
+    assert modules - homes == {"__init__", "console", "main"}

@@ -1,29 +1,103 @@
 """Calibration and standards toolkit for a tire force-and-moment laboratory.
 
-The public names are loaded when they are first used, so that ``import toolkit`` costs nothing.
+What a notebook needs is here; every name is loaded when it is first used, so that ``import toolkit`` costs
+nothing. Forces are in N, moments in N·m, angles in rad, in SAE J670 axes, unless a header says otherwise.
+
+>>> import toolkit
+>>> laboratory = toolkit.open_laboratory(toolkit.example("home"))
+>>> laboratory.records
+<Records m15-r1 withdrawn | m15-r2 approved | m15-virtual-r1 approved>
+>>> record = laboratory.in_force("m15-virtual")
+>>> record
+<Record m15-virtual-r1 | approved, in force from 2026-03-03 | verified | FY, MZ, MX from ...>
+
+A record turns indications into loads, each with its expanded uncertainty; units stand in the headers:
+
+>>> loads = record.apply({"D51 [mV/V]": [0.1, 0.2], "D52 [mV/V]": [0.1, 0.2], "E5 [mV/V]": [0.1, 0.1]})
+>>> loads
+<Loads 2 rows | FY [N], MZ [N*m], MX [N*m] | m15-virtual-r1>
+>>> list(loads.to_dataframe().columns)
+['FY [N]', 'U(FY) [N]', 'MZ [N*m]', 'U(MZ) [N*m]', 'MX [N*m]', 'U(MX) [N*m]']
+
+`read_test` and `process` take a test from its recordings to its characteristics, `fit_tire` to tire models,
+`write_report` to the laboratory's Word template; `diagnose`, `simulate` and `audit_archive` are the use cases
+of the same names. docs/library.md walks through all of them.
 """
 
 from __future__ import annotations
 
 from importlib import import_module
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-__version__ = "0.1.0"
+from toolkit.version import __version__ as __version__
+
+if TYPE_CHECKING:
+    from toolkit.errors import ToolkitError
+    from toolkit.estimate import Estimate
+    from toolkit.lab.archive import Audit, audit_archive
+    from toolkit.lab.cases import Diagnosis, Simulation, diagnose, simulate
+    from toolkit.lab.laboratory import Laboratory, example, open_laboratory
+    from toolkit.lab.record import Loads, Record
+    from toolkit.lab.test import (
+        ProcessedTest,
+        Recording,
+        Report,
+        Test,
+        read_recording,
+        read_test,
+        write_report,
+    )
+    from toolkit.lab.tires import Tire, TireFit, fit_tire, read_tire
+    from toolkit.machine import Machine, load_machine
+
+__all__ = [
+    "Audit",
+    "Diagnosis",
+    "Estimate",
+    "Laboratory",
+    "Loads",
+    "Machine",
+    "ProcessedTest",
+    "Record",
+    "Recording",
+    "Report",
+    "Simulation",
+    "Test",
+    "Tire",
+    "TireFit",
+    "ToolkitError",
+    "audit_archive",
+    "diagnose",
+    "example",
+    "fit_tire",
+    "load_machine",
+    "open_laboratory",
+    "read_recording",
+    "read_test",
+    "read_tire",
+    "simulate",
+    "write_report",
+]
 
 _PUBLIC = {
-    "Estimate": "toolkit.estimate",
-    "Machine": "toolkit.machine",
-    "Recording": "toolkit.recording",
-    "ToolkitError": "toolkit.errors",
-    "load_machine": "toolkit.machine",
+    "errors": "ToolkitError",
+    "estimate": "Estimate",
+    "lab.archive": "Audit audit_archive",
+    "lab.cases": "Diagnosis Simulation diagnose simulate",
+    "lab.laboratory": "Laboratory example open_laboratory",
+    "lab.record": "Loads Record",
+    "lab.test": "ProcessedTest Recording Report Test read_recording read_test write_report",
+    "lab.tires": "Tire TireFit fit_tire read_tire",
+    "machine": "Machine load_machine",
 }
+_MODULES = {name: module for module, names in _PUBLIC.items() for name in names.split()}
 
 
 def __getattr__(name: str) -> Any:
-    if name not in _PUBLIC:
+    if name not in _MODULES:
         raise AttributeError(f"module 'toolkit' has no attribute {name!r}")
-    return getattr(import_module(_PUBLIC[name]), name)
+    return getattr(import_module(f"toolkit.{_MODULES[name]}"), name)
 
 
 def __dir__() -> list[str]:
-    return sorted(["__version__", *_PUBLIC])
+    return sorted(["__version__", *__all__])

@@ -30,6 +30,7 @@ class ToolkitError(Exception):
     ----------
     what : one sentence that names the problem
     where : file, sheet, row, channel or record
+    line : the line of a text file, with its number
     got, expected : what stood there and what should have
     next_step : what the user can do about it
     rule : id of the finding's rule, for ``toolkit explain``
@@ -42,6 +43,7 @@ class ToolkitError(Exception):
         what: str,
         *,
         where: object = None,
+        line: str | None = None,
         got: object = None,
         expected: object = None,
         next_step: str | None = None,
@@ -50,6 +52,7 @@ class ToolkitError(Exception):
         super().__init__(what)
         self.what = what
         self.where = None if where is None else str(where)
+        self.line = line
         self.got = None if got is None else str(got)
         self.expected = None if expected is None else str(expected)
         self.next_step = next_step
@@ -60,6 +63,7 @@ class ToolkitError(Exception):
         parts = [self.what]
         for label, text in (
             ("where", self.where),
+            ("line", self.line),
             ("got", self.got),
             ("expected", self.expected),
             ("next", self.next_step),
@@ -73,11 +77,12 @@ class ToolkitError(Exception):
         return (_rebuild, (type(self), self.what, self.as_dict()))
 
     def as_dict(self) -> dict[str, str | None]:
-        """Return the parts as a JSON-ready dict."""
+        """Return the parts as a JSON-ready dict; ``line`` only where there is one."""
         return {
             "rule": self.rule,
             "what": self.what,
             "where": self.where,
+            **({} if self.line is None else {"line": self.line}),
             "got": self.got,
             "expected": self.expected,
             "next_step": self.next_step,

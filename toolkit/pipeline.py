@@ -47,18 +47,18 @@ def read_test(
 ) -> tuple[Recording, ...]:
     """Read every recording of a test, all or nothing; ``step`` is told each name."""
     machine = load_machine(folder.info.machine)
-    found = []
+    recordings = []
     for path in folder.files:
-        found.append(read_recording(path, machine, reader=reader))
+        recordings.append(read_recording(path, machine, reader=reader))
         step(path.name)
-    return tuple(found)
+    return tuple(recordings)
 
 
 def machine_of(folder: TestFolder, protocol: Protocol | None = None) -> Machine:
     """Return a test's machine with the protocol that applies: ``protocol``, the test's own, the machine's."""
     machine = load_machine(folder.info.machine)
-    chosen = protocol or folder.protocol
-    return machine if chosen is None else dataclasses.replace(machine, protocol=chosen)
+    applied = protocol or folder.protocol
+    return machine if applied is None else dataclasses.replace(machine, protocol=applied)
 
 
 def process(
@@ -80,8 +80,12 @@ def process(
         machine=machine,
         record=record,
         recordings=[
-            (one.path.relative_to(folder.folder).as_posix(), one, folder.rotation_of(one.path))
-            for one in recordings
+            (
+                recording.path.relative_to(folder.folder).as_posix(),
+                recording,
+                folder.rotation_of(recording.path),
+            )
+            for recording in recordings
         ],
         tare=declared_tare(folder, machine),
         use=use,

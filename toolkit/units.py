@@ -275,6 +275,16 @@ def from_si(values: ArrayLike, text: str) -> NDArray[np.float64]:
     return (np.asarray(values, dtype=np.float64) - found.offset) / found.factor
 
 
+def unit_examples(text: str) -> tuple[str, ...]:
+    """Return units of the same dimension that files of this field have.
+
+    >>> unit_examples("m/s")
+    ('m/s', 'km/h')
+    """
+    dimension = unit(text).dimension
+    return tuple(name for name, parts in _EXACT.items() if parts[3] == dimension)
+
+
 _BESIDE = {"N": "lbf", "lbf": "N", "N*m": "lbf*ft", "lbf*ft": "N*m"}
 
 

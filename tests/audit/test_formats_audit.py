@@ -67,7 +67,7 @@ def test_every_format_has_the_grade_of_the_same_rows_in_csv(audited):
         assert len(files) == 7
         for one in files.values():
             assert one.grade == GRADES[name], one.path
-            assert one.found == files["run.csv"].found
+            assert one.identification == files["run.csv"].identification
             assert one.rows == 50
 
 

@@ -79,9 +79,9 @@ def test_it_tells_what_the_failing_session_found(home):
     drift = drift_since(home[1], "m15-r2")
     FY_off = next(one for one in drift.failed.loads if one.load == "FY")
     assert abs(FY_off.max_error) > FY_off.tolerance
-    assert drift.told.startswith("on 2021-01-01, m15-r3 found m15-r1: FY off by ")
-    assert f"(tolerance {FY_off.tolerance:.4g} lbf)" in drift.told
-    assert "MZ" not in drift.told
+    assert drift.statement.startswith("on 2021-01-01, m15-r3 found m15-r1: FY off by ")
+    assert f"(tolerance {FY_off.tolerance:.4g} lbf)" in drift.statement
+    assert "MZ" not in drift.statement
 
 
 @pytest.fixture(scope="module")
@@ -166,5 +166,5 @@ def test_the_command_tells_each_test_and_its_page_too(home, tmp_path):
     for one in told["tests"]:
         line = next(row for row in text.splitlines() if row.startswith(one["test"]) and "%" in row)
         assert line.split()[-2:] == [f"{one['FY_max_abs_N']:.2f}", f"{one['MZ_max_abs_Nm']:.3f}"]
-        assert f"<tr><td>{one['test']}</td><td class=d>{one['date']}</td>" in page
-        assert f"<td class=n>{one['FY_max_abs_N']:.2f}</td>" in page
+        assert f'<tr><td>{one["test"]}</td><td class="d">{one["date"]}</td>' in page
+        assert f'<td class="n">{one["FY_max_abs_N"]:.2f}</td>' in page

@@ -41,8 +41,7 @@ _PAIRS = 3
 
 def run(folder: Path, count: int) -> list[dict[str, object]]:
     """Time the audit against its peers, then a second run, memory, and hold every grade against the truth."""
-    from toolkit.audit.archive import audit_archive
-    from toolkit.audit.inventory import inventory
+    from toolkit.audit.archive import audit_archive, inventory
     from toolkit.calibration.registry.registry import Registry
 
     big = make_archive(folder / "big", files=FILES)
@@ -157,10 +156,9 @@ class _Reader:
         self.folder, self.machine = folder, load_machine("m15")
 
     def __call__(self, name: str) -> int:
-        from toolkit.recording.safe_open import gate
-
         from toolkit.errors import ToolkitError
         from toolkit.recording.columns import header_of
+        from toolkit.recording.safe_open import gate
         from toolkit.recording.xlsx import read_sheet
 
         try:

@@ -12,7 +12,7 @@ import math
 from pathlib import Path
 
 from tests.benchmarks.timing import pairs, row
-from toolkit.cli.home import packaged_home
+from toolkit.lab.home import packaged_home
 
 TRIALS = 1_000_000
 

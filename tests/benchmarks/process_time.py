@@ -13,7 +13,7 @@ def run(folder: Path, count: int) -> list[dict[str, object]]:
 
     from tests.benchmarks.virtual import virtual_test
     from toolkit.calibration.registry.registry import Registry
-    from toolkit.cli.home import packaged_home
+    from toolkit.lab.home import packaged_home
     from toolkit.pipeline import process, read_test
     from toolkit.recording.folder import read_test_folder
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from tests.benchmarks.timing import pairs, row
 from tests.benchmarks.virtual import virtual_test
-from toolkit.cli.home import packaged_home
+from toolkit.lab.home import packaged_home
 
 
 def run(folder: Path, count: int) -> list[dict[str, object]]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from toolkit.cli.home import packaged_home
+from toolkit.lab.home import packaged_home
 
 
 def virtual_test(folder: Path) -> Path:

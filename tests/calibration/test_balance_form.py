@@ -9,10 +9,15 @@ import numpy as np
 import pytest
 from calibration_factory import csv_text, session_text
 
-from toolkit.calibration.fit.balance import BalanceForm, fit_balance, loads_by_iteration, loads_by_newton
+from toolkit.calibration.fit.balance import (
+    BalanceForm,
+    estimate_tares,
+    fit_balance,
+    loads_by_iteration,
+    loads_by_newton,
+)
 from toolkit.calibration.fit.balance_report import balance_findings, report_balance
 from toolkit.calibration.fit.session_fit import fit_session
-from toolkit.calibration.fit.tares import estimate_tares
 from toolkit.calibration.session.read import read_session
 from toolkit.calibration.terms import model_terms, term_matrix
 from toolkit.errors import SessionError

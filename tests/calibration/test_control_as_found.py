@@ -8,8 +8,7 @@ from pathlib import Path
 import pytest
 from control_factory import enter, put_in_force
 
-from toolkit.calibration.control.as_found import as_found, as_found_before, as_found_history
-from toolkit.calibration.control.in_use import in_use_before
+from toolkit.calibration.control.as_found import as_found, as_found_before, as_found_history, in_use_before
 from toolkit.calibration.registry.approval import withdraw
 from toolkit.calibration.registry.registry import Registry
 

@@ -11,9 +11,9 @@ from control_factory import enter, put_in_force
 from toolkit.calibration.control.as_found import AsFound, AsFoundLoad
 from toolkit.calibration.control.recall import due_findings, due_of, recommend
 from toolkit.calibration.registry.approval import approve
-from toolkit.calibration.registry.interval import parse_interval
 from toolkit.calibration.registry.ledger import parse_ledger
 from toolkit.calibration.registry.registry import Registry
+from toolkit.calibration.registry.status import parse_interval
 from toolkit.errors import RegistryError
 
 DAY = dt.date(2024, 2, 29)

@@ -13,10 +13,10 @@ import typer
 from calibration_factory import hub_data
 from test_legacy import GOOD
 
+from toolkit.calibration.registry.approval import name_key
 from toolkit.calibration.registry.candidate import calibrate
 from toolkit.calibration.registry.difference import differences
 from toolkit.calibration.registry.legacy import import_legacy
-from toolkit.calibration.registry.names import name_key
 from toolkit.calibration.registry.registry import Registry
 from toolkit.cli import calibration
 from toolkit.errors import ToolkitError

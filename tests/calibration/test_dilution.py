@@ -12,7 +12,7 @@ import pytest
 from calibration_factory import SENSITIVITY, ZERO, hub_data
 from numpy.typing import NDArray
 
-from toolkit.calibration.fit.dilution import NOISE_SHARE, noise_shares, noise_terms
+from toolkit.calibration.fit.adequacy import NOISE_SHARE, noise_shares, noise_terms
 from toolkit.calibration.fit.findings import session_findings
 from toolkit.calibration.fit.regression import fit_terms
 from toolkit.calibration.fit.session_fit import fit_session

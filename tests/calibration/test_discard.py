@@ -19,9 +19,8 @@ from test_legacy import GOOD
 from toolkit.calibration.control import calibrate as control
 from toolkit.calibration.control.chart import control_chart
 from toolkit.calibration.registry import store
-from toolkit.calibration.registry.approval import approve, withdraw
+from toolkit.calibration.registry.approval import approve, discard, withdraw
 from toolkit.calibration.registry.candidate import calibrate
-from toolkit.calibration.registry.discard import discard
 from toolkit.calibration.registry.history import approved_ids
 from toolkit.calibration.registry.legacy import import_legacy
 from toolkit.calibration.registry.registry import Registry

@@ -8,8 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
-from toolkit.calibration.standards.degree import best_degree, degree_factor
-from toolkit.calibration.standards.e74 import evaluate_e74
+from toolkit.calibration.standards.e74 import best_degree, degree_factor, evaluate_e74
 from toolkit.errors import SessionError
 
 # NIST Statistical Reference Datasets, Pontius: deflection at 150 000 .. 3 000 000 lbf, two runs.

@@ -7,9 +7,8 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from toolkit.calibration.fit.exact_products import CutDesign, exact_bits, leading
 from toolkit.calibration.fit.inner import inner
-from toolkit.calibration.fit.regression import fit_loads, fit_terms
+from toolkit.calibration.fit.regression import CutDesign, exact_bits, fit_loads, fit_terms, leading
 from toolkit.calibration.records.exact import solve_exactly
 
 

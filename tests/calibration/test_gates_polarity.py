@@ -20,7 +20,6 @@ from toolkit.calibration.registry.legacy import import_legacy
 from toolkit.calibration.registry.registry import Registry
 from toolkit.errors import ConfigError, UnitError
 from toolkit.machine import load_machine
-from toolkit.machine.polarity import read_polarity
 
 PROJECT = Registry(Path(__file__).resolve().parents[2] / "calibrations")
 
@@ -59,7 +58,7 @@ def test_the_machine_has_the_published_signs() -> None:
     assert signs == {
         "D51": {"FY": 1, "MZ": -1, "MX": 1}, "D52": {"FY": 1, "MZ": 1, "MX": 1}, "E5": {"FY": 1, "MX": -1},
     }  # fmt: skip
-    assert {n: np.sign(lever) for n, lever in machine.overturning_lever_m} == {
+    assert {n: np.sign(lever) for n, lever in machine.layout.overturning_lever_m} == {
         n: s["MX"] for n, s in signs.items()
     }
     assert all("thesis 4.1" in one.source for one in machine.cells)
@@ -166,19 +165,22 @@ def test_a_turned_cell_needs_a_new_definition_and_then_passes(used: Registry, tm
 
 
 @pytest.mark.parametrize(
-    "entry",
+    ("entry", "key"),
     [
-        {"name": "D53", "polarity": {"FY": 1}, "source": "x"},
-        {"name": "D51", "polarity": {"FY": 2}, "source": "x"},
-        {"name": "D51", "polarity": {"FY": True}, "source": "x"},
-        {"name": "D51", "polarity": {}, "source": "x"},
-        {"name": "D51", "polarity": {"FY": 1}},
-        {"name": "D51", "polarity": {"FY": 1}, "source": "x", "sense": 1},
+        ('name = "D53"\npolarity = { FY = 1 }\nsource = "x"', "cell[1].name"),
+        ('name = "D51"\npolarity = { FY = 2 }\nsource = "x"', "cell[1].polarity.FY"),
+        ('name = "D51"\npolarity = { FY = true }\nsource = "x"', "cell[1].polarity.FY"),
+        ('name = "D51"\npolarity = {}\nsource = "x"', "cell[1].polarity"),
+        ('name = "D51"\npolarity = { FY = 1 }', "cell[1].source"),
+        ('name = "D51"\npolarity = { FY = 1 }\nsource = "x"\nsense = 1', "cell[1]"),
     ],
 )
-def test_a_polarity_that_cannot_be(entry: dict[str, object]) -> None:
-    with pytest.raises(ConfigError):
-        read_polarity([entry], ["D51"], "a test")
+def test_a_polarity_that_cannot_be(tmp_path: Path, entry: str, key: str) -> None:
+    path = tmp_path / "own.toml"
+    path.write_text(f'name = "own"\nextends = "m15"\n[[cell]]\n{entry}\n')
+    with pytest.raises(ConfigError) as caught:
+        load_machine(str(path))
+    assert caught.value.where == f"{path}: {key}"
 
 
 # A rig that no machine definition knows: readings.

@@ -16,8 +16,7 @@ import pytest
 
 from toolkit.calibration.registry.candidate import calibrate
 from toolkit.calibration.registry.registry import Registry
-from toolkit.calibration.registry.stored import stored_check, stored_loads
-from toolkit.calibration.registry.stored_session import stored_session
+from toolkit.calibration.registry.stored import stored_check, stored_loads, stored_session
 from toolkit.calibration.registry.verify import verify_registry
 from toolkit.calibration.session.read import Session, read_session
 from toolkit.calibration.session.table import Table, read_table

@@ -12,9 +12,10 @@ from toolkit.calibration.fit.session_fit import fit_session
 from toolkit.calibration.registry.approval import approve
 from toolkit.calibration.registry.candidate import calibrate
 from toolkit.calibration.registry.registry import Registry
-from toolkit.calibration.registry.stored_session import stored_session
+from toolkit.calibration.registry.stored import stored_session
 from toolkit.calibration.session import read
-from toolkit.calibration.session.keys import DATES, SESSION, TEXTS
+from toolkit.calibration.session.session_file import TEXTS, SessionFile
+from toolkit.declared import table_of
 from toolkit.errors import ConfigError
 from toolkit.report.certificate.collect import collect
 from toolkit.report.style import Style
@@ -68,7 +69,7 @@ def test_what_may_be_stated_is_taken(tmp_path: Path, make_session: Make) -> None
     texts = {key: f'"{key}"' for key in TEXTS} | {"number": "17", "country": '"DE"'}
     texts["decision_rule"] = '"guard band, w = U"'
     lines = [f"{key} = {value}" for key, value in texts.items()]
-    lines += [f"{key} = 2026-03-01" for key in DATES] + ["interval_agreed = true"]
+    lines += [f"{key} = 2026-03-01" for key in ("received", "due")] + ["interval_agreed = true"]
     record = calibrate(
         make_session(tail=CERTIFICATE.format("\n".join(lines))), Registry(tmp_path / "cal")
     ).record
@@ -84,8 +85,13 @@ def test_all_faults_are_told_at_once(tmp_path: Path, make_session: Make) -> None
     )  # fmt: skip
     error = refused(tmp_path, path)
     assert error.where == str(path)
-    lines = [line.strip() for line in str(error.got).splitlines()]
+    told = [line.strip() for line in str(error.got).splitlines()]
+    places = [line.split(" | ") for line in told if " | " in line]
+    text = path.read_text().splitlines()
+    assert [text[int(number) - 1] for number, _ in places] == [line for _, line in places]
+    lines = [line for line in told if " | " not in line]
     assert error.what == f"{len(lines)} entries cannot be used"
+    assert len(places) == len(lines) - 2  # what is missing at the top has no line
     assert lines == [
         "temprature: unknown key; did you mean 'temperature'?",
         "cells.D51.serail: unknown key; did you mean 'serial'?",
@@ -94,8 +100,8 @@ def test_all_faults_are_told_at_once(tmp_path: Path, make_session: Make) -> None
         "reference.uncertainty.FY.unit: missing; expected a unit of the load such as 'N', or '%' of the "
         "applied load",
         "certificate.custmer: unknown key; did you mean 'customer'?",
-        "certificate.due: 'soon' cannot be used; expected a date such as 2026-03-31",
-        "creep 1.seconds: missing; expected seconds, zero or more",
+        'certificate.due: "soon" cannot be used; expected a date such as 2026-03-31',
+        "creep[1].seconds: missing; expected seconds, zero or more",
         'operator: missing; expected a text: operator = "..."',
         'data: missing; expected the name of a file, such as data = "loads.csv" or "loads.xlsx"',
     ]
@@ -112,7 +118,7 @@ def test_a_misspelt_key_is_not_missing_too(tmp_path: Path, make_session: Make) -
     assert (error.what, error.rule) == ("unknown key 'operatr'", "unknown-key")
 
 
-@pytest.mark.parametrize("key", [key for key in SESSION.entries if key != "schema"])  # type: ignore[union-attr]
+@pytest.mark.parametrize("key", [key for key in table_of(SessionFile).keys if key != "schema"])
 def test_no_key_holds_whatever_is_written(tmp_path: Path, make_session: Make, key: str) -> None:
     # A moment is neither a text, a number, a name nor a table.
     changes = {"check": "-"} if key == "check" else {}

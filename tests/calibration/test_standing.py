@@ -13,9 +13,8 @@ from calibration_factory import hub_data
 from control_factory import enter, put_in_force
 
 from toolkit.calibration.records.use import CalibrationUse, mark_of
-from toolkit.calibration.registry.approval import approve, withdraw
+from toolkit.calibration.registry.approval import approve, discard, withdraw
 from toolkit.calibration.registry.candidate import calibrate
-from toolkit.calibration.registry.discard import discard
 from toolkit.calibration.registry.registry import Registry
 from toolkit.calibration.registry.standing import standing
 from toolkit.errors import RecordError

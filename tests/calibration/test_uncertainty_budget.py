@@ -10,7 +10,7 @@ import pytest
 from uncertainty_factory import levels, record_of_table, table_of
 
 from toolkit.calibration.uncertainty.budget import calibration_budget, combine, predict
-from toolkit.calibration.uncertainty.conditions import Temperature
+from toolkit.calibration.uncertainty.model import Temperature
 from toolkit.errors import SessionError
 from toolkit.estimate import round_uncertainty
 

@@ -25,10 +25,10 @@ import numpy as np
 
 from toolkit.calibration.records.record import CalibrationRecord
 from toolkit.calibration.registry.registry import Registry
-from toolkit.cli.home import packaged_home
 from toolkit.effects.catalogue import effects
 from toolkit.effects.effect import Effect, EffectParameter
 from toolkit.findings import Finding
+from toolkit.lab.home import packaged_home
 from toolkit.recording.model import Recording, Series, TestInfo
 from toolkit.reduction.model import ReducedTest, Tare
 from toolkit.reduction.physics import RULES

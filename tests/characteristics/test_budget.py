@@ -9,15 +9,15 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
 from tire_factory import LOAD, M15, PLYSTEER, Key, at_load, reduced_test, rows_of_many
 
 from toolkit.characteristics.characterise import characterise, characteristic_rows
-from toolkit.characteristics.rows import Row
-from toolkit.characteristics.shared import root_of
+from toolkit.characteristics.model import Row
+from toolkit.characteristics.shared_errors import root_of
 from toolkit.characteristics.uncertain import Part, Uncertain, weighted
 from toolkit.reduction.model import ReducedTest, Tare
 
@@ -214,18 +214,13 @@ def test_the_fit_and_the_rows_are_never_counted_twice() -> None:
 
 def test_the_sources_of_a_budget_add_up_to_the_value_s_uncertainty() -> None:
     found = characterise(reduced_test(u=(8.0, 0.3), pressure_Pa=234e3), machine=M15, record=None)
-    assert len(found.budgets) == len([n for p in found.pull for n in _named(p)]) + len(
-        [n for s in found.stiffness for n in _named(s)]
-    )
-    owners: dict[Any, Any] = {(p.load_N, "both"): p for p in found.pull}
-    owners |= {(s.load_N, s.rotation): s for s in found.stiffness}
-    for one in found.budgets:
-        estimate = getattr(owners[one.load_N, one.rotation], one.name)
-        assert math.sqrt(sum(u * u for _, u in one.sources)) == pytest.approx(estimate.u, rel=1e-12)
-
-
-def _named(one: Any) -> list[str]:
-    return [name for name in one.__dataclass_fields__ if hasattr(getattr(one, name), "u")]
+    budgeted = [row for row in found.rows if row.SA_rad is None and row.estimate is not None]
+    # Ten of the load, four of each of its directions.
+    assert len(budgeted) == 10 + 2 * 4
+    for row in budgeted:
+        assert row.estimate is not None
+        assert math.sqrt(sum(u * u for _, u in row.sources)) == pytest.approx(row.estimate.u, rel=1e-12)
+        assert {source for source, _ in row.sources} <= set(row.characteristic.budget)
 
 
 def test_a_condition_holds_every_source() -> None:
@@ -249,7 +244,7 @@ def test_values_at_the_protocol_s_slip_angles_stay_inside_what_was_measured() ->
     found = characterise(
         reduced_test(angles=(-6.0, -4.0, -2.0, -1.0, 0.0, 1.0, 2.0, 4.0)), machine=M15, record=None
     )
-    degrees = {round(math.degrees(one.SA_rad)) for one in found.at_angles}
+    degrees = {round(math.degrees(row.SA_rad)) for row in found.rows if row.SA_rad is not None}
     assert degrees == {-6, -4, -2, -1, 0, 1, 2, 4}
 
 

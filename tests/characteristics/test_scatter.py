@@ -10,7 +10,7 @@ from scipy.stats import chi2
 from tire_factory import LOAD, M15, at_load, reduced_test
 
 from toolkit.characteristics.characterise import characterise
-from toolkit.characteristics.rows import directions_of
+from toolkit.characteristics.groups import directions_of
 from toolkit.characteristics.scatter import Scatter, scatter_of
 from toolkit.reduction.model import ReducedTest
 

@@ -8,9 +8,8 @@ from typing import Any
 import numpy as np
 
 from toolkit.characteristics.characterise import characteristic_rows
-from toolkit.characteristics.groups import group
-from toolkit.characteristics.model import Characteristics, DirectionFit
-from toolkit.characteristics.rows import Row
+from toolkit.characteristics.groups import DirectionFit, group
+from toolkit.characteristics.model import Characteristics, Row
 from toolkit.machine import load_machine
 from toolkit.recording.model import TestInfo
 from toolkit.reduction.model import CalibrationUse, Condition, ReducedTest, Tare
@@ -116,8 +115,7 @@ def rows_of_many(tests: Sequence[ReducedTest]) -> Iterator[dict[Key, Row]]:
             fits=tuple(
                 DirectionFit(rotation=g.rotation, load_N=g.load_N, FY=next(fits), MZ=next(fits)) for g in some
             ),
-            stiffness=(),
-            pull=(),
+            rows=(),
             findings=(),
         )
         yield {

@@ -9,9 +9,9 @@ from typing import Any
 import pytest
 import typer
 
-from toolkit.cli import calibration_budget
-from toolkit.cli.home import packaged_home
+from toolkit.cli import calibration_results
 from toolkit.errors import ToolkitError
+from toolkit.lab.home import packaged_home
 
 RECORD = "m15-virtual-r1"
 
@@ -19,7 +19,7 @@ RECORD = "m15-virtual-r1"
 @pytest.fixture
 def run(capsys: pytest.CaptureFixture[str]) -> Any:
     root = typer.Typer()
-    root.command("budget")(calibration_budget.command)
+    root.command("budget")(calibration_results.budget)
 
     def call(*words: object, record: str = RECORD) -> tuple[int, dict[str, Any]]:
         folder = str(packaged_home() / "calibrations")

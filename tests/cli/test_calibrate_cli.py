@@ -15,7 +15,7 @@ from typer.testing import CliRunner
 
 from toolkit.calibration.registry.approval import approve
 from toolkit.calibration.registry.registry import Registry
-from toolkit.cli import calibrate, calibration_report
+from toolkit.cli import calibrate, calibration
 from toolkit.errors import ToolkitError
 
 CONTRACT = (
@@ -35,9 +35,9 @@ DAY = dt.date(2026, 1, 5)
 HEADER = "A [mV/V],B [mV/V],FY [lbf],MZ [lbf*ft]"
 
 
-def run(*arguments: object, of: Any = calibrate) -> tuple[int, str]:
+def run(*arguments: object, of: Any = calibrate.command) -> tuple[int, str]:
     app = typer.Typer()
-    app.command()(of.command)
+    app.command()(of)
     result = CliRunner().invoke(app, [str(one) for one in arguments], standalone_mode=False)
     if isinstance(result.exception, ToolkitError):
         raise result.exception
@@ -119,11 +119,11 @@ def test_figures_are_whole_and_the_same_again(session: Path, tmp_path: Path) -> 
 def test_a_stored_record_is_reported_as_its_session_was(session: Path, tmp_path: Path) -> None:
     _, first = run(session, "--calibrations", tmp_path / "cal", "--json", "--full")
     session.parent.rename(tmp_path / "moved")
-    code, out = run("cell2-r1", "--calibrations", tmp_path / "cal", "--json", of=calibration_report)
+    code, out = run("cell2-r1", "--calibrations", tmp_path / "cal", "--json", of=calibration.report)
     assert code == 0
     for name, one in json.loads(first)["loads"].items():
         assert json.loads(out)["loads"][name] == one["report"]
-    _, text = run("cell2-r1", "--calibrations", tmp_path / "cal", of=calibration_report)
+    _, text = run("cell2-r1", "--calibrations", tmp_path / "cal", of=calibration.report)
     assert "cell2-r1" in text
     assert "sign sure" in text
 
@@ -131,7 +131,7 @@ def test_a_stored_record_is_reported_as_its_session_was(session: Path, tmp_path:
 def test_a_legacy_record_has_no_report() -> None:
     registry = Path(__file__).resolve().parents[2] / "calibrations"
     with pytest.raises(ToolkitError) as caught:
-        run("m15-r1", "--calibrations", registry, of=calibration_report)
+        run("m15-r1", "--calibrations", registry, of=calibration.report)
     assert (caught.value.exit_code, caught.value.rule) == (2, "data")
     assert caught.value.next_step
 

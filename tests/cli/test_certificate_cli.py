@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 import typer
 
-from toolkit.cli import calibration_certificate
+from toolkit.cli import calibration_results
 from toolkit.errors import ToolkitError
 
 CHECKOUT = Path(__file__).resolve().parents[2]
@@ -26,7 +26,7 @@ office_needed = pytest.mark.skipif(
 @pytest.fixture
 def run(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Run:
     root = typer.Typer()
-    root.command("certificate")(calibration_certificate.command)
+    root.command("certificate")(calibration_results.certificate)
     root.command("other")(lambda: 0)
 
     def call(*words: object) -> tuple[int, dict[str, Any]]:

@@ -17,8 +17,8 @@ import pytest
 from toolkit.calibration.registry.approval import approve, withdraw
 from toolkit.calibration.registry.candidate import calibrate
 from toolkit.calibration.registry.registry import Registry, today
-from toolkit.cli.home import packaged_home
 from toolkit.cli.main import run
+from toolkit.lab.home import packaged_home
 from toolkit.recording.marks import is_own_output
 from toolkit.simulation.plan import read_plan
 from toolkit.simulation.run import simulate

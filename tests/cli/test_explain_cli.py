@@ -10,10 +10,10 @@ import pytest
 
 import toolkit
 from toolkit.audit.model import Grade
-from toolkit.cli.explain import rules_catalogue
 from toolkit.cli.main import run
 from toolkit.effects.catalogue import effects
-from toolkit.report.template.check import RULES
+from toolkit.lab.rules import rules_catalogue
+from toolkit.report.word.check import RULES
 
 SOURCES = sorted(Path(toolkit.__file__).parent.rglob("*.py"))
 REFUSERS = {"_refuse", "refuse_cell", "problem"}

@@ -9,7 +9,8 @@ from typer.testing import CliRunner
 
 from toolkit.cli import fit
 from toolkit.errors import ToolkitError
-from toolkit.simulation.bakker1987 import aligning_moment, lateral_force
+from toolkit.lab.fit_models import model_choice
+from toolkit.simulation.tire import aligning_moment, lateral_force
 from toolkit.tires.catalog import model_names
 
 KEYS = (
@@ -138,8 +139,8 @@ def test_a_folder_that_cannot_be_written_is_refused_before_the_fit(tire, tmp_pat
 
 
 def test_all_names_every_model_of_the_catalogue():
-    assert set(fit.model_choice(["all"])) == set(model_names())
-    assert fit.model_choice(["brush", "mf52", "brush"]) == ("brush", "mf52")
+    assert set(model_choice(["all"])) == set(model_names())
+    assert model_choice(["brush", "mf52", "brush"]) == ("brush", "mf52")
 
 
 def test_robust_and_weights_are_told(tire):

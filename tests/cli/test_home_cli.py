@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from toolkit.cli import doctor
-from toolkit.cli.home import calibrations_folder, find_home
 from toolkit.cli.main import run
 from toolkit.errors import ConfigError
+from toolkit.lab import doctor
+from toolkit.lab.home import calibrations_folder, find_home
 
 
 def code_of(*words: object) -> int:

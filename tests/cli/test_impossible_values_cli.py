@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from tests.campaigns import physics_gate as campaign
-from toolkit.cli.home import packaged_home
 from toolkit.cli.main import run
+from toolkit.lab.home import packaged_home
 from toolkit.reduction.physics import RULES
 from toolkit.simulation.plan import with_effects
 from toolkit.simulation.run import simulate
@@ -96,7 +96,7 @@ def test_the_report_says_it_on_its_first_page(turned: Path) -> None:
     from toolkit.calibration.registry.registry import Registry
     from toolkit.pipeline import process, read_test
     from toolkit.recording.folder import read_test_folder
-    from toolkit.report.build import build_content
+    from toolkit.report.test.content import build_content
 
     folder = read_test_folder(turned)
     record = Registry(packaged_home() / "calibrations").load("m15-virtual-r1")

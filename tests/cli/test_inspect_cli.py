@@ -151,7 +151,7 @@ def test_one_bad_file_of_many_does_not_hide_the_others(run, tmp_path):
 
 
 def test_corrected_values_are_held_against_physics_too(run, tmp_path):
-    from toolkit.cli.home import packaged_home
+    from toolkit.lab.home import packaged_home
 
     # Figure 4.4 with E5 as if the cell had been turned: what the good record makes of it is impossible too.
     columns = {s: v.copy() for s, v in zip(SYMBOLS, np.array(ROWS).T, strict=True)}

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from toolkit.cli.home import packaged_home
 from toolkit.cli.main import run
+from toolkit.lab.home import packaged_home
 from toolkit.tires.models.magic_formula import value
 
 CALIBRATIONS = packaged_home() / "calibrations"

@@ -10,8 +10,8 @@ from typing import Any
 import pandas as pd
 import pytest
 
-from toolkit.cli.home import packaged_home
 from toolkit.cli.main import run
+from toolkit.lab.home import packaged_home
 
 CALIBRATIONS = packaged_home() / "calibrations"
 FIG = packaged_home() / "toolkit" / "examples" / "fig4_4" / "M15_fig4_4.xlsx"

@@ -18,13 +18,13 @@ from report_factory import make_record, make_result
 from template_factory import make, p, tbl
 
 import toolkit
-from toolkit.cli import resolve
-from toolkit.cli.delivery import home_template
-from toolkit.cli.handover import details_of
 from toolkit.cli.report import command
 from toolkit.cli.template import check, new, tags
 from toolkit.errors import ConfigError, OutputError, TemplateError
 from toolkit.findings import Finding
+from toolkit.lab import resolve
+from toolkit.lab.handover import details_of
+from toolkit.lab.home import home_template
 from toolkit.recording.marks import is_own_output
 from toolkit.tires.tir import read_tir
 from toolkit.tires.tydex import read_tydex
@@ -229,7 +229,9 @@ def test_the_content_hash_follows_the_content(tmp_path: Path, monkeypatch, capsy
 
 @office_needed
 def test_units_of_choice_go_through_values_and_tables(tmp_path: Path, resolved, capsys) -> None:
-    pull = resolved.result.characteristics.pull[0]
+    characteristics = resolved.result.characteristics
+    load = characteristics.loads_N[0]
+    conicity, CRAT = (characteristics.at(name, load).estimate.value for name in ("conicity", "CRAT"))
     body = p("{{tk:unit.force}} {{tk:unit.moment}} {{tk:summary.load}}") + p("{{tk:figure.plysteer}}")
     columns = ["{{tk:row.load}}", "{{tk:row.conicity}}", "{{tk:row.CRAT}}"]
     template = make(tmp_path, body + p("{{tk:table.pull}}") + tbl(["a", "b", "c"], columns))
@@ -241,9 +243,9 @@ def test_units_of_choice_go_through_values_and_tables(tmp_path: Path, resolved, 
     texts = {one["tag"]: one["text"] for one in reversed(said["manifest"])}
     assert (texts["tk:unit.force"], texts["tk:unit.moment"]) == ("lbf", "lbf·ft")
     lbf, lbf_ft = 0.45359237 * 9.80665, 0.45359237 * 9.80665 * 0.3048  # exact by definition
-    assert float(texts["tk:table.pull.load"]) == pytest.approx(pull.load_N / lbf, abs=0.5)
-    assert float(texts["tk:table.pull.conicity"]) == pytest.approx(pull.conicity.value / lbf, abs=0.05)
-    assert float(texts["tk:table.pull.CRAT"]) == pytest.approx(pull.CRAT.value / lbf_ft, abs=0.005)
+    assert float(texts["tk:table.pull.load"]) == pytest.approx(load / lbf, abs=0.5)
+    assert float(texts["tk:table.pull.conicity"]) == pytest.approx(conicity / lbf, abs=0.05)
+    assert float(texts["tk:table.pull.CRAT"]) == pytest.approx(CRAT / lbf_ft, abs=0.005)
     assert "lbf" in said["figures"][0]["alt"]
     for units in ("psi", ""):
         with pytest.raises(ConfigError) as caught:

@@ -15,14 +15,14 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "report"))
 from report_factory import make_record, make_result
 from template_factory import make, p
 from test_diagnosis_in_report import ANSWER
+
+from toolkit.cli.report import command
 from toolkit.diagnosis.answer.answer import Diagnosis, Recorded
 from toolkit.diagnosis.answer.serial import as_json
-
-from toolkit.cli import resolve
-from toolkit.cli.handover import diagnosis_findings
-from toolkit.cli.report import command
-from toolkit.cli.resolve import Resolved
 from toolkit.errors import ConfigError
+from toolkit.lab import resolve
+from toolkit.lab.handover import diagnosis_findings
+from toolkit.lab.resolve import Resolved
 
 office_needed = pytest.mark.skipif(
     not (shutil.which("soffice") and shutil.which("pdftotext")),

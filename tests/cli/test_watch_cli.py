@@ -17,10 +17,7 @@ from typing import Any
 import pytest
 
 from toolkit import files
-from toolkit.cli.home import packaged_home
-from toolkit.cli.report import Made
 from toolkit.cli.watch import command
-from toolkit.cli.watching import SET_ASIDE, STATE, Round, Watcher
 from toolkit.errors import (
     ConfigError,
     OutputError,
@@ -31,6 +28,9 @@ from toolkit.errors import (
     UnreadableError,
 )
 from toolkit.findings import Finding
+from toolkit.lab.home import packaged_home
+from toolkit.lab.reports import MadeReport
+from toolkit.lab.watching import SET_ASIDE, STATE, Round, Watcher
 from toolkit.recording.marks import is_own_output
 
 office_needed = pytest.mark.skipif(
@@ -67,14 +67,14 @@ class Bench:
             raise self.faults[test.name]
         return SimpleNamespace(findings=self.findings.get(test.name, ()))
 
-    def report(self, ready: dict[Path, Any], folders: Sequence[Path]) -> list[Made]:
+    def report(self, ready: dict[Path, Any], folders: Sequence[Path]) -> list[MadeReport]:
         self.reported.append([test.name for test in ready])
         done = [
             SimpleNamespace(pdf=folder / "report.pdf", content_sha256="0", units=("N", "N*m"))
             for folder in folders
         ]
         return [
-            Made(test=test, resolved=ready[test], outcome=self.refusals.get(test.name, one))  # type: ignore[arg-type]
+            MadeReport(test=test, resolved=ready[test], outcome=self.refusals.get(test.name, one))  # type: ignore[arg-type]
             for test, one in zip(ready, done, strict=True)
         ]
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from toolkit.characteristics.rows import BOTH, Row
+from toolkit.characteristics.characteristic import BOTH
+from toolkit.characteristics.model import Row
 from toolkit.characteristics.uncertain import Part, Uncertain
 from toolkit.comparison.model import Entry
 
@@ -14,13 +15,8 @@ LOADS = (2000.0, 4000.0, 6000.0)
 def row(
     name: str, load: float, value: float, *parts: Part, rotation: str = BOTH, SA_rad: float | None = None
 ) -> Row:
-    return Row(
-        name=name,
-        load_N=load,
-        rotation=rotation,
-        SA_rad=SA_rad,
-        number=Uncertain(value=value, unit="N", parts=parts),
-    )
+    number = Uncertain(value=value, unit="N", parts=parts)
+    return Row.of(name, number, load_N=load, rotation=rotation, SA_rad=SA_rad)
 
 
 def own(label: str, u: float, where: object = "") -> Part:

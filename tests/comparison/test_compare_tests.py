@@ -26,11 +26,11 @@ from comparison_factory import conicity
 
 from toolkit.calibration.registry.registry import Registry
 from toolkit.characteristics.characterise import characterise
-from toolkit.cli.home import packaged_home
 from toolkit.comparison.compare import compare
 from toolkit.comparison.compare import test_entry as entry_of
 from toolkit.comparison.model import Comparison, Entry
 from toolkit.errors import ConfigError
+from toolkit.lab.home import packaged_home
 from toolkit.machine import load_machine
 from toolkit.pipeline import process, read_test
 from toolkit.recording.folder import read_test_folder

@@ -12,8 +12,8 @@ from statsmodels.stats.multitest import multipletests
 
 from toolkit.characteristics.uncertain import Part
 from toolkit.comparison.at_load import at_load
-from toolkit.comparison.differences import differences, two_sided_p
-from toolkit.comparison.holm import holm
+from toolkit.comparison.differences import differences
+from toolkit.comparison.significance import holm, two_sided_p
 
 
 def test_the_difference_of_two_tests_loses_what_they_share() -> None:

@@ -9,7 +9,8 @@ import pytest
 from comparison_factory import conicity
 from scipy import stats
 
-from toolkit.comparison.precision import factor_spread, factors_of, grubbs_p, repeats_of, spread
+from toolkit.comparison.precision import factor_spread, factors_of, repeats_of, spread
+from toolkit.comparison.significance import grubbs_p
 
 
 def test_gum_h5_zener_voltage_standard() -> None:

@@ -9,7 +9,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from tests.concealed import log, page, proof_file
+from tests.concealed import log, proof_file
 from tests.concealed.batch import draw_batch, redrawn, seed_of
 from tests.concealed.real import run_real
 from tests.concealed.running import run_batch
@@ -24,6 +24,8 @@ def _say(text: str) -> None:
 
 
 def _score(given: argparse.Namespace) -> None:
+    from tests.concealed import page
+
     proof = open_batch(given.out, workers=given.workers, progress=_say)
     batch, score = proof.batch, score_of(proof)
     small = proof_file.path_beside(given.log or given.out / "log", batch)

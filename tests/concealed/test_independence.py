@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import subprocess
 import sys
 from pathlib import Path
 
@@ -10,7 +11,9 @@ import pytest
 
 HERE = Path(__file__).parent
 ALLOWED = {"numpy", "scipy", "pandas", "openpyxl", "tests"}
-MODULES = sorted(p for p in HERE.rglob("*.py") if not p.name.startswith(("test_", "conftest")))
+PAGE = HERE / "page.py"
+"""It reads what was scored, and takes the page kit from the toolkit."""
+MODULES = sorted(p for p in HERE.rglob("*.py") if not p.name.startswith(("test_", "conftest")) and p != PAGE)
 
 
 def imports(path: Path) -> set[str]:
@@ -38,6 +41,21 @@ def test_no_module_reaches_the_toolkit_by_another_way(path: Path) -> None:
     text = path.read_text(encoding="utf-8")
     assert "importlib" not in text
     assert "__import__" not in text
+
+
+def test_the_page_takes_nothing_but_the_page_kit_and_nothing_takes_the_page_to_draw_or_judge() -> None:
+    assert {name for name in imports(PAGE) if name.startswith("toolkit")} == {
+        "toolkit.report.pages",
+        "toolkit.report.pages.drawing",
+    }
+    callers = [path.stem for path in MODULES if "import page" in path.read_text(encoding="utf-8")]
+    assert callers == ["__main__"]
+    code = "import sys, tests.concealed.__main__; print(*sorted({n.split('.')[0] for n in sys.modules}))"
+    loaded = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=HERE.parents[1]
+    ).stdout.split()
+    assert {"toolkit", "jinja2"}.isdisjoint(loaded)
+    assert "numpy" in loaded
 
 
 def test_a_case_simulator_stands_alone() -> None:

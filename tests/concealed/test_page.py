@@ -1,19 +1,34 @@
-"""The page of the proof: what is wider than the window scrolls by itself, not the page."""
+"""The page of the proof: its inline marks, its curves, and the bars that are not met."""
+
+from xml.etree import ElementTree as ET
+
+import pytest
 
 from tests.concealed import content, page
-from tests.concealed.content import Table
+from tests.concealed.intervals import Rate
 from tests.concealed.score import Bar
 
 
-def test_a_wide_table_has_a_container_that_scrolls():
-    head = tuple(f"answer {i}" for i in range(40))
-    wide = Table(title="Confusion", sentence="s", head=head, rows=[list(head)])
-    assert '<div class="wide"><table>' in page._table(wide, "")
-    assert ".wide, pre { overflow-x: auto }" in page._STYLE  # the commands have lines as long as any table
+@pytest.mark.parametrize(
+    ("text", "parts"),
+    [
+        ("met", [("met", "met")]),
+        ("all bars met", [("text", "all bars met")]),
+        ("**not met**", [("text", ""), ("not met", "not met"), ("text", "")]),
+        ("`<a>` & b", [("text", ""), ("code", "<a>"), ("text", " & b")]),
+    ],
+)
+def test_a_cell_shows_its_code_and_whether_a_bar_is_met(text, parts):
+    assert page.spans(text) == parts
 
 
-def test_ink_and_paper_are_both_stated():
-    assert "color: #1b1f24; background: #fff" in page._STYLE
+def test_a_curve_draws_a_dot_for_every_bin_that_holds_cases():
+    rates = [Rate(0, 0), Rate(1, 4), Rate(4, 4)]
+    bins = [{"from": i, "to": i + 1.0, "rate": rate} for i, rate in enumerate(rates)]
+    drawn = ET.fromstring(str(page.curve(bins, "size <1>")))  # noqa: S314  our own
+    assert len(drawn.findall("circle")) == 2
+    assert len(drawn.find("polyline").get("points").split()) == 2
+    assert drawn.get("aria-label") == "size <1>"
 
 
 def test_a_bar_that_is_not_met_stands_with_every_batch_and_its_reason():

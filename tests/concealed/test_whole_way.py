@@ -89,7 +89,7 @@ def test_the_score_and_its_page(batch: Path, tmp_path: Path, capsys: pytest.Capt
     assert batch_json["answers_sha256"] in text
     html = (tmp_path / "proof.html").read_text(encoding="utf-8")
     assert "<script" not in html
-    assert "http" not in html
+    assert "://" not in html
     assert html.count("<svg") == 3
     assert len((tmp_path / "log").read_text().splitlines()) == 1
     for part in ("Never put in", "pressure_change", "Outside the catalogue", "why it is outside", "verify"):

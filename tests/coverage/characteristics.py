@@ -17,6 +17,7 @@ from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
+from typing import cast
 
 import numpy as np
 
@@ -96,16 +97,15 @@ def readings(cell: Cell, seed: int) -> tuple[Reading, ...]:
             error = estimate.value - true
             made.append(Reading(name=name, load=load, rotation=rotation, error=error, u=estimate.u, U=U))
 
-    for place, pull in enumerate(found.pull):
-        truth = true_pull(tire, load_N=pull.load_N)
-        for name in PULL:
-            hold(name, place, "both", getattr(pull, name), getattr(truth, name))
-    loads = [pull.load_N for pull in found.pull]
-    for stiffness in found.stiffness:
-        rotation: Rotation = stiffness.rotation
-        true = true_stiffness(tire, load_N=stiffness.load_N, rotation=rotation)
-        for name in STIFFNESS:
-            hold(name, loads.index(stiffness.load_N), rotation, getattr(stiffness, name), getattr(true, name))
+    for row in found.rows:
+        load = found.loads_N.index(row.load_N)
+        if row.name in PULL:
+            truth = true_pull(tire, load_N=row.load_N)
+            hold(row.name, load, "both", row.estimate, getattr(truth, row.name))
+        elif row.name in STIFFNESS:
+            rotation = cast("Rotation", row.rotation)
+            true = true_stiffness(tire, load_N=row.load_N, rotation=rotation)
+            hold(row.name, load, rotation, row.estimate, getattr(true, row.name))
     return tuple(made)
 
 

@@ -7,10 +7,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from toolkit.diagnosis.answer.reader import read_answer
-from toolkit.diagnosis.answer.serial import as_json
 
 from tests.diagnosis.cases import HEAD, TWO, carriage, write_case
+from toolkit.diagnosis.answer.reader import read_answer
+from toolkit.diagnosis.answer.serial import as_json
 from toolkit.diagnosis.case.reader import read_case
 from toolkit.diagnosis.diagnose import diagnose
 from toolkit.errors import ConfigError, ToolkitError

@@ -11,7 +11,7 @@ import pytest
 from tests.diagnosis.cases import write_case
 from toolkit.diagnosis.case.reader import read_case
 from toolkit.diagnosis.simulators.build_simulator import model_of
-from toolkit.diagnosis.simulators.simulator import Active
+from toolkit.effects.applied import AppliedEffect
 from toolkit.effects.catalogue import effects
 
 # An interval is at most 0.64 T long, so that straight lines over its quarters are off by 0.64^2 / 128, 0.3 %,
@@ -71,7 +71,7 @@ def exact(t, u, at):
 def made(folder, t, u, effect=None, **values):
     table = pd.DataFrame({"t": t, "U": u, "Y": 0.0})
     case = read_case(write_case(folder, CASE, simulator=SIMULATOR, r0__csv=table))
-    active = () if effect is None else (Active(effect=effects()[effect], channel="Y", values=values),)
+    active = () if effect is None else (AppliedEffect(effect=effects()[effect], channel="Y", values=values),)
     return model_of(case, None).simulate(case.runs[0], {"T": T, "K": K}, active)["Y"]
 
 

@@ -6,13 +6,13 @@ import numpy as np
 import pandas as pd
 import pytest
 import typer
-from toolkit.diagnosis.search import forward_step, search
 from typer.testing import CliRunner
 
 from tests.diagnosis.cases import HEAD, TWO, carriage, write_case
 from toolkit.cli import diagnose as command
 from toolkit.diagnosis.case.reader import read_case
 from toolkit.diagnosis.diagnose import diagnose
+from toolkit.diagnosis.search import forward_step, search
 from toolkit.errors import FitError
 
 GAIN = 1.2

@@ -4,13 +4,12 @@ import math
 import time
 
 import pytest
-from toolkit.diagnosis.answer.serial import as_json
-from toolkit.diagnosis.search.search import BudgetSpentError
-from toolkit.diagnosis.search.time_budget import Watch
 
 from tests.diagnosis.cases import HEAD, ONE, SIMULATOR, TWO, carriage, write_case
+from toolkit.diagnosis.answer.serial import as_json
 from toolkit.diagnosis.case.reader import read_case
 from toolkit.diagnosis.diagnose import diagnose
+from toolkit.diagnosis.search.time_budget import BudgetSpentError, TimeBudget
 
 WAITS = SIMULATOR.replace("import pandas as pd", "import pandas as pd, time\n    WAIT")
 PREDICT = '[[recording.predict]]\nfile = "more.csv"\n'
@@ -24,15 +23,15 @@ def test_a_call_is_ended_where_it_stands_even_if_it_catches_everything():
             return 0
 
     with pytest.raises(BudgetSpentError):
-        Watch(0.2, lambda _: None).guarded(stubborn)()
+        TimeBudget(0.2, lambda _: None).guarded(stubborn)()
 
 
 def test_a_call_in_time_returns_and_leaves_no_alarm():
-    watch = Watch(0.3, lambda _: None)
-    assert watch.guarded(lambda a, b: a - b)(5, b=3) == 2
+    budget = TimeBudget(0.3, lambda _: None)
+    assert budget.guarded(lambda a, b: a - b)(5, b=3) == 2
     time.sleep(0.4)
     with pytest.raises(BudgetSpentError, match="declared"):
-        watch.guarded(lambda: None)()
+        budget.guarded(lambda: None)()
 
 
 def test_a_simulator_of_ten_minutes_gives_a_partial_answer(tmp_path):

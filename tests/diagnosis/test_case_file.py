@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from tests.diagnosis.cases import HEAD, ONE, TWO, carriage, write_case
-from toolkit.cli.explain import RULES_FILE
 from toolkit.diagnosis.case.reader import read_case
 from toolkit.errors import CellError, ColumnError, ConfigError, ToolkitError, UnreadableError
+from toolkit.lab.rules import RULES_FILE
 
 
 @pytest.mark.parametrize(

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 from scipy.linalg import toeplitz
 from scipy.stats import multivariate_normal
+
 from toolkit.diagnosis.fit.noise import (
-    Noise,
+    Autoregression,
     autocovariance,
     fit_noise,
     layout,
@@ -29,7 +30,7 @@ def _series(rng: np.random.Generator, phi: float, n: int) -> np.ndarray:
 
 @pytest.mark.parametrize("reflection", [(), (0.7,), (0.9, -0.4), (0.5, 0.3, -0.2)])
 def test_likelihood_is_that_of_the_dense_gaussian(reflection):
-    noise = Noise(reflection=reflection, sd=1.3)
+    noise = Autoregression(reflection=reflection, sd=1.3)
     n = 12
     # Yule and Walker: the autocovariance that the predictor's own equations imply, solved densely.
     a = predictor(reflection)[-1]
@@ -71,7 +72,7 @@ def test_a_gap_begins_a_new_segment_and_a_masked_row_splits_nothing_else():
 
 def test_whitening_columns_is_whitening_each():
     rng = np.random.default_rng(3)
-    noise = Noise(reflection=(0.8, 0.1), sd=2.0)
+    noise = Autoregression(reflection=(0.8, 0.1), sd=2.0)
     where = layout([np.arange(30.0), np.arange(25.0)], [np.ones(30, bool), np.ones(25, bool)])
     x = rng.normal(size=(55, 3))
     whole = whiten(x, where, noise)
@@ -81,5 +82,5 @@ def test_whitening_columns_is_whitening_each():
 
 def test_rows_of_a_smooth_noise_are_worth_less():
     # AR(1): the variance of a mean of n rows is (1 + phi) / (1 - phi) times that of white noise.
-    assert Noise(reflection=(0.9,), sd=1.0).correlation_rows == pytest.approx(1.9 / 0.1, rel=1e-9)
-    assert Noise(reflection=(), sd=1.0).correlation_rows == 1.0
+    assert Autoregression(reflection=(0.9,), sd=1.0).correlation_rows == pytest.approx(1.9 / 0.1, rel=1e-9)
+    assert Autoregression(reflection=(), sd=1.0).correlation_rows == 1.0

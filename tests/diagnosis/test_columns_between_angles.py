@@ -10,9 +10,9 @@ from toolkit.diagnosis.case.reader import read_case
 from toolkit.diagnosis.diagnose import diagnose
 from toolkit.diagnosis.fit.problem import problem_of
 from toolkit.diagnosis.simulators.columns import ColumnsModel
-from toolkit.diagnosis.simulators.simulator import Active
 from toolkit.diagnosis.simulators.surface import Surface, scatter
 from toolkit.diagnosis.simulators.tire import base_drive
+from toolkit.effects.applied import AppliedEffect
 from toolkit.effects.catalogue import effects
 from toolkit.errors import ConfigError
 
@@ -125,7 +125,7 @@ def test_few_angles_under_little_noise_are_judged_by_what_is_known_between_them(
     wrong = float(np.sqrt(np.mean((asked(case, SA, FZ)[0] - magic(SA, FZ)) ** 2)))
     floor = problem_of(case, model).floor["FY"]
     assert floor < 1e-3 if judged else floor > wrong > noise
-    assert [one.rule for one in model.findings] == ([] if judged else ["case-few-slip-angles"] * 2)
+    assert [one.rule for one in model.capability.findings] == ([] if judged else ["case-few-slip-angles"] * 2)
 
 
 def test_a_sweep_knows_the_tire_between_its_rows(tmp_path):
@@ -139,7 +139,7 @@ def test_a_sweep_knows_the_tire_between_its_rows(tmp_path):
     case = written(tmp_path, frame)
     made, _ = asked(case, 0.9 * SA, FZ)
     np.testing.assert_allclose(made, magic(0.9 * SA, FZ), atol=8)
-    assert ColumnsModel(case).findings == ()
+    assert ColumnsModel(case).capability.findings == ()
 
 
 def test_a_drum_against_a_table_of_columns_is_the_shorter_patch(tmp_path):
@@ -156,7 +156,7 @@ def test_a_drum_against_a_table_of_columns_is_the_shorter_patch(tmp_path):
 
 def test_an_effect_of_no_size_leaves_the_columns_as_they_are(tmp_path):
     case = written(tmp_path, table())
-    curved = Active(effect=effects()["drum_curvature"], values={"reduction": 0.0})
+    curved = AppliedEffect(effect=effects()["drum_curvature"], values={"reduction": 0.0})
     made = ColumnsModel(case).simulate(case.runs[0], {}, [curved])
     np.testing.assert_allclose(made["FY"], case.runs[0].simulated["FY"], atol=1e-9)
 

@@ -4,10 +4,10 @@ import numpy as np
 import pandas as pd
 import pytest
 from scipy.optimize import curve_fit
-from toolkit.diagnosis.fit.fit import fit
 
 from tests.diagnosis.cases import write_case
 from toolkit.diagnosis.case.reader import read_case
+from toolkit.diagnosis.fit.fit import fit
 from toolkit.diagnosis.fit.problem import problem_of
 from toolkit.diagnosis.simulators.build_simulator import model_of
 

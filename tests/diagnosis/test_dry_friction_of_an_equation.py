@@ -13,7 +13,7 @@ from tests.diagnosis.cases import write_case
 from toolkit.diagnosis.case.reader import read_case
 from toolkit.diagnosis.diagnose import diagnose
 from toolkit.diagnosis.simulators.build_simulator import model_of
-from toolkit.diagnosis.simulators.simulator import Active
+from toolkit.effects.applied import AppliedEffect
 from toolkit.effects.catalogue import effects
 
 COULOMB, REACH = 0.5, 1e-3  # N/kg, m
@@ -47,7 +47,7 @@ def slid(folder, force, v0, seconds=4.0, row=0.02):
     t = np.arange(0, seconds, row)
     table = pd.DataFrame({"t": t, "F": np.full(len(t), force), "X": 0.0, "V": 0.0})
     case = read_case(write_case(folder, CASE, simulator=SIMULATOR, r0__csv=table))
-    dry = Active(
+    dry = AppliedEffect(
         effect=effects()["coulomb_friction"], channel="v", values={"coulomb": COULOMB, "presliding": REACH}
     )
     made = model_of(case, None).simulate(case.runs[0], {"v0": v0}, (dry,))

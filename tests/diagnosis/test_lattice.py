@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+
 from toolkit.diagnosis.search.lattice import lattice_of
 
 

@@ -9,7 +9,7 @@ import pytest
 from tests.diagnosis.cases import write_case
 from toolkit.diagnosis.case.reader import read_case
 from toolkit.diagnosis.simulators.build_simulator import model_of
-from toolkit.diagnosis.simulators.simulator import Active
+from toolkit.effects.applied import AppliedEffect
 from toolkit.effects.catalogue import effects
 
 SIMULATOR = """
@@ -63,14 +63,14 @@ def test_an_effect_of_no_size_leaves_the_simulation_as_declared(model_and_run, n
     parameters = effects()[name].parameters
     off = {one.name: one.off if one.off is not None else one.typical[0] for one in parameters}
     plain = model.simulate(run, {}, ())
-    with_it = model.simulate(run, {}, (Active(effect=effects()[name], values=off),))
+    with_it = model.simulate(run, {}, (AppliedEffect(effect=effects()[name], values=off),))
     for output, values in plain.items():
         np.testing.assert_allclose(with_it[output], values, rtol=1e-6, atol=1e-6 * np.abs(values).max())
 
 
 def test_the_load_that_comes_late_is_late_in_the_load_itself(model_and_run):
     model, run, command = model_and_run
-    late = Active(effect=effects()["load_lag"], values={"time_constant": TAU})
+    late = AppliedEffect(effect=effects()["load_lag"], values={"time_constant": TAU})
     FZ = model.simulate(run, {}, (late,))["FZ"]
     # tau F' + F = F0 + r t from F(0) = F0: behind the ramp by r tau (1 - exp(-t/tau))
     np.testing.assert_allclose(FZ, command - RISE * TAU * (1 - np.exp(-run.t / TAU)), rtol=1e-4)

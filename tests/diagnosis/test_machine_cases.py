@@ -5,17 +5,17 @@ import hashlib
 import numpy as np
 import pandas as pd
 import pytest
-from toolkit.diagnosis.answer.answer import Recorded
-from toolkit.diagnosis.answer.case_findings import calibration_findings, case_findings
 
 from tests.conftest import EXAMPLES
 from tests.diagnosis.cases import write_case
 from tests.diagnosis.tire_case import TIR, sweep, toml
+from toolkit.diagnosis.answer.answer import Recorded
+from toolkit.diagnosis.answer.case_findings import calibration_findings, case_findings
 from toolkit.diagnosis.case.reader import read_case
 from toolkit.diagnosis.diagnose import diagnose
 from toolkit.diagnosis.fit.problem import problem_of
 from toolkit.diagnosis.simulators.build_simulator import model_of
-from toolkit.diagnosis.simulators.simulator import Active
+from toolkit.effects.applied import AppliedEffect
 from toolkit.effects.catalogue import effects
 from toolkit.errors import ConfigError
 
@@ -148,7 +148,7 @@ def test_a_lag_of_the_load_acts_once(tmp_path, measured):
         write_case(tmp_path, text, simulator=None, tire__tir=TIR, r0__csv=rows, r1__csv=rows[1:])
     )
     model = model_of(case, None)
-    late = Active(effect=effects()["load_lag"], values={"time_constant": 0.5})
+    late = AppliedEffect(effect=effects()["load_lag"], values={"time_constant": 0.5})
     plain, made = (model.simulate(case.runs[0], {"LMUY": 1.0}, one) for one in ((), (late,)))
     step = 60  # the command's row; one row later the lag has come exp(-0.1/0.5) of the way, less the ramp's
     assert (np.abs(made["FY"] - plain["FY"])[step:].max() > 100) is not measured
@@ -226,7 +226,7 @@ def test_an_effect_on_a_cell_is_predicted_for_inputs_without_cells(tmp_path):
                    (("run", "r0"), ("run", "r1"), ("predict", "more")))  # fmt: skip
     case = machine(tmp_path, simulation='calibration = "m15-r2"\n', channels=CELLS, frames=frames, runs=runs)
     model = model_of(case, REGISTRY)
-    gain = Active(effect=effects()["sensitivity_error"], channel="E5", values={"gain_error": 0.1})
+    gain = AppliedEffect(effect=effects()["sensitivity_error"], channel="E5", values={"gain_error": 0.1})
     (run,) = case.predict
     plain, more = (model.simulate(run, {"LMUY": 1.0}, active) for active in ((), (gain,)))
     # a cell that shows 1.1 of what it carries adds a part in 11 of what it shows, by its coefficient

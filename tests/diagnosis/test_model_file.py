@@ -7,15 +7,15 @@ import shutil
 import numpy as np
 import pandas as pd
 import pytest
-from toolkit.diagnosis.answer.model_text import MODEL, model_text
 
 from tests.diagnosis.cases import HEAD, SIMULATOR, TWO, carriage, write_case
 from tests.diagnosis.tire_case import TIR, plain, python_tire, toml
+from toolkit.diagnosis.answer.model_text import MODEL, model_text
 from toolkit.diagnosis.case.reader import read_case
 from toolkit.diagnosis.diagnose import diagnose
 from toolkit.diagnosis.forward import simulate_model
 from toolkit.diagnosis.simulators.build_simulator import model_of
-from toolkit.diagnosis.simulators.simulator import Active
+from toolkit.effects.applied import AppliedEffect
 from toolkit.effects.catalogue import effects
 from toolkit.errors import ConfigError, ToolkitError
 from toolkit.simulation.model_file import read_model
@@ -163,10 +163,11 @@ def test_a_model_with_what_was_found_misses_nothing_on_the_same_recordings(tmp_p
 def test_small_forces_act_beside_what_a_model_has_in_it(tmp_path):
     case = drag_ode(tmp_path / "case")
     _, path = written(case, tmp_path / "answer")
-    model = model_of(read_case(case, model=path), None)
-    run, p = model.case.runs[0], {one.name: one.value for one in model.parameters}
-    linear = model.pushed(run, p, (), "v", lambda x: np.ones((len(x), 1)))["h"][:, 0]
-    push = Active(effect=effects()["constant_force"], channel="v", values={"force": 1e-3})
+    read = read_case(case, model=path)
+    model = model_of(read, None)
+    run, p = read.runs[0], {one.name: one.value for one in model.parameters}
+    linear = model.capability.motion.pushed(run, p, (), "v", lambda x: np.ones((len(x), 1)))["h"][:, 0]
+    push = AppliedEffect(effect=effects()["constant_force"], channel="v", values={"force": 1e-3})
     moved = (model.simulate(run, p, (push,))["h"] - model.simulate(run, p, ())["h"]) / 1e-3
     # the drag holds back: less than the t^2/2 of a body without it
     assert moved[-1] < 0.9 * run.t[-1] ** 2 / 2
@@ -188,10 +189,11 @@ def simulate(inputs, p):
     case = write_case(tmp_path / "case", text + TWO, simulator=simulator, **frames)
     found, path = written(case, tmp_path / "answer")
     assert [one.name for one in found.effects] == ["quadratic_drag"]
-    model = model_of(read_case(case, model=path), None)
-    run, p = model.case.runs[0], {one.name: one.value for one in model.parameters}
+    read = read_case(case, model=path)
+    model = model_of(read, None)
+    run, p = read.runs[0], {one.name: one.value for one in model.parameters}
     seen = []
-    model.pushed(run, p, (), "h", lambda x: seen.append(x) or np.ones((len(x), 1)))
+    model.capability.motion.pushed(run, p, (), "h", lambda x: seen.append(x) or np.ones((len(x), 1)))
     w = np.sqrt(9.81 / 0.2)
     np.testing.assert_allclose(seen[0], -(w**2) / 9.81 * np.log(np.cosh(9.81 * run.t / w)), atol=0.03)
 
@@ -203,11 +205,11 @@ def test_a_model_file_says_what_it_rests_on(tmp_path, drag):
     assert dict(model.recordings) == {run.name: run.sha256 for run in read.runs}
     assert [len(one) for _, one in model.recordings] == [64, 64]
     (effect,) = model.effects
-    (found,) = effect.parameters
-    told = drag.effects[0].parameters[0]
-    assert (found.value, found.unit) == (told.value, told.unit)
+    applied, told = effect.applied, drag.effects[0].parameters[0]
+    assert (applied.values, applied.units) == ({"drag": told.value}, {"drag": told.unit})  # noqa: PD011
+    assert applied.key == drag.effects[0].key
     # a 95 % interval of some 160 rows reaches 1.97 to 1.98 standard errors
-    assert (told.ci95[1] - told.value) / found.standard_error == pytest.approx(1.975, abs=0.01)
+    assert (told.ci95[1] - told.value) / effect.standard_errors["drag"] == pytest.approx(1.975, abs=0.01)
     assert model.file("path").resolve() == (tmp_path / "sim.py").resolve()
 
 
@@ -219,7 +221,7 @@ def test_a_case_names_a_model_in_place_of_its_simulation(tmp_path, drag):
     read = read_case(tmp_path / "next.toml")
     assert [one.name for one in read.parameters] == ["mass", "c"]
     assert read.parameters[0].value == read_model(path).parameters[0].value
-    assert [one.effect.name for one in read.effects] == ["quadratic_drag"]
+    assert [one.applied.effect.name for one in read.effects] == ["quadratic_drag"]
     assert read.sha256 != read_case(case).sha256
 
 
@@ -246,7 +248,8 @@ def test_a_sign_is_that_of_the_axes_in_which_the_model_is_used(tmp_path):
     _, path = written(python_tire(tmp_path / "iso", "ISO-W", offset=0.3), tmp_path / "iso" / "answer")
     model = read_model(path)
     (effect,) = model.effects
-    angle = effect.parameters[0].value * (1 if effect.effect.name == "steer_offset" else -1)
+    (value,) = effect.applied.values.values()  # noqa: PD011
+    angle = value * (1 if effect.applied.effect.name == "steer_offset" else -1)
     assert angle == pytest.approx(0.3, abs=0.005)
     SA = np.array([-2.0, 0.0, 3.0])
     frame = pd.DataFrame({"t": [0.0, 1.0, 2.0], "SA": SA, "FZ": [3000.0, 4000.0, 5000.0]})
@@ -275,9 +278,10 @@ def test_a_model_is_run_forward_on_inputs_alone(tmp_path, drag):
 def test_an_effect_of_some_runs_acts_by_their_condition(tmp_path, drag):
     model = read_model(tmp_path / "answer" / MODEL)
     (effect,) = model.effects
-    model = dataclasses.replace(
-        model, effects=(dataclasses.replace(effect, runs=("r0.csv",), condition=("surface", ("steel",))),)
+    confined = dataclasses.replace(
+        effect.applied, runs=frozenset({"r0.csv"}), condition=("surface", ("steel",))
     )
+    model = dataclasses.replace(model, effects=(dataclasses.replace(effect, applied=confined),))
     frame = carriage(seed=9).drop(columns="F")
     frame.to_csv(tmp_path / "in.csv", index=False)
     made = {}
@@ -285,7 +289,7 @@ def test_an_effect_of_some_runs_acts_by_their_condition(tmp_path, drag):
         ((_, text),), _ = simulate_model(model, [tmp_path / "in.csv"], None, conditions=given)
         made[key] = pd.read_csv(io.StringIO(text))
     np.testing.assert_array_equal(made["other"]["F"], made["none"]["F"])
-    size = effect.parameters[0].value
+    size = effect.applied.values["drag"]  # noqa: PD011
     np.testing.assert_allclose(
         made["steel"]["F"] - made["other"]["F"], size * frame["v"] * frame["v"].abs(), rtol=1e-9, atol=1e-9
     )
@@ -307,9 +311,9 @@ def test_what_is_found_on_top_of_a_model_is_written_with_it(tmp_path, drag):
     found = diagnose(read, None)
     text = model_text(read, found.search, found.diagnosis, tmp_path)
     (tmp_path / "second.toml").write_text(text)
-    made = {one.effect.name: one for one in read_model(tmp_path / "second.toml").effects}
+    made = {one.applied.effect.name: one for one in read_model(tmp_path / "second.toml").effects}
     assert set(made) == {"quadratic_drag", "coulomb_friction"}
-    assert made["coulomb_friction"].parameters[0].value == pytest.approx(30.0, abs=2.0)
+    assert made["coulomb_friction"].applied.values["coulomb"] == pytest.approx(30.0, abs=2.0)  # noqa: PD011
 
 
 @pytest.mark.parametrize(

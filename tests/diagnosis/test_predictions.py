@@ -5,14 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 import pytest
-from toolkit.diagnosis.fit.predict import _spread_to, prediction_csv, prediction_names
 
 from tests.diagnosis.cases import HEAD, TWO, carriage, write_case
 from toolkit.diagnosis.case.reader import read_case
 from toolkit.diagnosis.diagnose import diagnose
+from toolkit.diagnosis.fit.predict import _spread_to, prediction_csv, prediction_names
 from toolkit.diagnosis.fit.problem import problem_of
 from toolkit.diagnosis.simulators.build_simulator import model_of
-from toolkit.diagnosis.simulators.simulator import Active
+from toolkit.effects.applied import AppliedEffect
 from toolkit.effects.catalogue import effects
 from toolkit.errors import FitError
 
@@ -56,7 +56,7 @@ def test_an_effect_of_some_runs_acts_where_the_condition_says_so(tmp_path, condi
     more = f'[[recording.predict]]\nfile = "more.csv"\n{condition}\n'
     read = case(tmp_path, more, ('surface = "steel"', 'surface = "sand"'))
     problem = problem_of(read, model_of(read, None))
-    active = Active(effect=effects()["surface_friction"], runs=frozenset(("r1.csv",)))
+    active = AppliedEffect(effect=effects()["surface_friction"], runs=frozenset(("r1.csv",)))
     assert _spread_to(problem, read.predict[0], active).acts_in(read.predict[0]) is carried
 
 

@@ -9,7 +9,7 @@ from tests.diagnosis.tire_case import SIGNS, SIMULATOR, sweep, toml
 from toolkit.diagnosis.case.reader import read_case
 from toolkit.diagnosis.diagnose import diagnose
 from toolkit.diagnosis.simulators.build_simulator import model_of
-from toolkit.diagnosis.simulators.simulator import Active
+from toolkit.effects.applied import AppliedEffect
 from toolkit.effects.catalogue import effects
 
 POSITION = HEAD.replace('v = { unit = "m/s"', 'x = { unit = "m", role = "input" }\nv = { unit = "m/s"')
@@ -98,11 +98,11 @@ def test_linear_responses_of_an_equation_are_its_simulations_for_a_small_force(t
     def pattern(x):
         return np.stack([np.sin(2 * np.pi * x / period), np.cos(2 * np.pi * x / period)], axis=1)
 
-    linear = model.pushed(run, p, (), "om", pattern)["TH"]
+    linear = model.capability.motion.pushed(run, p, (), "om", pattern)["TH"]
     plain = model.simulate(run, p, ())["TH"]
     for column, phase in enumerate((0.0, 90.0)):
         values = {"amplitude": 1e-3, "period": period, "phase": phase}
-        ripple = Active(effect=effects()["periodic_ripple"], channel="om", values=values)
+        ripple = AppliedEffect(effect=effects()["periodic_ripple"], channel="om", values=values)
         moved_by = (model.simulate(run, p, (ripple,))["TH"] - plain) / 1e-3
         # Where the motion passes a period within a row the trapezoid is coarse: a tenth of the largest.
         np.testing.assert_allclose(linear[:, column], moved_by, atol=0.1 * np.abs(moved_by).max())
@@ -115,9 +115,9 @@ def test_a_channel_that_is_saturated_shows_nothing_of_a_small_force(tmp_path):
     (run,), p = model.case.runs, {"k": 25.0, "c": 0.6}
     plain = model.simulate(run, p, ())["TH"]
     level = float(np.quantile(np.abs(plain), 0.6))
-    stop = Active(effect=effects()["saturation"], channel="TH", values={"level": level})
+    stop = AppliedEffect(effect=effects()["saturation"], channel="TH", values={"level": level})
     free, stopped = (
-        model.pushed(run, p, active, "om", lambda x: np.ones((len(x), 1)))["TH"][:, 0]
+        model.capability.motion.pushed(run, p, active, "om", lambda x: np.ones((len(x), 1)))["TH"][:, 0]
         for active in ((), (stop,))
     )
     beyond = np.abs(plain) > level

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from tests.effects.rig import setting
-from toolkit.diagnosis.simulators.channels import undone
-from toolkit.diagnosis.simulators.simulator import Active
+from toolkit.effects.applied import AppliedEffect
 from toolkit.effects.catalogue import effects
+from toolkit.effects.forward import undone
 from toolkit.errors import FitError
 
 T = np.linspace(0, 10, 101)
@@ -18,7 +18,7 @@ def bent(x, quadratic, cubic):
 
 
 def out(shown, quadratic, cubic):
-    one = Active(
+    one = AppliedEffect(
         effect=effects()["nonlinearity"], channel="E5", values={"quadratic": quadratic, "cubic": cubic}
     )
     return undone(shown, one, setting(T), {})
@@ -45,7 +45,12 @@ def test_a_bend_of_many_times_the_value_cannot_be_taken_out(times, sign):
 def test_what_the_search_keeps_for_itself_is_not_told():
     values = {"quadratic": 0.0, "cubic": 1.0, "_size_cubic": 2.5}
     with pytest.raises(FitError) as caught:
-        undone(CARRIED, Active(effect=effects()["nonlinearity"], channel="E5", values=values), setting(T), {})
+        undone(
+            CARRIED,
+            AppliedEffect(effect=effects()["nonlinearity"], channel="E5", values=values),
+            setting(T),
+            {},
+        )
     assert "_size" not in str(caught.value.got)
 
 
@@ -73,13 +78,15 @@ def test_a_channel_that_was_lost_or_stood_at_nothing_has_nothing_to_take_out():
 
 
 def test_an_offset_is_taken_out_of_a_channel_that_showed_nothing():
-    one = Active(effect=effects()["zero_offset"], channel="E5", values={"offset": 0.1})
+    one = AppliedEffect(effect=effects()["zero_offset"], channel="E5", values={"offset": 0.1})
     t = np.arange(5.0)
     np.testing.assert_allclose(undone(np.zeros(5), one, setting(t), {}), -0.1)
 
 
 def test_what_has_a_memory_is_taken_out_behind_a_lost_row_too():
-    one = Active(effect=effects()["creep"], channel="E5", values={"fraction": 0.1, "time_constant": 4.0})
+    one = AppliedEffect(
+        effect=effects()["creep"], channel="E5", values={"fraction": 0.1, "time_constant": 4.0}
+    )
     t = np.arange(30.0)
     true = np.full(30, 50.0)
     shown = one.effect.channel(true, one.values, setting(t))

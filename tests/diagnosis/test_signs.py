@@ -5,8 +5,7 @@ import pytest
 from tests.diagnosis.tire_case import SIGNS, python_tire
 from toolkit.diagnosis.case.reader import read_case
 from toolkit.diagnosis.diagnose import diagnose
-from toolkit.diagnosis.simulators.parameter_signs import sense
-from toolkit.diagnosis.simulators.simulator import Active
+from toolkit.effects.applied import AppliedEffect
 from toolkit.effects.catalogue import effects
 
 
@@ -27,15 +26,17 @@ def value(effect, name):
 def test_an_angle_is_compared_with_the_recorded_slip_angle(axes):
     # alpha = SA - offset, and alpha = SA + pseudo_slip_angle, both with the case's own SA
     for name, parameter in (("steer_offset", "offset"), ("plysteer", "pseudo_slip_angle")):
-        assert sense(Active(effect=effects()[name]), parameter, axes) == SIGNS[axes][0]
+        assert AppliedEffect(effect=effects()[name]).sign(parameter, axes) == SIGNS[axes][0]
 
 
 @pytest.mark.parametrize("axes", SIGNS)
 def test_a_pull_is_compared_with_the_recorded_force(axes):
     # FY = FY_model + force with the case's own FY; everything else stands in the channel's own axes already
-    assert sense(Active(effect=effects()["conicity"]), "force_at_nominal_load", axes) == SIGNS[axes][1]
-    assert sense(Active(effect=effects()["crosstalk"]), "coefficient", axes) == 1
-    assert sense(Active(effect=effects()["channel_delay"]), "delay", axes) == 1
+    for name, parameter, sign in (
+        ("conicity", "force_at_nominal_load", SIGNS[axes][1]), ("crosstalk", "coefficient", 1),
+        ("channel_delay", "delay", 1),
+    ):  # fmt: skip
+        assert AppliedEffect(effect=effects()[name]).sign(parameter, axes) == sign
 
 
 @pytest.mark.parametrize("axes", ["adapted-SAE", "ISO-W"])

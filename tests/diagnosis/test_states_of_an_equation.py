@@ -5,6 +5,7 @@ import pytest
 
 from toolkit.diagnosis.simulators.simulator import Output
 from toolkit.diagnosis.simulators.states import dimensions, fitting
+from toolkit.effects.catalogue import effects
 
 FRICTION = ("coulomb_friction", "viscous_damping", "quadratic_drag")
 
@@ -37,7 +38,7 @@ def test_a_state_that_stands_still_or_is_a_bare_number_tells_nothing():
     ],
 )
 def test_friction_and_drag_act_on_velocities(name, velocities, known, there):
-    assert fitting(name, [1, 2], velocities, known) == there
+    assert fitting(effects()[name].term, [1, 2], velocities, known) == there
 
 
 @pytest.mark.parametrize(
@@ -45,10 +46,10 @@ def test_friction_and_drag_act_on_velocities(name, velocities, known, there):
     [({1: 0}, {0: "length"}, [1]), ({}, {1: "length"}, [1]), ({}, {1: "temperature"}, []), ({}, {}, [1, 2])],
 )
 def test_a_cubic_stiffness_acts_on_places(velocities, known, there):
-    assert fitting("cubic_stiffness", [1, 2], velocities, known) == there
+    assert fitting(effects()["cubic_stiffness"].term, [1, 2], velocities, known) == there
 
 
 def test_a_ripple_needs_a_place_behind_the_velocity_and_a_constant_flow_nothing():
-    assert fitting("periodic_ripple", [1, 2], {1: 0}, {}) == [1]
-    assert fitting("periodic_ripple", [1, 2], {}, {1: "length"}) == []
-    assert fitting("constant_force", [1, 2], {}, {1: "temperature"}) == [1, 2]
+    assert fitting(effects()["periodic_ripple"].term, [1, 2], {1: 0}, {}) == [1]
+    assert fitting(effects()["periodic_ripple"].term, [1, 2], {}, {1: "length"}) == []
+    assert fitting(effects()["constant_force"].term, [1, 2], {}, {1: "temperature"}) == [1, 2]

@@ -6,12 +6,12 @@ import numpy as np
 import pandas as pd
 import pint
 import pytest
-from toolkit.diagnosis.answer.model_text import model_text
 
 from tests.diagnosis.cases import CELL, write_case
+from toolkit.diagnosis.answer.model_text import model_text
 from toolkit.diagnosis.case.reader import read_case
 from toolkit.diagnosis.diagnose import diagnose
-from toolkit.diagnosis.simulators.channel_units import reduced
+from toolkit.diagnosis.simulators.parameter_units import reduced
 from toolkit.simulation.model_file import read_model
 
 
@@ -74,4 +74,4 @@ file = "r1.csv"
     assert made is not None
     (tmp_path / "again.toml").write_text(made, encoding="utf-8")
     (again,) = read_model(tmp_path / "again.toml").effects
-    assert again.effect.name == "nonlinearity"
+    assert again.applied.effect.name == "nonlinearity"

@@ -3,17 +3,17 @@
 import numpy as np
 import pandas as pd
 import pytest
-from toolkit.diagnosis.fit.fit import fit, replace_effects
-from toolkit.diagnosis.fit.noise import fit_noise, layout
-from toolkit.diagnosis.search.forward_step import Step
-from toolkit.diagnosis.search.search import _with_a_size
 
 from tests.diagnosis.cases import HEAD, TWO, write_case
 from toolkit.diagnosis.case.reader import read_case
 from toolkit.diagnosis.diagnose import diagnose
+from toolkit.diagnosis.fit.fit import fit, replace_effects
+from toolkit.diagnosis.fit.noise import fit_noise, layout
 from toolkit.diagnosis.fit.problem import problem_of
+from toolkit.diagnosis.search.forward_step import Step
+from toolkit.diagnosis.search.search import _with_a_size
 from toolkit.diagnosis.simulators.build_simulator import model_of
-from toolkit.diagnosis.simulators.simulator import Active
+from toolkit.effects.applied import AppliedEffect
 from toolkit.effects.catalogue import effects
 
 CASE = """schema = 1
@@ -64,8 +64,8 @@ def test_an_effect_that_nothing_shows_is_dropped_and_the_others_keep_their_covar
     problem = problem_of(case, model_of(case, None))
     plain = fit(problem)
     shown, unseen = (
-        Active(effect=effects()["zero_offset"], channel="F", values={"offset": 5.0}),
-        Active(effect=effects()["sensitivity_error"], channel="F", values={"gain_error": 1e-12}),
+        AppliedEffect(effect=effects()["zero_offset"], channel="F", values={"offset": 5.0}),
+        AppliedEffect(effect=effects()["sensitivity_error"], channel="F", values={"gain_error": 1e-12}),
     )
     both = replace_effects(problem, plain, (shown, unseen))
     steps = [Step(active=one, p_value=0.0, held_out_gain=9.0, gain=9.0, rivals=()) for one in (shown, unseen)]

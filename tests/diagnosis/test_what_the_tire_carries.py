@@ -8,7 +8,7 @@ from tests.diagnosis.test_machine_cases import CELLS, REGISTRY, machine, with_ce
 from tests.diagnosis.tire_case import SIGNS, SIMULATOR, TIR, plain, sweep, toml
 from toolkit.diagnosis.case.reader import read_case
 from toolkit.diagnosis.simulators.build_simulator import model_of
-from toolkit.diagnosis.simulators.simulator import Active
+from toolkit.effects.applied import AppliedEffect
 from toolkit.effects.catalogue import effects
 
 SPEED = 7.66 / 3.6  # m/s, of the drum where none is recorded (thesis, 7.66 km/h)
@@ -59,7 +59,9 @@ def test_a_load_channel_that_shows_too_much_is_not_what_the_tire_carries(tmp_pat
         folder = tmp_path / f"{factor}"
         case = read_case(write_case(folder, text, simulator=None, tire__tir=TIR, **frames))
         model = model_of(case, REGISTRY)
-        gain = Active(effect=effects()["sensitivity_error"], channel="FZ", values={"gain_error": factor - 1})
+        gain = AppliedEffect(
+            effect=effects()["sensitivity_error"], channel="FZ", values={"gain_error": factor - 1}
+        )
         shown.append(model.simulate(case.runs[0], {"LMUY": 1.0}, (gain,) if factor > 1 else ()))
     true, lying = shown
     np.testing.assert_allclose(lying["FZ"], 1.05 * true["FZ"], rtol=1e-12)

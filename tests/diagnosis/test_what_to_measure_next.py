@@ -6,9 +6,9 @@ from types import SimpleNamespace as Of
 
 import numpy as np
 import pytest
-from toolkit.diagnosis.answer.build_answer import _to_find_it
-from toolkit.diagnosis.answer.classes import apart
+
 from toolkit.diagnosis.answer.locate import places
+from toolkit.diagnosis.answer.next_measurements import apart, to_find_it
 
 
 def found(*variables):
@@ -29,7 +29,7 @@ def found(*variables):
     ],
 )
 def test_the_advice_is_about_what_the_mismatch_depends_on(variable, told):
-    (said,) = _to_find_it(found(variable))
+    (said,) = to_find_it(found(variable))
     assert told in said
 
 

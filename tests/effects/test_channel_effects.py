@@ -7,7 +7,7 @@ import pytest
 
 from tests.effects.rig import setting
 from toolkit.effects.catalogue import effect
-from toolkit.effects.unit_error import factors, factors_for
+from toolkit.effects.catalogue.unit_error import factors, factors_for
 from toolkit.units import unit
 
 T = np.linspace(0.0, 20.0, 4001)

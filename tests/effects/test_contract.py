@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from tests.effects.rig import driven, setting, tire
-from toolkit.effects.catalogue import NAMES, effect, effects
+from toolkit.effects.catalogue import effect, effects
 from toolkit.effects.effect import STAGES, Effect
 from toolkit.effects.signals import Drive
 from toolkit.errors import ConfigError
@@ -38,7 +38,7 @@ CONTRACT = {
 ALL = list(effects().values())
 CHANNEL = [one for one in ALL if one.channel is not None]
 DRIVE = [one for one in ALL if one.drive is not None]
-FORCE = [one for one in ALL if one.force is not None]
+FORCE = [one for one in ALL if one.term is not None and one.term.force is not None]
 
 
 def by_name(one: Effect) -> str:
@@ -65,7 +65,7 @@ def extremes(one: Effect) -> list[dict[str, float]]:
 
 
 def test_the_catalogue_holds_every_name_of_the_contract():
-    assert set(CONTRACT) <= set(NAMES)
+    assert set(CONTRACT) <= set(effects())
     for name, parameters in CONTRACT.items():
         assert effects()[name].names[: len(parameters.split())] == tuple(parameters.split()), name
 
@@ -73,7 +73,7 @@ def test_the_catalogue_holds_every_name_of_the_contract():
 @pytest.mark.parametrize("one", ALL, ids=by_name)
 def test_metadata_is_whole(one):
     assert one.stage in STAGES
-    assert sum(hook is not None for hook in (one.drive, one.channel, one.force)) == 1
+    assert sum(hook is not None for hook in (one.drive, one.channel, one.term)) == 1
     for text in (one.equation, one.reference, one.signature, one.separates):
         assert len(text) > 3
     assert re.fullmatch(r"[A-Z].*[.]", one.statement)
@@ -89,7 +89,7 @@ def test_metadata_is_whole(one):
         if not p.relative:
             assert all(p.bounds[0] <= start <= p.bounds[1] for start in p.starts)
     assert one.drive is None or one.stage in ("carriage", "tire", "road")
-    assert one.force is None or one.stage == "dynamics"
+    assert (one.term is not None) == (one.stage == "dynamics")
     known = {"surface", "pressure", "date", "order", "repeat_of", "phase", "*"}
     # a simulator that does not know of reversal has the wrong sign in some runs: nothing else is so gross
     known |= {"rotation", "mounting"} if one.name == "channel_sign" else set()
@@ -106,8 +106,8 @@ def test_units_are_known(one):
 def test_the_doc_of_the_file_says_what_it_is():
     import importlib
 
-    for name in NAMES:
-        module = importlib.import_module(f"toolkit.effects.{name}")
+    for name in effects():
+        module = importlib.import_module(f"toolkit.effects.catalogue.{name}")
         assert module.__doc__
         assert module.EFFECT.name == name
 
@@ -130,7 +130,9 @@ def test_a_channel_effect_that_is_off_changes_nothing(one):
 
 @pytest.mark.parametrize("one", FORCE, ids=by_name)
 def test_a_force_that_is_off_is_none(one):
-    assert all(one.force(x, v, off(one)) == 0.0 for x in (-1.0, 0.0, 2.0) for v in (-3.0, 0.0, 1e-5, 4.0))
+    assert all(
+        one.term.force(x, v, off(one)) == 0.0 for x in (-1.0, 0.0, 2.0) for v in (-3.0, 0.0, 1e-5, 4.0)
+    )
 
 
 @pytest.mark.parametrize("one", [*DRIVE, *CHANNEL], ids=by_name)
@@ -197,7 +199,9 @@ def test_a_channel_effect_is_finite_on_hostile_signals(one, rows):
 @pytest.mark.parametrize("one", FORCE, ids=by_name)
 def test_a_force_is_finite(one):
     for values in (usual(one), extremes(one)[2]):
-        assert all(math.isfinite(one.force(x, v, values)) for x in (-1e3, 0.0, 1e3) for v in (-1e3, 0.0, 1e3))
+        assert all(
+            math.isfinite(one.term.force(x, v, values)) for x in (-1e3, 0.0, 1e3) for v in (-1e3, 0.0, 1e3)
+        )
 
 
 def test_an_unknown_name_is_told_with_the_nearest():
@@ -209,11 +213,12 @@ def test_an_unknown_name_is_told_with_the_nearest():
 
 @pytest.mark.parametrize("one", [e for e in ALL if e.stage != "dynamics"], ids=by_name)
 def test_every_effect_of_the_machine_can_be_written(one):
-    place = {"crosstalk": ".FZ.FY", "channel_swap": ".D51.D52"}.get(one.name, "")
-    value = "=m15-r1" if one.name == "wrong_calibration" else "".join(f"={p}" for p in written(one))
+    paired = one.on_channel is not None and one.on_channel.paired
+    place = (".D51.D52" if one.exchanges else ".FZ.FY") if paired else ""
+    value = "=m15-r1" if one.replaces_record else "".join(f"={p}" for p in written(one))
     made = parse_effect(f"{one.name}{place}{value}", load_machine("m15-virtual"))
     assert all(each.effect is one for each in made)
-    assert all(set(each.parameters) == set(one.names) for each in made)
+    assert all(set(each.values) == set(one.names) for each in made)
 
 
 def written(one: Effect) -> list[str]:

@@ -5,7 +5,7 @@ import pytest
 
 from tests.effects.rig import setting
 from toolkit.effects.catalogue import effects
-from toolkit.effects.creep import FROM_REST
+from toolkit.effects.catalogue.creep import FROM_REST
 
 L, FRACTION, TAU = 700.0, 0.03, 12.0
 REGULAR = np.arange(80) * 0.5

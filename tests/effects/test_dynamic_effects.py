@@ -13,7 +13,7 @@ PLACES = [(x, v) for x in (-0.7, 0.0, 0.4) for v in (-2.0, -0.1, 0.0, 0.1, 2.0)]
 
 
 def force(name, x, v, **values):
-    return effect(name).force(x, v, values)
+    return effect(name).term.force(x, v, values)
 
 
 @pytest.mark.parametrize(
@@ -60,8 +60,12 @@ def test_stiffness_conserves_energy():
         assert force("cubic_stiffness", x, v, k3=8.0) == pytest.approx(slope, abs=1e-7)
 
 
-def test_overflow_is_no_force():
-    assert all(force("overflow", x, v, level=0.1) == 0 for x, v in PLACES)
+def test_overflow_is_no_force_and_stops_what_rises_at_the_level():
+    term = effect("overflow").term
+    assert term.force is None
+    assert term.limit(0.05, 1.0, {"level": 0.1}) == 1.0
+    assert term.limit(0.1 - 0.25e-3, 1.0, {"level": 0.1}) == pytest.approx(0.25)
+    assert all(term.limit(level, 1.0, {"level": 0.1}) == 0.0 for level in (0.1, 3.0))
     assert math.isinf(effect("overflow").parameters[0].off)
 
 
@@ -69,7 +73,7 @@ def test_recorded_dry_friction_turns_over_one_row_about_the_reversal():
     # v falls through zero at 0.53 of a row after row 5; a row shows the mean of sign(v) over its interval
     t = 0.04 * np.arange(12)
     v = 0.2 - t * 0.2 / (5.53 * 0.04)
-    made = effect("coulomb_friction").recorded(t, v, {"coulomb": 3.0, "presliding": 0.0})
+    made = effect("coulomb_friction").term.recorded(t, v, {"coulomb": 3.0, "presliding": 0.0})
     assert made[:6] == pytest.approx(np.full(6, 3.0))
     assert made[6] == pytest.approx(
         3.0 * (0.03 - 0.97)
@@ -92,6 +96,6 @@ def test_recorded_dry_friction_follows_the_bristle_equation():
     )
     inner = slice(1, -1)
     means = (np.interp(t[inner] + 0.01, fine, area) - np.interp(t[inner] - 0.01, fine, area)) / 0.02
-    made = effect("coulomb_friction").recorded(t, v, {"coulomb": 2.0, "presliding": reach})
+    made = effect("coulomb_friction").term.recorded(t, v, {"coulomb": 2.0, "presliding": reach})
     # a piece is a quarter of a row: its speed is taken as even
     assert made[inner] == pytest.approx(2.0 * means, abs=0.02)

@@ -8,7 +8,7 @@ from scipy.integrate import quad
 
 from tests.effects.rig import setting
 from toolkit.effects.catalogue import effects
-from toolkit.effects.dead_band import NOISE
+from toolkit.effects.catalogue.dead_band import NOISE
 
 WIDTH = 4.0
 Y = np.linspace(-9, 9, 37)

@@ -10,7 +10,7 @@ import pytest
 
 from tests.effects.rig import NOMINAL, PEAK, SLOPE, SPEED, TRAIL, driven, forces, setting, tire
 from toolkit.effects.catalogue import effect
-from toolkit.effects.thermal_friction import HEATING_K_PER_KJ
+from toolkit.effects.catalogue.thermal_friction import HEATING_K_PER_KJ
 
 ANGLES = np.radians(np.linspace(-15, 15, 61))
 ODD = ["surface_friction", "drum_curvature", "load_friction", "speed_friction", "steer_compliance"]

@@ -30,7 +30,7 @@ class Mention:
 
 
 def effect_names(modules: Sequence[Module]) -> frozenset[str]:
-    """Return the names of the effects: the files of ``toolkit/effects`` that define ``EFFECT``."""
+    """Return the names of the effects: the files of the layer ``effects`` that define ``EFFECT``."""
     return frozenset(
         module.path.stem
         for module in modules
@@ -43,22 +43,26 @@ def _binds(node: ast.stmt, name: str) -> bool:
     return any(isinstance(target, ast.Name) and target.id == name for target in targets)
 
 
-def effects_named(modules: Sequence[Module], catalogue: str = "toolkit.effects.catalogue") -> list[Mention]:
+PLAN_KEYS = ("toolkit.simulation.plan", "toolkit.simulation.plan_sections")
+"""Modules in which such words are keys of a plan's sections: the truth of the virtual machine, a format."""
+
+
+def effects_named(modules: Sequence[Module]) -> list[Mention]:
     """Return where an effect is named outside its own file, each name once a line.
 
     A name is a string equal to it, alone or before ``.``, ``=`` or ``:``, or a word of a string that is a
     list of such names; and an import of the effect's module. Other identifiers are free: the virtual tire
-    has a conicity, and a parameter of a tire file may be a pressure change. So are docstrings and comments.
-    The catalogue's own list counts once, until the catalogue is found by scan.
+    has a conicity, and a parameter of a tire file may be a pressure change. So are docstrings and comments,
+    and the keys of a plan.
     """
     names = effect_names(modules)
     mentions: list[Mention] = []
     for module in modules:
         if module.layer not in EFFECT_LAYERS and not _imports_effects(module):
             continue
+        if module.name in PLAN_KEYS:
+            continue
         at = {pair for pair in _words(module.tree, names) if pair[1] != module.path.stem}
-        if module.name == catalogue:
-            at = set(sorted(at)[:1])
         mentions += [Mention(module.name, line, word) for line, word in sorted(at)]
     return mentions
 

@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 from toolkit.errors import ConfigError, ToolkitError
-from toolkit.files import parse_toml, sha256_file
+from toolkit.files import sha256_file
 from toolkit.machine import Correction, load_machine
-from toolkit.machine.definition import build_machine, machine_file
+from toolkit.machine.definition import machine_file, machine_of_text
 from toolkit.machine.next_version import next_version
 from toolkit.pipeline import process, read_test
 from toolkit.recording.folder import read_test_folder
@@ -221,6 +221,6 @@ def test_a_correction_that_cannot_be_is_refused_with_its_place(tmp_path, change)
     text = 'name = "m15-x"\nextends = "m15"\n' + BLOCK.replace(*change)
     path = tmp_path / "bad.toml"
     with pytest.raises(ToolkitError) as caught:
-        build_machine(parse_toml(text.encode(), where=path), path)
+        machine_of_text(text.encode(), path)
     assert "correction" in str(caught.value.where)
     assert caught.value.next_step

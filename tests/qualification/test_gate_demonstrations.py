@@ -244,7 +244,7 @@ def test_the_virtual_hub_is_that_of_the_drawing() -> None:
 
     machine = load_machine(virtual_hub.HUB)
     per_FY, per_MZ, per_MX = virtual_hub.PER_INDICATION
-    levers = dict(machine.overturning_lever_m)
+    levers = dict(machine.layout.overturning_lever_m)
     assert (per_MX / per_FY).tolist() == pytest.approx([levers[name] for name in virtual_hub.CELLS])
     for load, row in (("FY", per_FY), ("MZ", per_MZ), ("MX", per_MX)):
         for name, value in zip(virtual_hub.CELLS, row, strict=True):

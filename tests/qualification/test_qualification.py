@@ -16,13 +16,12 @@ from scipy import linalg
 
 from tests.conftest import SHARED_DATA
 from toolkit.calibration.fit.basis import build_basis
-from toolkit.cli.home import packaged_home
 from toolkit.files import read_toml
-from toolkit.qualification.agreement import correct_digits, printed_check
+from toolkit.lab.home import packaged_home
 from toolkit.qualification.certified import check_certified, solve
 from toolkit.qualification.examples import check_e74, check_lines
 from toolkit.qualification.golden import check_golden
-from toolkit.qualification.model import QualificationRecord
+from toolkit.qualification.model import QualificationRecord, correct_digits, printed_check
 from toolkit.qualification.numbers import DIGESTS, FOLDER, SETS, check_whole, identity, read_set
 from toolkit.qualification.run import qualify
 

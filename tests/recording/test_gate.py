@@ -10,7 +10,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from format_checks import whole
-from toolkit.recording.safe_open import check_workbook, gate
 from workbook_factory import (
     CONTENT_MAIN,
     DATA,
@@ -28,6 +27,7 @@ from workbook_factory import (
 from toolkit.errors import UnreadableError
 from toolkit.recording.archive import MAX_MEMBERS, read_members, stored_archive
 from toolkit.recording.cells import _parse, error_cells, find_cells
+from toolkit.recording.safe_open import check_workbook, gate
 from toolkit.recording.sniff import office_kind, sniff
 
 

@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from toolkit.recording.safe_open import gate
 from workbook_factory import (
     DATA,
     HEADERS,
@@ -31,6 +30,7 @@ from toolkit.recording import read_recording
 from toolkit.recording.cells import _parse, find_cells
 from toolkit.recording.columns import header_of
 from toolkit.recording.grid import find_grid
+from toolkit.recording.safe_open import gate
 from toolkit.recording.table import read_table
 from toolkit.recording.xlsx import read_sheet
 
@@ -70,7 +70,7 @@ def test_a_plain_sheet_has_a_grid_and_it_holds_what_a_parser_reads():
     grid = find_grid(xml)
     assert grid.first_row == 2
     np.testing.assert_array_equal(grid.numbers(xml), DATA)
-    assert grid.rest(xml) == sheet_xml([row_xml(1, HEADERS)]).encode()
+    assert grid.without_rows(xml) == sheet_xml([row_xml(1, HEADERS)]).encode()
 
 
 def test_rows_of_excel_and_cells_of_openpyxl_have_one_too():
@@ -278,7 +278,7 @@ def test_several_sheets_have_one_answer(tmp_path, names, hidden, grid):
     for grids in (True, False):
         try:
             name, table = read_sheet(gate(path), header_of(M15), grids=grids)
-            told.append((name, table.whole().rows))
+            told.append((name, table.in_rows().rows))
             assert (table.numbers is not None) == (grid and grids)
         except ToolkitError as error:
             told.append(error.as_dict())

@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from format_checks import whole
-from toolkit.recording.safe_open import gate
 from workbook_factory import DATA, HEADERS, members, packed, sheet_xml, table_xml, with_cell, workbook
 
 from toolkit.errors import CellError, ColumnError, RecordingError, ToolkitError, UnreadableError
 from toolkit.machine import load_machine
 from toolkit.recording import read_recording
-from toolkit.recording.crosscheck import cross_check
+from toolkit.recording.read import cross_check
+from toolkit.recording.safe_open import gate
 from toolkit.recording.table import Table
 
 M15 = load_machine("m15")

@@ -179,22 +179,22 @@ def test_a_marked_workbook_is_known_again(tmp_path):
     [
         ("operator =", "operater =", "operator"),
         ("DOT =", "dot =", "DOT"),
-        ('rotation = "forward"', 'rotation = "foward"', "forward"),
+        ('rotation = "forward"', 'rotation = "foward"', "forward or reverse"),
         ('= "reverse"\n"sub', '= "backward"\n"sub', "forward or reverse"),
         ('"sub/c.xlsx" =', '"sub/d.xlsx" =', "sub/c.xlsx"),
         ("date = 2009-05-14", 'date = "14.5.2009"', "a date such as 2026-03-31"),
         ("date = 2009-05-14", "date = 5", "a date such as 2026-03-31"),
         ("schema = 1", "schema = 2", "1"),
-        ("value = 30", 'value = "30"', "a number"),
-        ("value = 30", "value = -30", "a positive number"),
-        ("value = 30", "value = nan", "a positive number"),
+        ("value = 30", 'value = "30"', "a finite number in psi"),
+        ("value = 30", "value = -30", '{ value = NUMBER, unit = "kPa" } above 0 kPa'),
+        ("value = 30", "value = nan", "a finite number in psi"),
         ("value = 30", "vaule = 30", "value"),
-        ('{ value = 30, unit = "psi" }', "30", '{ value = NUMBER, unit = "..." }'),
-        ('unit = "psi"', "unit = 5", "a unit as text"),
+        ('{ value = 30, unit = "psi" }', "30", '{ value = NUMBER, unit = "kPa" } above 0 kPa'),
+        ('unit = "psi"', "unit = 5", '{ value = NUMBER, unit = "kPa" } above 0 kPa'),
         ('"second person"', "true", "a text"),
         ('"second person"', '["second person"]', "a text"),
         ("E5 = -2", "E6 = -2", "E5"),
-        ("E5 = -2", 'E5 = "x"', "a number"),
+        ("E5 = -2", 'E5 = "x"', '{ value = NUMBER, unit = "..." }, or a number'),
         ("values =", 'file = "x"\nvalues =', "one of the two"),
         ('machine = "m15"', "", 'machine = "m15", or the path of a machine definition'),
         ('machine = "m15"', 'machine = "m16"', "m15, m15-virtual"),
@@ -208,7 +208,7 @@ def test_bad_lines(folder, old, new, expected):
         assert refused(folder).expected == expected
     else:
         (folder / "test.toml").write_text(f'machine = "m15"\n{new}')
-        assert refused(folder).expected == "a table [tare]"
+        assert refused(folder).expected == "a table [tare] with file, values"
 
 
 def test_units(folder):

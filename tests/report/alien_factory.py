@@ -7,10 +7,9 @@ import zipfile
 from collections.abc import Callable
 from pathlib import Path
 
-from template_factory import W
+from template_factory import W, grey_png
 
-from toolkit.report.design.blocks import placeholder_png
-from toolkit.report.template.xml import NS
+from toolkit.report.word.xml import NS
 
 _SPACES = " ".join(f'xmlns:{prefix}="{uri}"' for prefix, uri in NS.items()) + (
     ' xmlns:wps="http://schemas.microsoft.com/office/word/2010/wordprocessingShape" mc:Ignorable="w14 w15"'
@@ -234,7 +233,7 @@ def build(
         + "</w:ftr>",
     }  # fmt: skip
     data = {name: text.encode() for name, text in members.items()}
-    data["word/media/logo.png"] = placeholder_png(90, 30)
+    data["word/media/logo.png"] = grey_png(90, 30)
     if edit is not None:
         edit(data)
     with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:

@@ -8,11 +8,11 @@ from pathlib import Path
 import pytest
 from report_factory import make_record, make_result
 
-from toolkit.report.build import build_content
 from toolkit.report.deliver import Delivered, deliver
 from toolkit.report.drawer import Drawer
 from toolkit.report.style import read_style
-from toolkit.report.template.package import read_template
+from toolkit.report.test.content import build_content
+from toolkit.report.word.package import read_template
 
 CHECKOUT = Path(__file__).resolve().parents[2]
 

@@ -7,7 +7,8 @@ import hashlib
 import math
 
 from toolkit.calibration.records.record import CalibrationRecord, Golden, Indication, LoadFit
-from toolkit.characteristics.model import Characteristics, DirectionFit, Point, Pull, Stiffness
+from toolkit.characteristics.groups import DirectionFit
+from toolkit.characteristics.model import Characteristics, Point, Row
 from toolkit.estimate import Estimate
 from toolkit.findings import Finding
 from toolkit.pipeline import TestResult
@@ -88,6 +89,13 @@ def _estimate(value: float, u: float, unit: str) -> Estimate:
     return Estimate(value=value, u=u, unit=unit, dof=12)
 
 
+def _rows(load: float, rotation: str, **estimates: Estimate) -> list[Row]:
+    return [
+        Row(name=name, load_N=load, rotation=rotation, estimate=estimate)
+        for name, estimate in estimates.items()
+    ]
+
+
 def make_result(
     *,
     both: bool = True,
@@ -142,31 +150,28 @@ def make_result(
                 direction_fits.append(
                     DirectionFit(rotation=rotation, load_N=load, FY=_fit("FY", load), MZ=_fit("MZ", load))
                 )
-            stiffness.append(
-                Stiffness(
-                    load_N=load,
-                    rotation=rotation,
-                    secant_cornering=_estimate(18 * load - 1e-3 * load**2, 900, "N/rad"),
-                    slope_cornering=_estimate(18.4 * load - 1e-3 * load**2, 1100, "N/rad"),
-                    secant_aligning=_estimate(0.5 * load + 1e-4 * load**2, 60, "N*m/rad"),
-                    slope_aligning=_estimate(0.52 * load + 1e-4 * load**2, 75, "N*m/rad"),
-                )
+            stiffness += _rows(
+                load,
+                rotation,
+                secant_cornering=_estimate(18 * load - 1e-3 * load**2, 900, "N/rad"),
+                secant_aligning=_estimate(0.5 * load + 1e-4 * load**2, 60, "N*m/rad"),
+                slope_cornering=_estimate(18.4 * load - 1e-3 * load**2, 1100, "N/rad"),
+                slope_aligning=_estimate(0.52 * load + 1e-4 * load**2, 75, "N*m/rad"),
             )
     for load in LOADS_N if both else ():
-        pull.append(  # noqa: PERF401
-            Pull(
-                load_N=load,
-                conicity=_estimate(20 + 0.01 * load, 6, "N"),
-                plysteer=_estimate(-0.03 * load, 25, "N"),
-                CRAT=_estimate(0.4 + 1e-4 * load, 0.2, "N*m"),
-                PRAT=_estimate(2e-3 * load, 0.3, "N*m"),
-                PRAT_at_FY_zero=_estimate(1.8e-3 * load, 0.35, "N*m"),
-                thesis_CRAT=_estimate(1.0, 0.2, "N*m"),
-                thesis_PRAT=_estimate(0.3, 0.2, "N*m"),
-                thesis_PRAT_at_FY_zero=_estimate(0.25, 0.2, "N*m"),
-                residual_forward=_estimate(2.5, 0.3, "N*m"),
-                residual_reverse=_estimate(-1.5, 0.3, "N*m"),
-            )
+        pull += _rows(
+            load,
+            "both",
+            conicity=_estimate(20 + 0.01 * load, 6, "N"),
+            plysteer=_estimate(-0.03 * load, 25, "N"),
+            CRAT=_estimate(0.4 + 1e-4 * load, 0.2, "N*m"),
+            PRAT=_estimate(2e-3 * load, 0.3, "N*m"),
+            PRAT_at_FY_zero=_estimate(1.8e-3 * load, 0.35, "N*m"),
+            thesis_CRAT=_estimate(1.0, 0.2, "N*m"),
+            thesis_PRAT=_estimate(0.3, 0.2, "N*m"),
+            thesis_PRAT_at_FY_zero=_estimate(0.25, 0.2, "N*m"),
+            residual_forward=_estimate(2.5, 0.3, "N*m"),
+            residual_reverse=_estimate(-1.5, 0.3, "N*m"),
         )
     return TestResult(
         reduced=ReducedTest(
@@ -180,8 +185,7 @@ def make_result(
         ),
         characteristics=Characteristics(
             fits=tuple(direction_fits),
-            stiffness=tuple(stiffness),
-            pull=tuple(pull),
+            rows=(*pull, *stiffness),
             findings=(),
             points=tuple(
                 Point(file=c.file, first_row=c.first_row, u_FY=c.u_FY, u_MZ=c.u_MZ) for c in conditions

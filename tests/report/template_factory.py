@@ -9,9 +9,11 @@ from collections.abc import Callable
 from pathlib import Path
 
 import docx
+from lxml import etree
+from PIL import Image
 
-from toolkit.report.design.blocks import elements
-from toolkit.report.template.package import Template, read_template
+from toolkit.report.word.package import Template, read_template
+from toolkit.report.word.xml import NS, Element
 
 HASH = "{{tk:calibration.hash}}"
 FOOTNOTES = (
@@ -19,6 +21,20 @@ FOOTNOTES = (
     "application/vnd.openxmlformats-officedocument.wordprocessingml.footnotes+xml",
 )
 W = "http://schemas.openxmlformats.org/wordprocessingml/2006/main"
+FOLDER = Path(__file__).resolve().parents[2] / "report_templates"
+_SPACES = " ".join(f'xmlns:{prefix}="{NS[prefix]}"' for prefix in ("w", "wp", "a", "pic", "r"))
+
+
+def elements(fragment: str) -> list[Element]:
+    """Parse a fragment of WordprocessingML into elements."""
+    return list(etree.fromstring(f"<w:body {_SPACES}>{fragment}</w:body>"))
+
+
+def grey_png(width: int, height: int) -> bytes:
+    """Return a plain grey picture."""
+    stream = io.BytesIO()
+    Image.new("L", (width, height), 225).save(stream, "PNG")
+    return stream.getvalue()
 
 
 def p(*runs: str) -> str:
@@ -98,8 +114,6 @@ def opened(folder: Path, body: str, **more: object) -> Template:
 
 def texts(data: bytes, part: str = "word/document.xml") -> str:
     """Return the text of a part, paragraphs by line."""
-    from lxml import etree
-
     with zipfile.ZipFile(io.BytesIO(data)) as archive:
         root = etree.fromstring(archive.read(part))
     return "\n".join("".join(t.text or "" for t in para.iter(f"{{{W}}}t")) for para in root.iter(f"{{{W}}}p"))

@@ -15,17 +15,16 @@ from alien_factory import build, p, section
 from lxml import etree
 from report_factory import make_record, make_result
 
-from toolkit.report.build import build_content
 from toolkit.report.deliver import Delivered, deliver
+from toolkit.report.kinds import check as check_template
 from toolkit.report.style import Style
-from toolkit.report.template.check import check_template
-from toolkit.report.template.contents_pages import pdf_outline, printed_pages
-from toolkit.report.template.fill import fill
-from toolkit.report.template.package import read_template
-from toolkit.report.template.verify import pdf_text
-from toolkit.report.template.verify_contents import contents_problems
-from toolkit.report.template.verify_text import text_checks
-from toolkit.report.template.xml import NS
+from toolkit.report.test.content import build_content
+from toolkit.report.word.contents_pages import pdf_outline, pdf_text, printed_pages
+from toolkit.report.word.fill import fill
+from toolkit.report.word.package import read_template
+from toolkit.report.word.verify import contents_problems
+from toolkit.report.word.verify_text import text_checks
+from toolkit.report.word.xml import NS
 
 STYLE = Style(laboratory="Prüflabor Ärmel & Söhne", decimal_comma=True, dates="%d.%m.%Y")
 DAY = dt.date(2026, 11, 21)
@@ -168,7 +167,7 @@ def test_a_hash_that_a_page_end_cuts_is_found_and_a_number_is_not(tmp_path: Path
 
 
 def test_pages_are_read_with_leaders_and_roman_numbers() -> None:
-    from toolkit.report.template.contents import ContentsEntry
+    from toolkit.report.word.contents import ContentsEntry
 
     def entry(name: str, text: str) -> ContentsEntry:
         return ContentsEntry(bookmark=name, text=text, level=1, heading=True, numbered=False, paged=True)
@@ -181,10 +180,11 @@ def test_pages_are_read_with_leaders_and_roman_numbers() -> None:
 
 
 def _pictures() -> dict:
-    from toolkit.report.design.blocks import placeholder_png
+    from template_factory import grey_png
+
     from toolkit.report.figures import Picture
 
-    return dict.fromkeys(content().plots, Picture(png=placeholder_png(63, 37), width_px=63, height_px=37))
+    return dict.fromkeys(content().plots, Picture(png=grey_png(63, 37), width_px=63, height_px=37))
 
 
 def test_a_bound_control_around_a_literal_loses_its_binding(tmp_path: Path) -> None:

@@ -8,25 +8,30 @@ import math
 import pytest
 from report_factory import make_result
 
-from toolkit.characteristics.model import AtAngle, Budget
+from toolkit.characteristics.model import Row
 from toolkit.estimate import Estimate
 from toolkit.machine import TypeB
 from toolkit.pipeline import TestResult
 from toolkit.report.style import Style
-from toolkit.report.tables import build_tables, summary_load
+from toolkit.report.test.characteristics import summary_load
+from toolkit.report.test.content import build_content
 
 
 def with_budget(load: float, name: str, **sources: float) -> TestResult:
     result = make_result()
     named = tuple((key.replace("_", " "), u) for key, u in sources.items())
     unit = "N/rad" if name.startswith("slope") else "N"
-    budget = Budget(load_N=load, rotation="both", name=name, unit=unit, sources=named)
-    chars = dataclasses.replace(result.characteristics, budgets=(budget,))
+    estimate = Estimate(value=1.0, u=math.hypot(*sources.values()), unit=unit)
+    rotation = "forward" if name.startswith("slope") else "both"
+    row = Row(name=name, load_N=load, rotation=rotation, estimate=estimate, sources=named)
+    # The load of the summary is that of the whole test, whatever else it has.
+    rest = tuple(dataclasses.replace(one, estimate=None) for one in result.characteristics.rows)
+    chars = dataclasses.replace(result.characteristics, rows=(*rest, row))
     return dataclasses.replace(result, characteristics=chars)
 
 
 def rows(result: TestResult, style: Style | None = None) -> list[dict[str, object]]:
-    table = build_tables(result, None, (), style or Style())["budget"]
+    table = build_content(result, style=style or Style()).tables["budget"]
     return [dict(zip([c.name for c in table.columns], row, strict=True)) for row in table.rows]
 
 
@@ -63,12 +68,13 @@ def test_other_loads_are_left_to_the_whole_test_file() -> None:
 
 def test_values_at_slip_angles_have_their_uncertainty() -> None:
     result = make_result()
-    at = AtAngle(
-        load_N=4000.0, rotation="forward", SA_rad=-0.0349065850398866,
-        FY=Estimate(value=2000.0, u=10.0, unit="N"), MZ=None,
+    at = Row(
+        name="FY", load_N=4000.0, rotation="forward", SA_rad=-0.0349065850398866,
+        estimate=Estimate(value=2000.0, u=10.0, unit="N"),
     )  # fmt: skip
-    chars = dataclasses.replace(result.characteristics, at_angles=(at,))
-    made = build_tables(dataclasses.replace(result, characteristics=chars), None, (), Style())["at_angles"]
+    lacking = dataclasses.replace(at, name="MZ", estimate=None, lacking="no fitted curve of MZ")
+    chars = dataclasses.replace(result.characteristics, rows=(at, lacking))
+    made = build_content(dataclasses.replace(result, characteristics=chars)).tables["at_angles"]
     row = dict(zip([c.name for c in made.columns], made.rows[0], strict=True))
     assert row["SA"] == pytest.approx(-2.0)
     assert (row["FY"], row["MZ"]) == (2000.0, None)
@@ -85,7 +91,7 @@ STATED = (
 def stated(style: Style, *given: TypeB) -> list[tuple[object, ...]]:
     result = make_result()
     result = dataclasses.replace(result, reduced=dataclasses.replace(result.reduced, stated=given))
-    return list(build_tables(result, None, (), style)["stated"].rows)
+    return list(build_content(result, style=style).tables["stated"].rows)
 
 
 def test_what_the_machine_states_is_told_with_its_source() -> None:

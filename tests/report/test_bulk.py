@@ -12,12 +12,12 @@ from lxml import etree
 from report_factory import make_record, make_result
 from template_factory import HASH, opened, p, run, sdt, tbl
 
-from toolkit.report.build import build_content
 from toolkit.report.content import ReportContent, Table
-from toolkit.report.template import bulk, rows
-from toolkit.report.template.bulk import with_rows, without_rows
-from toolkit.report.template.fill import Filled, fill
-from toolkit.report.template.verify import verify_docx
+from toolkit.report.test.content import build_content
+from toolkit.report.word import bulk, rows
+from toolkit.report.word.bulk import with_rows, without_rows
+from toolkit.report.word.fill import Filled, fill
+from toolkit.report.word.verify import verify_docx
 
 W = "{http://schemas.openxmlformats.org/wordprocessingml/2006/main}"
 ODD = (
@@ -180,7 +180,7 @@ def test_a_part_is_parsed_without_its_long_runs_of_rows(monkeypatch: pytest.Monk
 
 def test_libreoffice_is_given_the_time_that_a_long_table_takes(tmp_path: Path) -> None:
     """One table of 13 000 rows (501 pages) took it 270 s; 22 000 rows more than 495 s of processor time."""
-    from toolkit.report.pdf import time_for
+    from toolkit.report.word.office import time_for
 
     def document(rows: int) -> Path:
         row = "<w:tr>" + "<w:tc><w:p><w:r><w:t>1</w:t></w:r></w:p></w:tc>" * 3 + "</w:tr>"

@@ -19,7 +19,6 @@ from toolkit.errors import ConfigError, RecordError
 from toolkit.report.certificate.collect import collect
 from toolkit.report.certificate.content import GAP, build_content
 from toolkit.report.certificate.dcc import build_dcc
-from toolkit.report.certificate.template import build_certificate
 from toolkit.report.style import Style
 
 CHECKOUT = Path(__file__).resolve().parents[2]
@@ -219,10 +218,6 @@ def test_a_legacy_import_has_none() -> None:
     with pytest.raises(RecordError) as caught:
         collect(Registry(CHECKOUT / "calibrations"), "m15-r2", STYLE)
     assert caught.value.rule == "certificate-unverified"
-
-
-def test_the_packaged_template_is_what_the_code_builds() -> None:
-    assert (CHECKOUT / "report_templates" / "certificate.docx").read_bytes() == build_certificate()
 
 
 def test_the_dcc_is_deterministic_and_needs_a_country(tmp_path: Path) -> None:

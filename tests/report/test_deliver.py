@@ -17,12 +17,11 @@ from template_factory import opened, p, run, sdt, tbl
 from toolkit.errors import OutputError, RenderError, TemplateError
 from toolkit.recording.marks import is_own_output
 from toolkit.report import deliver as deliver_module
-from toolkit.report import pdf
-from toolkit.report.build import build_content
 from toolkit.report.deliver import Delivered, deliver
-from toolkit.report.pdf import Office
-from toolkit.report.template import verify, verify_text
-from toolkit.report.template.fill import Entry, Filled
+from toolkit.report.test.content import build_content
+from toolkit.report.word import office, verify, verify_text
+from toolkit.report.word.fill import Entry, Filled
+from toolkit.report.word.office import Office
 
 CHECKOUT = Path(__file__).resolve().parents[2]
 DAY = dt.date(2026, 11, 21)
@@ -186,18 +185,18 @@ def test_a_conversion_that_a_busy_machine_holds_up_gets_more_time(
     tmp_path: Path, monkeypatch, script: str, ends: bool
 ) -> None:
     go = tmp_path / "go"
-    monkeypatch.setattr(pdf, "_LOOK_S", 0.2)
+    monkeypatch.setattr(office, "_LOOK_S", 0.2)
     # As if half of a core were given to it: it has worked for less than its limit when that is over.
     looks = iter(range(1, 100))
-    real = pdf._processor_s
+    real = office._processor_s
 
     def slow(groups: set[int]) -> float:
         if next(looks) == 4:
             go.touch()
         return real(groups) / 20
 
-    monkeypatch.setattr(pdf, "_processor_s", slow)
-    monkeypatch.setattr(pdf, "_STANDS", 0.001)
+    monkeypatch.setattr(office, "_processor_s", slow)
+    monkeypatch.setattr(office, "_STANDS", 0.001)
     process = subprocess.Popen(
         ["sh", "-c", script],
         stderr=subprocess.PIPE,
@@ -206,13 +205,13 @@ def test_a_conversion_that_a_busy_machine_holds_up_gets_more_time(
     )
     try:
         if ends:
-            assert pdf._wait(process, 0.5, also=None) == b"done\n"
+            assert office._wait(process, 0.5, also=None) == b"done\n"
             assert next(looks) > 3  # it was looked at after its limit
         else:
             with pytest.raises(subprocess.TimeoutExpired):
-                pdf._wait(process, 0.5, also=None)
+                office._wait(process, 0.5, also=None)
     finally:
-        pdf._kill(process)
+        office._kill(process)
 
 
 # A LibreOffice that makes a PDF of each document but those named bad*, and notes who converted what.

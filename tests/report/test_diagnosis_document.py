@@ -13,15 +13,12 @@ from tests.diagnosis.cases import HEAD, TWO, carriage, write_case
 from toolkit.calibration.records.use import CalibrationUse
 from toolkit.diagnosis.case.reader import read_case
 from toolkit.diagnosis.diagnose import diagnose
+from toolkit.report.diagnosis.answer import DIAGNOSIS
 from toolkit.report.diagnosis.content import build_diagnosis_content
 from toolkit.report.diagnosis.page import page
-from toolkit.report.diagnosis.plots import diagnosis_plots
-from toolkit.report.diagnosis.template import build_diagnosis
-from toolkit.report.diagnosis.vocabulary import DIAGNOSIS, TABLES
 from toolkit.report.style import Style
-from toolkit.report.template.check import check_template
-from toolkit.report.template.fill import fill
-from toolkit.report.template.package import read_template
+from toolkit.report.word.fill import fill
+from toolkit.report.word.package import read_template
 
 CHECKOUT = Path(__file__).resolve().parents[2]
 DAY = dt.date(2026, 4, 1)
@@ -47,19 +44,13 @@ def content(made: tuple[Any, Any], style: Style | None = None, **more: Any) -> A
     return build_diagnosis_content(*made, style or Style(), issued=DAY, **more)
 
 
-def test_the_packaged_template_is_the_built_one() -> None:
-    packaged = CHECKOUT / "report_templates" / "diagnosis.docx"
-    assert packaged.read_bytes() == build_diagnosis()
-    assert check_template(read_template(packaged), Style()) == ()
-
-
 def test_every_table_has_the_columns_of_its_vocabulary(dragged: Any) -> None:
     found = content(dragged)
-    assert set(found.tables) == set(TABLES)
+    assert set(found.tables) == set(DIAGNOSIS.vocabulary.tables)
     for name, table in found.tables.items():
-        assert table.columns == TABLES[name][1]
+        assert table.columns == DIAGNOSIS.vocabulary.tables[name].columns
         assert all(len(row) == len(table.columns) for row in table.rows)
-    assert set(found.conditions) >= set(DIAGNOSIS.conditions)
+    assert set(found.conditions) >= set(DIAGNOSIS.vocabulary.asked)
 
 
 def test_the_cause_is_an_opinion_and_the_numbers_are_results(dragged: Any) -> None:
@@ -105,7 +96,7 @@ def test_nothing_found_has_no_opinion_and_no_bar_of_effects(clean: Any) -> None:
 
 
 def test_the_chart_of_ten_seconds_is_error_over_noise(dragged: Any) -> None:
-    plots = diagnosis_plots(dragged[1], Style())
+    plots = content(dragged).plots
     assert set(plots) == {"diagnosis_errors", "diagnosis_where_1", "diagnosis_run"}
     (one,) = dragged[1].diagnosis.held_out
     bars = [curve.y[0] for curve in plots["diagnosis_errors"].curves[:3]]

@@ -8,7 +8,8 @@ from pathlib import Path
 
 import pytest
 from report_factory import make_record, make_result
-from template_factory import opened, p, texts
+from template_factory import FOLDER, grey_png, opened, p, texts
+
 from toolkit.diagnosis.answer.answer import (
     Diagnosis,
     FoundEffect,
@@ -17,27 +18,23 @@ from toolkit.diagnosis.answer.answer import (
     Mismatch,
     Place,
 )
-
+from toolkit.effects.applied import EffectKey
 from toolkit.findings import Finding
-from toolkit.report.build import build_content
 from toolkit.report.content import ReportContent
-from toolkit.report.design.blocks import placeholder_png
-from toolkit.report.design.files import packaged_templates
-from toolkit.report.diagnosis.entries import REPORT_FIGURES, REPORT_TABLES, REPORT_VALUES
-from toolkit.report.diagnosis.in_report import Told
-from toolkit.report.diagnosis.vocabulary import DIAGNOSIS
+from toolkit.report.diagnosis.answer import DIAGNOSIS, Told
 from toolkit.report.figures import Picture, _figure
-from toolkit.report.listing import list_tags
+from toolkit.report.kinds import VOCABULARIES, list_tags
+from toolkit.report.kinds import check as check_template
 from toolkit.report.style import Style
-from toolkit.report.template.check import check_template, vocabulary_of
-from toolkit.report.template.fill import Filled, fill
-from toolkit.report.template.package import open_package, read_template
-from toolkit.report.template.scan import scan
-from toolkit.report.template.xml import stories
-from toolkit.report.vocabulary import REPORT
+from toolkit.report.test.content import REPORT, build_content
+from toolkit.report.word.check import vocabulary_of
+from toolkit.report.word.fill import Filled, fill
+from toolkit.report.word.package import open_package, read_template
+from toolkit.report.word.scan import scan
+from toolkit.report.word.xml import stories
 
 EFFECT = FoundEffect(
-    name="quadratic_drag", stage="dynamics", channel="F", statement="Drag is missing.",
+    key=EffectKey("quadratic_drag", "F"), stage="dynamics", statement="Drag is missing.",
     equation="F = - drag v|v|", reference="Newton", equivalent_to=("viscous_damping",),
     rejected=(("coulomb_friction", -12.0),),
     held_out_log_score_gain=106.5, p_value=1e-12,
@@ -63,11 +60,11 @@ def content(told: Told | None) -> ReportContent:
 
 
 def made(name: str, told: Told | None, folder: Path) -> Filled:
-    path = folder / f"{name}.docx"
-    path.write_bytes(packaged_templates()[name].build())
     found = content(told)
-    picture = Picture(png=placeholder_png(63, 37), width_px=63, height_px=37)
-    return fill(read_template(path), found, dict.fromkeys(found.plots, picture), allow_missing=True)
+    picture = Picture(png=grey_png(63, 37), width_px=63, height_px=37)
+    return fill(
+        read_template(FOLDER / f"{name}.docx"), found, dict.fromkeys(found.plots, picture), allow_missing=True
+    )
 
 
 @pytest.mark.parametrize(
@@ -135,13 +132,17 @@ def test_without_a_name_the_opinion_is_a_draft(tmp_path: Path) -> None:
 
 
 def test_the_tags_are_those_of_the_diagnosis_own_document() -> None:
-    listed = {one["tag"] for one in list_tags(None, Style(), REPORT)}
-    assert {f"tk:{one.path}" for one in REPORT_VALUES} <= listed
-    for spec in REPORT_VALUES:
-        assert DIAGNOSIS.value(spec.path) == spec
-    assert all(DIAGNOSIS.tables[name] == entry for name, entry in REPORT_TABLES.items())
-    assert set(REPORT_FIGURES) <= set(DIAGNOSIS.figures)
-    available = {one["tag"]: one["available"] for one in list_tags(content(None), Style(), REPORT)}
+    report, own = REPORT.vocabulary, DIAGNOSIS.vocabulary
+    values = {entry.path: entry for entry in report.values if entry.path.startswith("diagnosis.")}
+    assert all(own.value(path) == entry for path, entry in values.items())
+    # What only the case and the search have is in the diagnosis' own document alone.
+    assert {entry.path for entry in own.values} - set(values) == {
+        f"diagnosis.{name}" for name in ("calibrations", "model", "issued", "software")
+    }
+    shared = set(own.tables) - {"recorded"}
+    assert all(report.tables[name] == own.tables[name] for name in shared)
+    assert set(report.figures) & set(own.figures) == {"diagnosis_errors"}
+    available = {one["tag"]: one["available"] for one in list_tags(content(None), Style(), report)}
     assert not [tag for tag, there in available.items() if "diagnosis" in tag and there]
     assert not available["tk:table.found"]
 
@@ -155,10 +156,11 @@ def test_the_legend_of_the_chart_ends_inside_the_picture() -> None:
 
 def test_a_report_that_tells_a_diagnosis_is_still_a_report(tmp_path: Path) -> None:
     def kind(body: str, *, hash_: bool) -> object:
-        return vocabulary_of(scan(stories(open_package(opened(tmp_path, body, hash_=hash_)))))
+        sites = scan(stories(open_package(opened(tmp_path, body, hash_=hash_))))
+        return vocabulary_of(sites, VOCABULARIES)
 
-    assert kind(p("{{tk:diagnosis.verdict}}"), hash_=True) is REPORT
-    assert kind(p("{{tk:diagnosis.id}} {{tk:diagnosis.case}}"), hash_=False) is DIAGNOSIS
+    assert kind(p("{{tk:diagnosis.verdict}}"), hash_=True) is REPORT.vocabulary
+    assert kind(p("{{tk:diagnosis.id}} {{tk:diagnosis.case}}"), hash_=False) is DIAGNOSIS.vocabulary
     assert check_template(opened(tmp_path, p("{{tk:diagnosis.verdict}}")), Style()) == ()
     wrong = check_template(opened(tmp_path, p("{{tk:diagnosis.model}}")), Style())
     assert [one.rule for one in wrong] == ["unknown-tag"]

@@ -12,9 +12,8 @@ from tests.diagnosis.cases import carriage, write_case
 from toolkit.diagnosis.case.reader import read_case
 from toolkit.diagnosis.diagnose import diagnose
 from toolkit.report.diagnosis import figures
-from toolkit.report.diagnosis.chance import chance
 from toolkit.report.diagnosis.maps import size_maps, variables
-from toolkit.report.diagnosis.numbers import few, over
+from toolkit.report.diagnosis.numbers import chance, few, over
 from toolkit.report.diagnosis.page import HEADLINES, condition, headline, page
 
 
@@ -26,15 +25,16 @@ def dragged(tmp_path_factory):
 
 def test_the_chart_comes_before_every_table_and_heading(dragged):
     html = page(dragged)
-    assert html.index('class="verdict"') < html.index("<img") < html.index("<h2>") < html.index("<table")
+    assert html.index('<div class="verdict') < html.index("<img") < html.index("<h2>") < html.index("<table")
 
 
 def test_a_table_scrolls_by_itself_and_a_narrow_window_is_as_wide_as_it_is(dragged):
     html = page(dragged)
     assert html.count('<div class="wide"><table>') == html.count("<table>") > 0
     assert 'name="viewport"' in html
-    assert "overflow-x:auto" in html
-    assert "background:#fff" in html  # a browser in the dark keeps the ink and would take the paper away
+    assert ".wide { overflow-x: auto;" in html
+    # Figures are drawn in dark ink: in the dark they keep their white paper.
+    assert re.search(r"img \{[^}]*background: #ffffff", html)
     assert "@media print" in html
 
 

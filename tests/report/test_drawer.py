@@ -3,9 +3,9 @@ from __future__ import annotations
 import pytest
 from report_factory import make_record, make_result
 
-from toolkit.report.build import build_content
 from toolkit.report.drawer import Drawer
 from toolkit.report.figures import Picture, draw
+from toolkit.report.test.content import build_content
 
 
 @pytest.mark.parametrize("hands", [1, 2, 5])

@@ -14,22 +14,21 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from lxml import etree
 from report_factory import SHA, make_record, make_result
-from template_factory import W, make, opened, p, run, sdt, tbl, texts
+from template_factory import W, grey_png, make, opened, p, run, sdt, tbl, texts
 
 from toolkit.errors import TemplateError
-from toolkit.report.build import build_content
 from toolkit.report.content import Table, Value
-from toolkit.report.design.blocks import placeholder_png
 from toolkit.report.figures import Picture
 from toolkit.report.style import Style
-from toolkit.report.template.fill import Filled, fill
-from toolkit.report.template.package import read_template
-from toolkit.report.template.verify import verify_docx
-from toolkit.report.template.verify_text import text_checks
-from toolkit.report.template.xml import NS
+from toolkit.report.test.content import build_content
+from toolkit.report.word.fill import Filled, fill
+from toolkit.report.word.package import read_template
+from toolkit.report.word.verify import verify_docx
+from toolkit.report.word.verify_text import text_checks
+from toolkit.report.word.xml import NS
 
 DAY = dt.date(2026, 11, 21)
-PICTURE = Picture(png=placeholder_png(63, 37), width_px=63, height_px=37)
+PICTURE = Picture(png=grey_png(63, 37), width_px=63, height_px=37)
 
 
 def content(**changes: object):

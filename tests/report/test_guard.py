@@ -9,12 +9,12 @@ from pathlib import Path
 
 import pytest
 
-from toolkit.report.guard import Guard
+from toolkit.report.word.office import Guard
 
 _PARENT = """
 import os, subprocess, sys, time
 from pathlib import Path
-from toolkit.report.guard import Guard
+from toolkit.report.word.office import Guard
 folder = Path(sys.argv[1])
 guard = Guard(folder)
 # As LibreOffice is started: a session of its own, the folder's name among its words.

@@ -8,21 +8,20 @@ from pathlib import Path
 
 import pytest
 from report_factory import COMPARISON, LOADS_N, entry, make_record, make_result
-from template_factory import make, p, tbl
+from template_factory import FOLDER, make, p, tbl
 
-from toolkit.cli import resolve
-from toolkit.cli.report import Options, _compared, _job, command
-from toolkit.cli.resolve import Resolved
+from toolkit.cli.report import command
 from toolkit.errors import FitError, TemplateError
-from toolkit.report.build import build_content
+from toolkit.lab import resolve
+from toolkit.lab.reports import Options, _compared, _job
+from toolkit.lab.resolve import Resolved
 from toolkit.report.content import ReportContent
-from toolkit.report.design.default import build_default
 from toolkit.report.figures import draw, draw_svg
 from toolkit.report.handover import content_hash
-from toolkit.report.models import model_plots, model_rows
-from toolkit.report.tags import catalogue
-from toolkit.report.template.fill import fill, needed_figures
-from toolkit.report.template.package import read_template
+from toolkit.report.test.content import REPORT, build_content
+from toolkit.report.test.models import model_plots, model_rows
+from toolkit.report.word.fill import fill, needed_figures
+from toolkit.report.word.package import read_template
 from toolkit.tires.comparison import Comparison
 
 office_needed = pytest.mark.skipif(
@@ -83,7 +82,7 @@ def test_a_report_can_ask_for_them_and_the_catalogue_lists_them() -> None:
     made = content(COMPARISON)
     assert all(made.holds(one) for one in ("models", "models_fy", "figure.models_mz", "table.models"))
     assert made.values["caption.models_fy"].value == made.plots["models_fy"].caption
-    listed = {one.path for one in catalogue()}
+    listed = {one.path for one in REPORT.vocabulary.entries}
     assert {"table.models", "figure.models_fy", "figure.models_mz", "if.models", "row.FY_left_out"} <= listed
 
 
@@ -98,7 +97,7 @@ def test_the_default_template_prints_them_and_its_hash_does_not_know_the_clock(
     tmp_path: Path, read: None, capsys: pytest.CaptureFixture[str]
 ) -> None:
     template = tmp_path / "org.docx"
-    template.write_bytes(build_default())
+    template.write_bytes((FOLDER / "org.docx").read_bytes())
     models = ["magic_formula", "brush"]
     assert command(
         [Path("any")], template=template, out=tmp_path / "out", models=models, allow_missing=True, json=True

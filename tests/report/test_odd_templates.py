@@ -13,14 +13,14 @@ from odd_templates import ALL
 from report_factory import make_record, make_result
 
 from toolkit.errors import ToolkitError
-from toolkit.report.build import build_content
 from toolkit.report.content import ReportContent
 from toolkit.report.deliver import Delivered, Job, deliver_all
+from toolkit.report.kinds import check as check_template
 from toolkit.report.style import Style
-from toolkit.report.template.check import check_template
-from toolkit.report.template.direction import kept_whole
-from toolkit.report.template.package import read_template
-from toolkit.report.template.verify import pdf_text
+from toolkit.report.test.content import build_content
+from toolkit.report.word.contents_pages import pdf_text
+from toolkit.report.word.controls import kept_whole
+from toolkit.report.word.package import read_template
 
 pytestmark = pytest.mark.skipif(
     not (shutil.which("soffice") and shutil.which("pdftotext")),

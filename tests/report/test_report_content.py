@@ -11,13 +11,10 @@ from hypothesis import strategies as st
 from report_factory import COMPARISON, LOADS_N, formula, make_record, make_result, shape
 
 from toolkit.errors import ConfigError, TemplateError
-from toolkit.report.build import build_content, report_id
-from toolkit.report.columns import TABLES
-from toolkit.report.diagnosis.entries import REPORT_TABLES
 from toolkit.report.figures import draw
 from toolkit.report.style import Style, read_style
-from toolkit.report.tags import catalogue, format_number, format_problem, parse_tag
-from toolkit.report.vocabulary import REPORT
+from toolkit.report.tags import format_number, format_problem, parse_tag
+from toolkit.report.test.content import REPORT, build_content, report_id
 
 DAY = dt.date(2026, 11, 21)
 
@@ -39,12 +36,12 @@ def test_title_page_values_of_the_source_document() -> None:
 
 
 def test_every_value_and_table_is_in_the_catalogue_and_the_other_way_round() -> None:
-    made, listed = content(), {one.path: one for one in catalogue()}
-    assert all(REPORT.knows(path) for path in made.values)
+    made, listed = content(), {one.path: one for one in REPORT.vocabulary.entries}
+    assert all(REPORT.vocabulary.knows(path) for path in made.values)
     assert {path for path, one in listed.items() if one.kind in ("text", "number", "date")} <= set(
         made.values
     )
-    assert set(made.tables) == {*TABLES, *REPORT_TABLES}
+    assert set(made.tables) == set(REPORT.vocabulary.tables)
     for path, one in made.values.items():
         if path in listed:
             assert one.kind == listed[path].kind, path
@@ -56,7 +53,11 @@ def test_every_value_and_table_is_in_the_catalogue_and_the_other_way_round() -> 
 def test_stiffness_is_per_degree_with_student_t() -> None:
     # secant = 18 x 1112 - 1e-3 x 1112^2 N/rad; U = t(12, 95 %) x 900 with t = 2.179 (GUM table G.2)
     row = dict(
-        zip((c.name for c in TABLES["stiffness"][1]), content().tables["stiffness"].rows[0], strict=True)
+        zip(
+            (c.name for c in REPORT.vocabulary.tables["stiffness"].columns),
+            content().tables["stiffness"].rows[0],
+            strict=True,
+        )
     )
     assert row["cornering_secant"] == pytest.approx((18 * 1112 - 1e-3 * 1112**2) * math.pi / 180)
     assert row["U_cornering_secant"] == pytest.approx(2.179 * 900 * math.pi / 180, rel=1e-3)
@@ -65,7 +66,7 @@ def test_stiffness_is_per_degree_with_student_t() -> None:
 def test_units_by_choice() -> None:
     metric, customary = content(), content(style=Style(force="lbf", moment="lbf*ft"))
     for name, column, factor in (("results", "FY", 4.4482216152605), ("results", "MZ", 1.3558179483314)):
-        index = [c.name for c in TABLES[name][1]].index(column)
+        index = [c.name for c in REPORT.vocabulary.tables[name].columns].index(column)
         one, other = metric.tables[name].rows[7][index], customary.tables[name].rows[7][index]
         assert one == pytest.approx(other * factor)
     assert customary.values["unit.force_per_angle"].value == "lbf/deg"

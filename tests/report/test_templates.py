@@ -1,4 +1,4 @@
-"""The templates that come with the toolkit: clean, built by code, and each taken to its PDF."""
+"""The templates that come with the toolkit are Word files: each is clean, and each is taken to its PDF."""
 
 from __future__ import annotations
 
@@ -12,27 +12,43 @@ from pathlib import Path
 import pytest
 from lxml import etree
 from report_factory import make_record, make_result
+from template_factory import FOLDER
+from test_certificate import DAY as CALIBRATED
+from test_certificate import STYLE, registry_of
+from test_comparison_document import content as compared
+from test_comparison_document import pair
+from test_diagnosis_in_report import ANSWER
 
+from tests.conftest import EXAMPLES
+from tests.diagnosis.cases import HEAD, TWO, carriage, write_case
+from toolkit.audit.archive import audit_archive
+from toolkit.calibration.registry.registry import Registry
+from toolkit.diagnosis.case.reader import read_case
+from toolkit.diagnosis.diagnose import Result
 from toolkit.errors import ConfigError
+from toolkit.lab.rules import rules_catalogue
 from toolkit.recording.details import read_details
-from toolkit.report.build import build_content, report_id
-from toolkit.report.deliver import Delivered, deliver
-from toolkit.report.design.files import packaged_templates
+from toolkit.report.audit.content import build_audit_content
+from toolkit.report.audit.page import AuditView
+from toolkit.report.certificate.collect import collect
+from toolkit.report.certificate.content import build_content as certified
+from toolkit.report.content import ReportContent, say
+from toolkit.report.deliver import Delivered, Job, deliver_all
+from toolkit.report.diagnosis.content import build_diagnosis_content
+from toolkit.report.kinds import check as check_template
 from toolkit.report.style import Style, read_style, style_file
-from toolkit.report.template.check import check_template
-from toolkit.report.template.contents_pages import pdf_outline
-from toolkit.report.template.package import read_template
-from toolkit.report.template.verify import pdf_text
-from toolkit.report.template.xml import q
-from toolkit.report.words import say
+from toolkit.report.test.content import build_content, report_id
+from toolkit.report.word.contents_pages import pdf_outline, pdf_text
+from toolkit.report.word.package import read_template
+from toolkit.report.word.xml import q
 
-FOLDER = Path(__file__).resolve().parents[2] / "report_templates"
 DAY = dt.date(2026, 11, 21)
 DETAILS = {
     "customer": "Example Tyres",
     "customer_contact": "1 Rubber Road",
     "received": dt.date(2019, 5, 28),
     "condition": "new",
+    "conformity": "nicht beurteilt",
     "authorised_by": "A. Authoriser",
     "function": "head of laboratory",
     "opinions": ["The belt may be off centre.", {"statement": "Carcass buckling.", "basis": "Table 2"}],
@@ -43,35 +59,80 @@ office_needed = pytest.mark.skipif(
 )
 
 
-def report(name: str, out: Path, **changes: object) -> Delivered:
-    path = FOLDER / f"{name}.docx"
-    content = build_content(
+def of_a_test(name: str, **changes: object) -> ReportContent:
+    return build_content(
         make_result(**changes),
         make_record(),
-        style=read_style(style_file(path)),
+        style=read_style(style_file(FOLDER / f"{name}.docx")),
         issued=DAY,
         details=read_details(DETAILS, where="test.toml"),
     )
-    return deliver(read_template(path), content, out)
 
 
-@pytest.mark.parametrize("name", ["org", "summary", "pruefbericht"])
-def test_each_is_what_its_builder_makes_and_is_clean(name: str) -> None:
-    one, path = packaged_templates()[name], FOLDER / f"{name}.docx"
-    assert path.read_bytes() == one.build()
-    if one.style is not None:
-        assert path.with_suffix(".toml").read_text() == one.style
+@pytest.fixture(scope="session")
+def printed(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Delivered]:
+    """Return a document of every packaged template, all of them converted in one call of LibreOffice."""
+    work = tmp_path_factory.mktemp("printed")
+    registry = Registry(FOLDER.parent / "calibrations")
+    audited = audit_archive(EXAMPLES / "fig4_4", registry, known_at=DAY)
+    recordings = {f"r{i}__csv": carriage(seed=i, coulomb=0.0, drag=800.0) for i in range(2)}
+    contents = {
+        "org": of_a_test("org"),
+        "summary": of_a_test("summary", simulated=True, unverified=True),
+        "pruefbericht": of_a_test("pruefbericht"),
+        "audit": build_audit_content(
+            AuditView(made=audited, rules=rules_catalogue(), timelines=(), traces=())
+        ),
+        "certificate": certified(collect(registry_of(work), "pair-r1", STYLE, issued=CALIBRATED), STYLE),
+        "comparison": compared(pair()),
+        "diagnosis": build_diagnosis_content(
+            read_case(write_case(tmp_path_factory.mktemp("case"), HEAD + TWO, **recordings)),
+            Result(diagnosis=ANSWER, search=None),
+            Style(),
+            issued=DAY,
+        ),
+    }
+    jobs = [
+        Job(template=read_template(FOLDER / f"{name}.docx"), content=content, out=work / "out", name=name)
+        for name, content in contents.items()
+    ]
+    answers = deliver_all(jobs)
+    assert all(isinstance(answer, Delivered) for answer in answers), answers
+    return dict(zip(contents, answers, strict=True))
+
+
+@pytest.mark.parametrize("path", sorted(FOLDER.glob("*.docx")), ids=lambda path: path.stem)
+def test_each_is_clean(path: Path) -> None:
     assert check_template(read_template(path), read_style(style_file(path))) == ()
 
 
-def test_all_of_them_are_there() -> None:
-    assert set(packaged_templates()) <= {path.stem for path in FOLDER.glob("*.docx")}
+@office_needed
+@pytest.mark.parametrize("name", sorted(path.stem for path in FOLDER.glob("*.docx")))
+def test_each_prints_all_that_it_asks_for(printed: dict[str, Delivered], name: str) -> None:
+    report = printed[name]
+    assert report.pdf.read_bytes().startswith(b"%PDF")
+    assert [check.message for check in report.checks if not check.ok] == []
+    assert report.warnings == ()
+    text = re.sub(r"\s", "", pdf_text(report.pdf))
+    assert "{{" not in text
+    assert report.filled.manifest
+    assert name in ("audit", "diagnosis") or report.filled.figures
+
+
+@pytest.mark.parametrize(("like", "style"), [("summary", "org"), ("pruefbericht", "pruefbericht")])
+def test_a_new_template_is_a_copy_with_the_style_file_that_serves_it(
+    like: str, style: str, tmp_path: Path
+) -> None:
+    from toolkit.cli.template import new
+
+    assert new(tmp_path / "ours.docx", like=like, quiet=True) == 0
+    assert (tmp_path / "ours.docx").read_bytes() == (FOLDER / f"{like}.docx").read_bytes()
+    assert (tmp_path / "ours.toml").read_bytes() == (FOLDER / f"{style}.toml").read_bytes()
 
 
 @office_needed
-def test_the_default_has_what_the_standard_asks_of_a_report(tmp_path: Path) -> None:
-    done = report("org", tmp_path / "out")
-    assert done.warnings == ()
+def test_the_default_has_what_the_standard_asks_of_a_report(printed: dict[str, Delivered]) -> None:
+    done = printed["org"]
     pages = pdf_text(done.pdf).split("\f")[:-1]
     text = " ".join(" ".join(pages).split())
     for words in (
@@ -107,18 +168,16 @@ def test_a_report_without_details_leaves_their_places_out(plain_report: Delivere
 
 
 @office_needed
-def test_the_summary_is_one_page(tmp_path: Path) -> None:
-    done = report("summary", tmp_path / "out", simulated=True, unverified=True)
+def test_the_summary_is_one_page(printed: dict[str, Delivered]) -> None:
+    done = printed["summary"]
     assert done.pages == 1
     assert "SIMULATED DATA" in pdf_text(done.pdf)
     assert "page 1 of 1" in pdf_text(done.pdf)
 
 
 @office_needed
-def test_the_german_report_has_its_own_look(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(DETAILS, "conformity", "nicht beurteilt")
-    done = report("pruefbericht", tmp_path / "out")
-    assert done.warnings == ()
+def test_the_german_report_has_its_own_look(printed: dict[str, Delivered]) -> None:
+    done = printed["pruefbericht"]
     text = " ".join(pdf_text(done.pdf).split())
     for words in (
         "Reifenprüfstelle Musterstadt",

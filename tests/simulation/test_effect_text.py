@@ -55,7 +55,7 @@ SIGMA = {"relaxation_length": 0.5, "falling": 0.0, "with_load": 1.0}
 def test_values_in_any_unit_of_their_dimension(text, channel, parameters):
     made = one(text)
     assert made.channel == channel
-    assert made.parameters == {name: pytest.approx(value, rel=1e-6) for name, value in parameters.items()}
+    assert made.values == {name: pytest.approx(value, rel=1e-6) for name, value in parameters.items()}
 
 
 def test_without_a_channel_every_cell_is_meant():
@@ -66,24 +66,24 @@ def test_without_a_channel_every_cell_is_meant():
 
 def test_two_signals_and_a_record():
     leak, swap = one("crosstalk.FZ.FY=0.01"), one("channel_swap.D51.D52")
-    assert (leak.source, leak.channel, leak.parameters) == ("FZ", "FY", {"coefficient": 0.01})
+    assert (leak.source, leak.channel, leak.values) == ("FZ", "FY", {"coefficient": 0.01})
     assert (swap.source, swap.channel) == ("D51", "D52")
-    assert one("wrong_calibration=m15-r1").record == "m15-r1"
+    assert one("wrong_calibration=m15-r1").source == "m15-r1"
 
 
 def test_what_is_not_given_is_off_or_usual():
-    heat = one("thermal_friction=peak_per_K:-0.004").parameters
+    heat = one("thermal_friction=peak_per_K:-0.004").values
     assert (heat["peak_per_K"], heat["stiffness_per_K"]) == (-0.004, 0.0)
     assert heat["time_constant"] > 0
-    assert one("nonuniformity.FY=amplitude_2:5N").parameters["amplitude_1"] == 0.0
+    assert one("nonuniformity.FY=amplitude_2:5N").values["amplitude_1"] == 0.0
 
 
 def test_conditions():
     made = one("load_lag@order:1+2=1.5s")
-    assert made.only == ("order", ("1", "2"))
-    assert made.acts_in({"order": "2"})
-    assert not made.acts_in({"order": "3"})
-    assert not made.acts_in({})
+    assert made.condition == ("order", ("1", "2"))
+    assert made.acts_under({"order": "2"})
+    assert not made.acts_under({"order": "3"})
+    assert not made.acts_under({})
 
 
 @pytest.mark.parametrize(

@@ -70,7 +70,7 @@ def test_what_was_put_in_is_named(plan, tmp_path, text):
     assert switched.effect.name in (effect.name, *effect.equivalent_to)
     if effect.name == switched.effect.name:
         for one in effect.parameters:
-            true = switched.parameters.get(one.name)
+            true = switched.values.get(one.name)
             if one.ci95 is None or not true:
                 continue
             reach = (one.ci95[1] - one.ci95[0]) / 2

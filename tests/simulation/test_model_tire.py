@@ -120,7 +120,7 @@ def test_the_case_of_such_a_plan_has_the_refitted_tire_and_no_effect(tmp_path):
 def test_an_effect_of_a_condition_acts_in_those_runs(tmp_path):
     where = 'condition = { rotation = ["reverse"] }\nruns = ["r1.csv"]'
     plan = made(tmp_path / "a", "model.toml", model=MODEL + GRIP.replace("WHERE", where))
-    assert plan.effects[0].only == ("rotation", ("reverse",))
+    assert plan.effects[0].condition == ("rotation", ("reverse",))
 
 
 @pytest.mark.parametrize(

@@ -5,12 +5,14 @@ from __future__ import annotations
 import dataclasses
 import hashlib
 import json
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import openpyxl
 import pytest
 
+from toolkit.characteristics.model import Characteristics, Row
 from toolkit.errors import RecordingError, ToolkitError
 from toolkit.findings import Finding
 from toolkit.machine import load_machine
@@ -54,13 +56,14 @@ def test_it_reads_back_whatever_is_missing(tmp_path: Path, made: Made) -> None:
         findings=(Finding(rule="no-tare", where="=1+1", message="+cmd|' /C calc'!A0 <&> ёж 🛞"),),
         info=dataclasses.replace(result.reduced.info, special="=HYPERLINK(0)", date=None, operator="12"),
     )
-    pull = dataclasses.replace(result.characteristics.pull[0], conicity=None)
+    first, *others = result.characteristics.rows
+    lacking = Row(
+        name=first.name, load_N=first.load_N, rotation=first.rotation, lacking="the data do not determine it"
+    )
     fits = (dataclasses.replace(result.characteristics.fits[0], MZ=None), *result.characteristics.fits[1:])
     changed = TestResult(
         reduced=reduced,
-        characteristics=dataclasses.replace(
-            result.characteristics, pull=(pull, *result.characteristics.pull[1:]), fits=fits
-        ),
+        characteristics=dataclasses.replace(result.characteristics, rows=(lacking, *others), fits=fits),
     )
     path = tmp_path / "x.xlsx"
     write_test_file(path, changed)
@@ -131,13 +134,51 @@ def test_what_the_machine_states_is_in_the_file(made: Made, file: Path) -> None:
     assert stated == {symbol: m15.stated_uncertainty(symbol) for symbol in ("FZ", "SA", "SA_scale", "P")}
 
 
+PULL = """conicity plysteer CRAT PRAT PRAT_at_FY_zero thesis_CRAT thesis_PRAT thesis_PRAT_at_FY_zero
+residual_forward residual_reverse""".split()
+STIFFNESS = "secant_cornering secant_aligning slope_cornering slope_aligning".split()
+
+
+def first_form(found: Characteristics) -> dict[str, Any]:
+    """Characteristics as the first files hashed them: an entry a load, with a key for each characteristic."""
+
+    def entry(names: Sequence[str], **place: Any) -> dict[str, Any]:
+        key = (place["load_N"], place.get("rotation", "both"), place.get("SA_rad"))
+        rows = [found.at(name, *key) for name in names]
+        return place | {
+            name: None if row is None or row.estimate is None else dataclasses.asdict(row.estimate)
+            for name, row in zip(names, rows, strict=True)
+        }
+
+    directions = [(fit.load_N, fit.rotation) for fit in found.fits]
+    angles = dict.fromkeys((r.load_N, r.rotation, r.SA_rad) for r in found.rows if r.SA_rad is not None)
+    return {
+        "fits": [dataclasses.asdict(fit) for fit in found.fits],
+        "findings": [dataclasses.asdict(finding) for finding in found.findings],
+        "points": [dataclasses.asdict(point) for point in found.points],
+        "stiffness": [entry(STIFFNESS, load_N=load, rotation=way) for load, way in directions],
+        "pull": [entry(PULL, load_N=load) for load in found.loads_N],
+        "at_angles": [
+            entry(("FY", "MZ"), load_N=load, rotation=way, SA_rad=angle) for load, way, angle in angles
+        ],
+        "budgets": [
+            {"load_N": r.load_N, "rotation": r.rotation, "name": r.name, "unit": r.estimate.unit,
+             "sources": r.sources}
+            for r in found.rows if r.estimate is not None and r.SA_rad is None
+        ],
+    }  # fmt: skip
+
+
 def test_a_file_from_before_anything_was_stated_keeps_its_hash(tmp_path: Path, made: Made) -> None:
     """Its hash was made of a reduced test that had no such field."""
     use = dataclasses.replace(made[0].reduced.calibration, draft_reasons=())
     bare = dataclasses.replace(
         made[0], reduced=dataclasses.replace(made[0].reduced, stated=(), calibration=use)
     )
-    content = dataclasses.asdict(bare)
+    content = {
+        "reduced": dataclasses.asdict(bare.reduced),
+        "characteristics": first_form(bare.characteristics),
+    }
     del content["reduced"]["stated"]
     for name in ("draft_reasons", "since"):
         del content["reduced"]["calibration"][name]

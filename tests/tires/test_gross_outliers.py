@@ -5,7 +5,7 @@ import pytest
 
 from toolkit.tires.fit import Curve, fit_curves, value_at
 from toolkit.tires.models.magic_formula import value
-from toolkit.tires.outliers import gross_outliers
+from toolkit.tires.table_fit import gross_outliers
 
 SA = np.radians(np.arange(-12.0, 12.5, 0.75))
 TRUTH = {"FY": (10.5, 1.35, -3150.0, -0.6, 0.003, -30.0), "MZ": (12.0, 2.4, 84.0, -2.0, 0.002, 0.3)}

@@ -4,9 +4,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from toolkit.tires.plausibility import LARGEST, size_findings
 
 from toolkit.tires.models.magic_formula import MODEL
+from toolkit.tires.plausibility import LARGEST, size_findings
 from toolkit.tires.table import read_table
 from toolkit.tires.table_fit import fit_table
 

@@ -6,15 +6,61 @@ path, as plain answers; what is kept of each is a few bytes.
 
 from __future__ import annotations
 
+import json
+import tempfile
+import weakref
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
 from toolkit.audit.effects import TestSums
-from toolkit.audit.lines import Lines
 from toolkit.findings import Finding, Level
 from toolkit.reduction.physics import RULES
+
+# Values that are too many for the memory: JSON lines in a temporary file.
+
+
+class Lines:
+    """Takes plain values one by one, and gives them again in that order as often as is asked."""
+
+    def __init__(self) -> None:
+        self._file = tempfile.TemporaryFile()  # noqa: SIM115  it lives as long as this object
+        self._count = 0
+        weakref.finalize(self, self._file.close)
+
+    def add(self, value: dict[str, Any]) -> None:
+        """Append a value that JSON can hold."""
+        self.take(json.dumps(value).encode() + b"\n")
+
+    def take(self, line: bytes) -> None:
+        """Append a value as the line that `raw` yields for it."""
+        self._file.seek(0, 2)
+        self._file.write(line)
+        self._count += 1
+
+    def __len__(self) -> int:
+        return self._count
+
+    def __iter__(self) -> Iterator[dict[str, Any]]:
+        return (json.loads(line) for line in self.raw())
+
+    def raw(self) -> Iterator[bytes]:
+        """Yield every value as a line."""
+        place = 0
+        for _ in range(self._count):
+            self._file.seek(place)
+            line = self._file.readline()
+            place += len(line)
+            yield line
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Lines):
+            return NotImplemented
+        return len(self) == len(other) and all(a == b for a, b in zip(self, other, strict=True))
+
+    __hash__ = None  # type: ignore[assignment]
+
 
 _LATE_DAYS = 1  # a file is often saved on the day after its test
 
@@ -30,37 +76,40 @@ class Across:
     _units: dict[str, Counter[tuple[tuple[str, str], ...]]] = field(default_factory=dict)
     _with: dict[tuple[tuple[str, str], ...], list[str]] = field(default_factory=dict)
 
-    def add(self, one: Mapping[str, Any]) -> Iterator[Finding]:
+    def add(self, line: Mapping[str, Any]) -> Iterator[Finding]:
         """Take a file and yield what can be said at once."""
-        path = one["path"]
-        for note in one["notes"]:
+        path = line["path"]
+        for note in line["notes"]:
             yield noted(note, path)
-        yield from self._copies(one)
-        if one["units"]:
-            units = tuple(sorted(one["units"].items()))
-            self._units.setdefault(one["instrument"], Counter())[units] += 1
+        yield from self._copies(line)
+        if line["units"]:
+            units = tuple(sorted(line["units"].items()))
+            self._units.setdefault(line["instrument"], Counter())[units] += 1
             if len(few := self._with.setdefault(units, [])) < 4:
                 few.append(path)
-        if one["date"] is not None and one["modified"] is not None:
-            late = _days(one["modified"]) - _days(one["date"])
+        if line["date"] is not None and line["modified"] is not None:
+            late = _days(line["modified"]) - _days(line["date"])
             if late > _LATE_DAYS:
                 message = (
-                    f"by its own properties the file was last saved on {one['modified']}, {late} days after "
-                    f"the test of {one['date']}"
+                    f"by its own properties the file was last saved on {line['modified']}, {late} days after "
+                    f"the test of {line['date']}"
                 )
                 yield Finding(rule="edited-after-test", where=path, message=message, level="note")
         # Sorted by path, all files of a test's folder come in one stretch.
         for name in [name for name in self._open if name != "." and not path.startswith(name + "/")]:
             yield from self._closed(name)
-        key = one["test"]
-        if key is not None and one["date"] is not None and one["grade"] != "unreadable":
+        key = line["test"]
+        if key is not None and line["date"] is not None and line["grade"] != "unreadable":
             if key not in self._open:
                 self._open[key] = TestSums(
-                    test=key, instrument=one["instrument"], date=one["date"], own_protocol=one["own_protocol"]
+                    test=key,
+                    instrument=line["instrument"],
+                    date=line["date"],
+                    own_protocol=line["own_protocol"],
                 )
-            self._open[key].add(one)
+            self._open[key].add(line)
 
-    def rest(self) -> Iterator[Finding]:
+    def at_end(self) -> Iterator[Finding]:
         """Yield what only the whole archive can say."""
         for name in list(self._open):
             yield from self._closed(name)
@@ -70,10 +119,10 @@ class Across:
             against = [name for name, sign in signs if sign != most]
             if len(against) >= len(signs) / 2:
                 continue  # no convention to depart from
-            usual, here = ("rises", "falls") if most > 0 else ("falls", "rises")
+            usual, direction = ("rises", "falls") if most > 0 else ("falls", "rises")
             for name in against:
                 message = (
-                    f"drum {rotation}: Fy {here} with the slip angle, and {usual} in "
+                    f"drum {rotation}: Fy {direction} with the slip angle, and {usual} in "
                     f"{len(signs) - len(against)} of {len(signs)} tests of {instrument}: an axis has another "
                     "sign here"
                 )
@@ -86,30 +135,32 @@ class Across:
             self._slopes.setdefault((test.instrument, rotation), []).append((name, sign))
         self.tests.add(test.summary())
 
-    def _copies(self, one: Mapping[str, Any]) -> Iterator[Finding]:
-        told = False
-        for key, what in ((one["sha256"], "byte for byte"), (one["values_sha256"], "in every number")):
+    def _copies(self, line: Mapping[str, Any]) -> Iterator[Finding]:
+        reported = False
+        for key, what in ((line["sha256"], "byte for byte"), (line["values_sha256"], "in every number")):
             if key is None:
                 continue
             short = bytes.fromhex(key[:32])
-            first = self._first.setdefault(short, one["path"])
-            if first != one["path"] and not told:
-                told = True
+            first = self._first.setdefault(short, line["path"])
+            if first != line["path"] and not reported:
+                reported = True
                 message = f"the same as {first}, {what}"
-                yield Finding(rule="duplicate-file", where=one["path"], message=message, level="note")
+                yield Finding(rule="duplicate-file", where=line["path"], message=message, level="note")
 
     def _conventions(self) -> Iterator[Finding]:
         for instrument, kinds in sorted(self._units.items()):
             usual = dict(kinds.most_common(1)[0][0])
             for units, count in kinds.items():
-                other = {symbol: unit for symbol, unit in units if symbol in usual and usual[symbol] != unit}
-                if other:
-                    told = ", ".join(f"{s} in {unit} for {usual[s]}" for s, unit in other.items())
-                    some = self._with[units]
+                differing = {
+                    symbol: unit for symbol, unit in units if symbol in usual and usual[symbol] != unit
+                }
+                if differing:
+                    text = ", ".join(f"{s} in {unit} for {usual[s]}" for s, unit in differing.items())
+                    paths = self._with[units]
                     message = (
-                        f"{told}: {count} file{'s' if count > 1 else ''} of {instrument}, such as {some[0]}"
+                        f"{text}: {count} file{'s' if count > 1 else ''} of {instrument}, such as {paths[0]}"
                     )
-                    yield Finding(rule="units-changed", where=some[0], message=message, level="note")
+                    yield Finding(rule="units-changed", where=paths[0], message=message, level="note")
 
 
 def noted(note: Mapping[str, str], path: str) -> Finding:

@@ -82,7 +82,7 @@ def unfit(record: CalibrationRecord, columns: Columns) -> str | None:
     for name, text in zip(record.indications, record.indication_units, strict=True):
         if unit(text).dimension != unit(have[name]).dimension:
             return f"its indications are in {text}, the file's in {have[name]}"
-    missing = [load for load in columns.loads if load not in {one.load for one in record.loads}]
+    missing = [load for load in columns.loads if load not in {fit.load for fit in record.loads}]
     return f"it has no equation for {', '.join(missing)}" if missing else None
 
 
@@ -163,15 +163,17 @@ def _family(
 ) -> Family:
     terms, moved = _design(record, fit, x, half)
     to_file = si_scale(fit.unit) / si_scale(columns.y_units[load])
-    some = _variants(fit, record.indications, to_file, issued)
+    variants = _variants(fit, record.indications, to_file, issued)
     size = np.abs(terms)
     return Family(
-        signs=some.signs,
-        coefficients=some.coefficients,
-        predicted=some.coefficients @ terms.T,
+        signs=variants.signs,
+        coefficients=variants.coefficients,
+        predicted=variants.coefficients @ terms.T,
         # Large terms may cancel to a small load: the sum's own round-off is no departure.
-        bound=columns.half_y[load] + 1e-9 * np.abs(columns.y[load]) + (moved + ROUND_OFF * size) @ some.size,
-        slack=size @ some.slack,
+        bound=columns.half_y[load]
+        + 1e-9 * np.abs(columns.y[load])
+        + (moved + ROUND_OFF * size) @ variants.size,
+        slack=size @ variants.slack,
     )
 
 
@@ -205,43 +207,43 @@ def describe(
     Signs first: ``E5 negative in FY, MZ`` names the sign that the file has; then exchanged columns,
     ``D51<->D52``, or for three ``D51->D52->E5->D51``: the first one's coefficient took the next one's column.
     """
-    told = []
+    parts = []
     names = (*record.indications, CONSTANT)
     for i, name in enumerate(names):
         by_sign: dict[str, list[str]] = {}
         for load, turned in signs.items():
             if turned[i] < 0:
                 by_sign.setdefault(_sign_in_file(record.load(load), name), []).append(load)
-        told += [f"{name} {sign} in {', '.join(loads)}" for sign, loads in by_sign.items()]
-    seen: set[int] = set()
+        parts += [f"{name} {sign} in {', '.join(loads)}" for sign, loads in by_sign.items()]
+    cells_seen: set[int] = set()
     for start, image in enumerate(order):
-        if start in seen or image == start:
+        if start in cells_seen or image == start:
             continue
         cycle = [start]
         while order[cycle[-1]] != start:
             cycle.append(order[cycle[-1]])
-        seen.update(cycle)
+        cells_seen.update(cycle)
         shown = [record.indications[i] for i in cycle]
-        told.append("<->".join(shown) if len(shown) == 2 else "->".join([*shown, shown[0]]))
-    return "; ".join(told) or None
+        parts.append("<->".join(shown) if len(shown) == 2 else "->".join([*shown, shown[0]]))
+    return "; ".join(parts) or None
 
 
-def turned_against(record: CalibrationRecord, other: CalibrationRecord, loads: tuple[str, ...]) -> str | None:
+def turned_against(record: CalibrationRecord, rival: CalibrationRecord, loads: tuple[str, ...]) -> str | None:
     """Return which signs a record has otherwise than another of the same magnitudes; None where it has not.
 
     It tells in one line what was wrong with a withdrawn record: ``E5 negative in FY, MZ``.
     """
     signs: dict[str, tuple[int, ...]] = {}
     for load in loads:
-        mine, theirs = record.load(load), other.load(load)
-        if mine.terms != theirs.terms or record.indications != other.indications:
+        mine, theirs = record.load(load), rival.load(load)
+        if mine.terms != theirs.terms or record.indications != rival.indications:
             return None
         if not np.allclose(np.abs(mine.coefficients), np.abs(theirs.coefficients), rtol=1e-9, atol=0.0):
             return None
         pairs = zip(mine.coefficients, theirs.coefficients, strict=True)
         factor = dict(zip(mine.terms, (1 if a * b >= 0 else -1 for a, b in pairs), strict=True))
         signs[load] = tuple(factor.get(name, 1) for name in (*record.indications, INTERCEPT))
-    return describe(other, tuple(range(len(record.indications))), signs)
+    return describe(rival, tuple(range(len(record.indications))), signs)
 
 
 def _sign_in_file(fit: LoadFit, name: str) -> str:

@@ -59,6 +59,6 @@ class Choices:
                 entries = self.registry.ledger(instrument).entries
             except RegistryError:
                 entries = ()
-            named = {entry.since for entry in entries if entry.since is not None}
-            self._edges[instrument] = tuple(sorted(named))
+            since_days = {entry.since for entry in entries if entry.since is not None}
+            self._edges[instrument] = tuple(sorted(since_days))
         return self._edges[instrument]

@@ -8,19 +8,111 @@ memory of a worker is limited by its nanny.
 
 from __future__ import annotations
 
+import asyncio
 import gc
 import os
+import socket
 import threading
 import time
 import uuid
 from collections.abc import Callable, Iterator, Sequence
 from itertools import islice
+from pathlib import Path
 from typing import Any, TypeVar
+from urllib.parse import urlsplit
 
-from toolkit.audit.scheduler import CONNECT_S, security_of, trouble, unreachable
 from toolkit.audit.workers import DIED, TIMEOUT_S, Lost
 from toolkit.errors import ConfigError
 from toolkit.recording.extras import needed
+
+# The scheduler of a cluster: whether one answers at an address, and with which certificates.
+
+
+CONNECT_S = 10.0
+_SECTION = "distributed.comm.tls"
+_NEEDED = (("tls_ca_file", "ca-file"), ("tls_client_cert", "client.cert"))
+_FILES = (*_NEEDED, ("tls_client_key", "client.key"))  # the key may stand in the certificate's file
+_GREETING = 0.8  # of the time to connect: its own words say more than that the time is over
+
+
+def security_of(distributed: Any, address: str) -> Any:
+    """Return dask's security settings for an address, as its configuration has them.
+
+    Raises
+    ------
+    ConfigError
+        ``cluster``: ``tls://``, and the configuration lacks a certificate or names one that cannot be used
+    """
+    try:
+        security = distributed.Security()
+        if address.startswith("tls:"):
+            _check_files(security, address)
+        security.get_connection_args("client")
+    except (OSError, ValueError) as error:  # an SSLError is an OSError
+        raise trouble(
+            address,
+            f"certificates that cannot be used: {error}",
+            f"{_SECTION} in dask's configuration: PEM files of ca-file, client.cert, client.key",
+            "correct the files or the configuration; 'dask config list' shows it",
+        ) from error
+    return security
+
+
+def _check_files(security: Any, address: str) -> None:
+    lacking = [f"{_SECTION}.{key}" for field, key in _NEEDED if not getattr(security, field)]
+    lack = f"dask's configuration without {' and '.join(lacking)}"
+    if not lacking:
+        files = [(key, str(getattr(security, field) or "")) for field, key in _FILES]
+        absent = [f"{key} {text}" for key, text in files if text and "\n" not in text and not _there(text)]
+        if not absent:
+            return
+        lack = f"no such file: {', '.join(absent)}"
+    raise trouble(
+        address,
+        lack,
+        "for tls://, the certificate authority and the client's certificate and key in dask's configuration",
+        f"name {_SECTION}.ca-file, .client.cert and .client.key in ~/.config/dask/distributed.yaml, or set "
+        "DASK_DISTRIBUTED__COMM__TLS__CA_FILE, ..__CLIENT__CERT and ..__CLIENT__KEY",
+    )
+
+
+def _there(text: str) -> bool:
+    return Path(text).is_file()
+
+
+def unreachable(distributed: Any, address: str, security: Any) -> str | None:
+    """Return why no scheduler answers at an address, None where one does.
+
+    A client asks whoever is there, and would wait for an answer without end.
+    """
+    try:
+        parts = urlsplit(address)
+        host, port = parts.hostname, parts.port
+        if parts.scheme not in ("tcp", "tls") or not host or port is None:
+            return f"{address!r}, which is no address of a scheduler"
+        socket.create_connection((host, port), timeout=CONNECT_S).close()
+        asyncio.run(asyncio.wait_for(_greeted(distributed, address, security), CONNECT_S))
+    except TimeoutError:
+        return f"no answer within {CONNECT_S:g} s"
+    except (OSError, ValueError, RuntimeError) as error:
+        cause = error.__cause__
+        return f"{error}" + (f" ({cause})" if cause is not None and str(cause) not in str(error) else "")
+    return None
+
+
+async def _greeted(distributed: Any, address: str, security: Any) -> None:
+    words = security.get_connection_args("client")
+    comm = await distributed.core.connect(address, timeout=_GREETING * CONNECT_S, **words)
+    await comm.close()
+
+
+def trouble(address: str, got: str, expected: str, next_step: str) -> ConfigError:
+    """Return the error of a cluster that cannot be used."""
+    return ConfigError(
+        "the cluster cannot be used", where=f"--scheduler {address}", got=got, expected=expected,
+        next_step=next_step, rule="cluster",
+    )  # fmt: skip
+
 
 Result = TypeVar("Result")
 
@@ -74,18 +166,18 @@ def run_on_cluster(
 
 def _client(distributed: Any, address: str) -> Any:
     security = security_of(distributed, address)
-    told = unreachable(distributed, address, security)
-    if told is None:
+    why = unreachable(distributed, address, security)
+    if why is None:
         try:
             return distributed.Client(
                 address, timeout=CONNECT_S, set_as_default=False, name="toolkit-audit", security=security
             )
         except (OSError, ValueError, TypeError) as error:
-            told = str(error) or type(error).__name__
+            why = str(error) or type(error).__name__
         gc.collect()  # a client that failed, found later while another one starts, would wait for it for ever
     raise trouble(
         address,
-        told[:300],
+        why[:300],
         "a scheduler at an address such as tcp://host:8786, or tls:// with dask's own certificates",
         "start it with 'dask scheduler', and workers with 'dask worker ADDRESS'",
     )
@@ -105,12 +197,12 @@ def _batches(
     token = uuid.uuid4().hex
     todo = (names[i : i + batch] for i in range(0, len(names), batch))
     flying: dict[Any, Sequence[str]] = {}
-    seen = time.monotonic()  # when there was a worker
+    last_worker = time.monotonic()  # when there was a worker
     while True:
         threads = _threads(client, address)
         if threads:
-            seen = time.monotonic()
-        elif time.monotonic() - seen > empty_s:
+            last_worker = time.monotonic()
+        elif time.monotonic() - last_worker > empty_s:
             raise _no_workers(address, empty_s)
         for part in islice(todo, max(_AHEAD * max(threads, 1) - len(flying), 0)):
             task = client.submit(_several, make, tuple(part), token, timeout_s, pure=False, retries=0)
@@ -121,13 +213,13 @@ def _batches(
         for task in ready:
             part = flying.pop(task)
             try:
-                found = _result(distributed, task, address)
+                answer = _result(distributed, task, address)
             except _LostResultError:
-                found = None
-            if found is None:
+                answer = None
+            if answer is None:
                 doubtful.extend(part)
             else:
-                yield from zip(part, found, strict=True)
+                yield from zip(part, answer, strict=True)
             task.release()
 
 
@@ -143,15 +235,15 @@ def _alone(
 ) -> Result | Lost:
     token = uuid.uuid4().hex
     task = client.submit(_several, make, (name,), token, timeout_s, pure=False, retries=0)
-    began = seen = time.monotonic()
+    began = last_worker = time.monotonic()
     started = False
     late = f"timeout: no answer within {timeout_s:g} s"
     try:
         while not _wait(client, distributed, [task]):
             now = time.monotonic()
             if _threads(client, address):
-                seen = now
-            elif now - seen > empty_s:
+                last_worker = now
+            elif now - last_worker > empty_s:
                 raise _no_workers(address, empty_s)
             if not started and any(client.processing().values()):
                 started = True
@@ -160,14 +252,14 @@ def _alone(
             if started and now - began > timeout_s + _GRACE_S:
                 return Lost(reason=late)
         try:
-            found = _result(distributed, task, address)
+            answer = _result(distributed, task, address)
         except _LostResultError:
             # It was done, and the worker that held it is no more: by what, nothing tells the first time.
             if tries <= 1:
                 return Lost(reason=DIED)
             return _alone(client, distributed, make, name, timeout_s, empty_s, address, tries - 1)
-        if found is not None:
-            result: Result = found[0]
+        if answer is not None:
+            result: Result = answer[0]
             return result
         # The worker ends itself where the time is up.
         return Lost(reason=late if started and time.monotonic() - began >= timeout_s else DIED)
@@ -197,7 +289,7 @@ def _result(distributed: Any, task: Any, address: str) -> list[Any] | None:
     if task.status in ("cancelled", "lost"):
         raise _lost(distributed, address)
     try:
-        found: list[Any] = task.result(timeout=CONNECT_S)
+        answers: list[Any] = task.result(timeout=CONNECT_S)
     except distributed.KilledWorker:
         return None
     except (ImportError, AttributeError) as error:
@@ -209,7 +301,7 @@ def _result(distributed: Any, task: Any, address: str) -> list[Any] | None:
         ) from error
     except (OSError, TimeoutError) as error:
         raise _lost(distributed, address) from error
-    return found
+    return answers
 
 
 class _LostResultError(Exception):
@@ -217,15 +309,15 @@ class _LostResultError(Exception):
 
 
 def _lost(distributed: Any, address: str) -> Exception:
-    told = unreachable(distributed, address, security_of(distributed, address))
-    return _LostResultError() if told is None else _gone(address)
+    trouble = unreachable(distributed, address, security_of(distributed, address))
+    return _LostResultError() if trouble is None else _lost_scheduler(address)
 
 
 def _threads(client: Any, address: str) -> int:
     try:
         return sum(client.nthreads().values())
     except (OSError, TimeoutError) as error:
-        raise _gone(address) from error
+        raise _lost_scheduler(address) from error
 
 
 def _several(
@@ -248,7 +340,7 @@ def _timed(work: Callable[[str], Result], name: str, timeout_s: float) -> Result
         watch.cancel()
 
 
-def _gone(address: str) -> ConfigError:
+def _lost_scheduler(address: str) -> ConfigError:
     return trouble(
         address,
         "the connection was lost",

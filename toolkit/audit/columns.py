@@ -56,16 +56,18 @@ class Columns:
 
 def columns_of(recording: Recording) -> Columns:
     """Return a recording's columns for identification."""
-    cells = [one for one in recording.series if one.role == "indication"]
-    own = [one for one in recording.series if one.role == "acquired" and one.symbol in LOADS]
-    x = np.column_stack([one.values for one in cells]) if cells else np.empty((recording.rows, 0))
-    half = roundings([*cells, *own]) if cells or own else np.empty((0, recording.rows))
+    cells = [channel for channel in recording.series if channel.role == "indication"]
+    loads = [
+        channel for channel in recording.series if channel.role == "acquired" and channel.symbol in LOADS
+    ]
+    x = np.column_stack([cell.values for cell in cells]) if cells else np.empty((recording.rows, 0))
+    half = roundings([*cells, *loads]) if cells or loads else np.empty((0, recording.rows))
     return Columns(
-        names=tuple(one.symbol for one in cells),
-        units=tuple(one.unit for one in cells),
+        names=tuple(cell.symbol for cell in cells),
+        units=tuple(cell.unit for cell in cells),
         x=x,
         half_x=np.ascontiguousarray(half[: len(cells)].T),
-        y={one.symbol: one.values for one in own},
-        half_y={one.symbol: values for one, values in zip(own, half[len(cells) :], strict=True)},
-        y_units={one.symbol: one.unit for one in own},
+        y={channel.symbol: channel.values for channel in loads},
+        half_y={channel.symbol: values for channel, values in zip(loads, half[len(cells) :], strict=True)},
+        y_units={channel.symbol: channel.unit for channel in loads},
     )

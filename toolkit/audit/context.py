@@ -62,8 +62,8 @@ def context_of(
         name, source = str(table["machine"]), "test.toml"
         name = str(toml.parent / name) if name.endswith(".toml") else name
     else:
-        named = machine_of(path) if own is None else own()
-        name, source = (named, "file") if named is not None else (DEFAULT_MACHINE, "default")
+        file_machine = machine_of(path) if own is None else own()
+        name, source = (file_machine, "file") if file_machine is not None else (DEFAULT_MACHINE, "default")
     return Context(
         machine=load_machine(name),
         machine_source=source,
@@ -78,8 +78,8 @@ def _is_tare(path: Path, tare: object, folder: Path) -> bool:
     name = tare.get("file") if isinstance(tare, dict) else None
     if not isinstance(name, str):
         return False
-    named = folder / name
-    return named.is_file() and path.is_file() and named.samefile(path)
+    tare_file = folder / name
+    return tare_file.is_file() and path.is_file() and tare_file.samefile(path)
 
 
 def _date(value: object, toml: Path) -> dt.date:

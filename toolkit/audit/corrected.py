@@ -81,9 +81,13 @@ def check_target(archive: Path, target: Path) -> None:
     OutputError
         ``repair-target``: the folder is the archive, inside it, or around it; or it holds other files
     """
-    one, other = archive.resolve(), target.resolve()
-    if one == other or one in other.parents or other in one.parents:
-        raise _refused(target, f"the archive is {one}", "a folder apart from the archive")
+    source_folder, target_folder = archive.resolve(), target.resolve()
+    if (
+        source_folder == target_folder
+        or source_folder in target_folder.parents
+        or target_folder in source_folder.parents
+    ):
+        raise _refused(target, f"the archive is {source_folder}", "a folder apart from the archive")
     if target.exists() and not target.is_dir():
         raise _refused(target, "a file", "a folder")
     if target.is_dir() and any(target.iterdir()) and not (target / INDEX).is_file():
@@ -91,7 +95,7 @@ def check_target(archive: Path, target: Path) -> None:
 
 
 def write_copies(
-    made: ArchiveAudit,
+    audit: ArchiveAudit,
     registry: Registry,
     target: Path,
     *,
@@ -108,37 +112,37 @@ def write_copies(
     OutputError
         see `check_target`; or a copy cannot be written
     """
-    check_target(made.archive, target)
-    stands: dict[tuple[str, str], Standing] = {}
+    check_target(audit.archive, target)
+    standings: dict[tuple[str, str], Standing] = {}
     copies: list[Copy] = []
-    for plain in made.files.plain():
+    for plain in audit.files.plain():
         if plain["repair"] is None or plain["grade"] in CLEAN or not plain["units"]:
             continue
         key = (plain["in_force"], plain["date"])
-        if key not in stands:
-            stands[key] = standing(
+        if key not in standings:
+            standings[key] = standing(
                 registry,
                 instrument_of(key[0]),
                 on=dt.date.fromisoformat(key[1]),
-                known_at=made.known_at,
+                known_at=audit.known_at,
                 named=key[0],
             )
-        copies.append(_copy(made.archive, plain, stands[key], target, draft=draft))
+        copies.append(_copy(audit.archive, plain, standings[key], target, draft=draft))
         step(plain["path"])
-    told = {
+    manifest = {
         "generator": GENERATOR,
         "marks": OWN_OUTPUT,
         "schema": 1,
-        "known_at": made.known_at.isoformat(),
-        "heads": dict(made.heads),
-        "files": [one.as_dict() for one in copies],
+        "known_at": audit.known_at.isoformat(),
+        "heads": dict(audit.heads),
+        "files": [copy.as_dict() for copy in copies],
     }
-    write_atomic(target / INDEX, json.dumps(told, indent=2) + "\n")
+    write_atomic(target / INDEX, json.dumps(manifest, indent=2) + "\n")
     return tuple(copies)
 
 
-def _copy(archive: Path, plain: Mapping[str, Any], stands: Standing, target: Path, *, draft: bool) -> Copy:
-    record = stands.record
+def _copy(archive: Path, plain: Mapping[str, Any], standing: Standing, target: Path, *, draft: bool) -> Copy:
+    record = standing.record
     path, place = archive / plain["path"], target / plain["path"]
     failed: str | None = None
     sha256: str | None = None
@@ -146,7 +150,7 @@ def _copy(archive: Path, plain: Mapping[str, Any], stands: Standing, target: Pat
     if not place.parent.resolve().is_relative_to(target.resolve()):
         raise _refused(place.parent, "a link that leads outside", "a plain folder")
     try:
-        use = stands.use(draft=draft, where=path)
+        use = standing.use(draft=draft, where=path)
         context = context_of(path)
         recording = read_recording(path, context.machine)
         if recording.sha256 != plain["sha256"]:
@@ -181,30 +185,30 @@ def _write(
     title = f"corrected copy of {recording.name}, sha256 {recording.sha256}; Fy and Mz by {use.id}"
     title += f"; {use.mark}" if use.mark else ""
     if recording.format in WRITERS:
-        write_atomic(place, WRITERS[recording.format](_written(recording, new), title))
+        write_atomic(place, WRITERS[recording.format](_copied_columns(recording, new), title))
         return
     machine = recording.machine
-    known = {column.symbol: column.unit for column in machine.columns}
+    units = {column.symbol: column.unit for column in machine.columns}
     columns: dict[str, NDArray[np.float64]] = {}
-    for one in recording.series:
-        if one.symbol in known:
-            unit, name = known[one.symbol], one.symbol
+    for channel in recording.series:
+        if channel.symbol in units:
+            unit, name = units[channel.symbol], channel.symbol
         else:
-            unit, name = one.unit, f"{one.symbol} [{one.unit}]"
-        values = one.values if unit == one.unit else from_si(one.si, unit)
-        columns[name] = np.asarray(from_si(new[one.symbol], unit) if one.symbol in new else values)
+            unit, name = channel.unit, f"{channel.symbol} [{channel.unit}]"
+        values = channel.values if unit == channel.unit else from_si(channel.si, unit)
+        columns[name] = np.asarray(from_si(new[channel.symbol], unit) if channel.symbol in new else values)
     write_labview(place, machine, columns, simulated=recording.simulated, title=title)
 
 
-def _written(recording: Recording, new: Mapping[str, NDArray[np.float64]]) -> list[Written]:
+def _copied_columns(recording: Recording, new: Mapping[str, NDArray[np.float64]]) -> list[Written]:
     return [
         Written(
-            symbol=one.symbol,
-            header=one.header,
-            unit=one.unit,
-            values=new[one.symbol] / si_scale(one.unit) if one.symbol in new else one.values,
+            symbol=channel.symbol,
+            header=channel.header,
+            unit=channel.unit,
+            values=new[channel.symbol] / si_scale(channel.unit) if channel.symbol in new else channel.values,
         )
-        for one in recording.series
+        for channel in recording.series
     ]
 
 
@@ -212,9 +216,9 @@ def _csv(recording: Recording, new: Mapping[str, NDArray[np.float64]]) -> str:
     stream = io.StringIO()
     writer = csv.writer(stream, lineterminator="\n")
     # A header that a spreadsheet would take for a formula is made a text.
-    headers = [one.header for one in recording.series]
+    headers = [channel.header for channel in recording.series]
     writer.writerow([f"'{text}" if text.startswith(("=", "+", "-", "@")) else text for text in headers])
-    columns = [one.values for one in _written(recording, new)]
+    columns = [column.values for column in _copied_columns(recording, new)]
     writer.writerows([repr(float(v)) for v in row] for row in np.column_stack(columns))
     return stream.getvalue()
 

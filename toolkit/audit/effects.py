@@ -11,12 +11,18 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from toolkit.audit.model import CLEAN
 from toolkit.channels import ROTATIONS, Rotation
+from toolkit.characteristics.catalogue import summary
+from toolkit.characteristics.derivations import half_at_zero, secant
+from toolkit.characteristics.groups import CHANNELS
 from toolkit.findings import Finding
 from toolkit.machine import load_machine, machine_names
+
+if TYPE_CHECKING:
+    from toolkit.characteristics.characteristic import Characteristic, Scope
 
 _NEEDED = ("SA_deg", "FY_N", "MZ_Nm", "FY_change_N", "MZ_change_Nm", "step_SA_deg", "step_FZ_N")
 
@@ -28,8 +34,8 @@ Point = tuple[float, float, float, float, float]
 class Effect:
     """One characteristic of one load: ``old`` by the files' own values, ``new`` by the record in force.
 
-    ``name`` is ``cornering_stiffness`` [N/rad], ``aligning_stiffness`` [N·m/rad] of a direction, or
-    ``conicity``, ``plysteer`` [N], ``CRAT``, ``PRAT`` [N·m], whose ``rotation`` is None.
+    ``name`` is that of the catalogue's summary, as ``cornering_stiffness`` [N/rad] of a direction or
+    ``conicity`` [N], whose ``rotation`` is None; ``unit`` is SI.
     """
 
     load_N: float
@@ -56,21 +62,21 @@ class TestSums:
     worst_MZ_Nm: float = 0.0
     points: dict[tuple[Rotation, float, float], Point] = field(default_factory=dict)
 
-    def add(self, one: Mapping[str, Any]) -> None:
+    def add(self, line: Mapping[str, Any]) -> None:
         """Take a file's plain answer."""
         self.files += 1
-        self.dirty += one["grade"] not in CLEAN
-        if one["repair"] is not None:
-            self.worst_FY_N = max(self.worst_FY_N, one["repair"]["FY_max_abs_N"] or 0.0)
-            self.worst_MZ_Nm = max(self.worst_MZ_Nm, one["repair"]["MZ_max_abs_Nm"] or 0.0)
-        sign = one["to_SAE"]
-        for block in one["conditions"]:
+        self.dirty += line["grade"] not in CLEAN
+        if line["repair"] is not None:
+            self.worst_FY_N = max(self.worst_FY_N, line["repair"]["FY_max_abs_N"] or 0.0)
+            self.worst_MZ_Nm = max(self.worst_MZ_Nm, line["repair"]["MZ_max_abs_Nm"] or 0.0)
+        sign = line["to_SAE"]
+        for block in line["conditions"]:
             if any(block[key] is None for key in _NEEDED):
                 continue
             FY, MZ = sign["FY"] * block["FY_N"], sign["MZ"] * block["MZ_Nm"]
             dFY, dMZ = sign["FY"] * block["FY_change_N"], sign["MZ"] * block["MZ_change_Nm"]
             SA = sign["SA"] * math.radians(block["SA_deg"])
-            key = (one["rotation"], block["step_FZ_N"], round(block["step_SA_deg"], 6))
+            key = (line["rotation"], block["step_FZ_N"], round(block["step_SA_deg"], 6))
             self.points.setdefault(key, (SA, FY, MZ, FY + dFY, MZ + dMZ))
 
     def summary(self) -> dict[str, Any]:
@@ -83,30 +89,30 @@ class TestSums:
             "not_clean": self.dirty,
             "FY_max_abs_N": self.worst_FY_N,
             "MZ_max_abs_Nm": self.worst_MZ_Nm,
-            "effects": [asdict(one) | {"change": one.new - one.old} for one in self.effects()]
+            "effects": [asdict(effect) | {"change": effect.new - effect.old} for effect in self.effects()]
             if self.dirty
             else [],
         }
 
     def effects(self) -> tuple[Effect, ...]:
         """Return every characteristic that the test's files give, by load."""
-        made: list[Effect] = []
+        summary_effects: list[Effect] = []
         for load in sorted({load for _, load, _ in self.points}):
             at_zero: dict[Rotation, tuple[float, ...]] = {}
             for rotation in ROTATIONS:
                 near = self._pair(rotation, load)
                 if near is not None:
-                    made += _stiffness(near, load, rotation)
+                    summary_effects += _stiffness(near, load, rotation)
                 points = sorted(p for (r, at, _), p in self.points.items() if (r, at) == (rotation, load))
                 crossing = _at_zero(points)
                 if crossing is not None:
                     at_zero[rotation] = crossing
             if len(at_zero) == 2:
-                made += _pull(at_zero["forward"], at_zero["reverse"], load)
-        return tuple(made)
+                summary_effects += _pull(at_zero["forward"], at_zero["reverse"], load)
+        return tuple(summary_effects)
 
     def _pair(self, rotation: Rotation, load: float) -> tuple[Point, Point] | None:
-        below, above = (self.points.get((rotation, load, wanted)) for wanted in (-1.0, 1.0))
+        below, above = (self.points.get((rotation, load, angle)) for angle in (-1.0, 1.0))
         return None if below is None or above is None else (below, above)
 
     def slope_signs(self) -> Iterator[tuple[str, int]]:
@@ -127,9 +133,9 @@ class TestSums:
         planned = load_machine(self.instrument).protocol.slip_angles_rad
         for rotation in ROTATIONS:
             there = {step for r, _, step in self.points if r == rotation}
-            gone = [a for a in (round(math.degrees(step), 6) for step in planned) if a not in there]
-            if there and gone:
-                angles = ", ".join(f"{angle:g}" for angle in gone)
+            absent = [a for a in (round(math.degrees(step), 6) for step in planned) if a not in there]
+            if there and absent:
+                angles = ", ".join(f"{angle:g}" for angle in absent)
                 message = f"drum {rotation}: no recording at slip angle {angles} deg"
                 yield Finding(rule="missing-condition", where=self.test, message=message, level="note")
 
@@ -139,27 +145,37 @@ def _stiffness(near: tuple[Point, Point], load: float, rotation: Rotation) -> li
     slope = [(b - a) / (above[0] - below[0]) for a, b in zip(below, above, strict=True)]
     return [
         Effect(
-            load_N=load, name=name, rotation=rotation, unit=unit, old=factor * slope[at],
-            new=factor * slope[at + 2],
+            load_N=load,
+            name=str(entry.summary),
+            rotation=rotation,
+            unit=entry.unit,
+            old=entry.sign * slope[1 + at],
+            new=entry.sign * slope[3 + at],
         )
-        for name, unit, factor, at in (
-            ("cornering_stiffness", "N/rad", -1.0, 1),
-            ("aligning_stiffness", "N*m/rad", 1.0, 2),
-        )
-    ]  # fmt: skip
+        for entry, at in _entries("direction")
+    ]
 
 
 def _pull(F: tuple[float, ...], R: tuple[float, ...], load: float) -> list[Effect]:
-    # In axes that follow the travel; see `toolkit.characteristics.pull`.
+    # In axes that follow the travel; see `toolkit.characteristics.derivations`.
     return [
         Effect(
-            load_N=load, name=name, rotation=None, unit=unit, old=(F[at] + sign * R[at]) / 2,
-            new=(F[at + 2] + sign * R[at + 2]) / 2,
+            load_N=load,
+            name=str(entry.summary),
+            rotation=None,
+            unit=entry.unit,
+            old=(F[at] + entry.sign * R[at]) / 2,
+            new=(F[2 + at] + entry.sign * R[2 + at]) / 2,
         )
-        for name, unit, sign, at in (
-            ("conicity", "N", -1, 0), ("plysteer", "N", 1, 0), ("CRAT", "N*m", -1, 1), ("PRAT", "N*m", 1, 1),
-        )
-    ]  # fmt: skip
+        for entry, at in _entries("load")
+    ]
+
+
+def _entries(scope: Scope) -> Iterator[tuple[Characteristic, int]]:
+    """Yield what the summary of a report has of a scope, each with the place of its channel: FY 0, MZ 1."""
+    for entry in summary():
+        if entry.scope == scope and entry.read in (secant, half_at_zero):
+            yield entry, CHANNELS.index(entry.channel)
 
 
 def _at_zero(points: list[Point]) -> tuple[float, ...] | None:

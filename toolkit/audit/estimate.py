@@ -73,10 +73,10 @@ class Estimate:
 
 def estimate(columns: Columns, segments: Sequence[Segment], screen: Screen) -> Estimate | None:
     """Return the equation of a file's unknown rows; None where there are too few of them."""
-    unknown = [one for one in segments if one.grade == "unknown"]
+    unknown = [segment for segment in segments if segment.grade == "unknown"]
     if not unknown or not columns.loads or not columns.names:
         return None
-    longest = max(unknown, key=lambda one: one.last_row - one.first_row)
+    longest = max(unknown, key=lambda segment: segment.last_row - segment.first_row)
     rows = slice(longest.first_row - 1, longest.last_row)
     part = columns.part(rows)
     if part.rows < len(columns.names) + 1 + _MARGIN:
@@ -96,7 +96,7 @@ def _equation(part: Columns, load: str) -> Equation:
     scale = np.maximum(np.abs(design).max(axis=0), np.finfo(float).tiny)
     solved = np.linalg.lstsq(design / scale, part.y[load], rcond=1e-12)[0] / scale
     residual = part.y[load] - design @ solved
-    bounds = {one.name: one for one in coefficient_intervals(part, load)}
+    bounds = {interval.name: interval for interval in coefficient_intervals(part, load)}
     names = (*part.names, "constant")
     return Equation(
         load=load,

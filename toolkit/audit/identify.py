@@ -7,6 +7,7 @@ unit of its fifth significant digit. Candidates that the file cannot tell apart 
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import date
@@ -18,7 +19,6 @@ from toolkit.audit.candidates import Group, describe, unfit
 from toolkit.audit.columns import Columns
 from toolkit.audit.model import Grade, Identification, Repair, Segment, Skipped, worst
 from toolkit.audit.screen import Key, Screen, screen_of
-from toolkit.audit.segments import Hit, Run, distinct_rivals, partition, whole_file, without_chance
 from toolkit.calibration.terms import INTERCEPT, term_matrix
 from toolkit.units import si_scale
 
@@ -26,6 +26,129 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from toolkit.calibration.records.record import CalibrationRecord
+
+# Segments: which candidate fits which rows of a file that changes in the middle.
+
+
+_LUCKY = 3  # rows
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Hit:
+    """A candidate: ``group`` by its index, and the sign variant of each load by its index."""
+
+    group: int
+    signs: tuple[tuple[str, int], ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Run:
+    """Rows ``start`` to ``stop`` (0-based, stop excluded) and the candidates that fit all of them."""
+
+    start: int
+    stop: int
+    hits: tuple[Hit, ...]
+
+
+def whole_file(fits: Sequence[dict[str, NDArray[np.bool_]]]) -> tuple[Hit, ...]:
+    """Return the candidates that fit every row; ``fits`` has (variants, rows) a load for each group."""
+    hits: list[Hit] = []
+    for index, by_load in enumerate(fits):
+        choices = [[(load, int(v)) for v in np.flatnonzero(fit.all(axis=1))] for load, fit in by_load.items()]
+        hits += _products(index, choices)
+    return tuple(hits)
+
+
+def partition(fits: Sequence[dict[str, NDArray[np.bool_]]], rows: int) -> tuple[Run, ...]:
+    """Split a file into runs of rows that the same candidates fit."""
+    lengths = [{load: _run_lengths(fit) for load, fit in by_load.items()} for by_load in fits]
+    # A pair of variants fits as long as the shorter of the two; the longest pair is wanted.
+    reaches = np.zeros((len(fits), rows), dtype=np.int64)
+    for reach, by_load in zip(reaches, lengths, strict=True):
+        if by_load:
+            reach[:] = np.minimum.reduce([length.max(axis=0) for length in by_load.values()])
+    runs: list[Run] = []
+    row = 0
+    while row < rows:
+        reach_here = reaches[:, row]
+        longest = int(reach_here.max(initial=0))
+        hits: list[Hit] = []
+        for index in np.flatnonzero(reach_here == longest).tolist() if longest else ():
+            choices = [
+                [(load, int(v)) for v in np.flatnonzero(length[:, row] >= longest)]
+                for load, length in lengths[index].items()
+            ]
+            hits += _products(index, choices)
+        if longest == 0 and runs and not runs[-1].hits:
+            runs[-1] = Run(start=runs[-1].start, stop=row + 1, hits=())
+        else:
+            runs.append(Run(start=row, stop=row + max(longest, 1), hits=tuple(hits)))
+        row += max(longest, 1)
+    return tuple(runs)
+
+
+def without_chance(runs: Sequence[Run]) -> tuple[Run, ...]:
+    """Return the runs without those that a file of unknown origin has by chance.
+
+    Thousands of candidates meet a few rows of any file. Where over half of the rows have no candidate, a run
+    of one to three rows counts only if one of its candidates explains three rows and a fiftieth of the file.
+    """
+    unknown = sum(run.stop - run.start for run in runs if not run.hits)
+    if 2 * unknown <= runs[-1].stop:
+        return tuple(runs)
+    explained: Counter[Hit] = Counter()
+    for run in runs:
+        explained.update(dict.fromkeys(run.hits, run.stop - run.start))
+    enough = max(_LUCKY, runs[-1].stop / 50)
+    kept_runs: list[Run] = []
+    for run in runs:
+        lucky = run.stop - run.start <= _LUCKY and all(explained[hit] < enough for hit in run.hits)
+        if run.hits and not lucky:
+            kept_runs.append(run)
+        elif kept_runs and not kept_runs[-1].hits:
+            kept_runs[-1] = Run(start=kept_runs[-1].start, stop=run.stop, hits=())
+        else:
+            kept_runs.append(Run(start=run.start, stop=run.stop, hits=()))
+    return tuple(kept_runs)
+
+
+def _run_lengths(fit: NDArray[np.bool_]) -> NDArray[np.int64]:
+    # How many rows from this one on fit without a break, variants x rows.
+    rows = fit.shape[1]
+    position = np.arange(rows)
+    breaks = np.where(fit, rows, position)
+    next_break = np.minimum.accumulate(breaks[:, ::-1], axis=1)[:, ::-1]
+    return np.asarray(next_break - position)
+
+
+def _products(index: int, choices: list[list[tuple[str, int]]]) -> list[Hit]:
+    import itertools
+
+    if not choices:
+        return []
+    return [Hit(group=index, signs=signs) for signs in itertools.product(*choices)]
+
+
+def distinct_rivals(groups: Sequence[Group], accepted: Hit, *, slack: bool) -> tuple[Hit, ...]:
+    """Return the candidates that this file cannot tell from the accepted one, itself included.
+
+    Two candidates are told apart where their predictions differ, in some row of FY or MZ, by more than the
+    sum of their two bounds (twice the bound): then not both could fit.
+    """
+    accepted_group = groups[accepted.group]
+    close: list[Hit] = []
+    for index, group in enumerate(groups):
+        choices = []
+        for load, variant in accepted.signs:
+            mine, rival = accepted_group.families[load], group.families[load]
+            limit = mine.bound + rival.bound
+            if slack:
+                limit = limit + mine.slack + rival.slack
+            apart = np.abs(rival.predicted - mine.predicted[variant]) > limit
+            choices.append([(load, int(v)) for v in np.flatnonzero(~apart.any(axis=1))])
+        close += _products(index, choices)
+    return tuple(close)
+
 
 _ALIKE = "{:.12g}"
 
@@ -128,23 +251,23 @@ class _Judge:
         usual = self._usual()
         if usual is not None:
             return usual
-        self._let_in(self.screen.whole(self.columns))
+        self._let_in(self.screen.for_all_rows(self.columns))
         for slack in (False, True):
             hits = whole_file(self._fits(slack=slack))
             if hits:
-                told = self._answers(hits, slack=slack)
-                if len(told) == 1:  # and does nothing else come near?
+                answers = self._answers(hits, slack=slack)
+                if len(answers) == 1:  # and does nothing else come near?
                     accepted = self.groups[hits[0].group]
                     self._let_in(self.screen.close_to(accepted, self.columns, dict(hits[0].signs)))
-                    told = self._answers(distinct_rivals(self.groups, hits[0], slack=slack), slack=slack)
-                return self._told([Run(start=0, stop=self.columns.rows, hits=hits)], [told])
+                    answers = self._answers(distinct_rivals(self.groups, hits[0], slack=slack), slack=slack)
+                return self._conclusion([Run(start=0, stop=self.columns.rows, hits=hits)], [answers])
         self._let_in(self.screen.anywhere(self.columns))
         parts = [
             (slack, without_chance(partition(self._fits(slack=slack), self.columns.rows)))
             for slack in (False, True)
         ]
         slack, runs = min(parts, key=lambda part: (_unknown_rows(part[1]), len(part[1]), part[0]))
-        return self._told(runs, [self._answers(run.hits, slack=slack) for run in runs])
+        return self._conclusion(runs, [self._answers(run.hits, slack=slack) for run in runs])
 
     def _usual(self) -> tuple[tuple[Segment, ...], tuple[_Answer | None, ...]] | None:
         # Most files are what they should be: by the record in force, as it is, and by nothing else.
@@ -160,10 +283,10 @@ class _Judge:
                 return None
         hit = Hit(group=0, signs=tuple((load, 0) for load in self.groups[0].families))
         self._let_in(self.screen.close_to(self.groups[0], self.columns, dict(hit.signs)))
-        told = self._answers(distinct_rivals(self.groups, hit, slack=False), slack=False)
-        if len(told) > 1:
+        answers = self._answers(distinct_rivals(self.groups, hit, slack=False), slack=False)
+        if len(answers) > 1:
             return None
-        return self._told([Run(start=0, stop=self.columns.rows, hits=(hit,))], [told])
+        return self._conclusion([Run(start=0, stop=self.columns.rows, hits=(hit,))], [answers])
 
     def _let_in(self, keys: Sequence[Key]) -> None:
         new = [key for key in keys if key not in self._keys]
@@ -180,39 +303,39 @@ class _Judge:
             for group in self.groups
         ]
 
-    def _told(
+    def _conclusion(
         self, runs: Sequence[Run], answers: Sequence[tuple[_Answer, ...]]
     ) -> tuple[tuple[Segment, ...], tuple[_Answer | None, ...]]:
-        made, single = [], []
-        for run, told in zip(runs, answers, strict=True):
-            one = told[0] if len(told) == 1 else None
+        segments, single = [], []
+        for run, answer in zip(runs, answers, strict=True):
+            only = answer[0] if len(answer) == 1 else None
             # What all candidates of an ambiguous file share is known of it.
-            variants = {a.variant for a in told}
-            made.append(
+            variants = {a.variant for a in answer}
+            segments.append(
                 Segment(
                     first_row=run.start + 1,
                     last_row=run.stop,
-                    record=one.record if one else None,
+                    record=only.record if only else None,
                     variant=variants.pop() if len(variants) == 1 else None,
-                    grade=self._grade(one) if one else "ambiguous" if told else "unknown",
-                    candidates=tuple(sorted({a.record for a in told})) if len(told) > 1 else (),
+                    grade=self._grade(only) if only else "ambiguous" if answer else "unknown",
+                    candidates=tuple(sorted({a.record for a in answer})) if len(answer) > 1 else (),
                 )
             )
-            single.append(one)
-        return tuple(made), tuple(single)
+            single.append(only)
+        return tuple(segments), tuple(single)
 
-    def _grade(self, one: _Answer) -> Grade:
-        if one.swapped:
+    def _grade(self, answer: _Answer) -> Grade:
+        if answer.swapped:
             return "column_swap"
-        if one.variant is not None:
+        if answer.variant is not None:
             return "sign_variant"
-        if one.record in self.void:
+        if answer.record in self.void:
             return "stale"
         if self.on is None:
             return "undated"
-        if self.in_force is None or one.record != self.in_force.id:
+        if self.in_force is None or answer.record != self.in_force.id:
             return "stale"
-        return "rounding" if one.slack else "exact"
+        return "rounding" if answer.slack else "exact"
 
     def _answers(self, hits: Sequence[Hit], *, slack: bool) -> tuple[_Answer, ...]:
         # Equal coefficients are one candidate, named after the plain record or the one with fewest changes;
@@ -224,9 +347,9 @@ class _Judge:
             for key in (self._coefficients(hit), self._variant(hit)):
                 by_key.setdefault(key, set()).add(hit)
         answers: list[_Answer] = []
-        left = set(hits)
-        while left:
-            same, queue = set(), [next(hit for hit in hits if hit in left)]
+        remaining = set(hits)
+        while remaining:
+            same, queue = set(), [next(hit for hit in hits if hit in remaining)]
             while queue:
                 hit = queue.pop()
                 if hit in same:
@@ -234,17 +357,17 @@ class _Judge:
                 same.add(hit)
                 for key in (self._coefficients(hit), self._variant(hit)):
                     queue += by_key[key]
-            left -= same
+            remaining -= same
             answers.append(self._simplest(same, slack=slack))
         return tuple(answers)
 
     def _simplest(self, same: set[Hit], *, slack: bool) -> _Answer:
         def rank(hit: Hit) -> tuple[object, ...]:
             group = self.groups[hit.group]
-            other = self.in_force is None or group.record.id != self.in_force.id
+            not_in_force = self.in_force is None or group.record.id != self.in_force.id
             return (
-                self._changes(hit), other, group.record.id in self.void, group.record.id, not group.issued,
-                group.order, hit.signs,
+                self._changes(hit), not_in_force, group.record.id in self.void, group.record.id,
+                not group.issued, group.order, hit.signs,
             )  # fmt: skip
 
         hit = min(same, key=rank) if len(same) > 1 else next(iter(same))
@@ -273,17 +396,17 @@ class _Judge:
 
     def _variant(self, hit: Hit) -> object:
         group = self.groups[hit.group]
-        return (group.record.id, group.order, tuple(self._signs(hit, *one) for one in hit.signs))
+        return (group.record.id, group.order, tuple(self._signs(hit, *sign) for sign in hit.signs))
 
     def _coefficients(self, hit: Hit) -> object:
         # By load: what each column, and the constant, is multiplied by in the file's units.
         group = self.groups[hit.group]
-        told = []
+        texts = []
         for load, variant in hit.signs:
             fit = group.record.load(load)
             names = [_in_columns(group, term) for term in fit.terms]
             values = group.families[load].coefficients[variant].tolist()
-            told.append(
+            texts.append(
                 (
                     load,
                     tuple(
@@ -295,7 +418,7 @@ class _Judge:
                     ),
                 )
             )
-        return tuple(told)
+        return tuple(texts)
 
 
 def _in_columns(group: Group, term: str) -> str:

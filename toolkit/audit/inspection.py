@@ -12,7 +12,7 @@ from toolkit.audit.columns import Columns, columns_of
 from toolkit.audit.context import Context, context_of
 from toolkit.audit.identify import identify_columns, recompute
 from toolkit.audit.model import CLEAN, TELLS, Identification
-from toolkit.audit.stored import impossible
+from toolkit.audit.quality import impossible
 from toolkit.errors import RecordError, RegistryError
 from toolkit.findings import Finding
 from toolkit.recording.read import read_recording
@@ -203,21 +203,23 @@ def _impossible(
     """Return what no tire can do, of the file's own values and of the corrected ones."""
     loads = [block for block in blocks if not block.tare]
     rows = [f"rows {block.first_row}-{block.last_row}" for block in loads]
-    own = [(b.FZ_N, b.SA_rad, b.FY_file_N, b.MZ_file_Nm) for b in loads]
-    found = impossible(path.name, rows, own, values="the stored Fy and Mz are impossible")
+    stored_blocks = [(b.FZ_N, b.SA_rad, b.FY_file_N, b.MZ_file_Nm) for b in loads]
+    findings = impossible(path.name, rows, stored_blocks, values="the stored Fy and Mz are impossible")
     if corrector is None:
-        return found
+        return findings
     new = [(b.FZ_N, b.SA_rad, b.FY_N, b.MZ_Nm) for b in loads]
     return (
-        *found,
+        *findings,
         *impossible(path.name, rows, new, values=f"Fy and Mz by {corrector.id} are impossible too"),
     )
 
 
 def withdrawal(inspection: Inspection) -> RecordStatus | None:
     """Return the status of the record that computed a file where it was withdrawn, else None."""
-    found, choice = inspection.identification, inspection.choice
-    status = choice.status(found.record) if found is not None and choice is not None else None
+    identification, choice = inspection.identification, inspection.choice
+    status = (
+        choice.status(identification.record) if identification is not None and choice is not None else None
+    )
     return status if status is not None and status.state == "withdrawn" else None
 
 
@@ -225,11 +227,16 @@ def wrong_signs(inspection: Inspection) -> str | None:
     """Return how the record that computed a file differs in sign from the one that corrects it, in words."""
     from toolkit.audit.candidates import turned_against
 
-    found, choice = inspection.identification, inspection.choice
-    if found is None or choice is None or found.variant is not None or inspection.corrected_by is None:
+    identification, choice = inspection.identification, inspection.choice
+    if (
+        identification is None
+        or choice is None
+        or identification.variant is not None
+        or inspection.corrected_by is None
+    ):
         return None
     by_id = {record.id: record for record in choice.records}
-    mine, right = by_id.get(found.record or ""), by_id.get(inspection.corrected_by)
+    mine, right = by_id.get(identification.record or ""), by_id.get(inspection.corrected_by)
     if mine is None or right is None:
         return None
     return turned_against(mine, right, inspection.columns.loads)
@@ -278,19 +285,25 @@ def _means(
     )
 
 
-def _findings(path: Path, found: Identification | None, choice: Choice | None) -> tuple[Finding, ...]:
+def _findings(
+    path: Path, identification: Identification | None, choice: Choice | None
+) -> tuple[Finding, ...]:
     where = path.name
     if choice is None:
         text = "no laboratory home was found, so nobody can say which calibration computed the file"
         return (Finding(rule="no-home", where=where, message=text),)
-    made = [
-        Finding(rule="refused-record", where=one.id, message=f"left out as a candidate: {one.reason}")
-        for one in choice.refused
+    findings = [
+        Finding(rule="refused-record", where=record.id, message=f"left out as a candidate: {record.reason}")
+        for record in choice.refused
     ]
     if choice.trouble is not None:
-        made.append(Finding(rule="registry-damaged", where=where, message=choice.trouble))
-    if found is not None and found.grade not in CLEAN:
-        who = f" ({found.record}{', ' + found.variant if found.variant else ''})" if found.record else ""
-        text = f"Fy and Mz were computed {TELLS[found.grade]}{who}"
-        made.append(Finding(rule=f"identified-{found.grade}", where=where, message=text))
-    return tuple(made)
+        findings.append(Finding(rule="registry-damaged", where=where, message=choice.trouble))
+    if identification is not None and identification.grade not in CLEAN:
+        who = (
+            f" ({identification.record}{', ' + identification.variant if identification.variant else ''})"
+            if identification.record
+            else ""
+        )
+        text = f"Fy and Mz were computed {TELLS[identification.grade]}{who}"
+        findings.append(Finding(rule=f"identified-{identification.grade}", where=where, message=text))
+    return tuple(findings)

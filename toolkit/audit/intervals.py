@@ -95,7 +95,7 @@ def interval_bounds(
         return np.tile([-np.inf, np.inf], (n + 1, 1))  # a dead channel, or one that is another's multiple
     back = np.linalg.inv(r) / scale[:, None]
     target = y / rounding
-    centre, rest = back @ (q.T @ target), target - q @ (q.T @ target)
+    centre, residual = back @ (q.T @ target), target - q @ (q.T @ target)
     low, high = np.full(n + 1, np.inf), np.full(n + 1, -np.inf)
     with np.errstate(over="ignore"):
         size = np.linalg.norm(back, axis=1)
@@ -106,7 +106,7 @@ def interval_bounds(
         allowed = half_x / rounding[:, None] * turned  # |c| half_x for these signs
         moving, fixed = allowed @ back[:n], half_y / rounding + allowed @ centre[:n]
         area = np.vstack([q - moving, -q - moving, -turned[:, None] * back[:n] / size[:n, None]])
-        right = np.concatenate([fixed + rest, fixed - rest, turned * centre[:n] / size[:n]])
+        right = np.concatenate([fixed + residual, fixed - residual, turned * centre[:n] / size[:n]])
         polytope = _Polytope(area, right)
         for i in range(n + 1):
             ends = [polytope.lowest(turn * back[i] / size[i]) for turn in (1.0, -1.0)]
@@ -177,12 +177,12 @@ class _Polytope:
                 moves = np.linalg.solve(sides.T, self._area[new])
             except np.linalg.LinAlgError:
                 break
-            held = moves > _TIGHT
-            if not held.any():
+            blocking = moves > _TIGHT
+            if not blocking.any():
                 self.empty = True
                 return None
             ratio = np.full(n, np.inf)
-            ratio[held] = np.maximum(weights[held], 0.0) / moves[held]
+            ratio[blocking] = np.maximum(weights[blocking], 0.0) / moves[blocking]
             basis[int(np.argmin(ratio))] = new
         return _lowest(goal, *self._given)
 

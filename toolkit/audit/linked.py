@@ -44,7 +44,7 @@ class PastReport:
     id: str | None = None
     path: Path | None = None  # of a document that was found in a folder
     words: str | None = None
-    named: set[str] = field(default_factory=set)
+    names: set[str] = field(default_factory=set)
     hashes: set[str] = field(default_factory=set)
     calibrations: tuple[str, ...] = ()
     linked_by: set[str] = field(default_factory=set)
@@ -88,7 +88,7 @@ class Linked:
 
     def of_test(self, test: str | None) -> list[str]:
         """Return the reports that rest on a test."""
-        return [one.report for one in self.reports if test in one.tests]
+        return [report.report for report in self.reports if test in report.tests]
 
 
 def read_reports(source: Path) -> tuple[PastReport, ...]:
@@ -104,57 +104,57 @@ def read_reports(source: Path) -> tuple[PastReport, ...]:
     return tuple(_of_csv(source))
 
 
-def link(made: ArchiveAudit, reports: tuple[PastReport, ...]) -> Linked:
+def link(audit: ArchiveAudit, reports: tuple[PastReport, ...]) -> Linked:
     """Link reports to the tests of an audited archive, each report by all that it says."""
-    reports = _but_recordings(made, reports)
+    reports = _but_recordings(audit, reports)
     by_hash: dict[str, list[PastReport]] = {}
-    for one in reports:
-        for sha256 in one.hashes:
-            by_hash.setdefault(sha256, []).append(one)
+    for report in reports:
+        for sha256 in report.hashes:
+            by_hash.setdefault(sha256, []).append(report)
     tests: dict[str, tuple[int, int]] = {}
     in_force: dict[str, set[str]] = {}
-    for plain in made.files.plain():
+    for plain in audit.files.plain():
         test = plain["test"]
         dirty = plain["grade"] not in CLEAN
         if test is not None:
             n, bad = tests.get(test, (0, 0))
             tests[test] = (n + 1, bad + dirty)
             in_force.setdefault(test, set()).update({plain["in_force"]} - {None})
-        for one in by_hash.get(plain["sha256"] or "", ()):
-            one.linked_by.add("sha256" if one.id is None else "manifest")
+        for same_report in by_hash.get(plain["sha256"] or "", ()):
+            same_report.linked_by.add("sha256" if same_report.id is None else "manifest")
             if test is not None:
-                one.tests.add(test)
+                same_report.tests.add(test)
             else:
-                one.files += 1
-                one.not_clean += dirty
+                same_report.files += 1
+                same_report.not_clean += dirty
     names: dict[str, list[str]] = {}
     for test in tests:
-        names.setdefault(_words(_last(test, made.archive)), []).append(test)
-    for one in reports:
-        for test in _by_name(one, names):
-            one.tests.add(test)
-            one.linked_by.add("test")
-        for test in one.tests:
-            one.files += tests[test][0]
-            one.not_clean += tests[test][1]
-            one.in_force |= in_force[test]
-    taken = {test for one in reports for test in one.tests}
-    return Linked(reports=reports, unknown=tuple(sorted(set(tests) - taken)))
+        names.setdefault(_words(_last(test, audit.archive)), []).append(test)
+    for report in reports:
+        for test in _by_name(report, names):
+            report.tests.add(test)
+            report.linked_by.add("test")
+        for test in report.tests:
+            report.files += tests[test][0]
+            report.not_clean += tests[test][1]
+            report.in_force |= in_force[test]
+    with_report = {test for report in reports for test in report.tests}
+    return Linked(reports=reports, unknown=tuple(sorted(set(tests) - with_report)))
 
 
-def _but_recordings(made: ArchiveAudit, reports: tuple[PastReport, ...]) -> tuple[PastReport, ...]:
+def _but_recordings(audit: ArchiveAudit, reports: tuple[PastReport, ...]) -> tuple[PastReport, ...]:
     """Return the reports without the archive's own recordings, which may stand in the same folder."""
-    if all(one.path is None for one in reports):
+    if all(report.path is None for report in reports):
         return reports
-    archive = made.archive.resolve()
-    known = {archive / plain["path"] for plain in made.files.plain() if plain["grade"] != "unreadable"}
-    return tuple(one for one in reports if one.path is None or one.path not in known)
+    archive = audit.archive.resolve()
+    recordings = {archive / plain["path"] for plain in audit.files.plain() if plain["grade"] != "unreadable"}
+    return tuple(report for report in reports if report.path is None or report.path not in recordings)
 
 
-def _by_name(one: PastReport, names: Mapping[str, list[str]]) -> Iterator[str]:
-    if one.linked_by & {"manifest", "sha256"}:
+def _by_name(past_report: PastReport, names: Mapping[str, list[str]]) -> Iterator[str]:
+    if past_report.linked_by & {"manifest", "sha256"}:
         return  # what a report says of its files is better than what it is called
-    texts = [_words(name) for name in one.named] if one.named else [one.words or ""]
+    texts = [_words(name) for name in past_report.names] if past_report.names else [past_report.words or ""]
     for text in texts:
         for name, tests in names.items():
             if not name or not (text == name or f" {name} " in f" {text} "):
@@ -185,7 +185,7 @@ def _of_csv(source: Path) -> Iterator[PastReport]:
     check_keys(dict.fromkeys(header), _COLUMNS, where=source)
     if "report" not in header or len(header) < 2:
         raise _bad(source, ", ".join(header) or "nothing", "the columns report and test, sha256, or both")
-    found: dict[str, PastReport] = {}
+    past_reports: dict[str, PastReport] = {}
     for number, row in enumerate(rows, start=2):
         name = (row.get("report") or "").strip()
         test, sha256 = ((row.get(key) or "").strip() for key in ("test", "sha256"))
@@ -193,10 +193,10 @@ def _of_csv(source: Path) -> Iterator[PastReport]:
             raise _bad(source, f"row {number}: no report, or neither test nor sha256", "both in every row")
         if sha256 and not _SHA.fullmatch(sha256):
             raise _bad(source, f"row {number}: {sha256[:80]!r}", "64 hexadecimal digits")
-        one = found.setdefault(name, PastReport(report=name))
-        one.named |= {test} - {""}
-        one.hashes |= {sha256.lower()} - {""}
-    yield from found.values()
+        report = past_reports.setdefault(name, PastReport(report=name))
+        report.names |= {test} - {""}
+        report.hashes |= {sha256.lower()} - {""}
+    yield from past_reports.values()
 
 
 def _of_folder(folder: Path) -> Iterator[PastReport]:
@@ -205,11 +205,11 @@ def _of_folder(folder: Path) -> Iterator[PastReport]:
         manifests = [
             _manifest(Path(place) / name, folder) for name in sorted(names) if name.endswith(".json")
         ]
-        known = {name for one in manifests if one is not None for name in one[1]}
-        yield from (one[0] for one in manifests if one is not None)
+        output_names = {name for manifest in manifests if manifest is not None for name in manifest[1]}
+        yield from (manifest[0] for manifest in manifests if manifest is not None)
         for name in sorted(names):
             path = Path(place) / name
-            if path.suffix.lower() in DOCUMENTS and name not in known and not path.is_symlink():
+            if path.suffix.lower() in DOCUMENTS and name not in output_names and not path.is_symlink():
                 shown = path.relative_to(folder)
                 yield PastReport(
                     report=shown.as_posix(),
@@ -222,19 +222,21 @@ def _manifest(path: Path, folder: Path) -> tuple[PastReport, set[str]] | None:
     if path.is_symlink() or path.stat().st_size > MAX_FILE_BYTES:
         return None
     try:
-        told = json.loads(path.read_bytes())
+        manifest = json.loads(path.read_bytes())
     except (OSError, ValueError, RecursionError):
         return None
-    if not isinstance(told, dict) or told.get("generator") != GENERATOR or "inputs" not in told:
+    if not isinstance(manifest, dict) or manifest.get("generator") != GENERATOR or "inputs" not in manifest:
         return None
-    outputs = {one.get("name") for one in _dicts(told.get("outputs"))}
-    made = PastReport(
+    outputs = {output.get("name") for output in _dicts(manifest.get("outputs"))}
+    past_report = PastReport(
         report=path.parent.relative_to(folder).as_posix(),
-        id=str(told.get("report")),
-        hashes={one["sha256"].lower() for one in _dicts(told["inputs"]) if _is_sha(one.get("sha256"))},
-        calibrations=tuple(str(one.get("id")) for one in _dicts(told.get("calibrations"))),
+        id=str(manifest.get("report")),
+        hashes={
+            entry["sha256"].lower() for entry in _dicts(manifest["inputs"]) if _is_sha(entry.get("sha256"))
+        },
+        calibrations=tuple(str(entry.get("id")) for entry in _dicts(manifest.get("calibrations"))),
     )
-    return made, {name for name in outputs if isinstance(name, str)}
+    return past_report, {name for name in outputs if isinstance(name, str)}
 
 
 def _dicts(value: Any) -> Iterator[dict[str, Any]]:
@@ -243,8 +245,8 @@ def _dicts(value: Any) -> Iterator[dict[str, Any]]:
         yield value
         value = list(value.values())
     if isinstance(value, list):
-        for one in value:
-            yield from _dicts(one)
+        for entry in value:
+            yield from _dicts(entry)
 
 
 def _is_sha(value: object) -> bool:

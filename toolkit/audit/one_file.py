@@ -19,8 +19,7 @@ from toolkit.audit.context import DEFAULT_MACHINE, Context, MachineSource, conte
 from toolkit.audit.estimate import Estimate, estimate
 from toolkit.audit.identify import identify_columns, recompute
 from toolkit.audit.model import Grade, Identification
-from toolkit.audit.quality import quality
-from toolkit.audit.stored import impossible
+from toolkit.audit.quality import impossible, quality
 from toolkit.calibration.registry.registry import Registry
 from toolkit.channels import REVERSALS, ROTATIONS, Rotation, seen_by_cells, signs
 from toolkit.errors import ToolkitError
@@ -38,7 +37,8 @@ from toolkit.reduction.prepare_rows import split_blocks
 class FileAudit:
     """What is known of one file. ``path`` is relative to the archive, with ``/``.
 
-    ``found`` is None where the file is unreadable; ``reason`` then begins with the rule that refused it.
+    ``identification`` is None where the file is unreadable; ``reason`` then begins with the rule that
+    refused it.
     ``context`` tells why its test.toml could not be used, None where it could or there is none. ``test`` is
     the folder of its test.toml, relative to the archive (``.``: at or above it); ``to_SAE`` the sign that
     each channel has in SAE axes, ``own_protocol`` whether the test declares another than the machine's.
@@ -54,7 +54,7 @@ class FileAudit:
     instrument: str | None
     date: dt.date | None
     rows: int | None
-    found: Identification | None
+    identification: Identification | None
     reason: str | None
     context: str | None = None
     test: str | None = None
@@ -71,7 +71,7 @@ class FileAudit:
     @property
     def grade(self) -> Grade:
         """The file's grade."""
-        return "unreadable" if self.found is None else self.found.grade
+        return "unreadable" if self.identification is None else self.identification.grade
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -115,8 +115,10 @@ class Auditor:
             sha256 = large if data is None else sha256_bytes(data)
             if workbook and data is not None and own_output(data):
                 return OwnOutput(sha256=sha256)
-            told = f"{error.rule or 'unreadable'}: {error.what}" + (f", got {error.got}" if error.got else "")
-            return unreadable(name, told, sha256=sha256, size=size, context=trouble)
+            reason = f"{error.rule or 'unreadable'}: {error.what}" + (
+                f", got {error.got}" if error.got else ""
+            )
+            return unreadable(name, reason, sha256=sha256, size=size, context=trouble)
         columns = columns_of(recording)
         instrument = context.machine.name
         choice = self.choices.on(instrument, context.date)
@@ -124,7 +126,7 @@ class Auditor:
         in_force = choice.in_force
         fits = in_force is not None and unfit(in_force, columns) is None
         new = recompute(columns, in_force) if in_force is not None and fits else None
-        found = identify_columns(
+        identification = identify_columns(
             columns,
             choice.records,
             on=context.date,
@@ -136,8 +138,8 @@ class Auditor:
         table: Mapping[str, Any] = {} if context.test_toml is None else self._toml(context.test_toml)
         rotation = self._rotation(path, context, table)
         reversal = table.get("reversal")
-        seen = seen_by_cells(rotation, reversal) if reversal in REVERSALS else rotation
-        sae = signs(context.machine.axes, "SAE", seen)
+        direction = seen_by_cells(rotation, reversal) if reversal in REVERSALS else rotation
+        sae = signs(context.machine.axes, "SAE", direction)
         changed = changes(recording, columns, blocks, new, turn=sae["SA"])
         return FileAudit(
             path=name,
@@ -146,18 +148,20 @@ class Auditor:
             instrument=instrument,
             date=context.date,
             rows=recording.rows,
-            found=found,
+            identification=identification,
             reason=None if columns.loads else "no-own-values: the file has no FY and no MZ of its own",
             context=trouble,
             test=None if context.test_toml is None else self._test(context.test_toml),
             rotation=rotation,
             to_SAE=tuple(sae.items()),
             own_protocol="protocol" in table,
-            units=tuple((one.symbol, one.unit) for one in recording.series),
-            values_sha256=sha256_bytes(b"".join(one.values.tobytes() for one in recording.series)),
+            units=tuple((channel.symbol, channel.unit) for channel in recording.series),
+            values_sha256=sha256_bytes(b"".join(channel.values.tobytes() for channel in recording.series)),
             modified=recording.saved,
             changes=changed,
-            estimate=estimate(columns, found.segments, screen) if found.grade == "unknown" else None,
+            estimate=estimate(columns, identification.segments, screen)
+            if identification.grade == "unknown"
+            else None,
             notes=(
                 *_impossible(name, changed, in_force.id if in_force is not None else None),
                 *quality(recording, name),
@@ -169,14 +173,14 @@ class Auditor:
         try:
             return context_of(path, own=lambda: machine_in(data), read=self._toml, find=self._find), None
         except ToolkitError as error:
-            own = machine_in(data)
-            source: MachineSource = "default" if own is None else "file"
-            machine = load_machine(own or DEFAULT_MACHINE)
-            told = (
+            file_machine = machine_in(data)
+            source: MachineSource = "default" if file_machine is None else "file"
+            machine = load_machine(file_machine or DEFAULT_MACHINE)
+            trouble = (
                 f"{error.rule or 'test-toml'}: {error.what} ({error.where}); got {error.got}, "
                 f"expected {error.expected}"
             )
-            return Context(machine=machine, machine_source=source, date=None, test_toml=None), told
+            return Context(machine=machine, machine_source=source, date=None, test_toml=None), trouble
 
     def _folder_of(self, toml: Path) -> str:
         try:
@@ -187,30 +191,30 @@ class Auditor:
     def _rotation(self, path: Path, context: Context, table: Mapping[str, Any]) -> Rotation:
         if context.test_toml is None:
             return "forward"
-        said, own = table.get("rotation"), table.get("rotations")
-        if isinstance(own, dict):
-            here = self._root / path.relative_to(self.archive)
-            inside = here.relative_to(context.test_toml.parent).as_posix()
-            said = own.get(inside, own.get(path.name, said))
-        return cast("Rotation", said) if said in ROTATIONS else "forward"
+        rotation_entry, exceptions = table.get("rotation"), table.get("rotations")
+        if isinstance(exceptions, dict):
+            absolute = self._root / path.relative_to(self.archive)
+            inside = absolute.relative_to(context.test_toml.parent).as_posix()
+            rotation_entry = exceptions.get(inside, exceptions.get(path.name, rotation_entry))
+        return cast("Rotation", rotation_entry) if rotation_entry in ROTATIONS else "forward"
 
 
 def _impossible(name: str, blocks: tuple[Change, ...], in_force: str | None) -> tuple[Finding, ...]:
     rows = [f"rows {b.first_row}-{b.last_row}" for b in blocks]
     angles = [None if b.SA_deg is None else math.radians(b.SA_deg) for b in blocks]
-    own = [(b.FZ_N, SA, b.FY_N, b.MZ_Nm) for b, SA in zip(blocks, angles, strict=True)]
-    found = impossible(name, rows, own, values="the stored Fy and Mz are impossible")
+    stored = [(b.FZ_N, SA, b.FY_N, b.MZ_Nm) for b, SA in zip(blocks, angles, strict=True)]
+    findings = impossible(name, rows, stored, values="the stored Fy and Mz are impossible")
     if in_force is None:
-        return found
+        return findings
     new = [
         (b.FZ_N, SA, _sum(b.FY_N, b.FY_change_N), _sum(b.MZ_Nm, b.MZ_change_Nm))
         for b, SA in zip(blocks, angles, strict=True)
     ]
-    return (*found, *impossible(name, rows, new, values=f"Fy and Mz by {in_force} are impossible too"))
+    return (*findings, *impossible(name, rows, new, values=f"Fy and Mz by {in_force} are impossible too"))
 
 
-def _sum(own: float | None, change: float | None) -> float | None:
-    return None if own is None or change is None else own + change
+def _sum(stored: float | None, change: float | None) -> float | None:
+    return None if stored is None or change is None else stored + change
 
 
 def unreadable(
@@ -223,6 +227,6 @@ def unreadable(
 ) -> FileAudit:
     """Return the row of a file that cannot be read; ``reason`` begins with a rule id."""
     return FileAudit(
-        path=name, sha256=sha256, size=size, instrument=None, date=None, rows=None, found=None,
+        path=name, sha256=sha256, size=size, instrument=None, date=None, rows=None, identification=None,
         reason=reason, context=context,
     )  # fmt: skip

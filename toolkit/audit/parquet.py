@@ -55,7 +55,7 @@ def write_parquet(
     with atomic_path(target) as temporary:
         try:
             with parquet.ParquetWriter(temporary, schema) as writer:
-                while batch := [_row(one, schema.names) for one in itertools.islice(rows, _BATCH)]:
+                while batch := [_row(line, schema.names) for line in itertools.islice(rows, _BATCH)]:
                     writer.write_batch(arrow.RecordBatch.from_pylist(batch, schema=schema))
         except arrow.ArrowInvalid as error:
             raise OutputError(
@@ -64,41 +64,41 @@ def write_parquet(
             ) from error  # fmt: skip
 
 
-def _row(one: Mapping[str, Any], names: list[str]) -> dict[str, Any]:
-    found = {name: one[name] for name in names}
-    found["path"] = os.fsencode(one["path"]).decode("utf-8", "backslashreplace")
+def _row(line: Mapping[str, Any], names: list[str]) -> dict[str, Any]:
+    fields = {name: line[name] for name in names}
+    fields["path"] = os.fsencode(line["path"]).decode("utf-8", "backslashreplace")
     for key in ("date", "modified"):
-        found[key] = None if one[key] is None else dt.date.fromisoformat(one[key])
+        fields[key] = None if line[key] is None else dt.date.fromisoformat(line[key])
     for key in ("to_SAE", "units"):
-        found[key] = list(one[key].items())
-    estimate = one["estimate"]
+        fields[key] = list(line[key].items())
+    estimate = line["estimate"]
     if estimate is not None:
-        found["estimate"] = {
+        fields["estimate"] = {
             **estimate,
             "equations": [
                 (load, {**equation, "coefficients": list(equation["coefficients"].items())})
                 for load, equation in estimate["equations"].items()
             ],
         }
-    return found
+    return fields
 
 
 def _schema(pa: Any, *, reports: bool) -> Any:
-    text, number, whole, truth = pa.string(), pa.float64(), pa.int64(), pa.bool_()
+    text, number, integer, truth = pa.string(), pa.float64(), pa.int64(), pa.bool_()
     change = dict.fromkeys(("FY_max_abs_N", "MZ_max_abs_Nm"), number)
-    segment = {"first_row": whole, "last_row": whole, "record": text, "variant": text, "grade": text,
+    segment = {"first_row": integer, "last_row": integer, "record": text, "variant": text, "grade": text,
                "candidates": pa.list_(text)}  # fmt: skip
-    condition = {"first_row": whole, "last_row": whole, "SA_deg": number, "FZ_N": number, "FY_N": number,
+    condition = {"first_row": integer, "last_row": integer, "SA_deg": number, "FZ_N": number, "FY_N": number,
                  "MZ_Nm": number, "FY_change_N": number, "MZ_change_Nm": number, "step_SA_deg": number,
                  "step_FZ_N": number}  # fmt: skip
     coefficient = {"value": number, "low": number, "high": number}
     equation = {"unit": text, "linear": truth, "rms": number, "max_abs": number,
                 "coefficients": pa.map_(text, pa.struct(coefficient))}  # fmt: skip
-    estimate = {"first_row": whole, "last_row": whole, "equations": pa.map_(text, pa.struct(equation)),
+    estimate = {"first_row": integer, "last_row": integer, "equations": pa.map_(text, pa.struct(equation)),
                 "nearest": pa.struct({"record": text, **change})}  # fmt: skip
     columns = {
-        "path": text, "sha256": text, "size": whole, "instrument": text, "date": pa.date32(), "test": text,
-        "rotation": text, "to_SAE": pa.map_(text, pa.int8()), "own_protocol": truth, "rows": whole,
+        "path": text, "sha256": text, "size": integer, "instrument": text, "date": pa.date32(), "test": text,
+        "rotation": text, "to_SAE": pa.map_(text, pa.int8()), "own_protocol": truth, "rows": integer,
         "grade": text, "record": text, "variant": text, "issued": truth, "candidates": pa.list_(text),
         "segments": pa.list_(pa.struct(segment)), "in_force": text, "repair": pa.struct(change),
         "conditions": pa.list_(pa.struct(condition)), "estimate": pa.struct(estimate),

@@ -24,13 +24,13 @@ from pathlib import Path
 from types import TracebackType
 from typing import IO, Any, overload
 
-from toolkit import __version__
 from toolkit.audit.one_file import FileAudit, OwnOutput
 from toolkit.audit.serial import SHAPE, from_plain, to_plain
 from toolkit.errors import OutputError
 from toolkit.files import sha256_bytes, sha256_file
 from toolkit.recording.folder import nearest_test_toml
 from toolkit.recording.marks import GENERATOR, OWN_OUTPUT
+from toolkit.version import __version__
 
 RESULTS = "results.jsonl"
 _HEADER = (json.dumps({"generator": GENERATOR, "marks": OWN_OUTPUT}) + "\n").encode()
@@ -78,7 +78,7 @@ class Files(Sequence[FileAudit]):
         return from_plain(self._plain(self._places[index]))
 
     def __iter__(self) -> Iterator[FileAudit]:
-        return (from_plain(one) for one in self.plain())
+        return (from_plain(line) for line in self.plain())
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Files):
@@ -98,8 +98,8 @@ class Files(Sequence[FileAudit]):
         return (self._raw(place) for place in self._places)
 
     def _plain(self, place: int) -> dict[str, Any]:
-        found: dict[str, Any] = json.loads(self._raw(place))
-        return found
+        line: dict[str, Any] = json.loads(self._raw(place))
+        return line
 
     def _raw(self, place: int) -> bytes:
         self._file.seek(place)
@@ -130,16 +130,16 @@ class Results:
         self._path = None if folder is None else folder / RESULTS
         self._file = tempfile.TemporaryFile() if self._path is None else _opened(self._path)  # noqa: SIM115
         self._file.seek(0)
-        whole = 0
+        length = 0
         for line in self._file:
             if not line.endswith(b"\n"):
                 break
-            self._remember(line, whole)
-            whole += len(line)
-        self._file.truncate(whole)
-        self._file.seek(whole)
-        self._end = whole
-        if whole == 0:
+            self._remember(line, length)
+            length += len(line)
+        self._file.truncate(length)
+        self._file.seek(length)
+        self._end = length
+        if length == 0:
             self._write(_HEADER)
 
     def __enter__(self) -> Results:
@@ -179,13 +179,13 @@ class Results:
 
     def digest(self, names: Sequence[str]) -> str | None:
         """Return the hash of all that the results of the names are, None where one is not used again."""
-        whole = hashlib.sha256()
+        running = hashlib.sha256()
         for name in sorted(names):
             key, crc, _ = self._places[name]
             if not key:
                 return None
-            whole.update(json.dumps([name, key.hex(), crc]).encode())
-        return whole.hexdigest()
+            running.update(json.dumps([name, key.hex(), crc]).encode())
+        return running.hexdigest()
 
     def _mark(self, name: str, *, own: bool) -> None:
         # A file that was replaced by another is what its newest line says.
@@ -246,11 +246,11 @@ def _words(toml: Path | None) -> str:
     try:
         data = toml.read_bytes()
         machine = tomllib.loads(data.decode()).get("machine") if b".toml" in data else None
-        named = isinstance(machine, str) and machine.endswith(".toml")
-        own = sha256_file(toml.parent / str(machine)) if named else ""
+        is_file = isinstance(machine, str) and machine.endswith(".toml")
+        definition = sha256_file(toml.parent / str(machine)) if is_file else ""
     except (OSError, ValueError) as error:
-        own = str(error)
-    return f"{toml}:{sha256_bytes(data)}:{own}"
+        definition = str(error)
+    return f"{toml}:{sha256_bytes(data)}:{definition}"
 
 
 def _opened(path: Path) -> IO[bytes]:

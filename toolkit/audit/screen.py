@@ -52,7 +52,7 @@ class Screen:
     records: tuple[CalibrationRecord, ...]
     reasons: tuple[tuple[str, str | None], ...]
     linear: tuple[Key, ...]
-    other: tuple[Key, ...]
+    general: tuple[Key, ...]
     equations: dict[str, _Equations]
 
     def group(self, key: Key, columns: Columns) -> Group:
@@ -60,7 +60,7 @@ class Screen:
         index, issued, order = key
         return group_of(self.records[index], columns, order=order, issued=issued)
 
-    def whole(self, columns: Columns) -> list[Key]:
+    def for_all_rows(self, columns: Columns) -> list[Key]:
         """Return the groups that may explain every row, with a rounded coefficient or without."""
         rows = _probe(columns.rows)
         good = np.arange(len(self.linear))
@@ -71,18 +71,18 @@ class Screen:
 
     def anywhere(self, columns: Columns) -> list[Key]:
         """Return the groups that may explain at least one row."""
-        found: set[int] = set()
-        most = max((one.coefficients[..., 0].size for one in self.equations.values()), default=1)
+        keys: set[int] = set()
+        most = max((equation.coefficients[..., 0].size for equation in self.equations.values()), default=1)
         for start in range(0, columns.rows, max(1, _CELLS // most)):
             rows = np.arange(start, min(start + max(1, _CELLS // most), columns.rows))
             good = np.arange(len(self.linear))
-            both = np.ones((len(rows), len(good)), dtype=bool)
+            fitting = np.ones((len(rows), len(good)), dtype=bool)
             for load in self.equations:
-                both &= np.any(self._fits(columns, load, rows, good), axis=2)
-                some = np.any(both, axis=0)
-                good, both = good[some], both[:, some]
-            found.update(good.tolist())
-        return self._keys(np.array(sorted(found), dtype=np.int64))
+                fitting &= np.any(self._fits(columns, load, rows, good), axis=2)
+                survivors = np.any(fitting, axis=0)
+                good, fitting = good[survivors], fitting[:, survivors]
+            keys.update(good.tolist())
+        return self._keys(np.array(sorted(keys), dtype=np.int64))
 
     def close_to(self, accepted: Group, columns: Columns, signs: dict[str, int]) -> list[Key]:
         """Return the groups that a file may not tell from an accepted candidate."""
@@ -97,7 +97,7 @@ class Screen:
         return self._keys(good)
 
     def _keys(self, good: NDArray[np.int64]) -> list[Key]:
-        return [*(self.linear[i] for i in good.tolist()), *self.other]
+        return [*(self.linear[i] for i in good.tolist()), *self.general]
 
     def _fits(
         self, columns: Columns, load: str, rows: NDArray[np.int64], among: NDArray[np.int64]
@@ -129,10 +129,10 @@ class Screen:
         size, slack = equations.size, equations.slack
         if len(among) < len(size):
             size, slack = size[among], slack[among]
-        here = np.column_stack([np.abs(columns.x[rows]), np.ones(len(rows))])
-        own = (columns.half_y[load][rows] + 1e-9 * y)[:, None]
+        magnitudes = np.column_stack([np.abs(columns.x[rows]), np.ones(len(rows))])
+        bound = (columns.half_y[load][rows] + 1e-9 * y)[:, None]
         limit: NDArray[np.float64] = (
-            columns.half_x[rows] @ size[:, :-1].T + here @ (slack + 2 * ROUND_OFF * size).T + own
+            columns.half_x[rows] @ size[:, :-1].T + magnitudes @ (slack + 2 * ROUND_OFF * size).T + bound
         ) * _SPARE
         return limit
 
@@ -147,18 +147,18 @@ def screen_of(records: Sequence[CalibrationRecord], columns: Columns) -> Screen:
     reasons = tuple((record.id, unfit(record, columns)) for record in records)
     fitting = tuple(r for r, (_, reason) in zip(records, reasons, strict=True) if reason is None)
     linear: list[Key] = []
-    other: list[Key] = []
+    keys: list[Key] = []
     for index, record in enumerate(fitting if columns.loads else ()):
-        forms = (False,) if all(one.issued == one.coefficients for one in record.loads) else (False, True)
+        forms = (False,) if all(load.issued == load.coefficients for load in record.loads) else (False, True)
         simple = all(_is_linear(record, record.load(load)) for load in columns.loads)
-        (linear if simple else other).extend(
+        (linear if simple else keys).extend(
             (index, issued, order) for order in orders(len(record.indications)) for issued in forms
         )
     return Screen(
         records=fitting,
         reasons=reasons,
         linear=tuple(linear),
-        other=tuple(other),
+        general=tuple(keys),
         equations={load: _equations(fitting, linear, columns, load) for load in columns.loads}
         if linear
         else {},
@@ -185,10 +185,10 @@ def _equations(
         for i, name in enumerate(record.indications):
             # The coefficient of this channel is given the column of the channel that stands in its place.
             place = columns.names.index(record.indications[order[i]])
-            own = si_scale(columns.units[place]) / si_scale(record.indication_units[order[i]])
+            scale = si_scale(columns.units[place]) / si_scale(record.indication_units[order[i]])
             value = values.get(name, 0.0)
-            plain[at, place] = value * own * to_file
-            slack[at, place] = abs(own * to_file) * half_fifth_digit(np.array([value]))[0]
+            plain[at, place] = value * scale * to_file
+            slack[at, place] = abs(scale * to_file) * half_fifth_digit(np.array([value]))[0]
             signs[:, place] = turned[:, i]
         constant = values.get(INTERCEPT, 0.0)
         plain[at, n] = constant * to_file

@@ -18,40 +18,44 @@ SHAPE = 5
 """Of what is written here; results of another one are not used again."""
 
 
-def to_plain(one: FileAudit) -> dict[str, Any]:
+def to_plain(file_audit: FileAudit) -> dict[str, Any]:
     """Return a file's audit under the keys of the answer; what it does not have is None or empty."""
-    found = one.found
-    repair = None if found is None else found.repair
+    identification = file_audit.identification
+    repair = None if identification is None else identification.repair
     return {
-        "path": one.path,
-        "sha256": one.sha256,
-        "size": one.size,
-        "instrument": one.instrument,
-        "date": _day(one.date),
-        "test": one.test,
-        "rotation": one.rotation,
-        "to_SAE": dict(one.to_SAE),
-        "own_protocol": one.own_protocol,
-        "rows": one.rows,
-        "grade": one.grade,
-        "record": None if found is None else found.record,
-        "variant": None if found is None else found.variant,
-        "issued": None if found is None else found.issued,
-        "candidates": [] if found is None else list(found.candidates),
-        "segments": [] if found is None else [_segment(segment) for segment in found.segments],
-        "in_force": None if found is None else found.in_force,
+        "path": file_audit.path,
+        "sha256": file_audit.sha256,
+        "size": file_audit.size,
+        "instrument": file_audit.instrument,
+        "date": _day(file_audit.date),
+        "test": file_audit.test,
+        "rotation": file_audit.rotation,
+        "to_SAE": dict(file_audit.to_SAE),
+        "own_protocol": file_audit.own_protocol,
+        "rows": file_audit.rows,
+        "grade": file_audit.grade,
+        "record": None if identification is None else identification.record,
+        "variant": None if identification is None else identification.variant,
+        "issued": None if identification is None else identification.issued,
+        "candidates": [] if identification is None else list(identification.candidates),
+        "segments": []
+        if identification is None
+        else [_segment(segment) for segment in identification.segments],
+        "in_force": None if identification is None else identification.in_force,
         "repair": None
         if repair is None
         else {"FY_max_abs_N": repair.FY_max_abs_N, "MZ_max_abs_Nm": repair.MZ_max_abs_Nm},
-        "conditions": [_change(change) for change in one.changes],
-        "estimate": None if one.estimate is None else _estimate(one.estimate),
-        "skipped": [] if found is None else [{"id": s.id, "reason": s.reason} for s in found.skipped],
-        "reason": one.reason,
-        "test_toml": one.context,
-        "units": dict(one.units),
-        "values_sha256": one.values_sha256,
-        "modified": _day(one.modified),
-        "notes": [{"rule": note.rule, "message": note.message} for note in one.notes],
+        "conditions": [_change(change) for change in file_audit.changes],
+        "estimate": None if file_audit.estimate is None else _estimate(file_audit.estimate),
+        "skipped": []
+        if identification is None
+        else [{"id": s.id, "reason": s.reason} for s in identification.skipped],
+        "reason": file_audit.reason,
+        "test_toml": file_audit.context,
+        "units": dict(file_audit.units),
+        "values_sha256": file_audit.values_sha256,
+        "modified": _day(file_audit.modified),
+        "notes": [{"rule": note.rule, "message": note.message} for note in file_audit.notes],
     }
 
 
@@ -71,7 +75,7 @@ def from_plain(plain: Mapping[str, Any]) -> FileAudit:
         instrument=plain["instrument"],
         date=_date(plain["date"]),
         rows=plain["rows"],
-        found=None if plain["grade"] == "unreadable" else _found(plain),
+        identification=None if plain["grade"] == "unreadable" else _identification(plain),
         reason=plain["reason"],
         context=plain["test_toml"],
         test=plain["test"],
@@ -81,7 +85,7 @@ def from_plain(plain: Mapping[str, Any]) -> FileAudit:
         units=tuple(plain["units"].items()),
         values_sha256=plain["values_sha256"],
         modified=_date(plain["modified"]),
-        changes=tuple(_changed(one) for one in plain["conditions"]),
+        changes=tuple(_changed(change) for change in plain["conditions"]),
         estimate=None if estimate is None else _estimated(estimate),
         notes=tuple(noted(note, plain["path"]) for note in plain["notes"]),
     )
@@ -95,18 +99,18 @@ def _date(text: str | None) -> dt.date | None:
     return None if text is None else dt.date.fromisoformat(text)
 
 
-def _change(one: Change) -> dict[str, Any]:
-    return {name: getattr(one, name) for name in _CHANGE}
+def _change(change: Change) -> dict[str, Any]:
+    return {name: getattr(change, name) for name in _CHANGE}
 
 
 def _changed(plain: Mapping[str, Any]) -> Change:
     return Change(**plain)
 
 
-def _estimate(one: Estimate) -> dict[str, Any]:
+def _estimate(estimate: Estimate) -> dict[str, Any]:
     return {
-        "first_row": one.first_row,
-        "last_row": one.last_row,
+        "first_row": estimate.first_row,
+        "last_row": estimate.last_row,
         "equations": {
             equation.load: {
                 "unit": equation.unit,
@@ -117,9 +121,9 @@ def _estimate(one: Estimate) -> dict[str, Any]:
                     c.name: {"value": c.value, "low": c.low, "high": c.high} for c in equation.coefficients
                 },
             }
-            for equation in one.equations
+            for equation in estimate.equations
         },
-        "nearest": None if one.nearest is None else asdict(one.nearest),
+        "nearest": None if estimate.nearest is None else asdict(estimate.nearest),
     }
 
 
@@ -130,30 +134,32 @@ def _estimated(plain: Mapping[str, Any]) -> Estimate:
         equations=tuple(
             Equation(
                 load=load,
-                unit=one["unit"],
-                linear=one["linear"],
-                rms=one["rms"],
-                max_abs=one["max_abs"],
-                coefficients=tuple(Coefficient(name=name, **c) for name, c in one["coefficients"].items()),
+                unit=equation["unit"],
+                linear=equation["linear"],
+                rms=equation["rms"],
+                max_abs=equation["max_abs"],
+                coefficients=tuple(
+                    Coefficient(name=name, **c) for name, c in equation["coefficients"].items()
+                ),
             )
-            for load, one in plain["equations"].items()
+            for load, equation in plain["equations"].items()
         ),
         nearest=None if plain["nearest"] is None else Nearest(**plain["nearest"]),
     )
 
 
-def _segment(one: Segment) -> dict[str, Any]:
+def _segment(segment: Segment) -> dict[str, Any]:
     return {
-        "first_row": one.first_row,
-        "last_row": one.last_row,
-        "record": one.record,
-        "variant": one.variant,
-        "grade": one.grade,
-        "candidates": list(one.candidates),
+        "first_row": segment.first_row,
+        "last_row": segment.last_row,
+        "record": segment.record,
+        "variant": segment.variant,
+        "grade": segment.grade,
+        "candidates": list(segment.candidates),
     }
 
 
-def _found(plain: Mapping[str, Any]) -> Identification:
+def _identification(plain: Mapping[str, Any]) -> Identification:
     repair = plain["repair"]
     return Identification(
         grade=plain["grade"],
@@ -167,5 +173,5 @@ def _found(plain: Mapping[str, Any]) -> Identification:
         ),
         in_force=plain["in_force"],
         repair=None if repair is None else Repair(**repair),
-        skipped=tuple(Skipped(**one) for one in plain["skipped"]),
+        skipped=tuple(Skipped(**skipped) for skipped in plain["skipped"]),
     )

@@ -56,7 +56,7 @@ class Drift:
         return since / span if 0 < since <= span else None
 
     @property
-    def told(self) -> str:
+    def statement(self) -> str:
         """What the failing session found, in words."""
         off = ", ".join(
             f"{o.load} off by {o.max_error:+.4g} {o.unit} (tolerance {o.tolerance:.4g} {o.unit})"
@@ -142,24 +142,24 @@ class DriftedTest:
         }
 
 
-def drifted_tests(made: ArchiveAudit, files: Sequence[DriftedFile]) -> tuple[DriftedTest, ...]:
+def drifted_tests(audit: ArchiveAudit, files: Sequence[DriftedFile]) -> tuple[DriftedTest, ...]:
     """Return the tests that recordings of the stretch belong to, by date and folder."""
-    by_path = {one.path: one for one in files}
+    by_path = {file.path: file for file in files}
     tests: dict[str, list[DriftedFile]] = {}
-    for plain in made.files.plain():
+    for plain in audit.files.plain():
         if plain["path"] in by_path:
             tests.setdefault(plain["test"], []).append(by_path[plain["path"]])
     return tuple(
         DriftedTest(
             test=name,
-            date=some[0].date,
-            share=some[0].share,
-            files=len(some),
-            left_out=sum(one.reason is not None for one in some),
-            FY_N=max((one.FY_N for one in some if one.FY_N is not None), default=None),
-            MZ_Nm=max((one.MZ_Nm for one in some if one.MZ_Nm is not None), default=None),
+            date=files_of_test[0].date,
+            share=files_of_test[0].share,
+            files=len(files_of_test),
+            left_out=sum(file.reason is not None for file in files_of_test),
+            FY_N=max((file.FY_N for file in files_of_test if file.FY_N is not None), default=None),
+            MZ_Nm=max((file.MZ_Nm for file in files_of_test if file.MZ_Nm is not None), default=None),
         )
-        for name, some in sorted(tests.items(), key=lambda pair: (pair[1][0].date, pair[0]))
+        for name, files_of_test in sorted(tests.items(), key=lambda pair: (pair[1][0].date, pair[0]))
     )
 
 
@@ -181,17 +181,19 @@ def drift_since(registry: Registry, good: str) -> Drift:
     date = dt.date.fromisoformat(record.date)
     if phase_of(record) == "as_found" and as_found(registry, record).within is not True:
         raise _refused(good, "an as-found session that was out of tolerance itself", "one that was within")
-    after = [one for one in as_found_history(registry, instrument) if one.date > date]
-    failed = next((one for one in after if one.within is False), None)
+    after = [session for session in as_found_history(registry, instrument) if session.date > date]
+    failed = next((session for session in after if session.within is False), None)
     if failed is None:
-        told = f"{len(after)} as-found sessions after {record.date}, none of them out of tolerance"
-        raise _refused(good, told, "a later as-found session out of tolerance")
-    between = tuple(one.session_record for one in after if one.date < failed.date and one.within)
+        reason = f"{len(after)} as-found sessions after {record.date}, none of them out of tolerance"
+        raise _refused(good, reason, "a later as-found session out of tolerance")
+    between = tuple(
+        session.session_record for session in after if session.date < failed.date and session.within
+    )
     return Drift(instrument=instrument, good=good, good_date=date, failed=failed, later_good=between)
 
 
 def drifted_files(
-    made: ArchiveAudit,
+    audit: ArchiveAudit,
     registry: Registry,
     drift: Drift,
     *,
@@ -201,14 +203,14 @@ def drifted_files(
 ) -> Iterator[DriftedFile]:
     """Yield the recordings of the stretch, in the order in which they are done."""
     days: dict[str, dt.date] = {}
-    for plain in made.files.plain():
+    for plain in audit.files.plain():
         if plain["instrument"] == drift.instrument and plain["date"] is not None:
             day = dt.date.fromisoformat(plain["date"])
             if drift.share(day) is not None:
                 days[plain["path"]] = day
     # A worker may have another working folder.
-    archive, records = (Path(os.path.abspath(one)) for one in (made.archive, registry.folder))  # noqa: PTH100
-    make = partial(_Drifted, archive, Registry(records), made.known_at, drift)
+    archive, records = (Path(os.path.abspath(folder)) for folder in (audit.archive, registry.folder))  # noqa: PTH100
+    make = partial(_Drifted, archive, Registry(records), audit.known_at, drift)
     names = tuple(days)
     for name, result in (
         run_isolated(make, names, workers=workers)
@@ -236,22 +238,26 @@ class _Drifted:
         context = context_of(path)
         day = context.date or self.drift.good_date
         share = self.drift.share(day) or 0.0
-        found = DriftedFile(path=name, date=day, share=share)
+        file = DriftedFile(path=name, date=day, share=share)
         try:
             recording = read_recording(path, context.machine)
             blocks = () if context.is_tare else split_blocks(recording, context.machine)[0]
         except ToolkitError as error:
             return DriftedFile(path=name, date=day, share=share, reason=f"{error.rule}: {error.what}")
         columns = columns_of(recording)
-        used = self.choices.on(context.machine.name, context.date).in_force
-        why = "no record was in force" if used is None else unfit(used, columns) or unfit(self.true, columns)
-        if used is None or why is not None or columns.loads != ("FY", "MZ"):
+        record = self.choices.on(context.machine.name, context.date).in_force
+        why = (
+            "no record was in force"
+            if record is None
+            else unfit(record, columns) or unfit(self.true, columns)
+        )
+        if record is None or why is not None or columns.loads != ("FY", "MZ"):
             reason = why or "the file has not both Fy and Mz"
             return DriftedFile(path=name, date=day, share=share, reason=reason)
-        old, new = recompute(columns, used), recompute(columns, self.true)
+        old, new = recompute(columns, record), recompute(columns, self.true)
         FY, MZ = (share * (new[load] - old[load]) for load in ("FY", "MZ"))
         return DriftedFile(
-            path=found.path,
+            path=file.path,
             date=day,
             share=share,
             FY_N=float(np.abs(FY).max()),

@@ -51,10 +51,10 @@ def apply_record(
     check_units(record, units)
     _check_present(record, indications)
     return {
-        one.load: _evaluate(record, one, indications, tare, issued=issued)
-        * si_scale(one.unit, where=record.id)
-        for one in record.loads
-        if only is None or one.load in only
+        load.load: _evaluate(record, load, indications, tare, issued=issued)
+        * si_scale(load.unit, where=record.id)
+        for load in record.loads
+        if only is None or load.load in only
     }
 
 
@@ -82,9 +82,9 @@ def check_units(record: CalibrationRecord, units: Mapping[str, str]) -> None:
     """
     for name, expected in zip(record.indications, record.indication_units, strict=True):
         got = units.get(name)
-        wanted = unit(expected, where=record.id)
-        found = None if got is None else unit(got, where=f"channel {name}")
-        if found is None or (found.factor, found.dimension) != (wanted.factor, wanted.dimension):
+        needed = unit(expected, where=record.id)
+        present = None if got is None else unit(got, where=f"channel {name}")
+        if present is None or (present.factor, present.dimension) != (needed.factor, needed.dimension):
             raise RecordError(
                 f"the unit of {name} is not that of record {record.id}",
                 where=f"{record.id}, {name}",
@@ -110,28 +110,28 @@ def _check_present(record: CalibrationRecord, indications: Mapping[str, object])
 
 def _terms(
     record: CalibrationRecord,
-    one: LoadFit,
+    load: LoadFit,
     indications: Mapping[str, NDArray[np.float64]],
     tare: Mapping[str, float] | None,
 ) -> NDArray[np.float64]:
     values = {name: np.asarray(indications[name], dtype=np.float64) for name in record.indications}
     if tare is None:
-        return term_matrix(one.terms, values)
+        return term_matrix(load.terms, values)
     if record.zero != "included":
-        return term_matrix(one.terms, {name: values[name] - tare[name] for name in values})
+        return term_matrix(load.terms, {name: values[name] - tare[name] for name in values})
     unloaded = {name: np.array([tare[name]]) for name in values}
-    return term_matrix(one.terms, values) - term_matrix(one.terms, unloaded)
+    return term_matrix(load.terms, values) - term_matrix(load.terms, unloaded)
 
 
 def _evaluate(
     record: CalibrationRecord,
-    one: LoadFit,
+    load: LoadFit,
     indications: Mapping[str, NDArray[np.float64]],
     tare: Mapping[str, float] | None,
     *,
     issued: bool,
 ) -> NDArray[np.float64]:
-    loads: NDArray[np.float64] = _terms(record, one, indications, tare) @ np.asarray(
-        one.issued if issued else one.coefficients
+    loads: NDArray[np.float64] = _terms(record, load, indications, tare) @ np.asarray(
+        load.issued if issued else load.coefficients
     )
     return loads

@@ -3,26 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Literal, cast
+from dataclasses import replace
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from toolkit.channels import Rotation
-from toolkit.characteristics.direction import Direction
-from toolkit.characteristics.groups import Group, group
-from toolkit.characteristics.model import (
-    AtAngle,
-    Budget,
-    Characteristics,
-    DirectionFit,
-    Point,
-    Pull,
-    Stiffness,
-)
-from toolkit.characteristics.pull import NAMES as PULL
-from toolkit.characteristics.rows import BOTH, Row, directions_of, point_u, rows_of
-from toolkit.characteristics.shared import shared_of
-from toolkit.characteristics.stiffness import NAMES as STIFFNESS
+from toolkit.characteristics.groups import Direction, DirectionFit, Group, directions_of, group
+from toolkit.characteristics.model import Characteristics, Point, Row
+from toolkit.characteristics.rows import point_u, rows_of
+from toolkit.characteristics.shared_errors import shared_errors_of
 from toolkit.findings import Finding
 from toolkit.tires.evaluate import estimate_at
 from toolkit.tires.fit import fit_curves, why_not
@@ -46,53 +35,14 @@ def characterise(
     groups = group(reduced)
     fits, findings = _fit(groups)
     directions = directions_of(reduced, fits)
-    shared = shared_of(reduced, machine=machine, record=record)
-    rows = rows_of(directions, shared=shared)
-    found = {(row.name, row.load_N, row.rotation, row.SA_rad): row.number.estimate() for row in rows}
-    loads = sorted({d.group.load_N for d in directions})
+    shared = shared_errors_of(reduced, machine=machine, record=record)
     return Characteristics(
         fits=fits,
-        stiffness=tuple(
-            Stiffness(
-                load_N=g.load_N,
-                rotation=g.rotation,
-                **{name: found.get((name, g.load_N, g.rotation, None)) for name in STIFFNESS},
-            )
-            for g in groups
-        ),
-        pull=tuple(
-            Pull(load_N=load, **{name: found.get((name, load, BOTH, None)) for name in PULL})
-            for load in loads
-        ),
+        rows=tuple(replace(row, parts=()) for row in rows_of(directions, shared=shared)),
         findings=(*findings, *_line_findings(directions)),
-        at_angles=tuple(
-            AtAngle(
-                load_N=load,
-                rotation=rotation,
-                SA_rad=angle,
-                FY=found.get(("FY", load, rotation, angle)),
-                MZ=found.get(("MZ", load, rotation, angle)),
-            )
-            for load, rotation, angle in dict.fromkeys(
-                (row.load_N, cast("Rotation", row.rotation), row.SA_rad)
-                for row in rows
-                if row.SA_rad is not None
-            )
-        ),
         points=tuple(
             Point(file=file, first_row=row, u_FY=u["FY"], u_MZ=u["MZ"])
             for (file, row), u in point_u(directions, shared=shared).items()
-        ),
-        budgets=tuple(
-            Budget(
-                load_N=row.load_N,
-                rotation=row.rotation,
-                name=row.name,
-                unit=row.number.unit,
-                sources=row.number.by_source(),
-            )
-            for row in rows
-            if row.SA_rad is None
         ),
     )
 
@@ -104,11 +54,12 @@ def characteristic_rows(
     machine: Machine,
     record: CalibrationRecord | None,
 ) -> tuple[Row, ...]:
-    """Return the characteristics again as rows that know the parts of their uncertainty, to compare them."""
-    return rows_of(
+    """Return the rows that have a value, with the parts of their uncertainty, to compare them."""
+    rows = rows_of(
         directions_of(reduced, characteristics.fits),
-        shared=shared_of(reduced, machine=machine, record=record),
+        shared=shared_errors_of(reduced, machine=machine, record=record),
     )
+    return tuple(row for row in rows if row.estimate is not None)
 
 
 def _curve(group: Group, channel: Literal["FY", "MZ"]) -> Curve:
@@ -154,18 +105,18 @@ def _refused_findings(
             text = f"{problem.what} (got {problem.got}, expected {problem.expected})"
             key = (groups[index].rotation, problem.rule or "not-fitted", text)
             same.setdefault(key, {}).setdefault(channel, {})[index] = None
-    found = []
+    findings = []
     for (rotation, rule, text), channels in same.items():
         loads = dict.fromkeys(index for indices in channels.values() for index in indices)
         where = in_both([groups[index].load_N for index in loads], "lbf", ".0f")
-        found.append(
+        findings.append(
             Finding(
                 rule=rule,
                 where=f"drum {rotation}, {where}, {' and '.join(channels)}",
                 message=f"{text}; what these curves feed is null",
             )
         )
-    return found
+    return findings
 
 
 def _where(group: Group) -> str:
@@ -174,29 +125,29 @@ def _where(group: Group) -> str:
 
 def _line_findings(directions: Sequence[Direction]) -> list[Finding]:
     """Hold the curve's value at SA = 0 against the line through the nearest points."""
-    found = []
-    for one in directions:
-        SA = one.group.SA
+    findings = []
+    for direction in directions:
+        SA = direction.group.SA
         if not (len(SA) > 1 and SA[0] <= 0.0 <= SA[-1]):
-            if one.fit.FY is not None:
+            if direction.fit.FY is not None:
                 message = "the slip angles lie on one side of zero: stiffness and pull at SA = 0 are null"
-                found.append(Finding(rule="one-sided", where=_where(one.group), message=message))
+                findings.append(Finding(rule="one-sided", where=_where(direction.group), message=message))
             continue
-        for channel, unit, fit in (("FY", "N", one.fit.FY), ("MZ", "N*m", one.fit.MZ)):
+        for channel, unit, fit in (("FY", "N", direction.fit.FY), ("MZ", "N*m", direction.fit.MZ)):
             if fit is None:
                 continue
             at_zero = estimate_at(fit, 0.0)
-            line = float(np.interp(0.0, SA, one.group.values(channel)))
+            line = float(np.interp(0.0, SA, direction.group.values(channel)))
             # The line itself is wrong by the curve's bend: a fiftieth of the range is left to it.
-            limit = max(5 * at_zero.u, 0.02 * float(np.ptp(one.group.values(channel))))
+            limit = max(5 * at_zero.u, 0.02 * float(np.ptp(direction.group.values(channel))))
             if abs(at_zero.value - line) > limit:
-                found.append(
+                findings.append(
                     Finding(
                         rule="curve-against-line",
-                        where=_where(one.group),
+                        where=_where(direction.group),
                         message=f"{channel} at SA = 0 is {in_both(at_zero.value, unit)} by the curve, "
                         f"{in_both(line, unit)} by the line through the nearest points: look at the "
                         "residuals",
                     )
                 )
-    return found
+    return findings

@@ -1,14 +1,22 @@
-"""The conditions of one direction and one nominal load, in the order of the slip angle."""
+"""The conditions of one direction and one nominal load, in the order of the slip angle, and their curves."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from toolkit.channels import ROTATIONS, Rotation
 from toolkit.reduction.model import Condition, ReducedTest
+
+if TYPE_CHECKING:
+    from toolkit.tires.model import CurveFit
+
+Channel = Literal["FY", "MZ"]
+CHANNELS: tuple[Channel, Channel] = ("FY", "MZ")
 
 # Loads that the protocol does not know are one group while they lie within this part of each other.
 _SAME_LOAD = 0.10
@@ -35,26 +43,56 @@ class Group:
         """Standard uncertainty of each condition's own value: rows, and the way to the common load."""
         return np.array([c.u_FY_common if channel == "FY" else c.u_MZ_common for c in self.conditions])
 
+    def covers_zero(self) -> bool:
+        """Tell whether slip angles lie on both sides of zero."""
+        SA = self.SA
+        return len(SA) > 1 and bool(SA[0] <= 0.0 <= SA[-1])
+
     def step(self, degrees: float) -> tuple[int, ...]:
         """Return the places of the conditions of a slip angle step of the protocol [deg]; repeats too."""
-        wanted = np.radians(degrees)
+        step = np.radians(degrees)
         return tuple(
-            i
-            for i, one in enumerate(self.conditions)
-            if one.step_SA is not None and abs(one.step_SA - wanted) < 1e-9
+            place
+            for place, condition in enumerate(self.conditions)
+            if condition.step_SA is not None and abs(condition.step_SA - step) < 1e-9
         )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DirectionFit:
+    """The fitted curves of one direction of rotation at one load."""
+
+    rotation: Rotation
+    load_N: float
+    FY: CurveFit | None
+    MZ: CurveFit | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Direction:
+    """One direction's conditions and curves at one load; a curve is None where it could not be fitted."""
+
+    group: Group
+    fit: DirectionFit
+
+    def curve(self, channel: Channel) -> CurveFit | None:
+        """Return the fitted curve of a channel."""
+        return self.fit.FY if channel == "FY" else self.fit.MZ
+
+
+def directions_of(reduced: ReducedTest, fits: Sequence[DirectionFit]) -> tuple[Direction, ...]:
+    """Return the directions of a test with their curves, lightest load first, forward before reverse."""
+    return tuple(Direction(group=part, fit=fit) for part, fit in zip(group(reduced), fits, strict=True))
 
 
 def group(reduced: ReducedTest) -> tuple[Group, ...]:
     """Return the groups of a test: ascending load, forward before reverse."""
-    used = reduced.used()
     loads: list[list[Condition]] = []
-    for one in sorted(used, key=lambda c: c.FZ_common):
-        last = loads[-1][-1] if loads else None
-        if last is not None and _same(last, one):
-            loads[-1].append(one)
+    for condition in sorted(reduced.used(), key=lambda c: c.FZ_common):
+        if loads and _same_load(loads[-1][-1], condition):
+            loads[-1].append(condition)
         else:
-            loads.append([one])
+            loads.append([condition])
     return tuple(
         Group(
             load_N=float(np.mean([c.FZ_common for c in load])),
@@ -67,7 +105,7 @@ def group(reduced: ReducedTest) -> tuple[Group, ...]:
     )
 
 
-def _same(one: Condition, other: Condition) -> bool:
-    if one.step_FZ is not None or other.step_FZ is not None:
-        return one.step_FZ == other.step_FZ
-    return other.FZ_common - one.FZ_common <= _SAME_LOAD * other.FZ_common
+def _same_load(lighter: Condition, heavier: Condition) -> bool:
+    if lighter.step_FZ is not None or heavier.step_FZ is not None:
+        return lighter.step_FZ == heavier.step_FZ
+    return heavier.FZ_common - lighter.FZ_common <= _SAME_LOAD * heavier.FZ_common

@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolkit.characteristics.direction import CHANNELS, Channel, Direction
+from toolkit.characteristics.groups import CHANNELS, Channel, Direction
 from toolkit.characteristics.scatter import Scatter, weights_of
-from toolkit.characteristics.shared import Shared
+from toolkit.characteristics.shared_errors import SharedErrors
 from toolkit.characteristics.uncertain import Part, Uncertain, merged
 from toolkit.estimate import Estimate
 from toolkit.tires.catalog import model
@@ -41,34 +41,49 @@ class Reader:
     """Reads one direction; what its conditions share is computed once.
 
     ``scatter`` is that of the conditions about all curves of the test; without it each curve's own
-    covariance stands for it, as for a table whose rows follow one another.
+    covariance stands for it, as for a table whose rows follow one another. ``stepped`` False says that the
+    data are no steps of a protocol: a secant is then that of the curve.
     """
 
-    def __init__(self, direction: Direction, *, shared: Shared, scatter: Scatter | None = None) -> None:
-        self.direction, self.shared, self.scatter = direction, shared, scatter
+    def __init__(
+        self,
+        direction: Direction,
+        *,
+        shared: SharedErrors,
+        scatter: Scatter | None = None,
+        stepped: bool = True,
+    ) -> None:
+        self.direction, self.shared, self.scatter, self.stepped = direction, shared, scatter, stepped
         self.group = direction.group
         conditions = self.group.conditions
         self._calibration = {c: shared.calibration_rows(c, conditions) for c in CHANNELS}
         self._zero = {c: shared.zero_rows(c, conditions) for c in CHANNELS}
         # A tare of each file is a shift of that file alone.
-        own = np.zeros(len(conditions))
-        self._tares = {"FY": own, "MZ": own}
+        zeros = np.zeros(len(conditions))
+        self._tares = {"FY": zeros, "MZ": zeros}
         if shared.tared and not shared.u_cell_zero:
             self._tares = {
-                "FY": np.array([one.u_FY_zero for one in conditions]),
-                "MZ": np.array([one.u_MZ_zero for one in conditions]),
+                "FY": np.array([condition.u_FY_zero for condition in conditions]),
+                "MZ": np.array([condition.u_MZ_zero for condition in conditions]),
             }
         self._pseudo: dict[Channel, NDArray[np.float64]] = {}
+        # Several characteristics are made of the values at SA = 0 and of MZ where FY is zero.
+        self._at_zero: dict[Channel, Uncertain | None] = {}
+        self._residual: list[Uncertain | None] = []
 
     def covers_zero(self) -> bool:
         """Tell whether slip angles lie on both sides of zero."""
-        SA = self.group.SA
-        return len(SA) > 1 and bool(SA[0] <= 0.0 <= SA[-1])
+        return self.group.covers_zero()
 
     def value(self, channel: Channel, SA: float) -> Uncertain | None:
         """Return the curve's value at a slip angle [rad]; None without a curve."""
+        if SA == 0.0 and channel in self._at_zero:
+            return self._at_zero[channel]
         reading = self._value(channel, SA)
-        return None if reading is None else self._read(reading, f"value at {SA:.9g}")
+        number = None if reading is None else self._read(reading, f"value at {SA:.9g}")
+        if SA == 0.0:
+            self._at_zero[channel] = number
+        return number
 
     def _value(self, channel: Channel, SA: float) -> _Reading | None:
         fit = self.direction.curve(channel)
@@ -89,21 +104,24 @@ class Reader:
         if fit is None or "slope_at_zero" in fit.not_determined or fit.slope_at_zero is None:
             return None
         gradient = model(fit.model).slope_jacobian(fit.values, 0.0)
-        one = slope_estimate_at(fit, 0.0)
+        estimate = slope_estimate_at(fit, 0.0)
         # A zero of the slip angle moves along the curve to where its slope is another one.
         step = 1e-4
         bend = (float(slope_at(fit, step)) - float(slope_at(fit, -step))) / (2 * step)
-        angle = tuple(self.shared.angle_parts(bend, one.value))
+        angle = tuple(self.shared.angle_parts(bend, estimate.value))
         weights = self._weights(channel, gradient)
-        return self._read(_Reading(channel=channel, estimate=one, weights=weights, angle=angle), "slope at 0")
+        reading = _Reading(channel=channel, estimate=estimate, weights=weights, angle=angle)
+        return self._read(reading, "slope at 0")
 
     def secant(self, channel: Channel) -> Uncertain | None:
         """Return (y(1 deg) - y(-1 deg)) / 2 deg [per rad] from the measured steps.
 
         A steering zero moves both steps; each value is carried from its measured angle to the step's along
         the fitted curve, so that the secant is that of the definition. Without a curve the measured span
-        is used as it is. Repeats of a step count as their mean.
+        is used as it is. Repeats of a step count as their mean. Data without steps: off the curve alone.
         """
+        if not self.stepped:
+            return self._chord(channel)
         sides = (self.group.step(1.0), self.group.step(-1.0))
         if not all(sides):
             return None
@@ -115,14 +133,14 @@ class Reader:
         if span <= 0:
             return None
         fit = self.direction.curve(channel)
-        one = float(np.radians(1.0))
+        degree = float(np.radians(1.0))
         if fit is not None:
-            steps = np.where(weights > 0, one, -one)
+            steps = np.where(weights > 0, degree, -degree)
             y = y + value_at(fit, steps) - value_at(fit, SA)
-            span = 2 * one
+            span = 2 * degree
         slope = float(weights @ y) / span
         # What an error of the angle does to the two ends, by the slopes there; by the chord without a curve.
-        ends = (slope, slope) if fit is None else slope_at(fit, np.array([one, -one])).tolist()
+        ends = (slope, slope) if fit is None else slope_at(fit, np.array([degree, -degree])).tolist()
         parts = list(self.shared.angle_parts((ends[0] - ends[1]) / span, (ends[0] + ends[1]) / 2))
         if fit is None or self.scatter is None:
             # The zero of the slip angle cancels in the span; what is left of the angle is its scatter, which
@@ -135,22 +153,21 @@ class Reader:
         reading = _Reading(channel=channel, estimate=estimate, weights=weights / span, angle=tuple(parts))
         return self._read(reading, "secant")
 
-    def chord(self, channel: Channel) -> Uncertain | None:
-        """Return the +-1 deg secant [per rad] off the curve alone, for data without steps of a protocol."""
+    def _chord(self, channel: Channel) -> Uncertain | None:
         fit = self.direction.curve(channel)
-        one = float(np.radians(1.0))
+        degree = float(np.radians(1.0))
         SA = self.group.SA
-        if fit is None or SA[0] > -one or SA[-1] < one:
+        if fit is None or SA[0] > -degree or SA[-1] < degree:
             return None
         at = model(fit.model)
-        gradient = (at.jacobian(fit.values, one) - at.jacobian(fit.values, -one)) / (2 * one)
-        low, high = value_at(fit, np.array([-one, one])).tolist()
-        left, right = slope_at(fit, np.array([-one, one])).tolist()
-        slope = (high - low) / (2 * one)
+        gradient = (at.jacobian(fit.values, degree) - at.jacobian(fit.values, -degree)) / (2 * degree)
+        low, high = value_at(fit, np.array([-degree, degree])).tolist()
+        lower, upper = slope_at(fit, np.array([-degree, degree])).tolist()
+        slope = (high - low) / (2 * degree)
         u = float(np.sqrt(max(float(gradient @ np.asarray(fit.covariance) @ gradient), 0.0)))
         dof = estimate_at(fit, 0.0).dof
         estimate = Estimate(value=slope, u=u, unit=f"{UNIT[channel]}/rad", dof=dof)
-        angle = tuple(self.shared.angle_parts((right - left) / (2 * one), (right + left) / 2))
+        angle = tuple(self.shared.angle_parts((upper - lower) / (2 * degree), (upper + lower) / 2))
         weights = self._weights(channel, gradient)
         return self._read(_Reading(channel=channel, estimate=estimate, weights=weights, angle=angle), "chord")
 
@@ -160,6 +177,11 @@ class Reader:
         An error of FY moves the angle at which it is read, by dMZ/dFY along the curves; a zero of the slip
         angle moves both curves alike and cancels, as does the slip angle of a single block.
         """
+        if not self._residual:
+            self._residual.append(self._moment_without_force())
+        return self._residual[0]
+
+    def _moment_without_force(self) -> Uncertain | None:
         FY = self.direction.curve("FY")
         crossing = None if FY is None or not self.covers_zero() else zero_crossing(FY)
         if FY is None or crossing is None:
@@ -180,7 +202,7 @@ class Reader:
             self._pseudo[channel] = weights_of(self.direction, channel)
         return np.asarray(gradient @ self._pseudo[channel])
 
-    def _read(self, first: _Reading, what: str, *more: tuple[float, _Reading]) -> Uncertain:
+    def _read(self, first: _Reading, reading: str, *more: tuple[float, _Reading]) -> Uncertain:
         """Return the value of the first reading with all parts of a weighted sum of readings.
 
         What further readings share with the first, and what one block's errors do to both channels, is
@@ -188,28 +210,28 @@ class Reader:
         """
         terms = ((1.0, first), *more)
         channel, shared = first.channel, self.shared
-        weights = {one.channel: factor * one.weights for factor, one in terms}
+        weights = {term.channel: factor * term.weights for factor, term in terms}
         rows = _norm(np.concatenate([w * self.group.own_u(c) for c, w in weights.items()]))
         tares = _norm(np.concatenate([w * self._tares[c] for c, w in weights.items()]))
         if self.scatter is not None and all(self.direction.curve(c) is not None for c in weights):
-            rest, dof = self.scatter.of(self.direction, weights)
+            scatter, dof = self.scatter.of(self.direction, weights)
         else:
             # The fit's residuals hold the scatter of the rows already; where a curve follows its points more
             # closely than their own scatter allows, the scatter stands. Never both.
-            u = _norm(np.array([factor * one.estimate.u for factor, one in terms]))
-            rest, dof = float(np.sqrt(max(u**2 - rows**2, 0.0))), first.estimate.dof
+            u = _norm(np.array([factor * term.estimate.u for factor, term in terms]))
+            scatter, dof = float(np.sqrt(max(u**2 - rows**2, 0.0))), first.estimate.dof
         parts: list[Part] = []
         for c, w in weights.items():
             parts += shared.calibration_parts(c, self._calibration[c] @ w)
             parts += shared.zero_parts(self._zero[c] @ w)
-        parts.append(self._own(channel, "tare", what, tares))
-        parts += [replace(part, u=factor * part.u) for factor, one in terms for part in one.angle]
-        parts.append(self._own(channel, "repeatability", what, rows))
-        parts.append(self._own(channel, "fit", what, rest, dof))
+        parts.append(self._own(channel, "tare", reading, tares))
+        parts += [replace(part, u=factor * part.u) for factor, term in terms for part in term.angle]
+        parts.append(self._own(channel, "repeatability", reading, rows))
+        parts.append(self._own(channel, "fit", reading, scatter, dof))
         return Uncertain(value=first.estimate.value, unit=first.estimate.unit, parts=merged(parts))
 
-    def _own(self, channel: str, source: str, what: str, u: float, dof: float = np.inf) -> Part:
-        where = f"{self.shared.test}/{self.group.load_N:.6g}/{self.group.rotation}/{channel}/{what}"
+    def _own(self, channel: str, source: str, reading: str, u: float, dof: float = np.inf) -> Part:
+        where = f"{self.shared.test}/{self.group.load_N:.6g}/{self.group.rotation}/{channel}/{reading}"
         return Part(source=source, key=f"{source}/{where}", u=u, dof=dof)
 
 

@@ -1,170 +1,181 @@
-"""Every characteristic of a test as one row: name, load, direction, and a number that knows its parts."""
+"""Every characteristic of a test as one row, and the uncertainty of every condition."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolkit.characteristics.direction import CHANNELS, Channel, Direction
-from toolkit.characteristics.groups import group
-from toolkit.characteristics.pull import pull
+from toolkit.characteristics.catalogue import of_scope
+from toolkit.characteristics.characteristic import BOTH, Characteristic
+from toolkit.characteristics.groups import CHANNELS, Channel, Direction
+from toolkit.characteristics.model import Row
 from toolkit.characteristics.reading import Reader
 from toolkit.characteristics.scatter import Scatter, scatter_of
-from toolkit.characteristics.shared import Shared
-from toolkit.characteristics.stiffness import stiffness
+from toolkit.characteristics.shared_errors import SharedErrors
 from toolkit.characteristics.uncertain import Part, Uncertain
 from toolkit.reduction.common_load import at_one_angle, slopes
 
-if TYPE_CHECKING:
-    from toolkit.characteristics.model import DirectionFit
-    from toolkit.reduction.model import ReducedTest
-
-BOTH = "both"
 # Beyond the outermost measured slip angle by more than this, a curve is not read.
 _REACH_RAD = math.radians(0.5)
 
+# What a number is of, until it is a row.
+_Key = tuple[Characteristic, float, str, float | None]
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Row:
-    """One characteristic.
 
-    ``name`` as in `Pull` and `Stiffness`, or ``FY`` and ``MZ`` at the slip angle ``SA_rad``; ``rotation``
-    is ``both`` for what needs both directions.
+def rows_of(directions: Sequence[Direction], *, shared: SharedErrors) -> tuple[Row, ...]:
+    """Return every characteristic of a test, with parts: of its loads, its directions, its slip angle steps.
+
+    What the test cannot give is a row without an estimate that says what lacks.
     """
-
-    name: str
-    load_N: float
-    rotation: str
-    number: Uncertain
-    SA_rad: float | None = None
-
-    @property
-    def series(self) -> tuple[str, str, float | None]:
-        """What is the same at every load: (name, rotation, slip angle)."""
-        return self.name, self.rotation, self.SA_rad
-
-
-def directions_of(reduced: ReducedTest, fits: Sequence[DirectionFit]) -> tuple[Direction, ...]:
-    """Return the directions of a test with their curves, lightest load first, forward before reverse."""
-    return tuple(Direction(group=one, fit=fit) for one, fit in zip(group(reduced), fits, strict=True))
-
-
-def rows_of(directions: Sequence[Direction], *, shared: Shared) -> tuple[Row, ...]:
-    """Return every characteristic of a test: pull, stiffness, and FY and MZ at its slip angle steps."""
-    steps = {c.step_SA for one in directions for c in one.group.conditions if c.step_SA is not None}
+    steps = sorted({
+        c.step_SA for direction in directions for c in direction.group.conditions if c.step_SA is not None
+    })  # fmt: skip
     scatter = scatter_of(directions)
-    readers = [Reader(one, shared=shared, scatter=scatter) for one in directions]
-    found: list[Row] = []
-    for load in sorted({one.group.load_N for one in directions}):
-        there = {r.group.rotation: r for r in readers if r.group.load_N == load}
-        for name, number in pull(there.get("forward"), there.get("reverse")).items():
-            found.append(Row(name=name, load_N=load, rotation=BOTH, number=number))
+    readers = [Reader(direction, shared=shared, scatter=scatter) for direction in directions]
+    numbers: dict[_Key, Uncertain | None] = {}
+    for load in sorted({direction.group.load_N for direction in directions}):
+        runs = {reader.group.rotation: reader for reader in readers if reader.group.load_N == load}
+        for declared in of_scope("load"):
+            complete = all(rotation in runs for rotation in declared.runs)
+            number = declared.read(declared, *(runs[r] for r in declared.runs)) if complete else None
+            numbers[declared, load, BOTH, None] = number
     for reader in readers:
         load, rotation = reader.group.load_N, reader.group.rotation
-        for name, number in stiffness(reader).items():
-            found.append(Row(name=name, load_N=load, rotation=rotation, number=number))
-        found += _at_angles(reader, sorted(steps))
-    return tuple(_with_load_and_pressure(found, shared))
+        for declared in of_scope("direction"):
+            numbers[declared, load, rotation, None] = declared.read(declared, reader)
+        numbers |= at_angles(reader, steps)
+    by_load: dict[float, list[Direction]] = {}
+    for direction in directions:
+        by_load.setdefault(direction.group.load_N, []).append(direction)
+    return tuple(
+        lacking_row(key[0], key[1:], by_load[key[1]])
+        if number is None
+        else Row.of(key[0].name, number, load_N=key[1], rotation=key[2], SA_rad=key[3])
+        for key, number in _with_load_and_pressure(numbers, shared).items()
+    )
 
 
-def _at_angles(reader: Reader, angles: Sequence[float]) -> list[Row]:
+def at_angles(
+    reader: Reader, angles: Sequence[float], declared: Sequence[Characteristic] | None = None
+) -> dict[_Key, Uncertain | None]:
+    """Return what is read at slip angles [rad] inside those measured; angles that give nothing are left out.
+
+    Parameters
+    ----------
+    declared : the characteristics to read; by default all that are read at slip angles
+    """
     SA = reader.group.SA
-    found = []
+    numbers: dict[_Key, Uncertain | None] = {}
     for angle in angles:
         if not SA[0] - _REACH_RAD <= angle <= SA[-1] + _REACH_RAD:
             continue
-        for channel in CHANNELS:
-            number = reader.value(channel, angle)
-            if number is not None:
-                found.append(
-                    Row(
-                        name=channel,
-                        load_N=reader.group.load_N,
-                        rotation=reader.group.rotation,
-                        number=number,
-                        SA_rad=angle,
-                    )
-                )
-    return found
+        read: dict[_Key, Uncertain | None] = {
+            (entry, reader.group.load_N, reader.group.rotation, angle): entry.read(entry, reader, angle)
+            for entry in (of_scope("angle") if declared is None else declared)
+        }
+        if any(number is not None for number in read.values()):
+            numbers |= read
+    return numbers
 
 
-def _with_load_and_pressure(rows: Sequence[Row], shared: Shared) -> list[Row]:
+def lacking_row(
+    declared: Characteristic, key: tuple[float, str, float | None], directions: Sequence[Direction]
+) -> Row:
+    """Return the row of a characteristic that the directions of its load do not give.
+
+    Parameters
+    ----------
+    key : load [N], rotation, slip angle [rad]
+    """
+    load, rotation, SA = key
+    read_off = [direction for direction in directions if rotation in (BOTH, direction.group.rotation)]
+    return Row(
+        name=declared.name, load_N=load, rotation=rotation, SA_rad=SA, lacking=declared.why_lacking(read_off)
+    )
+
+
+def _with_load_and_pressure(
+    numbers: Mapping[_Key, Uncertain | None], shared: SharedErrors
+) -> dict[_Key, Uncertain | None]:
     """Add what an error of the load cell and of the pressure does to each value.
 
     An error of the load attributes a value to a wrong load: -dy/dFZ times the error, dy/dFZ from the
     neighbouring loads of the same series. With one load alone y is taken as proportional to it.
     """
-    series: dict[tuple[str, str, float | None], list[int]] = {}
-    for index, row in enumerate(rows):
-        series.setdefault(row.series, []).append(index)
-    found = list(rows)
-    for places in series.values():
-        loads = np.array([rows[i].load_N for i in places])
-        steep = slopes(loads, np.array([rows[i].number.value for i in places]))
-        for i, slope in zip(places, steep, strict=True):
-            row = rows[i]
-            value = row.number.value
-            by_load = value / row.load_N if slope is None else slope.value
-            parts: list[Part] = [shared.load_part(-by_load, row.load_N)]
-            pressure = shared.pressure_part(value)
+    series: dict[tuple[str, str, float | None], list[tuple[_Key, Uncertain]]] = {}
+    for key, number in numbers.items():
+        if number is not None:
+            declared, _, rotation, SA = key
+            series.setdefault((declared.name, rotation, SA), []).append((key, number))
+    complete = dict(numbers)
+    for members in series.values():
+        loads = np.array([load for (_, load, _, _), _ in members])
+        steep = slopes(loads, np.array([number.value for _, number in members]))
+        for (key, number), slope in zip(members, steep, strict=True):
+            load = key[1]
+            by_load = number.value / load if slope is None else slope.value
+            parts: list[Part] = [shared.load_part(-by_load, load)]
+            pressure = shared.pressure_part(number.value)
             if pressure is not None:
                 parts.append(pressure)
-            found[i] = replace(row, number=row.number.with_parts(*parts))
-    return found
+            complete[key] = number.with_parts(*parts)
+    return complete
 
 
-def point_u(directions: Sequence[Direction], *, shared: Shared) -> Mapping[tuple[str, int], dict[str, float]]:
+def point_u(
+    directions: Sequence[Direction], *, shared: SharedErrors
+) -> Mapping[tuple[str, int], dict[str, float]]:
     """Return the whole standard uncertainty of every condition as measured: (file, first row) -> channel.
 
     Sources: the record, the cells' zeros or tares, the scatter of the rows and about the curves, and through
     the curve's slopes the slip angle (zero and scale), the load and the pressure.
     """
-    every = [(one, place) for one in directions for place in range(len(one.group.conditions))]
-    groups = at_one_angle([one.group.conditions[place] for one, place in every])
+    every = [
+        (direction, place) for direction in directions for place in range(len(direction.group.conditions))
+    ]
+    groups = at_one_angle([direction.group.conditions[place] for direction, place in every])
     scatter = scatter_of(directions)
-    found: dict[tuple[str, int], dict[str, float]] = {}
+    uncertainties: dict[tuple[str, int], dict[str, float]] = {}
     for channel in CHANNELS:
         squares = _squares(directions, channel, shared, scatter)
-        for members in groups:
-            pairs = [every[index] for index in members]
-            conditions = [one.group.conditions[place] for one, place in pairs]
+        for places in groups:
+            pairs = [every[index] for index in places]
+            conditions = [direction.group.conditions[place] for direction, place in pairs]
             FZ = np.array([c.FZ for c in conditions])
             y = np.array([c.FY if channel == "FY" else c.MZ for c in conditions])
-            for (one, place), c, value, slope in zip(pairs, conditions, y, slopes(FZ, y), strict=True):
+            for (direction, place), c, value, slope in zip(pairs, conditions, y, slopes(FZ, y), strict=True):
                 load = shared.load_part(float(value / c.FZ) if slope is None else slope.value, c.FZ)
                 pressure = shared.pressure_part(float(value))
                 more = load.u**2 + (pressure.u**2 if pressure else 0.0)
-                u = math.sqrt(squares[id(one)][place] + more)
-                found.setdefault((c.file, c.first_row), {})[channel] = u
-    return found
+                u = math.sqrt(squares[id(direction)][place] + more)
+                uncertainties.setdefault((c.file, c.first_row), {})[channel] = u
+    return uncertainties
 
 
 def _squares(
-    directions: Sequence[Direction], channel: Channel, shared: Shared, scatter: Scatter
+    directions: Sequence[Direction], channel: Channel, shared: SharedErrors, scatter: Scatter
 ) -> dict[int, np.ndarray]:
     """Return the variance of each condition of each direction but for load and pressure."""
     from toolkit.tires.evaluate import slope_at
 
-    found = {}
-    for one in directions:
-        conditions = one.group.conditions
+    variances = {}
+    for direction in directions:
+        conditions = direction.group.conditions
         rows = np.array([c.u_FY if channel == "FY" else c.u_MZ for c in conditions])
         total = rows**2
-        for moved in (shared.calibration_rows(channel, conditions), shared.zero_rows(channel, conditions)):
-            total = total + np.sum(moved**2, axis=0)
+        for shift in (shared.calibration_rows(channel, conditions), shared.zero_rows(channel, conditions)):
+            total = total + np.sum(shift**2, axis=0)
         if shared.tared and not shared.u_cell_zero:
             total = (
                 total + np.array([c.u_FY_zero if channel == "FY" else c.u_MZ_zero for c in conditions]) ** 2
             )
-        fit = one.curve(channel)
+        fit = direction.curve(channel)
         if fit is not None:
-            SA = one.group.SA
+            SA = direction.group.SA
             slope = slope_at(fit, SA)
-            total = total + scatter.each(one, channel)
+            total = total + scatter.each(direction, channel)
             total = total + (slope * shared.SA.u) ** 2 + (slope * SA * shared.SA_scale.relative) ** 2
-        found[id(one)] = total
-    return found
+        variances[id(direction)] = total
+    return variances

@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolkit.characteristics.direction import CHANNELS, Channel, Direction
+from toolkit.characteristics.groups import CHANNELS, Channel, Direction
 from toolkit.reduction.common_load import at_one_angle, slopes
 from toolkit.tires.catalog import model
 from toolkit.tires.evaluate import slope_at, value_at
@@ -67,8 +67,8 @@ class Scatter:
         variance = float(squares @ self.variances)
         if variance <= 0:
             return 0.0, np.inf
-        own = float(squares @ self.covariance @ squares)
-        return float(np.sqrt(variance)), max(2 * variance**2 / own, 1.0) if own > 0 else np.inf
+        spread = float(squares @ self.covariance @ squares)  # the variance of the variance
+        return float(np.sqrt(variance)), max(2 * variance**2 / spread, 1.0) if spread > 0 else np.inf
 
     def each(self, direction: Direction, channel: Channel) -> Array:
         """Return the variance of each condition of a direction (conditions,)."""
@@ -100,14 +100,14 @@ def scatter_of(directions: Sequence[Direction]) -> Scatter:
     sensitivities = _sensitivities(directions)
     scale = _scale(directions, sensitivities)
     curves = [
-        _Residuals.of(one, sensitivities[one.group.load_N, one.group.rotation], scale)
-        for one in directions
-        if one.fit.FY is not None or one.fit.MZ is not None
+        _Residuals.of(direction, sensitivities[direction.group.load_N, direction.group.rotation], scale)
+        for direction in directions
+        if direction.fit.FY is not None or direction.fit.MZ is not None
     ]
-    freedoms = sum(len(one.z) for one in curves)
+    freedoms = sum(len(curve.z) for curve in curves)
     free = np.array([True, True, freedoms >= _ENOUGH, freedoms >= _ENOUGH])
     free &= np.array([
-        any(float(np.trace(one.parts[k])) > _SETTLED * len(one.z) for one in curves) for k in range(4)
+        any(float(np.trace(curve.parts[k])) > _SETTLED * len(curve.z) for curve in curves) for k in range(4)
     ]) if curves else False  # fmt: skip
     variances, covariance = _restricted(curves, free)
     return Scatter(
@@ -118,44 +118,50 @@ def scatter_of(directions: Sequence[Direction]) -> Scatter:
 
 
 def _sensitivities(directions: Sequence[Direction]) -> dict[tuple[float, str], Sensitivity]:
-    every = [(one, place) for one in directions for place in range(len(one.group.conditions))]
-    groups = at_one_angle([one.group.conditions[place] for one, place in every])
+    every = [
+        (direction, place) for direction in directions for place in range(len(direction.group.conditions))
+    ]
+    groups = at_one_angle([direction.group.conditions[place] for direction, place in every])
     by_load: dict[Channel, dict[tuple[int, int], float]] = {channel: {} for channel in CHANNELS}
     for members in groups:
         pairs = [every[index] for index in members]
-        FZ = np.array([one.group.conditions[place].FZ for one, place in pairs])
+        FZ = np.array([direction.group.conditions[place].FZ for direction, place in pairs])
         for channel in CHANNELS:
-            y = np.array([one.group.values(channel)[place] for one, place in pairs])
-            for (one, place), load, value, slope in zip(pairs, FZ, y, slopes(FZ, y), strict=True):
+            y = np.array([direction.group.values(channel)[place] for direction, place in pairs])
+            for (direction, place), load, value, slope in zip(pairs, FZ, y, slopes(FZ, y), strict=True):
                 steep = value / load if slope is None else slope.value
-                by_load[channel][id(one), place] = float(steep)
-    found: dict[tuple[float, str], Sensitivity] = {}
-    for one in directions:
-        SA = one.group.SA
+                by_load[channel][id(direction), place] = float(steep)
+    sensitivities: dict[tuple[float, str], Sensitivity] = {}
+    for direction in directions:
+        SA = direction.group.SA
         rows: dict[Channel, Array] = {}
         for index, channel in enumerate(CHANNELS):
-            fit = one.curve(channel)
-            made = np.zeros((4, len(SA)))
-            made[index] = 1.0
-            made[2] = [by_load[channel][id(one), place] for place in range(len(SA))]
-            made[3] = 0.0 if fit is None else slope_at(fit, SA)
-            rows[channel] = made
-        found[one.group.load_N, one.group.rotation] = Sensitivity(by_channel=rows)
-    return found
+            fit = direction.curve(channel)
+            moved = np.zeros((4, len(SA)))
+            moved[index] = 1.0
+            moved[2] = [by_load[channel][id(direction), place] for place in range(len(SA))]
+            moved[3] = 0.0 if fit is None else slope_at(fit, SA)
+            rows[channel] = moved
+        sensitivities[direction.group.load_N, direction.group.rotation] = Sensitivity(by_channel=rows)
+    return sensitivities
 
 
 def _scale(directions: Sequence[Direction], sensitivities: Mapping[tuple[float, str], Sensitivity]) -> Array:
     # What each source is measured in, so that all are of one size: max|y| of the channels, and what of load
     # and slip angle moves FY by as much.
     size = [
-        max((float(np.max(np.abs(one.group.values(c)))) for one in directions), default=1.0) or 1.0
+        max((float(np.max(np.abs(direction.group.values(c)))) for direction in directions), default=1.0)
+        or 1.0
         for c in CHANNELS
     ]
     steep = [
-        max((float(np.max(np.abs(one.by_channel["FY"][k]))) for one in sensitivities.values()), default=0.0)
+        max(
+            (float(np.max(np.abs(source.by_channel["FY"][k]))) for source in sensitivities.values()),
+            default=0.0,
+        )
         for k in (2, 3)
     ]
-    return np.array([*size, *(size[0] / one if one else 1.0 for one in steep)])
+    return np.array([*size, *(size[0] / slope if slope else 1.0 for slope in steep)])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -167,36 +173,37 @@ class _Residuals:
     parts: Array
 
     @classmethod
-    def of(cls, one: Direction, sensitivity: Sensitivity, scale: Array) -> _Residuals:
+    def of(cls, direction: Direction, sensitivity: Sensitivity, scale: Array) -> _Residuals:
         """Project the residuals of both channels out of their curves' tangent planes."""
-        SA = one.group.SA
+        SA = direction.group.SA
         n = len(SA)
-        left, rest, known, moved = [], [], [], []
+        spaces, residuals, variances, moved = [], [], [], []
         for index, channel in enumerate(CHANNELS):
-            fit = one.curve(channel)
+            fit = direction.curve(channel)
             if fit is None:
                 continue
             jacobian = model(fit.model).jacobian(fit.values, SA)
-            hat = jacobian.T @ weights_of(one, channel)
+            hat = jacobian.T @ weights_of(direction, channel)
             values, vectors = np.linalg.eigh((hat + hat.T) / 2)
-            left.append(vectors[:, values < 0.5].T)
-            y = one.group.values(channel)
-            rest.append((y - value_at(fit, SA)) / scale[index])
-            known.append((one.group.own_u(channel) / scale[index]) ** 2 + _FLOOR)
+            spaces.append(vectors[:, values < 0.5].T)
+            y = direction.group.values(channel)
+            residuals.append((y - value_at(fit, SA)) / scale[index])
+            variances.append((direction.group.own_u(channel) / scale[index]) ** 2 + _FLOOR)
             moved.append(sensitivity.by_channel[channel] * scale[:, None] / scale[index])
-        count = len(left)
-        K = np.zeros((sum(len(part) for part in left), count * n))
+        count = len(spaces)
+        K = np.zeros((sum(len(part) for part in spaces), count * n))
         row = 0
-        for place, part in enumerate(left):
+        for place, part in enumerate(spaces):
             K[row : row + len(part), place * n : (place + 1) * n] = part
             row += len(part)
         # Each source is one variable a condition: FY and MZ of a block share it.
         parts = []
         for k in range(4):
-            columns = np.vstack([np.diag(one[k]) for one in moved])
+            columns = np.vstack([np.diag(sources[k]) for sources in moved])
             through = K @ columns
             parts.append(through @ through.T)
-        return cls(z=K @ np.concatenate(rest), rows=(K * np.concatenate(known)) @ K.T, parts=np.array(parts))
+        rows = (K * np.concatenate(variances)) @ K.T
+        return cls(z=K @ np.concatenate(residuals), rows=rows, parts=np.array(parts))
 
 
 def _restricted(curves: Sequence[_Residuals], free: NDArray[np.bool_]) -> tuple[Array, Array]:
@@ -207,16 +214,16 @@ def _restricted(curves: Sequence[_Residuals], free: NDArray[np.bool_]) -> tuple[
     chosen = np.flatnonzero(free)
     if not len(curves) or not len(chosen):
         return variances, covariance
-    total = sum(float(one.z @ one.z) for one in curves) / sum(len(one.z) for one in curves)
+    total = sum(float(curve.z @ curve.z) for curve in curves) / sum(len(curve.z) for curve in curves)
     variances[chosen] = total / len(chosen)
     for _ in range(_STEPS):
         information, right = _score(curves, variances, chosen)
         size = 1 / np.sqrt(np.maximum(np.diag(information), 1e-300))
         lower = np.linalg.cholesky(information * np.outer(size, size) + 1e-10 * np.eye(len(chosen)))
-        found = nnls(lower.T, np.linalg.solve(lower, right * size))[0] * size
-        change = np.abs(found - variances[chosen]).max()
-        variances[chosen] = found
-        if change <= _SETTLED * found.max():
+        update = nnls(lower.T, np.linalg.solve(lower, right * size))[0] * size
+        change = np.abs(update - variances[chosen]).max()
+        variances[chosen] = update
+        if change <= _SETTLED * update.max():
             break
     active = np.flatnonzero(variances > 0)
     if len(active):
@@ -230,12 +237,12 @@ def _restricted(curves: Sequence[_Residuals], free: NDArray[np.bool_]) -> tuple[
 def _score(curves: Sequence[_Residuals], variances: Array, chosen: NDArray[np.intp]) -> tuple[Array, Array]:
     # The information on the variances, and the right side whose solution is the next step of scoring.
     information, right = np.zeros((len(chosen), len(chosen))), np.zeros(len(chosen))
-    for one in curves:
-        V = one.rows + np.einsum("k,kij->ij", variances, one.parts)
+    for curve in curves:
+        V = curve.rows + np.einsum("k,kij->ij", variances, curve.parts)
         inverse = np.linalg.inv(V)
-        through = inverse @ one.parts[chosen]
-        weighted = inverse @ one.z
+        through = inverse @ curve.parts[chosen]
+        weighted = inverse @ curve.z
         information += 0.5 * np.einsum("kij,lji->kl", through, through)
-        right += 0.5 * np.einsum("i,kij,j->k", weighted, one.parts[chosen], weighted)
-        right -= 0.5 * np.einsum("kij,ji->k", through, inverse @ one.rows)
+        right += 0.5 * np.einsum("i,kij,j->k", weighted, curve.parts[chosen], weighted)
+        right -= 0.5 * np.einsum("kij,ji->k", through, inverse @ curve.rows)
     return information, right

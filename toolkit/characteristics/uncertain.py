@@ -73,18 +73,18 @@ class Uncertain:
 
 def merged(parts: Iterable[Part]) -> tuple[Part, ...]:
     """Return parts with one entry a key, their signed shares added; those that vanish are left out."""
-    found: dict[str, Part] = {}
+    by_key: dict[str, Part] = {}
     for part in parts:
-        known = found.get(part.key)
-        found[part.key] = part if known is None else replace(known, u=known.u + part.u)
-    return tuple(part for part in found.values() if part.u)
+        before = by_key.get(part.key)
+        by_key[part.key] = part if before is None else replace(before, u=before.u + part.u)
+    return tuple(part for part in by_key.values() if part.u)
 
 
 def weighted(terms: Sequence[tuple[float, Uncertain]]) -> Uncertain:
     """Return the weighted sum of numbers of one unit; what they share is added with its sign."""
     first = terms[0][1]
     return Uncertain(
-        value=sum(weight * one.value for weight, one in terms),
+        value=sum(weight * number.value for weight, number in terms),
         unit=first.unit,
-        parts=merged(replace(part, u=part.u * weight) for weight, one in terms for part in one.parts),
+        parts=merged(replace(part, u=part.u * weight) for weight, number in terms for part in number.parts),
     )

@@ -4,38 +4,16 @@ from __future__ import annotations
 
 import datetime as dt
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from toolkit.cli import (
-    calibration_budget,
-    calibration_certificate,
-    calibration_chart,
-    calibration_diff,
-    calibration_discard,
-    calibration_due,
-    calibration_report,
-    calibration_standard,
-)
-from toolkit.cli.console import (
-    Calibrations,
-    Home,
-    Json,
-    Machine,
-    Quiet,
-    answer,
-    exit_code,
-    finding_lines,
-    table,
-)
-from toolkit.cli.home import calibrations_folder, registry_to_write
-from toolkit.errors import ConfigError
+from toolkit.cli import calibration_results as results
+from toolkit.cli.calibrate import Figures
+from toolkit.cli.console import Calibrations, Home, Id, Json, Machine, Quiet, answer, exit_code
 
 if TYPE_CHECKING:
-    from toolkit.calibration.records.record import CalibrationRecord
     from toolkit.calibration.registry.registry import Registry
-    from toolkit.calibration.registry.status import RecordStatus
 
 app = typer.Typer(help="Calibration records: what is in force, and why.", no_args_is_help=True)
 
@@ -43,7 +21,6 @@ IN_FORCE = (
     "First day in force (YYYY-MM-DD). Before the session's date it needs --reason; "
     "before the decision it is noted in the ledger."
 )
-Id = Annotated[str, typer.Argument(help="Record id, such as m15-r2.")]
 KnownAt = Annotated[str | None, typer.Option("--known-at", help="What was known on this day (YYYY-MM-DD).")]
 
 
@@ -61,35 +38,14 @@ def list_records(
 
     Example: toolkit calibration list m15 --known-at 2026-03-02
     """
-    registry = _registry(calibrations, home)
-    known = _day(known_at, "--known-at")
-    rows, heads, bad, hidden = [], {}, 0, 0
-    for name in [instrument] if instrument else registry.instruments():
-        ledger = registry.ledger(name)
-        heads[name] = {"count": len(ledger.entries), "sha256": ledger.head, "damage": ledger.damage}
-        good, refused = registry.usable(name)
-        bad += len(refused) + (ledger.damage is not None)
-        every = [_row(record, registry.status(record.id, known_at=known)) for record in good]
-        shown = [row for row in every if everything or row["status"] != "discarded"]
-        hidden += len(every) - len(shown)
-        rows += shown
-        rows += [
-            {"id": one.id, "status": "refused", "rule": one.rule, "reason": one.reason} for one in refused
-        ]
-    lines = table(
-        ["id", "state", "in force from", "void from", "verified", "sha256", "note"],
-        [
-            [r["id"], r["status"], r.get("in_force_from") or "", r.get("void_from") or "",
-             "yes" if r.get("verified") else "no", r.get("sha256", "")[:12], r.get("reason") or ""]
-            for r in rows
-        ],
-        align="<" * 7,
+    from toolkit.lab.registry_answer import listed
+
+    payload, text, sound = listed(
+        _registry(calibrations, home), instrument, known_at=_day(known_at, "--known-at"),
+        everything=everything,
     )  # fmt: skip
-    more = [f"discarded and not shown: {hidden} (--all)"] if hidden else []
-    heads_text = [f"head of {n}: {h['sha256']}" for n, h in heads.items()]
-    text = "\n".join([lines or "no records", *more, "", *heads_text])
-    answer({"records": rows, "heads": heads, "hidden": hidden}, text, as_json=as_json, quiet=quiet)
-    return 1 if bad else 0
+    answer(payload, text, as_json=as_json, quiet=quiet)
+    return 0 if sound else 1
 
 
 @app.command()
@@ -105,17 +61,10 @@ def show(
 
     Example: toolkit calibration show m15-r2
     """
-    from toolkit.cli.calibration_show import described
+    from toolkit.lab.registry_answer import shown
 
-    registry = _registry(calibrations, home)
-    record = registry.load(record_id)
-    row = _row(record, registry.status(record_id, known_at=_day(known_at, "--known-at")))
-    lines = [f"{key:<14}{_plainly(value)}" for key, value in row.items() if value not in (None, "", [])]
-    told, more = described(record, registry.folder)
-    head = registry.head(record.instrument)
-    lines += [f"{'ledger head':<14}{head}", *more]
-    payload = {"record": row, "head": head, **told}
-    answer(payload, "\n".join(lines), as_json=as_json, quiet=quiet)
+    payload, text = shown(_registry(calibrations, home), record_id, known_at=_day(known_at, "--known-at"))
+    answer(payload, text, as_json=as_json, quiet=quiet)
     return 0
 
 
@@ -132,6 +81,7 @@ def verify(
     Example: toolkit calibration verify --head HASH
     """
     from toolkit.calibration.registry.verify import verify_registry
+    from toolkit.lab.answers import table
 
     rows = verify_registry(_registry(calibrations, home), head)
     payload = [{"id": r.id, "ok": r.ok, "verified": r.verified, "reason": r.reason} for r in rows]
@@ -156,33 +106,13 @@ def history(
 
     Example: toolkit calibration history m15
     """
+    from toolkit.lab.registry_answer import history as told
+
     registry = _registry(calibrations, home)
     instrument = name if name in registry.instruments() else _instrument_of(name)
     ledger = registry.ledger(instrument)
-    entries = [entry for entry in ledger.entries if name in (instrument, entry.id)]
-    events = [
-        {
-            "seq": e.seq, "id": e.id, "event": e.event, "time": e.time, "by": e.by,
-            "approved_by": e.approved_by,
-            "known_on": e.known_on and e.known_on.isoformat(), "since": e.since and e.since.isoformat(),
-            "reason": e.reason, "note": e.note, "recall": e.recall,
-            "unverifiable": list(e.unverifiable), "evidence": list(e.evidence), "sha256": e.sha256,
-        }
-        for e in entries
-    ]  # fmt: skip
-    lines = [
-        f"{e['seq']:>3}  {e['time']}  {e['id']}  {e['event']:<10}by {e['by']}"
-        + (f", since {e['since']}" if e["since"] else "")
-        + (f", known on {e['known_on']}" if e["known_on"] else "")
-        + (f", {e['note']}" if e["note"] else "")
-        + (f", recall after {e['recall']}" if e["recall"] else "")
-        + (f"\n     {e['reason']}" if e["reason"] else "")
-        + "".join(f"\n     {text}" for text in entry.evidence)
-        for e, entry in zip(events, entries, strict=True)
-    ]
-    lines += [f"head {ledger.head}", *([f"DAMAGED: {ledger.damage}"] if ledger.damage else [])]
-    payload = {"events": events, "head": ledger.head, "damage": ledger.damage}
-    answer(payload, "\n".join(lines), as_json=as_json, quiet=quiet)
+    payload, text = told(ledger, instrument, name)
+    answer(payload, text, as_json=as_json, quiet=quiet)
     return 1 if ledger.damage else 0
 
 
@@ -203,11 +133,13 @@ def import_record(
     """
     from toolkit.calibration.registry.legacy import import_legacy
     from toolkit.calibration.registry.registry import Registry
+    from toolkit.lab.home import registry_to_write
+    from toolkit.lab.registry_answer import record_row
 
     registry = Registry(registry_to_write(calibrations, home))
     record, existing = import_legacy(file, registry, again=again)
     path = registry.folder / record.instrument / f"{record.id}.json"
-    payload = {**_row(record, registry.status(record.id)), "existing": existing, "path": str(path)}
+    payload = {**record_row(record, registry.status(record.id)), "existing": existing, "path": str(path)}
     text = (
         f"{record.id}  unverified legacy import" + ("  (already entered)" if existing else "") + f"\n"
         f"sha256 {record.sha256}\nnext: toolkit calibration approve {record.id} --in-force-from DATE "
@@ -252,6 +184,7 @@ def approve(
     Example: toolkit calibration approve m15-r2 --in-force-from 2026-03-02 --checked-by "second person"
     """
     from toolkit.calibration.registry.approval import approve as decide
+    from toolkit.lab.answers import finding_lines
 
     registry = _registry(calibrations, home)
     since = _day(in_force_from, "--in-force-from")
@@ -300,11 +233,14 @@ def withdraw(
     Example: toolkit calibration withdraw m15-r2 --on 2026-04-01 --reason "reference out of tolerance"
     """
     from toolkit.calibration.registry.approval import withdraw as decide
+    from toolkit.lab.registry_answer import void_day
 
     registry = _registry(calibrations, home)
-    known = _day(on, "--on") or dt.date.max
-    status = decide(registry, record_id, on=known, void_from=_day(void_from, "--from"), reason=reason, by=by)
-    void = _void(status)
+    known_on = _day(on, "--on") or dt.date.max
+    status = decide(
+        registry, record_id, on=known_on, void_from=_day(void_from, "--from"), reason=reason, by=by
+    )
+    void = void_day(status)
     text = f"{record_id}  withdrawn, void " + ("on every day" if status.void_always else f"from {void}")
     payload = {"id": record_id, "status": status.state, "void_from": void, "void_always": status.void_always}
     payload["head"] = registry.head(_instrument_of(record_id))
@@ -312,20 +248,103 @@ def withdraw(
     return 0
 
 
-app.command(calibration_certificate.NAME)(calibration_certificate.command)
-app.command("budget")(calibration_budget.command)
-app.command("diff")(calibration_diff.command)
-app.command("discard")(calibration_discard.command)
-app.command("report")(calibration_report.command)
-app.command("standard")(calibration_standard.command)
-app.command("chart")(calibration_chart.command)
-app.command("due")(calibration_due.command)
+def diff(
+    one: Id,
+    other: Id,
+    calibrations: Calibrations = None,
+    home: Home = None,
+    as_json: Json = False,
+    quiet: Quiet = False,
+) -> int:
+    """Compare two records term by term; exit code 1 where they differ.
+
+    Example: toolkit calibration diff m15-r1 m15-r2
+    """
+    from toolkit.lab.registry_answer import difference
+
+    payload, text, differs = difference(_registry(calibrations, home), one, other)
+    answer(payload, text, as_json=as_json, quiet=quiet)
+    return 1 if differs else 0
+
+
+def discard(
+    record_id: Annotated[str, typer.Argument(metavar="ID", help="Record id, such as m15-r2.")],
+    reason: Annotated[str, typer.Option("--reason", help="Why; the ledger keeps it.")],
+    by: Annotated[str, typer.Option("--by", help="Who discards.")] = "not stated",
+    calibrations: Calibrations = None,
+    home: Home = None,
+    as_json: Json = False,
+    quiet: Quiet = False,
+) -> int:
+    """Discard a candidate that was never approved: it can never be, and 'list' hides it.
+
+    The record stays and is verified for ever. The same session entered again is refused with this reason,
+    unless with 'toolkit calibrate SESSION.toml --again', which makes a record with a new id.
+
+    Example: toolkit calibration discard m15-r3 --reason "cable of D52 was loose" --by "first person"
+    """
+    from toolkit.calibration.registry.approval import discard as decide
+
+    registry = _registry(calibrations, home)
+    status = decide(registry, record_id, reason=reason, by=by)
+    head = registry.head(_instrument_of(record_id))
+    payload = {"id": record_id, "status": status.state, "reason": status.reason, "head": head}
+    answer(payload, f"{record_id}  discarded: {status.reason}", as_json=as_json, quiet=quiet)
+    return 0
+
+
+def report(
+    record_id: Id,
+    figures: Figures = None,
+    calibrations: Calibrations = None,
+    home: Home = None,
+    as_json: Json = False,
+    quiet: Quiet = False,
+) -> int:
+    """Fit a record's stored data again and print the whole report; exit code 1 where it has findings.
+
+    Example: toolkit calibration report m15-r2 --figures fit
+    """
+    from toolkit.calibration.fit.findings import session_findings
+    from toolkit.calibration.fit.session_fit import fit_session
+    from toolkit.calibration.registry.stored import stored_session
+    from toolkit.lab.answers import finding_lines, refuse_unwritable
+    from toolkit.lab.session_answer import fit_report
+
+    registry = _registry(calibrations, home)
+    record = registry.load(record_id)
+    fit = fit_session(stored_session(registry.folder, record))
+    refuse_unwritable(figures)
+    findings = session_findings(fit)
+    stored = fit_report(fit, title=record.id, full=True, figures=figures)
+    lines = [f"{record.id}  {record.instrument}, session of {record.date}", f"sha256 {record.sha256}"]
+    text = "\n".join(lines) + stored.text
+    if findings:
+        text += "\n\nfindings:\n" + "\n".join(finding_lines(findings))
+    payload = {
+        "record": {"id": record.id, "sha256": record.sha256},
+        "loads": stored.loads,
+        "findings": [finding.as_dict() for finding in findings],
+        **stored.payload,
+    }
+    answer(payload, text, as_json=as_json, quiet=quiet)
+    return exit_code(findings)
+
+
+app.command(results.CERTIFICATE)(results.certificate)
+app.command("budget")(results.budget)
+app.command("diff")(diff)
+app.command("discard")(discard)
+app.command("report")(report)
+app.command("standard")(results.standard)
+app.command("chart")(results.chart)
+app.command("due")(results.due)
 
 
 def _registry(calibrations: Path | None, home: Path | None) -> Registry:
-    from toolkit.calibration.registry.registry import Registry
+    from toolkit.lab.home import open_registry
 
-    return Registry(calibrations_folder(calibrations, home))
+    return open_registry(calibrations, home)
 
 
 def _instrument_of(record_id: str) -> str:
@@ -338,40 +357,9 @@ def _day(text: str | None, option: str) -> dt.date | None:
     try:
         return None if text is None else dt.date.fromisoformat(text)
     except ValueError as error:
+        from toolkit.errors import ConfigError
+
         raise ConfigError(
             f"{option} is no date", where=option, got=text, expected="YYYY-MM-DD",
             next_step="write it as in 2026-03-31", rule="usage",
         ) from error  # fmt: skip
-
-
-def _plainly(value: object) -> object:
-    if isinstance(value, bool):
-        return "yes" if value else "no"
-    return "; ".join(map(str, value)) if isinstance(value, list) else value
-
-
-def _void(status: RecordStatus) -> str | None:
-    # A record that was never in force is void from the beginning of time: no date to print.
-    if status.void_from is None or status.void_from == dt.date.min:
-        return None
-    return status.void_from.isoformat()
-
-
-def _row(record: CalibrationRecord, status: RecordStatus) -> dict[str, Any]:
-    return {
-        "id": record.id,
-        "instrument": record.instrument,
-        "sha256": record.sha256,
-        "status": status.state,
-        "verified": record.verified,
-        "date": record.date,
-        "in_force_from": status.in_force_from and status.in_force_from.isoformat(),
-        "void_from": _void(status),
-        "void_always": status.void_always,
-        "entered_by": status.entered_by,
-        "checked_by": status.checked_by,
-        "approved_by": status.approved_by,
-        "reason": status.reason,
-        "unverifiable": list(status.unverifiable),
-        "recall": status.recall,
-    }

@@ -35,8 +35,7 @@ Home = Annotated[
     Path | None,
     typer.Option("--home", help="Laboratory's home; default: the nearest folder upward with calibrations/."),
 ]
-
-
+Id = Annotated[str, typer.Argument(help="Record id, such as m15-r2.")]
 CalibrationId = Annotated[
     str | None,
     typer.Option("--calibration", help="Record id; default: the one in force on the test's date."),
@@ -97,8 +96,8 @@ def stream(payload: dict[str, Any]) -> None:
         if isinstance(value, Iterator):
             write("[")
             first = True
-            for one in value:
-                write(("" if first else ",") + "\n    " + _json(one))
+            for element in value:
+                write(("" if first else ",") + "\n    " + _json(element))
                 first = False
             write("]" if first else "\n  ]")
         else:
@@ -117,34 +116,10 @@ def _json(value: Any) -> str:
 
 
 def exit_code(findings: Sequence[Finding]) -> int:
-    """Return 1 where a finding asks for a person's attention, else 0; notes only inform."""
-    return 1 if any(finding.level != "note" for finding in findings) else 0
+    """Return 1 where a finding asks for a person's attention, else 0."""
+    from toolkit.lab.answers import needs_attention
 
-
-def finding_lines(findings: Sequence[Finding]) -> list[str]:
-    """Return findings as lines for people: level, rule and place, then the sentence, wrapped."""
-    import textwrap
-
-    lines = []
-    for one in findings:
-        lines.append(f"  {one.level:<8}{one.rule:<20} {one.where}")
-        lines += textwrap.wrap(one.message, width=98, initial_indent=" " * 10, subsequent_indent=" " * 10)
-    return lines
-
-
-def table(header: Sequence[str], rows: Sequence[Sequence[str]], *, align: str = "") -> str:
-    """Return a plain text table; ``align`` has one of ``<`` and ``>`` a column, default ``<`` then ``>``."""
-    if not rows:
-        return ""
-    align = align or "<" + ">" * (len(header) - 1)
-    widths = [max(len(str(row[i])) for row in [header, *rows]) for i in range(len(header))]
-    lines = [
-        "  ".join(
-            f"{cell!s:{side}{width}}" for cell, side, width in zip(row, align, widths, strict=True)
-        ).rstrip()
-        for row in [header, ["-" * width for width in widths], *rows]
-    ]
-    return "\n".join(lines)
+    return int(needs_attention(findings))
 
 
 def print_error(error: ToolkitError, *, as_json: bool) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
@@ -18,27 +18,9 @@ from toolkit.cli.console import (
     answer,
     day,
     exit_code,
-    finding_lines,
 )
-from toolkit.cli.delivery import draft_keys
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    import numpy as np
-    from numpy.typing import NDArray
-
-    from toolkit.calibration.records.use import CalibrationUse
-    from toolkit.channels import Axes
-    from toolkit.cli.resolve import Resolved
-    from toolkit.findings import Finding
-
-    Columns = dict[str, tuple[str, NDArray[np.float64]]]
 
 NAME = "convert"
-_KINDS = {".tir": "tir", ".csv": "csv", ".tdx": "tydex", ".tydex": "tydex", ".tyd": "tydex", ".xlsx": "test"}
-_PAIRS = {("tir", "tir"), ("tydex", "csv"), ("csv", "tydex"), ("test", "csv"), ("test", "tydex")}
-_WAYS = ".tir to .tir; .tdx to .csv; .csv to .tdx; a reduced test .xlsx to .csv or .tdx"
 
 
 def command(
@@ -61,191 +43,27 @@ def command(
 
     Example: toolkit convert tire.tdx tire.csv --axes SAE
     """
-    from toolkit.channels import AXES
-    from toolkit.cli.resolve import resolve_test
-    from toolkit.errors import ConfigError
-    from toolkit.files import write_atomic
+    from functools import partial
+
+    from toolkit.lab.answers import draft_keys, findings_text
+    from toolkit.lab.convert import convert
+    from toolkit.lab.resolve import resolve_test
 
     started = time.perf_counter()
-    use: CalibrationUse | None = None
-    if axes not in AXES:
-        raise ConfigError(
-            f"unknown axis system {axes!r}", where="--axes", got=axes, expected=", ".join(AXES),
-            next_step="name one of those expected", rule="unknown-axes",
-        )  # fmt: skip
-    kinds = _kinds(source, target)
-    if kinds == ("tir", "tir"):
-        text, findings = _tir(source)
-    else:
-        resolved = None
-        if kinds[0] == "test":
-            resolved = resolve_test(
-                source, calibrations=calibrations, home=home, known_at=day(known_at), draft=draft
-            )
-            use = resolved.result.reduced.calibration
-        _refuse_draft(source, target, kinds, use)
-        marks: tuple[str, ...]
-        if resolved:
-            columns, read_in, found = _of_test(source, resolved)
-            marks = (use.mark,) if use is not None and use.mark else ()
-        else:
-            columns, read_in, found, marks = _read(source, kinds[0], axes)
-        text, more = _written(columns, read_in, kinds[1], axes, source, marks)
-        findings = (*found, *more)
-    write_atomic(target, text)
+    resolve = partial(resolve_test, calibrations=calibrations, home=home, known_at=day(known_at), draft=draft)
+    converted = convert(source, target, axes=axes, resolve=resolve)
     shown = f"{target} written"
-    if findings:
-        shown += "\n\nfindings (toolkit explain RULE tells more):\n" + "\n".join(finding_lines(findings))
+    if converted.findings:
+        shown += f"\n\n{findings_text(converted.findings)}"
     payload = {
         "in": str(source),
         "out": str(target),
-        "from": kinds[0],
-        "to": kinds[1],
-        "axes": axes if "csv" in kinds else "ISO-W",
-        **draft_keys(*([use] if use else [])),
-        "findings": [finding.as_dict() for finding in findings],
+        "from": converted.kinds[0],
+        "to": converted.kinds[1],
+        "axes": axes if "csv" in converted.kinds else "ISO-W",
+        **draft_keys(*([converted.use] if converted.use else [])),
+        "findings": [finding.as_dict() for finding in converted.findings],
         "timing": {"seconds": time.perf_counter() - started},
     }
     answer(payload, shown, as_json=json, quiet=quiet)
-    return exit_code(findings)
-
-
-def _kinds(source: Path, target: Path) -> tuple[str, str]:
-    from toolkit.errors import OutputError
-
-    kinds = (_KINDS.get(source.suffix.lower(), ""), _KINDS.get(target.suffix.lower(), ""))
-    if kinds not in _PAIRS:
-        raise OutputError(
-            "there is no such conversion", where=f"{source.name} to {target.name}",
-            got=f"{source.suffix or 'no ending'} to {target.suffix or 'no ending'}", expected=_WAYS,
-            next_step="choose a name with one of these endings", rule="output-name",
-        )  # fmt: skip
-    if source.resolve() == target.resolve():
-        raise OutputError(
-            "the output would replace the input", where="OUT", got=target, expected="another name",
-            next_step="choose another name", rule="original",
-        )  # fmt: skip
-    return kinds
-
-
-def _refuse_draft(source: Path, target: Path, kinds: tuple[str, str], use: CalibrationUse | None) -> None:
-    """Refuse a table of a draft: of a reduced test, or of a file that carries the mark of one."""
-    from toolkit.calibration.records.use import DRAFT_MARK
-    from toolkit.errors import OutputError
-
-    draft = use is not None and use.draft
-    if kinds[0] == "tydex":
-        draft = source.is_file() and DRAFT_MARK.encode() in source.read_bytes()
-    if draft and kinds[1] == "csv":
-        raise OutputError(
-            "a table has no place for the mark of a draft", where=target, got=f"{source.name}, a draft",
-            expected="a format that carries the mark, such as .tdx",
-            next_step="convert to .tdx, or use a record that is in force", rule="draft-unmarked",
-        )  # fmt: skip
-
-
-def _tir(source: Path) -> tuple[str, tuple[Finding, ...]]:
-    from toolkit.tires.tir import read_tir
-    from toolkit.tires.tir_write import file_text, in_si
-
-    file = read_tir(source)
-    _ = file.version  # a kind that cannot be evaluated is not passed on
-    converted, findings = in_si(file)
-    return file_text(converted), findings
-
-
-def _read(source: Path, kind: str, axes: str) -> tuple[Columns, Axes, tuple[Finding, ...], tuple[str, ...]]:
-    # Columns in their own units, the axes that they are in, what stays out, and the marks of records.
-    from toolkit.findings import Finding
-    from toolkit.units import from_si, unit
-
-    if kind == "tydex":
-        from toolkit.tires.tydex import read_tydex
-
-        file = read_tydex(source)
-        columns = {one.symbol: (one.unit, one.values) for one in file.channels if one.symbol is not None}
-        out = [one.name for one in file.channels if one.symbol is None] + [
-            name for name in file.other if name != "RELEASE"
-        ]
-        note = Finding(
-            rule="not-converted", where=str(source), message=f"a table has no place for {', '.join(out)}"
-        )
-        return columns, "ISO-W", (*file.findings, *([note] if out else [])), _marks(source)
-    from toolkit.tires.table import read_table
-
-    table = read_table(source, axes=axes, required=("FZ",), measured=False)
-    units = [unit(cell.partition("[")[2].partition("]")[0]).text for cell in table.header]
-    columns = {
-        symbol: (name, from_si(values, name))
-        for name, (symbol, values) in zip(units, table.columns, strict=True)
-    }
-    return columns, table.axes, table.mark_findings, table.marks
-
-
-def _marks(tydex: Path) -> tuple[str, ...]:
-    """Return the marks of records among the comments of a TYDEX file."""
-    from toolkit.calibration.records.use import SINCE, UNVERIFIED
-
-    lines = tydex.read_bytes().decode("utf-8", errors="replace").splitlines()
-    return tuple(dict.fromkeys(line.strip() for line in lines if line.startswith((UNVERIFIED, SINCE))))
-
-
-def _of_test(source: Path, resolved: Resolved) -> tuple[Columns, Axes, tuple[Finding, ...]]:
-    import numpy as np
-
-    from toolkit.findings import Finding
-
-    every = resolved.result.reduced.conditions
-    use = resolved.result.reduced.calibration
-    conditions = [one for one in every if one.used]
-    reverse = sum(one.rotation == "reverse" for one in conditions)
-    columns = {
-        "SA": ("deg", np.degrees([one.SA for one in conditions])),
-        "FZ": ("N", np.array([one.FZ for one in conditions])),
-        "FY": ("N", np.array([one.FY for one in conditions])),
-        "MZ": ("N*m", np.array([one.MZ for one in conditions])),
-    }
-    text = "the uncertainties and the provenance of the reduced test"
-    if reverse:
-        text += f", and which {reverse} of {len(conditions)} rows ran in reverse"
-    if len(every) > len(conditions):
-        text += f", and {len(every) - len(conditions)} blocks that the reduction does not use"
-    note = Finding(
-        rule="not-converted", where=str(source), message=f"the target has no place for {text}", level="note"
-    )
-    own = [one for one in resolved.findings if one.where == use.id]  # how its record stands
-    return columns, "SAE", (*own, note)
-
-
-def _written(
-    columns: Columns, read_in: Axes, kind: str, axes: str, source: Path, marks: Sequence[str]
-) -> tuple[str, tuple[Finding, ...]]:
-    import csv
-    import io
-
-    from toolkit.channels import signs
-    from toolkit.findings import Finding
-    from toolkit.tires.table import MARKS
-    from toolkit.tires.tydex import NAMES, tydex_text
-
-    turn = signs(read_in, "ISO-W" if kind == "tydex" else axes)  # type: ignore[arg-type]
-    turned = {symbol: (name, turn.get(symbol, 1) * values) for symbol, (name, values) in columns.items()}
-    if kind == "csv":
-        # Every row says how its record stands: a row that is copied elsewhere says so too.
-        mark = [" - ".join(marks)] if marks else []
-        table = io.StringIO()
-        writer = csv.writer(table, lineterminator="\n")
-        writer.writerow(
-            [f"{symbol} [{name}]" for symbol, (name, _) in turned.items()] + [MARKS for _ in mark]
-        )
-        for row in zip(*(values for _, values in turned.values()), strict=True):
-            writer.writerow([repr(float(value) + 0.0) for value in row] + mark)  # -0 is 0
-        return table.getvalue(), ()
-    out = [symbol for symbol in turned if symbol not in NAMES]
-    text, findings = tydex_text(
-        {symbol: column for symbol, column in turned.items() if symbol in NAMES}, comments=marks
-    )
-    if out:
-        message = f"TYDEX has no channel for {', '.join(out)}"
-        findings = (*findings, Finding(rule="not-converted", where=str(source), message=message))
-    return text, findings
+    return exit_code(converted.findings)

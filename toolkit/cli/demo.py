@@ -15,11 +15,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from toolkit.cli.console import Json, Quiet, answer
-from toolkit.cli.home import packaged_home
 from toolkit.estimate import plus_minus, round_uncertainty
 
 if TYPE_CHECKING:
-    from toolkit.cli.resolve import Resolved
+    from toolkit.lab.resolve import Resolved
 
 NAME = "demo"
 
@@ -54,7 +53,7 @@ def command(
     """
     started = time.perf_counter()
     say = _silent if json or quiet else typer.echo
-    done: list[Payload] = []
+    steps_run: list[Payload] = []
     with _stage(out) as stage:
         steps = _steps(stage)
         say(f"The virtual M-15 from raw strain gauges to a report, in {len(steps) + 1} steps.\n")
@@ -62,18 +61,18 @@ def command(
             say(f"[{number}/{len(steps) + 1}] {step.title}")
             say(f"      $ toolkit {' '.join(_shown(step.words, stage, out))}")
             code, payload = _run(context, step.words)
-            told = step.told(payload)
-            say(f"      {told}\n")
-            done.append({"title": step.title, "exit_code": code, "told": told})
+            outcome = step.told(payload)
+            say(f"      {outcome}\n")
+            steps_run.append({"title": step.title, "exit_code": code, "told": outcome})
         say(f"[{len(steps) + 1}/{len(steps) + 1}] for other programs: a tire property file and the figures")
         resolved = _resolved(stage)
-        told = _tire_file(resolved, stage / "tire.tir")
+        outcome = _tire_file(resolved, stage / "tire.tir")
         figures = _figures(resolved, stage)
         certificates = sorted(one.name for one in (stage / "certificate").iterdir())
-        say(f"      {told}\n      {len(figures)} figures\n")
-        report = done[-1]
+        say(f"      {outcome}\n      {len(figures)} figures\n")
+        report = steps_run[-1]
         (stage / _MARK).write_text(
-            jsonlib.dumps({"generator": "toolkit", "content": "demo", "steps": done}, indent=2)
+            jsonlib.dumps({"generator": "toolkit", "content": "demo", "steps": steps_run}, indent=2)
         )
     say(f"The report: {out / 'report.pdf'}  ({out / 'report.docx'})")
     say(f"The whole test in one file: {out / 'test.xlsx'}")
@@ -85,7 +84,7 @@ def command(
         "files": [str(out / name) for name in names]
         + [str(out / "figures" / name) for name in figures]
         + [str(out / "certificate" / name) for name in certificates],
-        "steps": done,
+        "steps": steps_run,
         "report": report["told"],
         "timing": {"seconds": time.perf_counter() - started},
     }
@@ -132,13 +131,14 @@ def _stage(out: Path) -> Iterator[Path]:
 
 def _steps(stage: Path) -> list[Step]:
     from toolkit.examples.fig4_4 import packaged_fig4_4
+    from toolkit.lab.home import packaged_home
 
     home = stage / "home"
     for name in ("calibrations", "report_templates"):
         shutil.copytree(packaged_home() / name, home / name)
     plans = Path(__file__).parents[1] / "examples" / "virtual"
     at = ("--home", str(home))
-    test, whole = str(stage / "test"), str(stage / "test.xlsx")
+    test, reduced = str(stage / "test"), str(stage / "test.xlsx")
     return [
         Step(
             title="a real recording: which calibration computed its Fy and Mz?",
@@ -175,17 +175,17 @@ def _steps(stage: Path) -> list[Step]:
         ),
         Step(
             title="recordings to one reduced test",
-            words=("process", test, "--out", whole, *at),
+            words=("process", test, "--out", reduced, *at),
             told=_told_process,
         ),
         Step(
             title="tire model: the Magic Formula at each load, no start values",
-            words=("fit", whole, *at),
+            words=("fit", reduced, *at),
             told=_told_fit,
         ),
         Step(
             title="the report in the organisation's Word template, and its verified PDF",
-            words=("report", whole, "--template", str(home / "report_templates" / "org.docx"), "--out",
+            words=("report", reduced, "--template", str(home / "report_templates" / "org.docx"), "--out",
                    str(stage), *at),
             told=lambda p: f"{p['pages']} pages, {len(p['figures'])} figures, {len(p['manifest'])} values, "
             f"verified: {p['verified']}",
@@ -210,8 +210,8 @@ def _run(context: typer.Context, words: tuple[str, ...]) -> tuple[int, Payload]:
 
 
 def _told_inspect(payload: Payload) -> str:
-    one = payload["files"][0] if "files" in payload else payload
-    first, calibration = one["corrected_first_row"], one["calibration"]
+    file = payload["files"][0] if "files" in payload else payload
+    first, calibration = file["corrected_first_row"], file["calibration"]
     words = f"{calibration['record']}" + (f", {calibration['variant']}" if calibration["variant"] else "")
     withdrawn = f", withdrawn: {calibration['withdrawn']}" if calibration["withdrawn"] else ""
     return (
@@ -240,7 +240,7 @@ def _told_verify(payload: Payload) -> str:
 
 def _told_certificate(payload: Payload) -> str:
     loads = ", ".join(
-        f"{name} {round_uncertainty(one['U'])} {one['unit']}" for name, one in payload["loads"].items()
+        f"{name} {round_uncertainty(load['U'])} {load['unit']}" for name, load in payload["loads"].items()
     )
     state = "verified" if payload["verified"] else "not verified"
     return (
@@ -249,58 +249,39 @@ def _told_certificate(payload: Payload) -> str:
 
 
 def _told_process(payload: Payload) -> str:
-    used = sum(one["used"] for one in payload["conditions"])
-    findings = ", ".join(dict.fromkeys(one["rule"] for one in payload["findings"])) or "none"
+    used = sum(entry["used"] for entry in payload["conditions"])
+    findings = ", ".join(dict.fromkeys(entry["rule"] for entry in payload["findings"])) or "none"
     return f"{used} conditions by {payload['calibration']['id']}; findings: {findings}"
 
 
 def _told_fit(payload: Payload) -> str:
-    found = []
+    errors_by_channel = []
     for channel in ("FY", "MZ"):
-        errors = [one["error_percent"] for one in payload["fits"] if one["channel"] == channel]
+        errors = [fit["error_percent"] for fit in payload["fits"] if fit["channel"] == channel]
         if errors:
-            found.append(f"{channel} {min(errors):.2f} to {max(errors):.2f} %")
-    return f"{len(payload['fits'])} curves, error {', '.join(found)}"
+            errors_by_channel.append(f"{channel} {min(errors):.2f} to {max(errors):.2f} %")
+    return f"{len(payload['fits'])} curves, error {', '.join(errors_by_channel)}"
 
 
 def _resolved(stage: Path) -> Resolved:
-    from toolkit.cli.resolve import resolve_test
+    from toolkit.lab.resolve import resolve_test
 
     return resolve_test(stage / "test.xlsx", home=stage / "home")
 
 
 def _tire_file(resolved: Resolved, path: Path) -> str:
     """Write MF 6.1 over all loads of the forward run, and tell how well it fits."""
-    import numpy as np
+    from toolkit.lab.tire_files import write_test_tir
 
-    from toolkit.characteristics.groups import group
-    from toolkit.reduction.averaging import free_radius_m
-    from toolkit.tires.global_data import measured
-    from toolkit.tires.global_fit import fit_global
-    from toolkit.tires.models.mf61 import MODEL
-    from toolkit.tires.tir_write import tire_fit, write_tir
-
-    reduced = resolved.result.reduced
-    run = [one for one in group(reduced) if one.rotation == "forward"]
-    radius = free_radius_m(reduced.info.tire_size)
-    if radius is None:
-        raise ValueError("the packaged plan names a tire size that gives its radius")
-    columns = {
-        "SA": np.concatenate([one.SA for one in run]),
-        "FZ": np.concatenate([np.full(len(one.SA), one.load_N) for one in run]),
-        **{name: np.concatenate([one.values(name) for one in run]) for name in ("FY", "MZ")},
-    }
-    data = measured(columns, axes="SAE", rated_load_N=reduced.info.rated_load_N, unloaded_radius_m=radius)
-    fit = fit_global(MODEL, data, predict=False)
-    write_tir(path, tire_fit(MODEL, fit, data), comments=["simulated: the virtual M-15, drum forward"])
-    errors = ", ".join(f"{one.channel} {one.error_percent:.2f} %" for one in fit.fits)
+    fit = write_test_tir(path, resolved.result.reduced, comments=["simulated: the virtual M-15"])
+    errors = ", ".join(f"{channel.channel} {channel.error_percent:.2f} %" for channel in fit.fits)
     return f"tire.tir: MF 6.1 over all loads, error {errors}"
 
 
 def _figures(resolved: Resolved, stage: Path) -> list[str]:
-    from toolkit.report.build import build_content
     from toolkit.report.figures import draw
     from toolkit.report.style import read_style, style_file
+    from toolkit.report.test.content import build_content
 
     style = read_style(style_file(stage / "home" / "report_templates" / "org.docx"))
     content = build_content(resolved.result, resolved.record, findings=resolved.findings, style=style)

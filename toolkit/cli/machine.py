@@ -30,10 +30,10 @@ def show(
     from toolkit.machine import load_machine
     from toolkit.machine.definition import machine_file
 
-    found = load_machine(machine)
+    definition = load_machine(machine)
     path = machine_file(machine)
-    payload = {"path": path, "sha256": sha256_file(path)} | _payload(found)
-    answer(payload, _text(found), as_json=json, quiet=quiet)
+    payload = {"path": path, "sha256": sha256_file(path)} | _payload(definition)
+    answer(payload, _text(definition), as_json=json, quiet=quiet)
     return 0
 
 
@@ -43,7 +43,7 @@ def correct(
         Path, typer.Argument(metavar="ANSWER", help="Folder of toolkit diagnose --out, or its model.toml.")
     ],
     effect: Annotated[
-        str, typer.Option("--effect", help="What is corrected: steer_offset, steer_compliance or crosstalk.")
+        str, typer.Option("--effect", help="What is corrected: an effect that the answer names.")
     ],
     reason: Annotated[str, typer.Option("--reason", help="Why it is taken for the machine's own.")],
     by: Annotated[str, typer.Option("--by", help="Who decides it.")],
@@ -81,10 +81,10 @@ def correct(
     day = on.date() if on else date.today()  # noqa: DTZ011
     correction = correction_of(model, effect, reason=reason, by=by, date=day.isoformat())
     fitted = machine_of(model, load_machine(machine).name)
-    text, made = next_version(machine, correction, out=out, diagnosed_with=fitted)
+    text, definition = next_version(machine, correction, out=out, diagnosed_with=fitted)
     write_atomic(out, text)
-    payload = {"path": out} | _payload(made)
-    answer(payload, f"{_text(made)}\nwritten to {out}", as_json=json, quiet=quiet)
+    payload = {"path": out} | _payload(definition)
+    answer(payload, f"{_text(definition)}\nwritten to {out}", as_json=json, quiet=quiet)
     return 0
 
 
@@ -99,20 +99,20 @@ def _refuse_existing(out: Path) -> None:
         )  # fmt: skip
 
 
-def _payload(made: Machine) -> dict[str, Any]:
+def _payload(definition: Machine) -> dict[str, Any]:
     import dataclasses
 
     return {
-        "name": made.name,
-        "title": made.title,
-        "version": made.version,
-        "supersedes": made.supersedes,
-        "corrections": [dataclasses.asdict(one) for one in made.corrections],
+        "name": definition.name,
+        "title": definition.title,
+        "version": definition.version,
+        "supersedes": definition.supersedes,
+        "corrections": [dataclasses.asdict(correction) for correction in definition.corrections],
         "findings": [],
     }
 
 
-def _text(made: Machine) -> str:
-    lines = [f"{made.title} ({made.name}), version {made.version}"]
-    lines += [f"  correction   {one.as_text()}" for one in made.corrections]
-    return "\n".join(lines if made.corrections else [*lines, "  no corrections"])
+def _text(definition: Machine) -> str:
+    lines = [f"{definition.title} ({definition.name}), version {definition.version}"]
+    lines += [f"  correction   {correction.as_text()}" for correction in definition.corrections]
+    return "\n".join(lines if definition.corrections else [*lines, "  no corrections"])

@@ -9,9 +9,9 @@ from typing import Annotated, Any, NoReturn
 
 import typer
 
-from toolkit import __version__
 from toolkit.cli.console import print_error, print_usage_error
 from toolkit.errors import ToolkitError
+from toolkit.version import __version__
 
 # typer carries a copy of click whose exceptions it does not export: the root of its usage errors.
 _UsageError: type[Exception] = typer.BadParameter.__mro__[2]
@@ -44,7 +44,7 @@ def _root(
 
 @cache
 def _register() -> None:
-    # Each module holds one command and imports what is heavy only when it runs.
+    # Each module holds commands and imports what is heavy only when one of them runs.
     from toolkit.cli import (
         audit,
         calibrate,
@@ -53,30 +53,32 @@ def _register() -> None:
         convert,
         demo,
         diagnose,
-        doctor,
         evaluate,
-        explain,
         fit,
-        init,
         inspect,
+        installation,
         machine,
         process,
-        qualify,
         report,
         simulate,
         template,
         watch,
     )
 
-    for module in (demo, init, doctor, inspect, calibrate):
+    app.command(demo.NAME)(demo.command)
+    app.command("init")(installation.init)
+    app.command("doctor")(installation.doctor)
+    for module in (inspect, calibrate):
         app.command(module.NAME)(module.command)
     app.add_typer(calibration.app, name="calibration")
     for module in (process, fit, evaluate, convert, compare, report, watch):
         app.command(module.NAME)(module.command)
     app.add_typer(template.app, name="template")
     app.add_typer(machine.app, name="machine")
-    for module in (audit, simulate, diagnose, explain, qualify):
+    for module in (audit, simulate, diagnose):
         app.command(module.NAME)(module.command)
+    app.command("explain")(installation.explain)
+    app.command("qualify")(installation.qualify)
 
 
 @cache

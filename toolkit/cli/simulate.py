@@ -3,18 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated
 
 import typer
 
-from toolkit.cli.console import Calibrations, Home, Json, Quiet, answer, exit_code, finding_lines
-
-if TYPE_CHECKING:
-    from toolkit.calibration.registry.registry import Registry
-    from toolkit.errors import ToolkitError
-    from toolkit.simulation.acquisition import OwnProgram
-    from toolkit.simulation.plan import Plan
-    from toolkit.simulation.switched import Switched
+from toolkit.cli.console import Calibrations, Home, Json, Quiet, answer, exit_code
 
 NAME = "simulate"
 
@@ -77,7 +70,8 @@ def command(
 
     Example: toolkit simulate toolkit/examples/virtual/test_plan.toml --out virtual-test
     """
-    from toolkit.cli.simulate_model import is_model_file, model_answer
+    from toolkit.lab.answers import finding_lines
+    from toolkit.lab.simulate import is_model_file, model_answer, simulate_plan
     from toolkit.simulation.plan import read_plan, with_effects
 
     if inputs or condition or is_model_file(plan):
@@ -85,179 +79,22 @@ def command(
         payload, text = model_answer(plan, inputs or [], condition or [], out, calibrations, home)
         answer(payload, text, as_json=json, quiet=quiet)
         return 0
-    told = with_effects(read_plan(plan, seed=seed), effect or [])
-    if told.kind != "test" and (csv is not None or case is not None):
-        raise _no_runs(told)
-    if told.kind == "session":
-        payload, text = _session(told, out)
-    elif told.kind == "table":
-        payload, text = _table(told, out)
-    else:
-        payload, text = _test(told, out, _registry(calibrations, home), csv, case)
-    findings = () if told.tire_file is None else told.tire_file.tir.findings()
-    payload["findings"] = [one.as_dict() for one in findings]
+    planned = with_effects(read_plan(plan, seed=seed), effect or [])
+    payload, text = simulate_plan(planned, out, calibrations=calibrations, home=home, csv=csv, case=case)
+    findings = () if planned.tire_file is None else planned.tire_file.tir.findings()
+    payload["findings"] = [finding.as_dict() for finding in findings]
     answer(payload, "\n".join([text, *finding_lines(findings)]), as_json=json, quiet=quiet)
     return exit_code(findings)
 
 
-def _refuse_options(given: dict[str, object]) -> None:
+def _refuse_options(options: dict[str, object]) -> None:
     """Refuse options of a plan beside a model file."""
     from toolkit.errors import ConfigError
 
-    for name, value in given.items():
+    for name, value in options.items():
         if value is not None and value != []:
             raise ConfigError(
                 "a model file is run on inputs alone", where=name, got=name,
                 expected="--inputs, --condition, --out", rule="model-file",
                 next_step="leave the option out; a plan with [tire] file = the model knows it",
             )  # fmt: skip
-
-
-def _no_runs(plan: Plan) -> ToolkitError:
-    from toolkit.errors import ConfigError
-
-    return ConfigError(
-        f"a {plan.kind} has no recordings", where="--csv, --case", got=f'kind = "{plan.kind}"',
-        expected='a plan with kind = "test"', next_step="leave the option out", rule="wrong-value",
-    )  # fmt: skip
-
-
-def _test(
-    plan: Plan, out: Path, registry: Registry | None, csv: Path | None, case: Path | None
-) -> tuple[dict[str, Any], str]:
-    from toolkit.simulation.case import CASE, RUNS, TIRE, check_case, run_names, write_case, write_runs
-    from toolkit.simulation.program import other_programs
-    from toolkit.simulation.run import simulate
-    from toolkit.simulation.write import TEST, TRUTH, check_folder, write_test
-
-    program = _program(plan, registry)
-    record = None if program is None else program.record
-    others = other_programs(plan, registry)
-    for folder, names in ((csv, {*run_names(plan)}), (case, {CASE, RUNS, TIRE})):
-        if folder is not None:
-            _check_apart(folder, out)
-            check_folder(folder, names)
-    if case is not None:
-        check_case(plan, record)
-    test = simulate(plan, program, others)
-    files = write_test(test, out)
-    payload = _common(plan, out, files) | {
-        "kind": "test",
-        "record": plan.record,
-        "recordings": [file.name for file in test.files],
-        "truth": TRUTH,
-        "acquisition_program": {"record": record, "negated": plan.acquisition.negated},
-    }
-    wrong = f", with {', '.join(plan.acquisition.negated)} negative" if plan.acquisition.negated else ""
-    text = (
-        f"{len(test.files)} recordings of the virtual machine {plan.machine.name} in {out}  SIMULATED\n"
-        f"  conditions   {TEST}\n  truth        {TRUTH}\n"
-        f"  own Fy, Mz   by {record or 'the true map of the cells (no record applies)'}{wrong}"
-    )
-    if csv is not None:
-        payload["csv"] = [str(path) for path in write_runs(test, csv)]
-        text += f"\n  as CSV       {csv}"
-    if case is not None:
-        payload["case"] = str(write_case(test, case, record=record)[0])
-        text += f"\n  case         {case / CASE}   (toolkit diagnose {case / CASE} --out DIR)"
-    return payload, text + _effects(plan)
-
-
-def _check_apart(folder: Path, out: Path) -> None:
-    from toolkit.errors import OutputError
-
-    if out.resolve() in (folder.resolve(), *folder.resolve().parents):
-        raise OutputError(
-            "CSV files would lie among the test's recordings", where=folder, got=f"a folder in {out}",
-            expected="a folder beside the one of --out",
-            next_step="choose another folder; nothing was written",
-        )  # fmt: skip
-
-
-def _table(plan: Plan, out: Path) -> tuple[dict[str, Any], str]:
-    from toolkit.simulation.maker import TABLE, write_table
-    from toolkit.simulation.write import check_folder
-
-    check_folder(out, {TABLE})
-    path = write_table(plan, out)
-    payload = _common(plan, out, (path,)) | {"kind": "table", "table": path.name, "axes": "SAE"}
-    text = f"flat-surface table of the plan's tire in {path}, SAE axes  SIMULATED"
-    return payload, text + _effects(plan)
-
-
-def _session(plan: Plan, out: Path) -> tuple[dict[str, Any], str]:
-    from toolkit.simulation.session import simulate_session
-    from toolkit.simulation.write import SESSION, TRUTH, write_session
-
-    session = simulate_session(plan)
-    files = write_session(session, out)
-    payload = _common(plan, out, files) | {
-        "kind": "session",
-        "session": SESSION,
-        "truth": TRUTH,
-        "points": len(session.run),
-        "check_points": len(session.check_loads),
-    }
-    text = (
-        f"reference-load session of {plan.machine.name}: {len(session.run)} points in "
-        f"{max(session.run)} runs, {len(session.check_loads)} check loads  SIMULATED\n"
-        f"  next: toolkit calibrate {out / SESSION}"
-    )
-    return payload, text + _effects(plan)
-
-
-def _common(plan: Plan, out: Path, files: tuple[Path, ...]) -> dict[str, Any]:
-    return {
-        "out": out,
-        "simulated": True,
-        "machine": plan.machine.name,
-        "date": plan.date,
-        "seed": plan.seed,
-        "effects": [one.as_dict() for one in plan.effects],
-        "files": [path.name for path in files],
-    }
-
-
-def _effects(plan: Plan) -> str:
-    return "".join(f"\n  effect       {_effect(one)}" for one in plan.effects)
-
-
-def _effect(one: Switched) -> str:
-    place = "" if one.channel is None else f" on {one.channel}"
-    place += "" if one.source is None else f" with {one.source}"
-    units = dict(one.units)
-    said = [f"{name} = {value:g} {units[name]}" for name, value in one.values]
-    said += [] if one.record is None else [f"record {one.record}"]
-    said += [] if one.only is None else [f"where {one.only[0]} is {' or '.join(one.only[1])}"]
-    return f"{one.effect.name}{place}{': ' if said else ''}{', '.join(said)}"
-
-
-def _registry(calibrations: Path | None, home: Path | None) -> Registry | None:
-    # A virtual machine needs no registry; but one that is named, or is damaged, is never passed over.
-    from toolkit.calibration.registry.registry import Registry
-    from toolkit.cli.home import calibrations_folder
-    from toolkit.errors import ConfigError
-
-    try:
-        return Registry(calibrations_folder(calibrations, home))
-    except ConfigError:
-        if calibrations is not None or home is not None:
-            raise
-        return None
-
-
-def _program(plan: Plan, registry: Registry | None) -> OwnProgram | None:
-    from datetime import date
-
-    from toolkit.errors import RegistryError
-    from toolkit.simulation.program import program_from
-
-    if registry is None:
-        return None
-    try:
-        record = registry.in_force(plan.machine.name, on=date.fromisoformat(plan.date))
-    except RegistryError as error:
-        if error.rule == "no-record-in-force":
-            return None
-        raise
-    return program_from(record)

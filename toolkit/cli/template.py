@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
-from toolkit.cli.console import Calibrations, Draft, Home, Json, Quiet, answer, table
+from toolkit.cli.console import Calibrations, Draft, Home, Json, Quiet, answer
 
 app = typer.Typer(help="The contract of report templates.", no_args_is_help=True, rich_markup_mode=None)
 
@@ -22,24 +22,27 @@ def check(
 
     Example: toolkit template check report_templates/org.docx
     """
+    from toolkit.report.kinds import check as check_template
     from toolkit.report.style import read_style, style_file
-    from toolkit.report.template.check import check_template
-    from toolkit.report.template.package import open_package, read_template
-    from toolkit.report.template.scan import scan
-    from toolkit.report.template.xml import stories
+    from toolkit.report.word.package import open_package, read_template
+    from toolkit.report.word.scan import scan
+    from toolkit.report.word.xml import stories
 
     template = read_template(file)
-    found = check_template(template, read_style(style_file(file)))
+    findings = check_template(template, read_style(style_file(file)))
     tags = len({str(site.tag) for site in scan(stories(open_package(template)))})
-    text = "\n".join(f"{one.level:<8}{one.rule:<18}{one.part}, {one.place}: {one.message}" for one in found)
+    text = "\n".join(
+        f"{finding.level:<8}{finding.rule:<18}{finding.part}, {finding.place}: {finding.message}"
+        for finding in findings
+    )
     payload = {
         "template_sha256": template.sha256,
         "tag_count": tags,
-        "findings": [one.as_dict() for one in found],
+        "findings": [finding.as_dict() for finding in findings],
     }
     # Their number tells a template that another program has robbed of its controls.
     answer(payload, text or f"{file}: no findings; {tags} different tags", as_json=json, quiet=quiet)
-    return 1 if found else 0
+    return 1 if findings else 0
 
 
 @app.command("tags")
@@ -67,29 +70,29 @@ def tags(
 
     Example: toolkit template tags --test tests/2019-06-04
     """
-    from toolkit.report.audit.vocabulary import AUDIT
-    from toolkit.report.build import build_content
-    from toolkit.report.certificate.vocabulary import CERTIFICATE
-    from toolkit.report.comparison.vocabulary import COMPARISON
-    from toolkit.report.diagnosis.vocabulary import DIAGNOSIS
-    from toolkit.report.listing import list_tags
+    from toolkit.lab.answers import table
+    from toolkit.report.kinds import VOCABULARIES, list_tags
     from toolkit.report.style import read_style, style_file
-    from toolkit.report.vocabulary import REPORT
+    from toolkit.report.test.content import build_content
 
-    kinds = {one.name: one for one in (REPORT, CERTIFICATE, COMPARISON, DIAGNOSIS, AUDIT)}
-    if kind not in kinds or (kind != "report" and test is not None):
-        raise typer.BadParameter(f"{', '.join(kinds)}; only report with --test", param_hint="--kind")
+    if kind not in VOCABULARIES or (kind != "report" and test is not None):
+        raise typer.BadParameter(f"{', '.join(VOCABULARIES)}; only report with --test", param_hint="--kind")
     style = read_style(style_file(template)) if template else read_style(None)
     content = None
     if test is not None:
-        from toolkit.cli.resolve import resolve_test
+        from toolkit.lab.resolve import resolve_test
 
         resolved = resolve_test(
             test, calibration=calibration, calibrations=calibrations, home=home, draft=draft
         )
         content = build_content(resolved.result, resolved.record, findings=resolved.findings, style=style)
-    listed = list_tags(content, style, kinds[kind])
-    answer({"tags": listed}, _text(listed), as_json=json, quiet=quiet)
+    listed = list_tags(content, style, VOCABULARIES[kind])
+    rows = [
+        [tag["tag"], tag["kind"], tag["unit"] or "", str(tag["value"] or "")[:40], tag["description"]]
+        for tag in listed
+    ]
+    text = table(["tag", "kind", "unit", "value", "description"], rows, align="<<<<<")
+    answer({"tags": listed}, text, as_json=json, quiet=quiet)
     return 0
 
 
@@ -113,12 +116,12 @@ def new(
     """
     from toolkit.errors import OutputError
     from toolkit.files import write_atomic
-    from toolkit.report.design.default import STYLE_FILE
-    from toolkit.report.design.files import packaged_templates
+    from toolkit.lab.home import packaged_home
+    from toolkit.report.style import style_file
 
-    known = packaged_templates()
-    if like not in known:
-        raise typer.BadParameter(", ".join(known), param_hint="--like")
+    sources = {path.stem: path for path in sorted((packaged_home() / "report_templates").glob("*.docx"))}
+    if like not in sources:
+        raise typer.BadParameter(", ".join(sources), param_hint="--like")
 
     if file.suffix.lower() != ".docx":
         raise OutputError(
@@ -140,15 +143,8 @@ def new(
                 next_step="choose another name, or overwrite with --force",
                 rule="not-empty",
             )
-    write_atomic(file, known[like].build())
-    write_atomic(style, known[like].style or STYLE_FILE)
+    source = sources[like]
+    write_atomic(file, source.read_bytes())
+    write_atomic(style, (style_file(source) or source.with_name("org.toml")).read_bytes())
     answer({"template": file, "style": style}, f"{file}\n{style}", as_json=json, quiet=quiet)
     return 0
-
-
-def _text(listed: list[dict[str, Any]]) -> str:
-    rows = [
-        [one["tag"], one["kind"], one["unit"] or "", str(one["value"] or "")[:40], one["description"]]
-        for one in listed
-    ]
-    return table(["tag", "kind", "unit", "value", "description"], rows, align="<<<<<")

@@ -3,25 +3,15 @@
 from __future__ import annotations
 
 import contextlib
-import fcntl
-import shutil
 import signal
 import time
-from collections.abc import Iterator, Sequence
-from dataclasses import replace
-from functools import partial
+from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated
 
 import typer
 
 from toolkit.cli.console import Calibrations, Home, Json, Quiet, answer
-from toolkit.cli.delivery import home_template
-from toolkit.cli.watching import Round
-
-if TYPE_CHECKING:
-    from toolkit.cli.report import Made, Options
-    from toolkit.cli.resolve import Resolved
 
 NAME = "watch"
 
@@ -77,13 +67,16 @@ def command(
 
     Example: toolkit watch inbox --template report_templates/org.docx --out reports
     """
-    from toolkit.cli.report import Options
-    from toolkit.cli.resolve import resolve_test
-    from toolkit.cli.units import unit_choice
-    from toolkit.cli.watching import Watcher
+    from functools import partial
+
     from toolkit.errors import ConfigError
-    from toolkit.report.pdf import find_soffice
-    from toolkit.report.template.package import read_template
+    from toolkit.lab.answers import unit_choice
+    from toolkit.lab.home import home_template
+    from toolkit.lab.reports import Options
+    from toolkit.lab.resolve import resolve_test
+    from toolkit.lab.watch import WatchAnswer, alone, watcher_of
+    from toolkit.report.word.office import find_soffice
+    from toolkit.report.word.package import read_template
 
     if not folder.is_dir():
         raise ConfigError(
@@ -92,144 +85,29 @@ def command(
         )  # fmt: skip
     shown = None if units is None else unit_choice(units)
     find_soffice()
-    resolve = partial(resolve_test, calibrations=calibrations, home=home)
     options = Options(
         template=read_template(template or home_template("org.docx", home)),
-        resolve=resolve,
+        resolve=partial(resolve_test, calibrations=calibrations, home=home),
         units=shown,
         allow_missing=allow_missing,
     )
     target = out or folder / "reports"
     say = (lambda _text: None) if json or quiet else typer.echo
-    told = _Told(keep=json)
-    with _alone(target), _stopping() as stop:
-        watcher = Watcher(
-            folder,
-            target,
-            resolve=resolve,
-            report=partial(_report, options, target),
-            settle_s=settle,
-            patience_s=patience,
-            clock=time.monotonic,
-            settings=_settings(options, units),
-            registry=partial(_registry, calibrations, home),
-        )
+    watched = WatchAnswer(keep=json)
+    with alone(target), _stopping() as stop:
+        watcher = watcher_of(
+            folder, target, options, settle_s=settle, patience_s=patience, units=units,
+            calibrations=calibrations, home=home,
+        )  # fmt: skip
         while not stop:
-            found = watcher.look()
-            told.add(found, say)
-            if once and not any(one.reason == "files are arriving" for one in found.waiting):
+            look = watcher.look()
+            watched.add(look, say)
+            if once and not any(waits.reason == "files are arriving" for waits in look.waiting):
                 break
             _sleep(interval, stop)
-    payload = told.payload()
+    payload = watched.payload()
     answer(payload, "", as_json=json, quiet=quiet)
     return 1 if payload["waiting"] or payload["set_aside"] or payload["attention"] else 0
-
-
-def _registry(calibrations: Path | None, home: Path | None) -> str:
-    """Return one hash of every ledger's head, and of the day: what is in force can change with either."""
-    from toolkit.calibration.registry.registry import Registry, today
-    from toolkit.cli.home import calibrations_folder
-    from toolkit.files import sha256_bytes
-
-    registry = Registry(calibrations_folder(calibrations, home))
-    heads = [f"{one} {registry.head(one)}" for one in registry.instruments()]
-    return sha256_bytes("\n".join([today().isoformat(), *heads]).encode())
-
-
-def _settings(options: Options, units: str | None) -> str:
-    """Return one hash of what decides whether a report is refused: the template, its style, the choices."""
-    from toolkit.files import sha256_bytes, sha256_file
-    from toolkit.report.style import style_file
-
-    style = style_file(options.template.path)
-    parts = (options.template.sha256, sha256_file(style) if style else "", units or "", options.allow_missing)
-    return sha256_bytes("\n".join(map(str, parts)).encode())
-
-
-def _report(
-    options: Options, out: Path, resolved: dict[Path, Resolved], folders: Sequence[Path]
-) -> list[Made]:
-    """Make the reports of tests that were read already, each in its folder."""
-    from toolkit.cli.report import Made, make_reports
-    from toolkit.errors import ToolkitError
-    from toolkit.report.drawer import Drawer
-    from toolkit.report.pdf import Office
-
-    tests = list(resolved)
-    own = replace(options, resolve=resolved.__getitem__)
-    with Office() as office, Drawer() as drawer:
-        try:
-            return make_reports(tests, own, out, folders=folders, office=office, drawer=drawer)
-        except ToolkitError as error:
-            # One alone raises its error.
-            return [Made(test=tests[0], resolved=resolved[tests[0]], outcome=error)]
-
-
-class _Told:
-    """What was said of the looks so far: a watch runs for months, so no look and no report is kept whole."""
-
-    def __init__(self, *, keep: bool) -> None:
-        """Keep the answer of every report made, for ``--json``; else their number alone."""
-        self.keep = keep
-        self.made: list[dict[str, Any]] = []
-        self.attention = 0
-        self.last: Round | None = None
-
-    def add(self, found: Round, say: Any) -> None:
-        """Say what is new in a look."""
-        from toolkit.cli.report import report_code, report_payload
-
-        for one in found.made:
-            self.attention += report_code(one) != 0
-            if self.keep:
-                self.made.append({"test": one.test, **report_payload(one)})
-            if not isinstance(one.outcome, Exception):
-                say(f"{one.test}: {one.outcome.pdf}, {one.outcome.pages} pages")
-        before = self.last or Round(made=(), waiting=(), set_aside=())
-        for fault in found.set_aside:
-            if fault not in before.set_aside:
-                say(f"{fault.test}: set aside, {fault.rule}: {fault.reason.partition(chr(10))[0]}")
-        for waits in found.waiting:
-            if waits not in before.waiting:
-                say(f"{waits.test}: waiting, {waits.reason}")
-        self.last = replace(found, made=())
-
-    def payload(self) -> dict[str, Any]:
-        """Return the answer: what was made, and what waits or stands aside at the end."""
-        waiting, aside = (self.last.waiting, self.last.set_aside) if self.last else ((), ())
-        return {
-            "made": self.made,
-            "waiting": [{"test": one.test, "reason": one.reason} for one in waiting],
-            "set_aside": [{"test": one.test, "rule": one.rule, "reason": one.reason} for one in aside],
-            "attention": self.attention,
-        }
-
-
-@contextlib.contextmanager
-def _alone(out: Path) -> Iterator[None]:
-    """Hold the output folder for one watch; what a killed one left half made is taken away."""
-    from toolkit.errors import OutputError
-
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-        lock = (out / ".watch.lock").open("w")
-    except OSError as error:
-        raise OutputError(
-            "the output folder cannot be written", where=out, got=error.strerror,
-            expected="a writable folder", next_step="choose another folder with --out", rule="not-writable",
-        ) from error  # fmt: skip
-    with lock:
-        try:
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError as error:
-            raise OutputError(
-                "another watch works into this folder", where=out, got="a lock that is held",
-                expected="one watch for each output folder",
-                next_step="end the other one, or choose another --out", rule="watch-running",
-            ) from error  # fmt: skip
-        for left in [*out.glob(".report-*"), *out.glob("*/.report-*")]:
-            shutil.rmtree(left, ignore_errors=True)
-        yield
 
 
 @contextlib.contextmanager
@@ -237,8 +115,8 @@ def _stopping() -> Iterator[list[int]]:
     """Yield a list that is no longer empty once the command was asked to end."""
     asked: list[int] = []
     old = {
-        one: signal.signal(one, lambda number, _frame: asked.append(number))
-        for one in (signal.SIGTERM, signal.SIGINT)
+        request: signal.signal(request, lambda number, _frame: asked.append(number))
+        for request in (signal.SIGTERM, signal.SIGINT)
     }
     try:
         yield asked
@@ -249,5 +127,5 @@ def _stopping() -> Iterator[list[int]]:
 
 def _sleep(seconds: float, stop: list[int]) -> None:
     end = time.monotonic() + seconds
-    while not stop and (left := end - time.monotonic()) > 0:
-        time.sleep(min(left, 0.2))
+    while not stop and (remaining := end - time.monotonic()) > 0:
+        time.sleep(min(remaining, 0.2))

@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from toolkit.characteristics.rows import Row
+from toolkit.characteristics.model import Row
 from toolkit.characteristics.uncertain import Part, Uncertain, weighted
 
 REACH = 0.05  # of the outermost load
@@ -25,28 +25,28 @@ def at_load(rows: Sequence[Row], load_N: float, *, owner: str) -> Uncertain | No
     rows : one series, any order, each load once
     owner : what the series belongs to; the way between its loads is its own
     """
-    found = sorted(rows, key=lambda row: row.load_N)
-    first, last = found[0].load_N, found[-1].load_N
+    ordered = sorted(rows, key=lambda row: row.load_N)
+    first, last = ordered[0].load_N, ordered[-1].load_N
     if not first * (1 - REACH) <= load_N <= last * (1 + REACH):
         return None
-    near = sorted(found, key=lambda row: abs(row.load_N - load_N))
+    near = sorted(ordered, key=lambda row: abs(row.load_N - load_N))
     if near[0].load_N == load_N:
         return near[0].number
-    key = f"load interpolation/{owner}/{found[0].series}/{load_N:.6g}"
-    if len(found) == 1:
+    key = f"load interpolation/{owner}/{ordered[0].series}/{load_N:.6g}"
+    if len(ordered) == 1:
         # One load tells no slope: the value stands, and proportion to the load is its uncertainty.
         only = near[0]
         bend = only.number.value * (load_N / only.load_N - 1)
         return _with(only.number, bend, key)
     # The two around it, or the outermost two; the third is the nearer neighbour of these.
-    below = [row for row in found if row.load_N <= load_N]
-    left = min(max(len(below) - 1, 0), len(found) - 2)
-    pair = found[left : left + 2]
+    below = [row for row in ordered if row.load_N <= load_N]
+    start = min(max(len(below) - 1, 0), len(ordered) - 2)
+    pair = ordered[start : start + 2]
     line = _through(pair, load_N)
-    if len(found) == 2:
+    if len(ordered) == 2:
         steep = (pair[1].number.value - pair[0].number.value) / (pair[1].load_N - pair[0].load_N)
         return _with(line, steep * (load_N - near[0].load_N) / 2, key)
-    third = min((row for row in found if row not in pair), key=lambda row: abs(row.load_N - load_N))
+    third = min((row for row in ordered if row not in pair), key=lambda row: abs(row.load_N - load_N))
     parabola = _through(sorted([*pair, third], key=lambda row: row.load_N), load_N)
     return _with(parabola, parabola.value - line.value, key)
 
@@ -54,11 +54,11 @@ def at_load(rows: Sequence[Row], load_N: float, *, owner: str) -> Uncertain | No
 def _through(rows: Sequence[Row], load_N: float) -> Uncertain:
     """Return Lagrange's polynomial through the rows at a load."""
     terms = []
-    for one in rows:
+    for row in rows:
         weight = math.prod(
-            (load_N - other.load_N) / (one.load_N - other.load_N) for other in rows if other is not one
+            (load_N - other.load_N) / (row.load_N - other.load_N) for other in rows if other is not row
         )
-        terms.append((weight, one.number))
+        terms.append((weight, row.number))
     return weighted(terms)
 
 

@@ -9,10 +9,9 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from toolkit.characteristics.characterise import characteristic_rows
-from toolkit.characteristics.shared import identity_of
-from toolkit.comparison.differences import differences
+from toolkit.characteristics.shared_errors import identity_of
+from toolkit.comparison.differences import differences, pattern_effects
 from toolkit.comparison.model import MODES, Comparison, Entry, Mode, Repeats
-from toolkit.comparison.pattern import pattern_effect
 from toolkit.comparison.precision import repeats_of
 from toolkit.errors import ConfigError
 from toolkit.findings import Finding
@@ -94,49 +93,49 @@ def compare(
         bear, reproducibility without another laboratory
     """
     _check(entries, mode, level)
-    named = _labelled(entries)
-    chosen = mode or infer_mode(named)
-    found, left_out = differences(named, level=level)
-    if not found:
+    labelled = _labelled(entries)
+    chosen = mode or infer_mode(labelled)
+    table, left_out = differences(labelled, level=level)
+    if not table:
         raise ConfigError(
             "nothing can be compared",
-            where=", ".join(one.source for one in named),
+            where=", ".join(entry.source for entry in labelled),
             got="; ".join(left_out) or "no characteristic in common",
             expected="loads and characteristics in common",
             next_step="compare tests whose loads overlap, in the same direction of rotation",
             rule="nothing-in-common",
         )
-    repeats = repeats_of(named, level=level) if chosen == "repeats" else None
+    repeats = repeats_of(labelled, level=level) if chosen == "repeats" else None
     if reproducibility and (repeats is None or repeats.reproducibility is None):
-        known = {one.condition("laboratory") for one in named} - {None}
-        named_ones = ", ".join(map(str, known)) or "none named"
+        laboratories = {entry.condition("laboratory") for entry in labelled} - {None}
+        listed = ", ".join(map(str, laboratories)) or "none named"
         raise ConfigError(
             "reproducibility cannot be stated",
             where="--reproducibility",
-            got=f"tests of {len(known)} laboratories ({named_ones})",
+            got=f"tests of {len(laboratories)} laboratories ({listed})",
             expected="repeats of one tire in two laboratories or more, named in test.toml (laboratory = ...)",
             next_step="leave the option away; repeatability and intermediate precision are given",
             rule="no-other-laboratory",
         )
     return Comparison(
         mode=chosen,
-        entries=named,
+        entries=labelled,
         level=level,
-        differences=found,
+        differences=table,
         repeats=repeats,
-        pattern=pattern_effect(named),
+        pattern=pattern_effects(labelled),
         left_out=left_out,
-        findings=tuple(_findings(named, chosen, repeats, stated=mode is not None)),
+        findings=tuple(_findings(labelled, chosen, repeats, stated=mode is not None)),
     )
 
 
 def infer_mode(entries: Sequence[Entry]) -> Mode:
     """Return what a comparison is about: a maker's table, surfaces, tires, or repeats of one tire."""
-    if any(one.kind != "test" for one in entries):
+    if any(entry.kind != "test" for entry in entries):
         return "table"
-    if len({(one.condition("tire"), one.condition("belt")) for one in entries}) > 1:
+    if len({(entry.condition("tire"), entry.condition("belt")) for entry in entries}) > 1:
         return "tires"
-    return "surfaces" if len({one.condition("surface") for one in entries}) > 1 else "repeats"
+    return "surfaces" if len({entry.condition("surface") for entry in entries}) > 1 else "repeats"
 
 
 def _check(entries: Sequence[Entry], mode: Mode | None, level: float) -> None:
@@ -156,14 +155,14 @@ def _check(entries: Sequence[Entry], mode: Mode | None, level: float) -> None:
             f"unknown mode {mode!r}", where="--mode", got=mode, expected=", ".join(MODES),
             next_step="name one of those expected", rule="unknown-mode",
         )  # fmt: skip
-    for identity, count in Counter(one.identity for one in entries).items():
+    for identity, count in Counter(entry.identity for entry in entries).items():
         if count > 1:
-            twice = [one.source for one in entries if one.identity == identity]
+            twice = [entry.source for entry in entries if entry.identity == identity]
             raise ConfigError(
                 "the same data is compared with itself", where=", ".join(twice), got="the same recordings",
                 expected="different tests", next_step="name each test once", rule="same-test",
             )  # fmt: skip
-    tests = [one for one in entries if one.kind == "test"]
+    tests = [entry for entry in entries if entry.kind == "test"]
     if mode == "repeats" and len(tests) < len(entries):
         raise ConfigError(
             "a maker's table is no repeat of a test", where="--mode", got="repeats", expected="tests only",
@@ -173,43 +172,44 @@ def _check(entries: Sequence[Entry], mode: Mode | None, level: float) -> None:
 
 def _labelled(entries: Sequence[Entry]) -> tuple[Entry, ...]:
     """Return the entries with a label of their own each: equal names take a number."""
-    count = Counter(one.label for one in entries)
-    seen: Counter[str] = Counter()
-    found = []
-    for one in entries:
-        seen[one.label] += 1
-        label = f"{one.label} ({seen[one.label]})" if count[one.label] > 1 else one.label
-        found.append(replace(one, label=label))
-    return tuple(found)
+    count = Counter(entry.label for entry in entries)
+    used: Counter[str] = Counter()
+    labelled = []
+    for entry in entries:
+        used[entry.label] += 1
+        label = f"{entry.label} ({used[entry.label]})" if count[entry.label] > 1 else entry.label
+        labelled.append(replace(entry, label=label))
+    return tuple(labelled)
 
 
 def _findings(
     entries: Sequence[Entry], mode: Mode, repeats: Repeats | None, *, stated: bool
 ) -> list[Finding]:
-    found = []
-    tests = [one for one in entries if one.kind == "test"]
+    findings = []
+    tests = [entry for entry in entries if entry.kind == "test"]
     for name in _WATCHED:
-        values = {one.label: one.condition(name) for one in tests}
+        values = {entry.label: entry.condition(name) for entry in tests}
         if name in _SUBJECT[mode] or len(set(values.values())) < 2:
             continue
-        told = ", ".join(f"{label}: {value or 'not stated'}" for label, value in values.items())
-        message = f"the tests differ in {name} ({told}): a difference may come from it"
-        found.append(Finding(rule="conditions-differ", where=name, message=message, level="note"))
+        values_by_test = ", ".join(f"{label}: {value or 'not stated'}" for label, value in values.items())
+        message = f"the tests differ in {name} ({values_by_test}): a difference may come from it"
+        findings.append(Finding(rule="conditions-differ", where=name, message=message, level="note"))
     outliers: dict[str, list[str]] = {}
-    for one in repeats.precisions if repeats else ():
-        if one.outlier:
-            outliers.setdefault(one.farthest, []).append(f"{one.name} at {in_both(one.load_N, 'N', '.0f')}")
-    for label, where in outliers.items():
-        message = f"stands apart from the other repeats in {', '.join(where)} (Grubbs, Holm over the table)"
-        found.append(Finding(rule="repeat-outlier", where=label, message=message, level="note"))
+    for precision in repeats.precisions if repeats else ():
+        if precision.outlier:
+            where = f"{precision.name} at {in_both(precision.load_N, 'N', '.0f')}"
+            outliers.setdefault(precision.farthest, []).append(where)
+    for label, places in outliers.items():
+        message = f"stands apart from the other repeats in {', '.join(places)} (Grubbs, Holm over the table)"
+        findings.append(Finding(rule="repeat-outlier", where=label, message=message, level="note"))
     inferred = infer_mode(entries)
     if stated and mode != inferred and inferred != "repeats":
         message = f"compared as {mode}; by what the tests state it is a comparison of {inferred}"
-        found.append(Finding(rule="mode", where="--mode", message=message))
-    if len({one.simulated for one in tests}) > 1:
+        findings.append(Finding(rule="mode", where="--mode", message=message))
+    if len({entry.simulated for entry in tests}) > 1:
         message = "simulated and measured tests are compared with each other"
-        found.append(Finding(rule="simulated-and-measured", where="compare", message=message))
-    return found
+        findings.append(Finding(rule="simulated-and-measured", where="compare", message=message))
+    return findings
 
 
 def _shown(value: float | None, unit: str, digits: int) -> str | None:

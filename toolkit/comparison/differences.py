@@ -6,12 +6,12 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 
-from toolkit.characteristics.rows import Row
+from toolkit.characteristics.catalogue import compared
+from toolkit.characteristics.model import Row
 from toolkit.characteristics.uncertain import Uncertain, weighted
 from toolkit.comparison.at_load import at_load
-from toolkit.comparison.holm import holm
-from toolkit.comparison.model import PARTS, Difference, Entry, Part
-from toolkit.comparison.quantities import CHARACTERISTICS, CURVES
+from toolkit.comparison.model import PARTS, Difference, Entry, Part, PatternEffect
+from toolkit.comparison.significance import holm, two_sided_p
 from toolkit.units import in_both
 
 Series = tuple[str, str, float | None]
@@ -20,13 +20,12 @@ _SAME_ANGLE = 1e-6  # rad
 
 def series_of(rows: Sequence[Row]) -> dict[Series, list[Row]]:
     """Return the rows that are compared, by (name, rotation, slip angle)."""
-    names = {one.name for one in (*CHARACTERISTICS, *CURVES)}
-    found: dict[Series, list[Row]] = {}
+    series: dict[Series, list[Row]] = {}
     for row in rows:
-        if row.name in names:
+        if row.characteristic.compared:
             angle = None if row.SA_rad is None else round(row.SA_rad / _SAME_ANGLE) * _SAME_ANGLE
-            found.setdefault((row.name, row.rotation, angle), []).append(row)
-    return found
+            series.setdefault((row.name, row.rotation, angle), []).append(row)
+    return series
 
 
 def differences(entries: Sequence[Entry], *, level: float) -> tuple[tuple[Difference, ...], tuple[str, ...]]:
@@ -36,24 +35,24 @@ def differences(entries: Sequence[Entry], *, level: float) -> tuple[tuple[Differ
     """
     reference = entries[0]
     base = series_of(reference.rows)
-    found: list[Difference] = []
+    compared_rows: list[Difference] = []
     left_out: list[str] = []
     for other in entries[1:]:
-        theirs = series_of(other.rows)
+        other_series = series_of(other.rows)
         lacking: dict[str, None] = {}
         beyond: dict[float, None] = {}
         for series, rows in base.items():
-            if series not in theirs:
+            if series not in other_series:
                 lacking[_said(series)] = None
                 continue
-            for row in sorted(rows, key=lambda one: one.load_N):
-                number = at_load(theirs[series], row.load_N, owner=other.identity)
+            for row in sorted(rows, key=lambda row: row.load_N):
+                number = at_load(other_series[series], row.load_N, owner=other.identity)
                 if number is None:
                     beyond[round(row.load_N)] = None
                 else:
-                    found.append(_difference(series, row, number, other.label))
+                    compared_rows.append(_difference(series, row, number, other.label))
         left_out += _left_out(other.label, lacking, beyond)
-    return tuple(one for part in PARTS for one in _decided(found, part, level)), tuple(left_out)
+    return tuple(row for part in PARTS for row in _decided(compared_rows, part, level)), tuple(left_out)
 
 
 def _difference(series: Series, row: Row, number: Uncertain, label: str) -> Difference:
@@ -77,25 +76,12 @@ def _difference(series: Series, row: Row, number: Uncertain, label: str) -> Diff
     )
 
 
-def two_sided_p(value: float, u: float, dof: float) -> float | None:
-    """Return the two-sided p of a value that has standard uncertainty ``u`` being zero; None without one.
-
-    Student's t; normal for infinite degrees of freedom.
-    """
-    from scipy.special import ndtr, stdtr
-
-    if not u > 0 or math.isnan(dof):
-        return None
-    t = -abs(value) / u
-    return float(2 * (ndtr(t) if math.isinf(dof) else stdtr(dof, t)))
-
-
-def _decided(found: Sequence[Difference], part: Part, level: float) -> list[Difference]:
-    mine = [one for one in found if one.part == part]
-    adjusted = holm([one.p for one in mine])
+def _decided(differences: Sequence[Difference], part: Part, level: float) -> list[Difference]:
+    table = [difference for difference in differences if difference.part == part]
+    adjusted = holm([difference.p for difference in table])
     return [
-        replace(one, p_holm=p, significant=p is not None and p < level)
-        for one, p in zip(mine, adjusted, strict=True)
+        replace(difference, p_holm=p, significant=p is not None and p < level)
+        for difference, p in zip(table, adjusted, strict=True)
     ]
 
 
@@ -105,9 +91,43 @@ def _said(series: Series) -> str:
 
 
 def _left_out(label: str, lacking: dict[str, None], beyond: dict[float, None]) -> list[str]:
-    found = []
+    sentences = []
     if lacking:
-        found.append(f"{label} has no {', '.join(lacking)}")
+        sentences.append(f"{label} has no {', '.join(lacking)}")
     if beyond:
-        found.append(f"{label} does not reach the load {in_both(list(beyond), 'N', '.0f')}")
-    return found
+        sentences.append(f"{label} does not reach the load {in_both(list(beyond), 'N', '.0f')}")
+    return sentences
+
+
+def pattern_effects(entries: Sequence[Entry]) -> tuple[PatternEffect, ...]:
+    """Return the pattern effects of two prototypes whose belt cords mirror each other.
+
+        pattern effect = (PRAT_regular + PRAT_reversed)/2,   body effect = (PRAT_regular - PRAT_reversed)/2
+
+    The belt's part of PRAT changes its sign with the cords, the tread's does not (source document, 6.1.1). By
+    either definition of PRAT, at 0 deg and at FY = 0; empty without one regular and one reversed belt.
+    """
+    regular = [entry for entry in entries if entry.condition("belt") == "regular"]
+    turned = [entry for entry in entries if entry.condition("belt") == "reversed"]
+    if len(regular) != 1 or len(turned) != 1:
+        return ()
+    regular_series, turned_series = series_of(regular[0].rows), series_of(turned[0].rows)
+    effects = []
+    for declared in compared():
+        series = (declared.name, "both", None)
+        if not declared.belt_sign or series not in turned_series:
+            continue
+        for row in sorted(regular_series.get(series, ()), key=lambda row: row.load_N):
+            other = at_load(turned_series[series], row.load_N, owner=turned[0].identity)
+            if other is not None:
+                effects.append(
+                    PatternEffect(
+                        name=declared.name,
+                        load_N=row.load_N,
+                        regular=row.number.estimate(),
+                        reversed=other.estimate(),
+                        pattern=weighted([(0.5, row.number), (0.5, other)]).estimate(),
+                        body=weighted([(0.5, row.number), (-0.5, other)]).estimate(),
+                    )
+                )
+    return tuple(effects)

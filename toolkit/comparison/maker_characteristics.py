@@ -2,8 +2,8 @@
 
     FZ [N],conicity [N],U_conicity [N],plysteer [N],secant_cornering [N/deg]
 
-One row a load; any of the names of `quantities`, each with its unit, and optionally its expanded uncertainty
-(k = 2) as ``U_<name>``. SAE axes that follow the travel; conicity and plysteer by symmetry.
+One row a load; any name of the catalogue that is compared, each with its unit, and optionally its expanded
+uncertainty (k = 2) as ``U_<name>``. SAE axes that follow the travel; conicity and plysteer by symmetry.
 """
 
 from __future__ import annotations
@@ -16,16 +16,18 @@ import re
 from pathlib import Path
 from typing import NoReturn
 
-from toolkit.characteristics.rows import BOTH, Row
+from toolkit.characteristics.catalogue import compared
+from toolkit.characteristics.characteristic import BOTH
+from toolkit.characteristics.model import Row
 from toolkit.characteristics.uncertain import Part, Uncertain
-from toolkit.comparison.quantities import CHARACTERISTICS
 from toolkit.errors import CellError, ColumnError, UnreadableError
 from toolkit.tires.plausibility import demand_possible
 from toolkit.units import unit
 
 _HEADER = re.compile(r"\s*([A-Za-z_]+)\s*\[([^\]]*)\]\s*")
-_SI = {"N": "N", "N*m": "N*m", "N/deg": "N/rad", "N*m/deg": "N*m/rad"}
-_NAMES = {one.name: _SI[one.unit] for one in CHARACTERISTICS}
+# The characteristics that a maker can state against load, by name, with their SI unit.
+_STATED = {declared.name: declared for declared in compared() if declared.scope != "angle"}
+_NAMES = {name: declared.unit for name, declared in _STATED.items()}
 
 
 def is_characteristics_table(path: Path) -> bool:
@@ -64,7 +66,7 @@ def maker_characteristics(path: Path, *, identity: str) -> tuple[Row, ...]:
             )  # fmt: skip
     if "FZ" not in names:
         _refuse(path, "missing-column", "the table has no column FZ", ", ".join(head), "FZ [N]")
-    found: list[Row] = []
+    rows: list[Row] = []
     loads: set[float] = set()
     for number, cells in enumerate(_lines(text)[1:], start=2):
         if not any(cell.strip() for cell in cells):
@@ -92,17 +94,17 @@ def maker_characteristics(path: Path, *, identity: str) -> tuple[Row, ...]:
             what = f"row {number}: the load {'stands twice' if load else 'is zero'}"
             _refuse(path, "doubled-load", what, f"{load:g} N", "each load once, above zero")
         loads.add(load)
-        found += _rows_of(values, load, identity)
-    if not found:
+        rows += _rows_of(values, load, identity)
+    if not rows:
         raise UnreadableError(
             "the table has no data", where=path, got="a header and no values", expected="one row a load",
             next_step="add the rows", rule="no-data",
         )  # fmt: skip
-    return tuple(found)
+    return tuple(rows)
 
 
 def _rows_of(values: dict[str, float | None], load: float, identity: str) -> list[Row]:
-    found = []
+    rows = []
     for name, si in _NAMES.items():
         value = values.get(name)
         if value is None:
@@ -113,15 +115,15 @@ def _rows_of(values: dict[str, float | None], load: float, identity: str) -> lis
             if not U
             else (Part(source="maker's statement", key=f"maker/{identity}/{name}/{load:.9g}", u=U / 2),)
         )
-        found.append(
-            Row(
-                name=name,
+        rows.append(
+            Row.of(
+                name,
+                Uncertain(value=value, unit=si, parts=parts),
                 load_N=load,
-                rotation="forward" if name.startswith(("secant", "slope")) else BOTH,
-                number=Uncertain(value=value, unit=si, parts=parts),
+                rotation=BOTH if _STATED[name].scope == "load" else "forward",
             )
         )
-    return found
+    return rows
 
 
 def _text(path: Path) -> str:
@@ -165,11 +167,11 @@ def _column(cell: str, path: Path) -> tuple[str, float]:
         )
     where = f"{path}, column {cell.strip()!r}"
     wanted = unit("N" if name == "FZ" else _NAMES[bare])
-    given = unit(match[2], where=where)
+    stated = unit(match[2], where=where)
     # An angle has no dimension of its own: N and N/deg are told apart by what they are per.
-    if given.dimension != wanted.dimension or ("/" in given.text) != ("/" in wanted.text):
+    if stated.dimension != wanted.dimension or ("/" in stated.text) != ("/" in wanted.text):
         _refuse(path, "unit-dimension", f"the unit of {name} is of another kind", match[2], wanted.text)
-    return name, given.factor / wanted.factor
+    return name, stated.factor / wanted.factor
 
 
 def _number(cell: str, factor: float, where: str, *, needed: bool) -> float | None:

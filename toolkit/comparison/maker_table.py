@@ -14,12 +14,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from toolkit.channels import signs
-from toolkit.characteristics.direction import CHANNELS, Direction
-from toolkit.characteristics.groups import Group
-from toolkit.characteristics.model import DirectionFit
+from toolkit.characteristics.catalogue import of_scope
+from toolkit.characteristics.groups import CHANNELS, Direction, DirectionFit, Group
+from toolkit.characteristics.model import Row
 from toolkit.characteristics.reading import Reader
-from toolkit.characteristics.rows import Row
-from toolkit.characteristics.shared import Shared
+from toolkit.characteristics.rows import at_angles
+from toolkit.characteristics.shared_errors import SharedErrors
 from toolkit.errors import FitError
 from toolkit.findings import Finding
 from toolkit.machine import TypeB
@@ -34,7 +34,6 @@ from toolkit.units import from_si
 if TYPE_CHECKING:
     from toolkit.tires.model import CurveFit
 
-_REACH_RAD = np.radians(0.5)
 # What a table may vary that a free-rolling, upright test does not.
 _ONE_VALUE = {"IA": ("deg", 0.1), "P": ("kPa", 5.0), "V": ("km/h", 5.0), "KAPPA": ("1", 0.005)}
 
@@ -56,9 +55,9 @@ def maker_rows(
     table = read_table(path, axes=axes)
     _check_possible(table)
     _check_one_condition(table)
-    curves = [_in_sae(one) for one in table_curves(table)]
-    problems = [why_not(one) for one in curves]
-    good = [one for one, problem in zip(curves, problems, strict=True) if problem is None]
+    curves = [_in_sae(curve) for curve in table_curves(table)]
+    problems = [why_not(curve) for curve in curves]
+    good = [curve for curve, problem in zip(curves, problems, strict=True) if problem is None]
     if not good:
         first = next(problem for problem in problems if problem is not None)
         raise FitError(
@@ -68,42 +67,43 @@ def maker_rows(
     fits = fit_curves(good)
     findings = [
         Finding(
-            rule=one.rule or "not-fitted", where=f"{path.name}, {one.where}", message=f"{one.what}: {one.got}"
+            rule=problem.rule or "not-fitted",
+            where=f"{path.name}, {problem.where}",
+            message=f"{problem.what}: {problem.got}",
         )
-        for one in problems
-        if one is not None
+        for problem in problems
+        if problem is not None
     ]
     by_load: dict[float, dict[str, tuple[Curve, CurveFit]]] = {}
     for curve, fit in zip(good, fits, strict=True):
         by_load.setdefault(curve.load_N or 0.0, {})[curve.channel] = (curve, fit)
     rows = []
     for load, channels in sorted(by_load.items()):
-        reader = Reader(_direction(load, channels, path), shared=_nothing_shared(identity))
+        reader = Reader(_direction(load, channels, path), shared=_nothing_shared(identity), stepped=False)
         rows += _rows(reader, load, angles_rad)
     sae = TireTable(path=path, axes="SAE", columns=())
     # Which parameters a curve leaves open is of no interest here: values and slopes are read off it.
-    told = [one for one in fit_findings(list(fits)) if one.level != "note"]
+    warnings = [finding for finding in fit_findings(list(fits)) if finding.level != "note"]
     findings += [
-        replace(one, where=f"{path.name}, {one.where}") for one in (*told, *axes_findings(sae, fits))
+        replace(finding, where=f"{path.name}, {finding.where}")
+        for finding in (*warnings, *axes_findings(sae, fits))
     ]
     findings += (*repeat_findings(table), *table.mark_findings)
     return tuple(rows), tuple(findings)
 
 
 def _rows(reader: Reader, load: float, angles_rad: Sequence[float]) -> list[Row]:
-    found = []
-    SA = reader.group.SA
-    for channel, kind, sign in (("FY", "cornering", -1.0), ("MZ", "aligning", 1.0)):
-        assert channel in CHANNELS  # noqa: S101  tells the type
-        for way, number in (("secant", reader.chord(channel)), ("slope", reader.slope(channel))):
+    rows = []
+    for channel in CHANNELS:
+        for declared in of_scope("direction"):
+            number = declared.read(declared, reader) if declared.channel == channel else None
             if number is not None:
-                scaled = number.scaled(sign, number.unit)
-                found.append(Row(name=f"{way}_{kind}", load_N=load, rotation="forward", number=scaled))
-        for angle in angles_rad:
-            at = reader.value(channel, angle) if SA[0] - _REACH_RAD <= angle <= SA[-1] + _REACH_RAD else None
-            if at is not None:
-                found.append(Row(name=channel, load_N=load, rotation="forward", number=at, SA_rad=angle))
-    return found
+                rows.append(Row.of(declared.name, number, load_N=load, rotation="forward"))
+        at_angle = [declared for declared in of_scope("angle") if declared.channel == channel]
+        for (declared, _, _, angle), number in at_angles(reader, angles_rad, at_angle).items():
+            if number is not None:
+                rows.append(Row.of(declared.name, number, load_N=load, rotation="forward", SA_rad=angle))
+    return rows
 
 
 def _in_sae(curve: Curve) -> Curve:
@@ -119,8 +119,8 @@ def _in_sae(curve: Curve) -> Curve:
 
 def _direction(load: float, channels: dict[str, tuple[Curve, CurveFit]], path: Path) -> Direction:
     """Return a load of the table as the direction of a test: one condition a row."""
-    one = next(iter(channels.values()))[0]
-    order = np.argsort(one.SA, kind="stable")
+    curve = next(iter(channels.values()))[0]
+    order = np.argsort(curve.SA, kind="stable")
     y = {name: curve.y[order] for name, (curve, _) in channels.items()}
     zeros = np.zeros(len(order))
     conditions = tuple(
@@ -131,7 +131,7 @@ def _direction(load: float, channels: dict[str, tuple[Curve, CurveFit]], path: P
             u_FY_common=0.0, u_MZ_common=0.0, u_FY_zero=0.0, u_MZ_zero=0.0, used=True, calibration_sha256="",
         )
         for i, (SA, FY, MZ) in enumerate(
-            zip(one.SA[order].tolist(), y.get("FY", zeros).tolist(), y.get("MZ", zeros).tolist(), strict=True)
+            zip(*(a.tolist() for a in (curve.SA[order], y.get("FY", zeros), y.get("MZ", zeros))), strict=True)
         )
     )  # fmt: skip
     fits = {name: fit for name, (_, fit) in channels.items()}
@@ -141,11 +141,11 @@ def _direction(load: float, channels: dict[str, tuple[Curve, CurveFit]], path: P
     )
 
 
-def _nothing_shared(identity: str) -> Shared:
+def _nothing_shared(identity: str) -> SharedErrors:
     def none(symbol: str) -> TypeB:
         return TypeB(symbol=symbol, u=0.0, relative=0.0, source="a maker's table states none")
 
-    return Shared(
+    return SharedErrors(
         record=None,
         machine_axes="SAE",
         tared=True,

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Literal, get_args
 
 from toolkit.calibration.records.use import CalibrationUse
-from toolkit.characteristics.rows import Row
+from toolkit.characteristics.model import Row
 from toolkit.estimate import Estimate
 from toolkit.findings import Finding
 
@@ -16,16 +16,6 @@ Kind = Literal["test", "table", "characteristics"]
 # The two tables of a comparison; in each the error of all its decisions together is controlled.
 Part = Literal["characteristics", "curves"]
 PARTS: tuple[Part, ...] = get_args(Part)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Quantity:
-    """A compared quantity: ``unit`` and ``factor`` from SI as it is shown, ``title`` in words."""
-
-    name: str
-    title: str
-    unit: str
-    factor: float = 1.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -185,4 +175,4 @@ class Comparison:
     @property
     def uses(self) -> tuple[CalibrationUse, ...]:
         """The records that computed the tests, each once."""
-        return tuple(dict.fromkeys(one.calibration for one in self.entries if one.calibration))
+        return tuple(dict.fromkeys(entry.calibration for entry in self.entries if entry.calibration))

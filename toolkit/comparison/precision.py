@@ -23,8 +23,8 @@ from numpy.typing import NDArray
 
 from toolkit.comparison.at_load import at_load
 from toolkit.comparison.differences import Series, series_of
-from toolkit.comparison.holm import holm
 from toolkit.comparison.model import Entry, Factor, FactorSpread, Precision, Repeats, Spread
+from toolkit.comparison.significance import grubbs_p, holm
 
 FACTORS = ("day", "operator", "mounting", "calibration", "machine", "laboratory")
 
@@ -32,28 +32,28 @@ FACTORS = ("day", "operator", "mounting", "calibration", "machine", "laboratory"
 def repeats_of(entries: Sequence[Entry], *, level: float) -> Repeats:
     """Return the precision of tests of one tire, in every characteristic at the first test's loads."""
     factors = factors_of(entries)
-    varied = [one for one in factors if one.varied]
-    cells = list(zip(*(one.levels for one in factors if None not in one.levels), strict=True)) or [
+    varied = [factor for factor in factors if factor.varied]
+    cells = list(zip(*(factor.levels for factor in factors if None not in factor.levels), strict=True)) or [
         () for _ in entries
     ]
-    found = []
-    labels = [one.label for one in entries]
-    everywhere = [series_of(one.rows) for one in entries]
+    precisions = []
+    labels = [entry.label for entry in entries]
+    everywhere = [series_of(entry.rows) for entry in entries]
     for series, rows in everywhere[0].items():
         if series[2] is not None or any(series not in other for other in everywhere):
             continue
-        for row in sorted(rows, key=lambda one: one.load_N):
+        for row in sorted(rows, key=lambda row: row.load_N):
             numbers = [
-                at_load(mine[series], row.load_N, owner=entry.identity)
-                for mine, entry in zip(everywhere, entries, strict=True)
+                at_load(series_there[series], row.load_N, owner=entry.identity)
+                for series_there, entry in zip(everywhere, entries, strict=True)
             ]
-            values = [one.value for one in numbers if one is not None]
+            values = [number.value for number in numbers if number is not None]
             if len(values) == len(entries):
-                found.append(_precision(series, row.load_N, np.array(values), cells, varied, labels))
-    labs = next(one for one in factors if one.name == "laboratory")
-    reproducible = labs.varied and None not in labs.levels
+                precisions.append(_precision(series, row.load_N, np.array(values), cells, varied, labels))
+    laboratory = next(factor for factor in factors if factor.name == "laboratory")
+    reproducible = laboratory.varied and None not in laboratory.levels
     return Repeats(
-        precisions=_decided(found, level),
+        precisions=_decided(precisions, level),
         factors=factors,
         reproducibility="laboratory" if reproducible else None,
         reproducibility_note="the spread with factor laboratory different is the reproducibility"
@@ -65,30 +65,30 @@ def repeats_of(entries: Sequence[Entry], *, level: float) -> Repeats:
 def factors_of(entries: Sequence[Entry]) -> tuple[Factor, ...]:
     """Return the factors of the tests and which of them changed together."""
     levels = {name: tuple(entry.condition(name) for entry in entries) for name in FACTORS}
-    split = {name: _partition(one) for name, one in levels.items() if None not in one}
-    found = []
-    for name, mine in levels.items():
-        stated = None not in mine
-        varied = stated and len(set(mine)) > 1
+    split = {name: _partition(listed) for name, listed in levels.items() if None not in listed}
+    factors = []
+    for name, listed in levels.items():
+        stated = None not in listed
+        varied = stated and len(set(listed)) > 1
         same = tuple(
             other for other, parts in split.items() if varied and other != name and parts == split[name]
         )
         if not stated:
-            note = f"not stated by {sum(one is None for one in mine)} of {len(mine)} tests"
+            note = f"not stated by {sum(level is None for level in listed)} of {len(listed)} tests"
         elif not varied:
             note = "the same in all tests"
         elif same:
             note = f"changed together with {', '.join(same)}: what they add cannot be told apart"
         else:
             note = None
-        found.append(Factor(name=name, levels=mine, varied=varied, same_as=same, note=note))
-    return tuple(found)
+        factors.append(Factor(name=name, levels=listed, varied=varied, same_as=same, note=note))
+    return tuple(factors)
 
 
 def _partition(levels: Sequence[Hashable]) -> tuple[int, ...]:
     """Return the levels as numbers in the order in which they first come."""
-    seen: dict[Hashable, int] = {}
-    return tuple(seen.setdefault(level, len(seen)) for level in levels)
+    numbers: dict[Hashable, int] = {}
+    return tuple(numbers.setdefault(level, len(numbers)) for level in levels)
 
 
 def _precision(
@@ -114,7 +114,7 @@ def _precision(
         total=spread(float(values.std(ddof=1)), len(values) - 1),
         repeatability=repeatability,
         limit_r=1.96 * math.sqrt(2.0) * repeatability.value if repeatability else None,
-        factors=tuple(factor_spread(values, one.levels, factor=one.name) for one in varied),
+        factors=tuple(factor_spread(values, factor.levels, factor=factor.name) for factor in varied),
     )
 
 
@@ -122,9 +122,9 @@ def _within(values: NDArray[np.float64], levels: Sequence[Hashable]) -> tuple[fl
     """Return the pooled variance inside levels and its degrees of freedom."""
     squares, dof = 0.0, 0
     for level in set(levels):
-        mine = values[[one == level for one in levels]]
-        squares += float(np.sum((mine - mine.mean()) ** 2))
-        dof += len(mine) - 1
+        members = values[[other == level for other in levels]]
+        squares += float(np.sum((members - members.mean()) ** 2))
+        dof += len(members) - 1
     return (squares / dof if dof else 0.0), dof
 
 
@@ -133,14 +133,16 @@ def factor_spread(values: NDArray[np.float64], levels: Sequence[Hashable], *, fa
     from scipy.special import fdtrc
 
     N = len(values)
-    sizes = np.array([sum(one == level for one in levels) for level in dict.fromkeys(levels)], dtype=float)
+    sizes = np.array(
+        [sum(other == level for other in levels) for level in dict.fromkeys(levels)], dtype=float
+    )
     p = len(sizes)
     if p == N:
         # Every test has a level of its own: the spread of all is the intermediate precision itself.
         s = float(values.std(ddof=1))
         return FactorSpread(factor=factor, levels=p, s=s, s_between=None, F=None, p=None)
     within, dof = _within(values, levels)
-    means = np.array([values[[one == level for one in levels]].mean() for level in dict.fromkeys(levels)])
+    means = np.array([values[[other == level for other in levels]].mean() for level in dict.fromkeys(levels)])
     between = float(np.sum(sizes * (means - values.mean()) ** 2)) / (p - 1)
     n0 = (N - float(np.sum(sizes**2)) / N) / (p - 1)
     s_between = math.sqrt(max(0.0, (between - within) / n0))
@@ -155,32 +157,11 @@ def factor_spread(values: NDArray[np.float64], levels: Sequence[Hashable], *, fa
     )
 
 
-def grubbs_p(values: NDArray[np.float64]) -> float | None:
-    """Return the two-sided p of the value farthest from the mean (Grubbs, Technometrics 11, 1969, 1-21).
-
-    None for fewer than three values, or values that are all the same.
-
-    >>> round(grubbs_p(np.array([0.0, 0.1, -0.1, 0.05, 5.0])), 4) < 0.01
-    True
-    """
-    from scipy.special import stdtr
-
-    n, s = len(values), float(values.std(ddof=1)) if len(values) > 1 else 0.0
-    if n < 3 or s <= 0:
-        return None
-    G = float(np.max(np.abs(values - values.mean()))) / s
-    rest = (n - 1) ** 2 - n * G * G
-    if rest <= 0:
-        return 0.0
-    t = math.sqrt(n * (n - 2) * G * G / rest)
-    return min(1.0, 2 * n * float(stdtr(n - 2, -t)))
-
-
 def spread(s: float, dof: int) -> Spread:
     """Return a standard deviation with its 95 % interval from the chi-squared distribution.
 
-    >>> one = spread(1.0, 4)
-    >>> round(one.low, 3), round(one.high, 3)  # sqrt(4/11.143), sqrt(4/0.4844)
+    >>> s = spread(1.0, 4)
+    >>> round(s.low, 3), round(s.high, 3)  # sqrt(4/11.143), sqrt(4/0.4844)
     (0.599, 2.874)
     """
     from scipy.special import chdtri
@@ -189,25 +170,27 @@ def spread(s: float, dof: int) -> Spread:
     return Spread(value=s, dof=dof, low=s * math.sqrt(dof / float(chdtri(dof, 0.025))), high=s * high)
 
 
-def _decided(found: Sequence[Precision], level: float) -> tuple[Precision, ...]:
+def _decided(precisions: Sequence[Precision], level: float) -> tuple[Precision, ...]:
     """Adjust each factor's F tests, and the tests for outliers, over their tables."""
-    names = dict.fromkeys(one.factor for row in found for one in row.factors)
+    names = dict.fromkeys(factor.factor for row in precisions for factor in row.factors)
     adjusted: dict[tuple[int, str], float | None] = {}
     for name in names:
-        tests = [(i, one) for i, row in enumerate(found) for one in row.factors if one.factor == name]
-        for (i, _), p in zip(tests, holm([one.p for _, one in tests]), strict=True):
+        tests = [
+            (i, factor) for i, row in enumerate(precisions) for factor in row.factors if factor.factor == name
+        ]
+        for (i, _), p in zip(tests, holm([factor.p for _, factor in tests]), strict=True):
             adjusted[i, name] = p
-    apart = holm([row.outlier_p for row in found])
+    apart = holm([row.outlier_p for row in precisions])
     return tuple(
         replace(
             row,
             outlier_p_holm=apart[i],
             outlier=(p_apart := apart[i]) is not None and p_apart < level,
             factors=tuple(
-                replace(one, p_holm=p, significant=p is not None and p < level)
-                for one in row.factors
-                for p in (adjusted[i, one.factor],)
+                replace(factor, p_holm=p, significant=p is not None and p < level)
+                for factor in row.factors
+                for p in (adjusted[i, factor.factor],)
             ),
         )
-        for i, row in enumerate(found)
+        for i, row in enumerate(precisions)
     )

@@ -11,16 +11,18 @@ from typing import TYPE_CHECKING
 from toolkit.diagnosis.answer.answer import Diagnosis
 from toolkit.diagnosis.answer.build_answer import answer_of, mostly_unknown
 from toolkit.diagnosis.answer.case_findings import calibration_findings, case_findings
-from toolkit.diagnosis.answer.failed_runs import Refused
+from toolkit.diagnosis.answer.failed_runs import FailedRuns
 from toolkit.diagnosis.answer.truncated_answer import STEPS, does_not_vary, without_search
 from toolkit.diagnosis.case.case import Case
 from toolkit.diagnosis.fit.predict import prediction_csv, prediction_names
 from toolkit.diagnosis.fit.problem import Problem, problem_of
-from toolkit.diagnosis.search.search import Budget, BudgetSpentError, Search, search
-from toolkit.diagnosis.search.time_budget import Watch
+from toolkit.diagnosis.policy import BUDGET
+from toolkit.diagnosis.search.search import Search, search
+from toolkit.diagnosis.search.time_budget import BudgetSpentError, TimeBudget
 from toolkit.diagnosis.simulators.build_simulator import model_of
 from toolkit.diagnosis.simulators.built_in import built_in_findings
-from toolkit.diagnosis.simulators.guard import kept_apart
+from toolkit.diagnosis.simulators.simulator import Supervised
+from toolkit.diagnosis.simulators.user_code import kept_apart
 from toolkit.findings import Finding
 
 if TYPE_CHECKING:
@@ -28,9 +30,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from toolkit.diagnosis.fit.fit import Fit
-
-_QUICK_S = 2.0  # of a simulation: a slower one is not run twice to see whether it repeats itself
-_GRACE = 0.25  # of the budget, for predictions after a search that has spent it
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -60,74 +59,72 @@ def diagnose(
         the case cannot be used; FitError: its simulation gives no usable output as declared
     """
     with kept_apart():
-        return _diagnosed(case, calibrations, Watch(budget_s, tell), budget_s)
+        return _diagnosed(case, calibrations, TimeBudget(budget_s, tell), budget_s)
 
 
-def _diagnosed(case: Case, calibrations: Path | None, watch: Watch, budget_s: float) -> Result:
+def _diagnosed(case: Case, calibrations: Path | None, budget: TimeBudget, budget_s: float) -> Result:
     try:
-        model = watch.guarded(model_of)(case, calibrations)
+        model = budget.guarded(model_of)(case, calibrations)
     except BudgetSpentError:
-        return Result(diagnosis=_too_late(case, None, None, (), watch.step), search=None)
-    problem = problem_of(case, model)
-    simulate = model.simulate
-    refused = Refused(simulate)
-    model.simulate = watch.guarded(refused)  # type: ignore[method-assign]
-    told = (
+        return Result(diagnosis=_too_late(case, None, None, (), budget.step), search=None)
+    failed = FailedRuns(model.simulate)
+    supervised = Supervised(model, budget.guarded(failed))
+    problem = problem_of(case, supervised)
+    findings = (
         *case_findings(problem),
         *built_in_findings(case),
         *calibration_findings(case, calibrations),
     )
-    declared, found = None, None
+    declared, outcome = None, None
     try:
-        declared = _first_look(problem, watch)
+        declared = _first_look(problem, budget)
         if does_not_vary(problem):
-            made = without_search(
-                case, problem, declared, why="the outputs do not vary", findings=told,
+            answer = without_search(
+                case, problem, declared, why="the outputs do not vary", findings=findings,
                 next_measurements=("Vary the inputs: an output that stands still tells nothing.",),
             )  # fmt: skip
         else:
             seed = int(case.sha256[:12], 16)
-            budget = Budget(now=time.monotonic, until=watch.until, tell=watch.tell)
-            found = search(problem, seed=seed, budget=budget)
-            made = answer_of(case, found, told)
+            outcome = search(problem, seed=seed, budget=budget)
+            answer = answer_of(case, outcome, findings)
     except BudgetSpentError as error:
-        made = _too_late(case, problem, declared, told, str(error))
+        answer = _too_late(case, problem, declared, findings, str(error))
     finally:
-        model.simulate = simulate  # type: ignore[method-assign]
-    made = replace(made, findings=(*made.findings, *refused.findings(case)))
-    files, late = _predictions(problem, found, watch, budget_s)
+        supervised.release()
+    answer = replace(answer, findings=(*answer.findings, *failed.findings(case)))
+    files, late = _predictions(problem, outcome, budget, budget_s)
     if late:
-        made = replace(made, complete=False, skipped=(*made.skipped, late))
-    return Result(diagnosis=made, search=found, predictions=files)
+        answer = replace(answer, complete=False, skipped=(*answer.skipped, late))
+    return Result(diagnosis=answer, search=outcome, predictions=files)
 
 
-def _first_look(problem: Problem, watch: Watch) -> dict[str, NDArray[np.float64]]:
+def _first_look(problem: Problem, budget: TimeBudget) -> dict[str, NDArray[np.float64]]:
     """Return the simulation as declared; what cannot be simulated ends here."""
-    watch.tell("the simulation as declared")
-    values = tuple(one.value for one in problem.free)
-    made = problem.simulate(values, ())
-    quick = watch.last_s < _QUICK_S
-    repeats = getattr(problem.model, "repeats", None)
+    budget.tell("the simulation as declared")
+    values = tuple(parameter.value for parameter in problem.free)
+    simulated = problem.simulate(values, ())
+    quick = budget.last_s < BUDGET.quick_s
+    repeats = problem.model.capability.repeats
     if quick and repeats is not None:
         repeats(problem.runs[0], problem.known)
     for run in problem.case.predict if quick else ():
         problem.model.simulate(run, problem.known, ())
-    return made
+    return simulated
 
 
 def _predictions(
-    problem: Problem, found: Search | None, watch: Watch, budget_s: float
+    problem: Problem, outcome: Search | None, budget: TimeBudget, budget_s: float
 ) -> tuple[tuple[tuple[str, str], ...], str]:
     """Return the files of predictions, or what was skipped where the time is up."""
     runs = problem.case.predict
-    left = max(watch.until - time.monotonic(), _GRACE * budget_s)
-    if not runs or len(runs) * 3 * watch.last_s > left:
+    seconds = max(budget.until - time.monotonic(), BUDGET.grace * budget_s)
+    if not runs or len(runs) * 3 * budget.last_s > seconds:
         return (), "predictions" if runs else ""
     fits: list[Fit | None] = [None, None, None]
-    if found is not None:
-        fits[1] = found.refitted
-        fits[2] = found.refitted if mostly_unknown(found) else found.augmented
-    watch.tell("predictions")
+    if outcome is not None:
+        fits[1] = outcome.refitted
+        fits[2] = outcome.refitted if mostly_unknown(outcome) else outcome.augmented
+    budget.tell("predictions")
     return tuple(
         (name, prediction_csv(problem, run, fits))
         for name, run in zip(prediction_names(runs), runs, strict=True)
@@ -138,12 +135,12 @@ def _too_late(
     case: Case,
     problem: Problem | None,
     declared: dict[str, NDArray[np.float64]] | None,
-    told: tuple[Finding, ...],
+    findings: tuple[Finding, ...],
     at: str,
 ) -> Diagnosis:
     """Return the partial answer of a budget that was spent before anything could be judged."""
     return without_search(
-        case, problem, declared, why="the budget was spent before the search", findings=told,
+        case, problem, declared, why="the budget was spent before the search", findings=findings,
         next_measurements=("Give a larger --budget, fewer rows, or a faster simulation.",),
         skipped=tuple(dict.fromkeys((at, *STEPS))),
     )  # fmt: skip

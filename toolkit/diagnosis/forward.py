@@ -16,7 +16,7 @@ from toolkit.diagnosis.case.recordings import read_run
 from toolkit.diagnosis.fit.predict import csv_of, prediction_names
 from toolkit.diagnosis.simulators.build_simulator import model_of
 from toolkit.diagnosis.simulators.built_in import built_in_findings
-from toolkit.diagnosis.simulators.guard import kept_apart
+from toolkit.diagnosis.simulators.user_code import kept_apart
 from toolkit.errors import ConfigError
 from toolkit.files import read_bytes
 
@@ -55,15 +55,17 @@ def simulate_model(
 
 def _outputs(case: Case, calibrations: Path | None) -> tuple[tuple[str, str], ...]:
     simulator = model_of(case, calibrations)
-    p = {one.name: one.value for one in simulator.parameters}
-    made = []
+    p = {parameter.name: parameter.value for parameter in simulator.parameters}
+    files = []
     for name, run in zip(prediction_names(case.runs), case.runs, strict=True):
-        found = simulator.simulate(run, p, ())
-        _refuse_nothing(found, run)
-        columns = {one.name: run.columns[one.name] for one in case.channels if one.role == "time"}
-        columns |= {one.name: found[one.name] for one in simulator.outputs}
-        made.append((name, csv_of(columns)))
-    return tuple(made)
+        outputs = simulator.simulate(run, p, ())
+        _refuse_nothing(outputs, run)
+        columns = {
+            channel.name: run.columns[channel.name] for channel in case.channels if channel.role == "time"
+        }
+        columns |= {output.name: outputs[output.name] for output in simulator.outputs}
+        files.append((name, csv_of(columns)))
+    return tuple(files)
 
 
 def case_of(model: ModelFile, inputs: Sequence[Path], conditions: Mapping[str, str]) -> Case:
@@ -72,11 +74,12 @@ def case_of(model: ModelFile, inputs: Sequence[Path], conditions: Mapping[str, s
     channels = tuple(
         _channel(name, entry, f"{model.path}: channels.{name}") for name, entry in model.channels.items()
     )
-    time = next((one for one in channels if one.name == model.time), None)
+    time = next((channel for channel in channels if channel.name == model.time), None)
     if not inputs:
         raise ConfigError(
             "a model file is run on inputs", where=model.path, got="no --inputs",
-            expected=f"CSV files with {', '.join(one.name for one in channels if one.role != 'output')}",
+            expected="CSV files with "
+            + ", ".join(channel.name for channel in channels if channel.role != "output"),
             next_step="give --inputs FILE.csv, or name the model as [tire] file of a plan", rule="model-file",
         )  # fmt: skip
     runs = tuple(
@@ -121,8 +124,8 @@ def _channel(name: str, entry: object, where: str) -> CaseChannel:
     )
 
 
-def _refuse_nothing(made: Mapping[str, np.ndarray], run: Run) -> None:
-    for name, values in made.items():
+def _refuse_nothing(outputs: Mapping[str, np.ndarray], run: Run) -> None:
+    for name, values in outputs.items():
         bad = np.flatnonzero(~np.isfinite(values))
         if len(bad):
             raise ConfigError(

@@ -27,10 +27,10 @@ def lag(
         without lag anywhere y is x itself
     start : y at the first row; x there by default
     """
-    given = np.broadcast_to(np.asarray(time_constant, dtype=np.float64), t.shape)[1:]
-    if start is None and not (given > 0).any():
+    constants = np.broadcast_to(np.asarray(time_constant, dtype=np.float64), t.shape)[1:]
+    if start is None and not (constants > 0).any():
         return x.copy()
-    tau = np.maximum(given, 1e-12)
+    tau = np.maximum(constants, 1e-12)
     ratio = np.diff(t) / tau
     decay = np.exp(-ratio)
     # Response to a ramp: y1 = decay*y0 + (1 - decay)*x0 + (1 - (1 - decay)/ratio)*(x1 - x0)

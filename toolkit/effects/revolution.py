@@ -6,7 +6,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolkit.effects.effect import ChannelHook, EffectParameter, Values
+from toolkit.effects.effect import ChannelHook, EffectParameter
+from toolkit.effects.facts import Values
+from toolkit.effects.surroundings import of_channel
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -21,10 +23,10 @@ def harmonics(*angles: str) -> ChannelHook:
         angle = setting.channel(*angles)
         if angle is None:
             return y
-        made = y
+        total = y
         for n in (1, 2):
-            made = made + values[f"amplitude_{n}"] * np.cos(n * angle + np.deg2rad(values[f"phase_{n}"]))
-        return made
+            total = total + values[f"amplitude_{n}"] * np.cos(n * angle + np.deg2rad(values[f"phase_{n}"]))
+        return total
 
     return ripple
 
@@ -36,7 +38,7 @@ def _order(n: int, text: str, typical: tuple[float, float]) -> tuple[EffectParam
             unit="{channel}",
             text=text,
             typical=typical,
-            relative=True,
+            scale=of_channel,
             bounds=(0.0, float("inf")),
         ),
         EffectParameter(

@@ -82,7 +82,7 @@ def drive(
     pressure_error: NDArray[np.float64] | float = 0.0,
 ) -> Drive:
     """Return a drive that no effect has touched."""
-    zero, one = np.zeros(len(t)), np.ones(len(t))
+    zero, unity = np.zeros(len(t)), np.ones(len(t))
     return Drive(
         t=t,
         SA=SA,
@@ -90,9 +90,9 @@ def drive(
         IA=zero + IA,
         V=zero + V,
         pressure_error=zero + pressure_error,
-        friction=one,
-        stiffness=one,
-        trail=one,
+        friction=unity,
+        stiffness=unity,
+        trail=unity,
         FY=zero,
         MZ=zero,
     )

@@ -7,27 +7,29 @@ definition that it was made from stays as it is.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Annotated, ClassVar
 
-from toolkit.errors import ConfigError
+from toolkit.declared import AtLeast, Entry, Fault, Format, Names, UnitName
+from toolkit.effects.applied import AppliedEffect, EffectKey
+from toolkit.effects.catalogue import effects
+from toolkit.effects.effect import Effect
 from toolkit.estimate import plus_minus
-from toolkit.files import check_keys, is_number
 from toolkit.units import unit
 
-_LOADS = ("FY", "MZ")
-_SOURCES = ("FZ", "FY", "MZ")
-# Effect -> its parameter and the unit in which it computes; crosstalk's follows from its two loads.
-CORRECTABLE = {
-    "steer_offset": ("offset", "rad"),
-    "steer_compliance": ("compliance", "rad/(N*m)"),
-    "crosstalk": ("coefficient", ""),
-}
-_KEYS = (
-    "effect channel source parameter value unit standard_uncertainty reason by date answer_sha256 "
-    "case_sha256 code_version equivalent_to"
-).split()
 _SI = {"FZ": "N", "FY": "N", "MZ": "N*m"}
+
+
+def correctable() -> dict[str, Effect]:
+    """Return the effects that a machine can be corrected for by name, those of the whole machine first."""
+    chosen = [effect for effect in effects().values() if effect.correctable is not None]
+    chosen.sort(key=lambda effect: effect.correctable is not None and bool(effect.correctable.channels))
+    return {effect.name: effect for effect in chosen}
+
+
+_CORRECTABLE = correctable()
+_EXAMPLE = next(iter(_CORRECTABLE.values()))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -39,20 +41,25 @@ class Correction:
     recordings.
     """
 
-    effect: str
-    channel: str | None
-    source: str | None
-    parameter: str
-    value: float
-    unit: str
-    u: float
-    reason: str
-    by: str
-    date: str
-    answer_sha256: str
-    case_sha256: str
-    code_version: str
-    equivalent_to: tuple[str, ...] = ()
+    FORMAT: ClassVar[Format] = Format(
+        title="correction", wrong="machine-correction", missing="machine-correction",
+        next_step="write corrections with 'toolkit machine correct', never by hand",
+    )  # fmt: skip
+
+    effect: Annotated[str, Names(*_CORRECTABLE), Entry("what is put right")]
+    channel: Annotated[str | None, Entry("of a leak between two loads: the one that is put right")] = None
+    source: Annotated[str | None, Entry("of a leak between two loads: the one that leaks into it")] = None
+    parameter: Annotated[str, Entry("the effect's first parameter", example=_EXAMPLE.names[0])]
+    value: Annotated[float, Entry("its value, machine axes")]
+    unit: Annotated[str, UnitName(), Entry("of value and standard uncertainty", example="rad")]
+    u: Annotated[float, AtLeast(0), Entry("standard uncertainty", key="standard_uncertainty")]
+    reason: Annotated[str, Entry("why it is taken for the machine's own")]
+    by: Annotated[str, Entry("who decided it")]
+    date: Annotated[str, Entry("day of the decision, ISO 8601", example="2026-03-31")]
+    answer_sha256: Annotated[str, Entry("of the answer's model file")]
+    case_sha256: Annotated[str, Entry("of the case and its recordings")]
+    code_version: Annotated[str, Entry("of the program that gave the answer")]
+    equivalent_to: Annotated[tuple[str, ...], Entry("effects that the answer could not tell it from")] = ()
 
     @property
     def factor(self) -> float:
@@ -62,7 +69,20 @@ class Correction:
     @property
     def label(self) -> str:
         """Name and place: ``crosstalk FZ to FY``."""
-        return f"{self.effect} {self.source} to {self.channel}" if self.source else self.effect
+        return EffectKey(self.effect, self.channel, self.source).label
+
+    @property
+    def applied(self) -> AppliedEffect:
+        """The effect at its place, with its value in ``unit``."""
+        return AppliedEffect(
+            effect=effects()[self.effect], channel=self.channel, source=self.source,
+            values={self.parameter: self.value}, units={self.parameter: self.unit},
+        )  # fmt: skip
+
+    @property
+    def in_SI(self) -> AppliedEffect:
+        """The effect at its place, with its value in SI."""
+        return replace(self.applied, values={self.parameter: self.value * self.factor}, units={})
 
     def as_text(self) -> str:
         """Return it in one line for people: what, how large, from which answer, why."""
@@ -72,88 +92,33 @@ class Correction:
             f"answer {self.answer_sha256[:16]}, {self.date}, {self.by}: {self.reason}"
         )
 
-
-def read_corrections(entry: object, where: str) -> tuple[Correction, ...]:
-    """Read ``[[correction]]`` of a machine definition.
-
-    Raises
-    ------
-    ConfigError
-        ``machine-correction``: an effect that no reduction can put right, a number or a text that is missing
-    UnitError
-        a unit that is not known
-    """
-    if not isinstance(entry, list):
-        raise _wrong("corrections are no list of tables", where, entry, "[[correction]]")
-    return tuple(_correction(one, f"{where}[{i}]") for i, one in enumerate(entry, start=1))
-
-
-def _correction(table: Any, where: str) -> Correction:
-    if not isinstance(table, dict):
-        raise _wrong("a correction is no table", where, table, "[[correction]]")
-    check_keys(table, _KEYS, where=where)
-    effect = table.get("effect")
-    if effect not in CORRECTABLE:
-        raise _wrong("no reduction corrects this effect", f"{where}.effect", effect, ", ".join(CORRECTABLE))
-    texts: dict[str, str] = {}
-    for key in ("unit", "reason", "by", "date", "answer_sha256", "case_sha256", "code_version"):
-        given = table.get(key)
-        if not isinstance(given, str) or not given.strip():
-            raise _wrong(f"a correction has no {key}", f"{where}.{key}", given, "a text")
-        texts[key] = given
-    same = table.get("equivalent_to", [])
-    if not isinstance(same, list) or not all(isinstance(one, str) for one in same):
-        raise _wrong("equivalent_to is no list of names", f"{where}.equivalent_to", same, '["plysteer"]')
-    made = Correction(
-        effect=effect,
-        channel=table.get("channel"),
-        source=table.get("source"),
-        parameter=CORRECTABLE[effect][0],
-        value=_number(table.get("value"), f"{where}.value"),
-        u=_number(table.get("standard_uncertainty"), f"{where}.standard_uncertainty"),
-        equivalent_to=tuple(same),
-        **texts,
-    )
-    if table.get("parameter", made.parameter) != made.parameter:
-        raise _wrong("not the effect's parameter", f"{where}.parameter", table["parameter"], made.parameter)
-    check_correction(made, where)
-    return made
-
-
-def check_correction(one: Correction, where: str) -> None:
-    """Refuse a correction whose place, unit or uncertainty cannot be.
-
-    Raises
-    ------
-    ConfigError
-        ``machine-correction``
-    """
-    if one.u < 0:
-        raise _wrong("a standard uncertainty is negative", where, one.u, "a number from 0")
-    if one.effect == "crosstalk":
-        if one.channel not in _LOADS or one.source not in _SOURCES or one.channel == one.source:
-            raise _wrong(
-                "the crosstalk of these channels is not corrected in a reduction", where,
-                f"{one.source} to {one.channel}", f"from {', '.join(_SOURCES)} to {' or '.join(_LOADS)}",
+    def faults(self) -> Iterator[Fault]:
+        """Yield a parameter, a place or a unit that is not the effect's."""
+        effect = _CORRECTABLE[self.effect]
+        way = effect.correctable
+        if way is None:
+            return
+        expected, parameter = way.unit, effect.names[0]
+        if self.parameter != parameter:
+            yield Fault(key=("parameter",), got=self.parameter, expected=parameter)
+        if way.channels:
+            if (
+                self.channel not in way.channels
+                or self.source not in way.sources
+                or self.channel == self.source
+            ):
+                yield Fault(
+                    key=("channel",), got=f"{self.source} to {self.channel}",
+                    what=f"the {self.effect} of these channels is not corrected in a reduction",
+                    expected=f"from {', '.join(way.sources)} to {' or '.join(way.channels)}",
+                )  # fmt: skip
+                return
+            expected = way.unit.format_map({"channel": _SI[self.channel], "from": _SI[str(self.source)]})
+        elif self.channel or self.source:
+            key = "channel" if self.channel else "source"
+            yield Fault(
+                key=(key,), got=self.channel or self.source, expected="no channel",
+                what="the effect acts on the whole machine",
             )  # fmt: skip
-        expected = f"({_SI[one.channel]})/({_SI[one.source]})"
-    else:
-        if one.channel or one.source:
-            raise _wrong("the effect acts on the whole machine", where, one.channel, "no channel")
-        expected = CORRECTABLE[one.effect][1]
-    if unit(one.unit, where=where).dimension != unit(expected).dimension:
-        raise _wrong("a correction is in a unit of another dimension", where, one.unit, expected)
-
-
-def _number(entry: object, where: str) -> float:
-    if not is_number(entry):
-        raise _wrong("a correction has no number", where, entry, "a finite number")
-    return float(entry)
-
-
-def _wrong(what: str, where: str, got: object, expected: str) -> ConfigError:
-    return ConfigError(
-        what, where=where, got="nothing" if got is None else got, expected=expected,
-        next_step="write corrections with 'toolkit machine correct', never by hand",
-        rule="machine-correction",
-    )  # fmt: skip
+        if unit(self.unit).dimension != unit(expected).dimension:
+            yield Fault(key=("unit",), got=self.unit, expected=expected, what="a unit of another dimension")

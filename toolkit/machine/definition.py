@@ -1,69 +1,129 @@
-"""Read a machine definition (TOML) into a frozen `Machine`."""
+"""A machine definition (TOML): columns and their units, geometry, drum, protocol, what is stated of it."""
 
 from __future__ import annotations
 
+import dataclasses
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
-from typing import Any, Literal, cast
+from typing import Annotated, Any, ClassVar, Literal
 
-from toolkit.channels import AXES, ROTATIONS, Axes, Rotation
+from toolkit.channels import Axes, Rotation
+from toolkit.declared import (
+    Above,
+    AtLeast,
+    Distinct,
+    Entry,
+    Fault,
+    Format,
+    Keyed,
+    Names,
+    Size,
+    Source,
+    Unit,
+    UnitName,
+    build,
+    refuse,
+)
 from toolkit.errors import ConfigError
-from toolkit.files import check_keys, is_number, read_toml
-from toolkit.machine.correction import Correction, read_corrections
-from toolkit.machine.polarity import CellPolarity, read_polarity, read_rated_loads
-from toolkit.machine.protocol import KEYS as PROTOCOL_KEYS
-from toolkit.machine.protocol import Protocol, build_protocol
-from toolkit.machine.quantity import one_of, quantity
-from toolkit.units import si_scale, unit
-
-__all__ = [
-    "CellPolarity",
-    "Column",
-    "Correction",
-    "Drum",
-    "Machine",
-    "Protocol",
-    "Role",
-    "TypeB",
-    "load_machine",
-    "machine_names",
-    "quantity",
-]
+from toolkit.files import parse_toml, read_bytes
+from toolkit.machine.correction import Correction
+from toolkit.machine.protocol import Protocol
+from toolkit.units import unit
 
 Role = Literal["load", "indication", "slip_angle", "acquired", "time", "angle", "covariate"]
 
 _PACKAGED = Path(__file__).parent
-_KEYS = (
-    "schema name extends title kind axes rotations column drum cell cells rated_load protocol type_b "
-    "indication_unit sample_rate version supersedes correction"
-).split()
+_DIMENSIONS: dict[Role, tuple[str, ...]] = {
+    "load": ("force",),
+    "slip_angle": ("angle",),
+    "acquired": ("force", "moment"),
+    "time": ("time",),
+    "angle": ("angle",),
+}
+_INDICATIONS = Names(of="column.symbol", role="indication")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Column:
     """A column of the machine's own files: ``header`` as written there, ``unit`` as meant there."""
 
-    symbol: str
-    header: str
-    unit: str
-    role: Role
+    symbol: Annotated[str, Entry("the channel's symbol", example="FZ")]
+    header: Annotated[str, Entry("as the machine's files print it", example="FZ load")]
+    unit: Annotated[str, UnitName(), Entry("of the numbers in the column")]
+    role: Annotated[Role, Entry("what the column holds")]
+
+    def faults(self) -> Iterator[Fault]:
+        """Yield a unit in which what the column holds cannot be."""
+        dimensions = _DIMENSIONS.get(self.role)
+        dimension = unit(self.unit).dimension
+        if dimensions is not None and dimension not in dimensions:
+            yield Fault(
+                key=("unit",), got=self.unit, expected=f"a unit of {' or '.join(dimensions)}",
+                what=f"{self.unit} is a unit of {dimension}", rule="unit-dimension",
+            )  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Drum:
     """The road: circumference [m], surface speed and its tolerance [m/s]."""
 
-    surface: str
-    circumference_m: float
-    speed_m_s: float
-    speed_tolerance_m_s: float
+    surface: Annotated[str, Entry("what the road is like", example="convex")]
+    circumference_m: Annotated[float, Unit("m"), Above(0), Entry("of the surface", key="circumference")]
+    speed_m_s: Annotated[float, Unit("km/h"), Above(0), Entry("of the surface", key="speed")]
+    speed_tolerance_m_s: Annotated[
+        float, Unit("km/h"), AtLeast(0), Entry("about that speed", key="speed_tolerance")
+    ]
 
     @property
     def radius_m(self) -> float:
         """Radius of the drum [m]."""
         return self.circumference_m / (2 * math.pi)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CellLayout:
+    """Where the load cells are: the circle through them, the lever of each about the longitudinal axis."""
+
+    pitch_diameter_m: Annotated[
+        float, Unit("m"), Above(0), Entry("of the circle through the cells", key="pitch_diameter")
+    ]
+    overturning_lever_m: Annotated[
+        tuple[tuple[str, float], ...], Keyed(), _INDICATIONS, Unit("m", plain=True),
+        Entry("of each cell, with its sign", key="overturning_lever", example={}),
+    ]  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CellPolarity:
+    """The signs of one cell: ``signs`` are pairs of a load and +1 or -1, ``source`` says who states them.
+
+    A sign is that of d load / d indication in the load's equation: +1 where the load grows with the
+    indication while the other cells stay as they are.
+    """
+
+    name: Annotated[str, _INDICATIONS, Entry("symbol of the cell's column")]
+    signs: Annotated[
+        tuple[tuple[str, Literal[1, -1]], ...], Keyed(), Size(1),
+        Entry("sign by load: 1 where the load grows with the indication", key="polarity", example={"FY": 1}),
+    ]  # fmt: skip
+    source: Annotated[str, Entry("who states it, and where")]
+
+    def sign(self, load: str) -> int | None:
+        """Return +1 or -1 for a load; None where the definition states none."""
+        return dict(self.signs).get(load)
+
+
+# What may be stated, of which dimension, and with which of the numbers: what is not used is not accepted.
+_STATED = {
+    "FZ": ("force", "u", "relative"),
+    "zero": ("", "relative"),
+    "SA": ("angle", "u"),
+    "SA_scale": ("", "relative"),
+    "P": ("pressure", "u", "relative", "effect"),
+}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -76,11 +136,32 @@ class TypeB:
     """
 
     symbol: str
-    u: float
-    relative: float
-    source: str
-    common: Literal["machine", "test"] = "test"
-    effect: float = 0.0
+    u: Annotated[float, Unit("N", "deg", "kPa", beside="unit"), AtLeast(0), Entry("standard uncertainty")] = (
+        0.0
+    )
+    relative: Annotated[float, AtLeast(0), Entry("standard uncertainty as a part of the value")] = 0.0
+    source: Annotated[str, Entry("what it rests on")]
+    common: Annotated[
+        Literal["machine", "test"],
+        Entry("one error in all tests of the machine, or another one in each test"),
+    ] = "test"
+    effect: Annotated[float, Entry("relative change of a force for one of the condition")] = 0.0
+
+    def faults(self) -> Iterator[Fault]:
+        """Yield numbers that are not used for this symbol, and a unit of another dimension."""
+        dimension, *numbers = _STATED[self.symbol]
+        for key in ("u", "relative", "effect"):
+            if getattr(self, key) and key not in numbers:
+                yield Fault(
+                    key=(key,), got=getattr(self, key), expected=", ".join(numbers),
+                    what=f"is not used for {self.symbol}",
+                )  # fmt: skip
+        written = getattr(self.u, "unit", None)
+        if self.u and "u" in numbers and written is not None and unit(written).dimension != dimension:
+            yield Fault(
+                key=("unit",), got=written, expected=f"a unit of {dimension}",
+                what=f"{written} is a unit of {unit(written).dimension}", rule="unit-dimension",
+            )  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -92,23 +173,60 @@ class Machine:
     load cells must have, ``rated_loads`` pairs of a load and its rated value [N, N*m].
     """
 
-    name: str
-    title: str
-    simulated: bool
-    axes: Axes
-    rotations: tuple[Rotation, ...]
-    columns: tuple[Column, ...]
-    drum: Drum
-    cell_pitch_diameter_m: float
-    overturning_lever_m: tuple[tuple[str, float], ...]
-    protocol: Protocol
-    type_b: tuple[TypeB, ...]
-    sample_rate_Hz: float | None = None
-    version: int = 1
-    supersedes: str | None = None
-    corrections: tuple[Correction, ...] = ()
-    cells: tuple[CellPolarity, ...] = ()
-    rated_loads: tuple[tuple[str, float], ...] = ()
+    FORMAT: ClassVar[Format] = Format(
+        title="machine definition", schema=1,
+        next_step="correct {key}; the packaged m15.toml shows every entry",
+    )  # fmt: skip
+
+    name: Annotated[str, Entry("of the machine, and of the instrument in its calibrations", example="m15")]
+    extends: Annotated[
+        str | None, Entry("packaged machine whose entries hold where this file states none", example="m15")
+    ] = None
+    title: Annotated[str, Entry("for reports")]
+    kind: Annotated[Literal["real", "simulated"], Entry("whether its data are measured")]
+    axes: Annotated[Axes, Entry("axis system of the machine's files")]
+    rotations: Annotated[
+        tuple[Rotation, ...],
+        Size(1),
+        Distinct(),
+        Entry("directions of the drum", example=["forward", "reverse"]),
+    ]
+    version: Annotated[int, AtLeast(1), Entry("counts the definitions of this machine")] = 1
+    supersedes: Annotated[str | None, Entry("SHA-256 of the definition that this one was made from")] = None
+    indication_unit: Annotated[
+        str | None,
+        UnitName(),
+        Entry("unit of every indication, in place of the columns' own", example="mV/V"),
+    ] = None
+    sample_rate_Hz: Annotated[
+        float | None, Unit("Hz"), Above(0), Entry("of the recordings", key="sample_rate")
+    ] = None
+    columns: Annotated[
+        tuple[Column, ...], Size(1), Distinct("symbol"),
+        Entry("one entry a column of the machine's files, in their order", key="column"),
+    ]  # fmt: skip
+    drum: Annotated[Drum, Entry("the road")]
+    layout: Annotated[CellLayout, Entry("where the load cells are", key="cells")]
+    cells: Annotated[
+        tuple[CellPolarity, ...], Distinct("name"), Entry("signs that a cell must have", key="cell")
+    ] = ()
+    rated_loads: Annotated[
+        tuple[tuple[str, float], ...], Keyed(), Unit("N", "N*m"), Above(0),
+        Entry("rated value by load", key="rated_load", example={"FY": {"value": 6000, "unit": "N"}}),
+    ] = ()  # fmt: skip
+    protocol: Annotated[Protocol, Entry("the machine's default; a test may name another one")]
+    type_b: Annotated[
+        tuple[TypeB, ...], Keyed("symbol"), Names(*_STATED),
+        Entry("standard uncertainties of what has no calibration record of its own"),
+    ] = ()  # fmt: skip
+    corrections: Annotated[
+        tuple[Correction, ...], Entry("what a reduction puts right, by decision", key="correction")
+    ] = ()
+
+    @property
+    def simulated(self) -> bool:
+        """Whether its data are simulated."""
+        return self.kind == "simulated"
 
     @property
     def indications(self) -> tuple[Column, ...]:
@@ -117,7 +235,7 @@ class Machine:
 
     def cell(self, name: str) -> CellPolarity | None:
         """Return the stated signs of a cell; None where the definition states none."""
-        return next((one for one in self.cells if one.name == name), None)
+        return next((cell for cell in self.cells if cell.name == name), None)
 
     def column(self, symbol: str) -> Column:
         """Return the column of a symbol; KeyError where the machine has none."""
@@ -128,10 +246,20 @@ class Machine:
 
     def stated_uncertainty(self, symbol: str) -> TypeB:
         """Return the stated uncertainty of a channel, zero where none is stated."""
-        for stated in self.type_b:
-            if stated.symbol == symbol:
-                return stated
+        for statement in self.type_b:
+            if statement.symbol == symbol:
+                return statement
         return TypeB(symbol=symbol, u=0.0, relative=0.0, source="not stated")
+
+    def faults(self) -> Iterator[Fault]:
+        """Yield a header that two columns have: their numbers could not be told apart."""
+        headers = [column.header for column in self.columns]
+        for number, header in enumerate(headers):
+            if header in headers[:number]:
+                yield Fault(
+                    key=("column", number, "header"), got=header, expected="each header once",
+                    what=f'"{header}" stands twice',
+                )  # fmt: skip
 
 
 def machine_names() -> tuple[str, ...]:
@@ -146,7 +274,7 @@ def load_machine(name_or_path: str) -> Machine:
     Raises
     ------
     ConfigError
-        unknown name, unknown key, missing entry, a unit of the wrong dimension
+        an unknown name; every entry that is unknown, missing or cannot be used
 
     Examples
     --------
@@ -166,7 +294,7 @@ def load_machine(name_or_path: str) -> Machine:
             next_step="name one of those, or give the path of a machine definition (.toml)",
             rule="unknown-machine",
         )
-    return _build(_merged(path), path)
+    return machine_of_text(read_bytes(path), path)
 
 
 def machine_file(name_or_path: str) -> Path:
@@ -174,131 +302,44 @@ def machine_file(name_or_path: str) -> Path:
     return Path(name_or_path) if name_or_path.endswith(".toml") else _PACKAGED / f"{name_or_path}.toml"
 
 
-def build_machine(table: dict[str, Any], path: Path) -> Machine:
-    """Return the machine of a parsed definition; ``path`` names it in messages, errors as `load_machine`."""
-    return _build(_extended(table, path), path)
-
-
-def _merged(path: Path) -> dict[str, Any]:
-    return _extended(read_toml(path), path)
-
-
-def _extended(table: dict[str, Any], path: Path) -> dict[str, Any]:
-    check_keys(table, _KEYS, where=path)
-    if "extends" in table:
-        base = _merged(_PACKAGED / f"{table.pop('extends')}.toml")
-        stated = table.get("type_b", {})
-        if isinstance(stated, dict):  # one new figure must not silently drop the others
-            stated = {**base.get("type_b", {}), **stated}
-        table = {**base, **table, "type_b": stated}
-    return table
-
-
-def _build(table: dict[str, Any], path: Path) -> Machine:
-    check_keys(table.get("type_b", {}), list(_STATED), where=f"{path}: type_b")
-    try:
-        indication_unit = table.get("indication_unit")
-        columns = tuple(
-            Column(
-                symbol=entry["symbol"],
-                header=entry["header"],
-                unit=unit(
-                    indication_unit if indication_unit and entry["role"] == "indication" else entry["unit"],
-                    where=path,
-                ).text,
-                role=entry["role"],
-            )
-            for entry in table["column"]
-        )
-        drum, cells = table["drum"], table["cells"]
-        return Machine(
-            name=table["name"],
-            title=table["title"],
-            simulated=one_of(table["kind"], ("real", "simulated"), path) == "simulated",
-            axes=cast("Axes", one_of(table["axes"], AXES, path)),
-            rotations=tuple(cast("Rotation", one_of(r, ROTATIONS, path)) for r in table["rotations"]),
-            columns=columns,
-            drum=Drum(
-                surface=drum["surface"],
-                circumference_m=quantity(drum["circumference"], "length", path),
-                speed_m_s=quantity(drum["speed"], "speed", path),
-                speed_tolerance_m_s=quantity(drum["speed_tolerance"], "speed", path),
-            ),
-            cell_pitch_diameter_m=quantity(cells["pitch_diameter"], "length", path),
-            overturning_lever_m=tuple((k, float(v)) for k, v in cells["overturning_lever"].items()),
-            protocol=_protocol(table["protocol"], path),
-            type_b=tuple(_type_b(symbol, entry, path) for symbol, entry in table.get("type_b", {}).items()),
-            sample_rate_Hz=quantity(table["sample_rate"], "frequency", path)
-            if "sample_rate" in table
-            else None,
-            version=_version(table.get("version", 1), path),
-            supersedes=table.get("supersedes"),
-            corrections=read_corrections(table.get("correction", []), f"{path}: correction"),
-            cells=read_polarity(
-                table.get("cell", []),
-                [one.symbol for one in columns if one.role == "indication"],
-                f"{path}: cell",
-            ),
-            rated_loads=read_rated_loads(table.get("rated_load", {}), f"{path}: rated_load"),
-        )
-    except KeyError as error:
-        raise ConfigError(
-            "a machine definition lacks an entry",
-            where=path,
-            got="nothing",
-            expected=error.args[0],
-            next_step="add it; the packaged m15.toml shows every entry",
-        ) from error
-
-
-def _version(value: object, path: Path) -> int:
-    if isinstance(value, bool) or not isinstance(value, int) or value < 1:
-        raise ConfigError(
-            "a machine definition's version is no whole number", where=f"{path}: version", got=value,
-            expected="1, 2, 3, ...", next_step="correct it", rule="wrong-value",
-        )  # fmt: skip
-    return value
-
-
-def _protocol(entry: object, path: Path) -> Protocol:
-    if not isinstance(entry, dict):
-        raise ConfigError(
-            "the protocol of a machine definition is no table", where=path, got=entry, expected="[protocol]",
-            next_step="write the protocol into the definition; a test may name a file", rule="wrong-value",
-        )  # fmt: skip
-    check_keys(entry, PROTOCOL_KEYS, where=f"{path}: protocol")
-    return build_protocol(entry, path)
-
-
-# What may be stated, and with which of u and relative: what is not used is not accepted either.
-_STATED = {
-    "FZ": ("u", "relative"),
-    "zero": ("relative",),
-    "SA": ("u",),
-    "SA_scale": ("relative",),
-    "P": ("u", "relative", "effect"),
-}
-
-
-def _type_b(symbol: str, entry: dict[str, Any], where: Path) -> TypeB:
-    here = f"{where}: type_b.{symbol}"
-    check_keys(entry, (*_STATED[symbol], "unit", "source", "common"), where=here)
-    for key in ("u", "relative", "effect"):
-        value = entry.get(key, 0.0)
-        if not is_number(value) or (value < 0 and key != "effect"):
-            raise ConfigError(
-                f"a stated uncertainty has a wrong {key!r}", where=here, got=value,
-                expected="a number" if key == "effect" else "a number from 0",
-                next_step="correct it", rule="wrong-value",
-            )  # fmt: skip
-    u = float(entry.get("u", 0.0)) * (si_scale(entry["unit"], where=where) if "unit" in entry else 1.0)
-    return TypeB(
-        symbol=symbol,
-        u=u,
-        relative=float(entry.get("relative", 0.0)),
-        source=entry["source"],
-        common=cast(
-            "Literal['machine', 'test']", one_of(entry.get("common", "test"), ("machine", "test"), here)
+def machine_of_text(data: bytes, path: Path) -> Machine:
+    """Return the machine of a definition's content; ``path`` names it, errors as `load_machine`."""
+    table, source = _extended(data, path, ())
+    machine = build(Machine, table, source)
+    if machine.indication_unit is None:
+        return machine
+    return dataclasses.replace(
+        machine,
+        columns=tuple(
+            dataclasses.replace(column, unit=machine.indication_unit)
+            if column.role == "indication"
+            else column
+            for column in machine.columns
         ),
-        effect=float(entry.get("effect", 0.0)),
     )
+
+
+def _extended(data: bytes, path: Path, extending: tuple[Path, ...]) -> tuple[dict[str, Any], Source]:
+    """Return the entries of a definition with those of the one that it extends, and where each stands."""
+    table = parse_toml(data, where=path)
+    source = Source(where=path, text=data.decode("utf-8-sig"))
+    if "extends" not in table:
+        return table, source
+    name, names = table["extends"], machine_names()
+    circle = isinstance(name, str) and _PACKAGED / f"{name}.toml" in (*extending, path)
+    if circle or name not in names:
+        circle_text = "a definition extends itself" if circle else None
+        fault = Fault(
+            key=("extends",), got=name, expected=", ".join(names), what=circle_text, form=Machine.FORMAT,
+            rule="unknown-machine",
+        )  # fmt: skip
+        refuse([fault], source)
+    base_path = machine_file(name)
+    base, base_source = _extended(read_bytes(base_path), base_path, (*extending, path))
+    inherited: set[tuple[str, ...]] = {(key,) for key in base if key not in table}
+    statement, base_stated = table.get("type_b", {}), base.get("type_b", {})
+    if isinstance(statement, dict):  # one new figure must not silently drop the others
+        inherited |= {("type_b", symbol) for symbol in base_stated if symbol not in statement}
+        table["type_b"] = {**base_stated, **statement}
+    merged = Source(where=path, text=source.text, base=base_source, inherited=frozenset(inherited))
+    return {**base, **table}, merged

@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-import json
-import re
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
+from toolkit.declared import plain, toml_text
+from toolkit.declared.lines import lines_of
 from toolkit.errors import ConfigError
-from toolkit.files import parse_toml, read_bytes, sha256_bytes
-from toolkit.machine.correction import Correction, check_correction
-from toolkit.machine.definition import build_machine, machine_file
+from toolkit.files import read_bytes, sha256_bytes
+from toolkit.machine.correction import Correction
+from toolkit.machine.definition import machine_file, machine_of_text
 
 if TYPE_CHECKING:
     from toolkit.machine.definition import Machine
-
-_OWN = re.compile(r"^\s*(version|supersedes)\s*=")
-_NAME = re.compile(r"^\s*name\s*=")
 
 
 def next_version(
@@ -35,52 +32,28 @@ def next_version(
     ConfigError
         no such machine; ``machine-correction``: it is corrected already, or the correction cannot be
     """
-    check_correction(correction, str(out))
     path = machine_file(machine)
     data = read_bytes(path)
-    old = build_machine(parse_toml(data, where=path), path)
-    for one in old.corrections:
-        if one.label == correction.label and diagnosed_with != sha256_bytes(data):
+    old = machine_of_text(data, path)
+    for earlier in old.corrections:
+        if earlier.label == correction.label and diagnosed_with != sha256_bytes(data):
             raise ConfigError(
-                "the machine has this correction already", where=path, got=one.as_text(),
+                "the machine has this correction already", where=path, got=earlier.as_text(),
                 expected="an answer of recordings that were diagnosed with this version",
                 next_step=f"diagnose the case with machine = {path.name!r}, and correct what is left",
                 rule="machine-correction",
             )  # fmt: skip
-    made = {"version": old.version + 1, "supersedes": sha256_bytes(data)}
-    text = _with_version(data.decode("utf-8"), made) + _block(correction)
-    built = build_machine(parse_toml(text.encode(), where=out), out)
-    return text, built
+    numbers = {"version": old.version + 1, "supersedes": sha256_bytes(data)}
+    text = _with_entries(data.decode("utf-8-sig"), toml_text(numbers))
+    text += "\n" + toml_text({"correction": [plain(correction)]})
+    return text, machine_of_text(text.encode(), out)
 
 
-def _with_version(text: str, made: dict[str, Any]) -> str:
-    lines, inside, done = [], False, False
-    for line in text.splitlines():
-        inside = inside or line.lstrip().startswith("[")
-        if not inside and _OWN.match(line):
-            continue
-        lines.append(line)
-        if not inside and not done and _NAME.match(line):
-            lines += [f"{key} = {_value(value)}" for key, value in made.items()]
-            done = True
-    return "\n".join(lines).rstrip() + "\n"
-
-
-def _block(one: Correction) -> str:
-    entries: dict[str, Any] = {"effect": one.effect}
-    entries |= {key: value for key, value in (("channel", one.channel), ("source", one.source)) if value}
-    entries |= {
-        "parameter": one.parameter, "value": one.value, "unit": one.unit, "standard_uncertainty": one.u,
-        "reason": one.reason, "by": one.by, "date": one.date, "answer_sha256": one.answer_sha256,
-        "case_sha256": one.case_sha256, "code_version": one.code_version,
-        "equivalent_to": list(one.equivalent_to),
-    }  # fmt: skip
-    return "\n[[correction]]\n" + "".join(f"{key} = {_value(value)}\n" for key, value in entries.items())
-
-
-def _value(one: Any) -> str:
-    if isinstance(one, list):
-        return f"[{', '.join(_value(each) for each in one)}]"
-    if isinstance(one, str):
-        return json.dumps(one, ensure_ascii=False).replace("\x7f", "\\u007F")
-    return repr(one)
+def _with_entries(text: str, entries: str) -> str:
+    """Return the text with these entries of its top level below the name, in place of any older ones."""
+    places, lines = lines_of(text), text.splitlines()
+    older = {places[key,] for key in ("version", "supersedes") if (key,) in places}
+    after = places.get(("name",), 0)
+    numbered = [line for number, line in enumerate(lines, start=1) if number not in older or number == after]
+    after -= sum(number < after for number in older)
+    return "\n".join([*numbered[:after], entries.rstrip(), *numbered[after:]]).rstrip() + "\n"

@@ -18,8 +18,7 @@ import numpy as np
 
 from toolkit.calibration.fit.regression import fit_terms
 from toolkit.errors import ToolkitError
-from toolkit.qualification.agreement import correct_digits, digits_check
-from toolkit.qualification.model import Check, not_run
+from toolkit.qualification.model import Check, correct_digits, digits_check, not_run
 from toolkit.qualification.numbers import QUANTITIES, SETS, CertifiedSet, read_set
 
 if TYPE_CHECKING:
@@ -31,34 +30,38 @@ _NAMED_POWERS = 9
 
 def check_certified(folder: Path) -> list[Check]:
     """Solve every certified set; one check a quantity."""
-    found: list[Check] = []
+    checks: list[Check] = []
     for name in SETS:
         try:
-            found += _checks(read_set(name, folder))
+            checks += _checks(read_set(name, folder))
         except (ToolkitError, np.linalg.LinAlgError, ValueError, KeyError) as error:
-            found.append(not_run(GROUP, name, str(error)))
-    return found
+            checks.append(not_run(GROUP, name, str(error)))
+    return checks
 
 
-def solve(one: CertifiedSet) -> tuple[tuple[float, ...], tuple[float, ...], float]:
+def solve(certified: CertifiedSet) -> tuple[tuple[float, ...], tuple[float, ...], float]:
     """Return estimates, their standard errors and the residual standard deviation of a certified set."""
-    power = len(one.terms) - 1
-    if one.terms[-2:] == (f"x^{power}", "intercept") and power > _NAMED_POWERS:
-        return _high_polynomial(one.columns["x"], one.y, power)
-    fit = fit_terms(terms=one.terms, columns=one.columns, load=one.y)
+    power = len(certified.terms) - 1
+    if certified.terms[-2:] == (f"x^{power}", "intercept") and power > _NAMED_POWERS:
+        return _high_polynomial(certified.columns["x"], certified.y, power)
+    fit = fit_terms(terms=certified.terms, columns=certified.columns, load=certified.y)
     return fit.coefficients, tuple(fit.standard_errors.tolist()), fit.residual_sd
 
 
-def _checks(one: CertifiedSet) -> list[Check]:
-    estimates, errors, sd = solve(one)
+def _checks(certified: CertifiedSet) -> list[Check]:
+    estimates, errors, sd = solve(certified)
     reached = (
-        min(correct_digits(a, b) for a, b in zip(estimates, one.estimates, strict=True)),
-        min(correct_digits(a, b) for a, b in zip(errors, one.errors, strict=True)),
-        correct_digits(sd, one.residual_sd),
+        min(correct_digits(a, b) for a, b in zip(estimates, certified.estimates, strict=True)),
+        min(correct_digits(a, b) for a, b in zip(errors, certified.errors, strict=True)),
+        correct_digits(sd, certified.residual_sd),
     )
     return [
-        digits_check(GROUP, one.name, quantity.replace("_", " "), required, got, _note(public, required))
-        for quantity, required, public, got in zip(QUANTITIES, one.required, one.public, reached, strict=True)
+        digits_check(
+            GROUP, certified.name, quantity.replace("_", " "), required, got, _note(public, required)
+        )
+        for quantity, required, public, got in zip(
+            QUANTITIES, certified.required, certified.public, reached, strict=True
+        )
     ]
 
 

@@ -24,36 +24,38 @@ def check_golden(calibrations: Path) -> tuple[list[Check], list[NotCovered]]:
     """Check every record of a registry; a record that a load-time gate refuses is a failed check."""
     registry = Registry(calibrations)
     checks: list[Check] = []
-    left: list[NotCovered] = []
+    not_covered: list[NotCovered] = []
     for instrument in registry.instruments():
         try:
             good, bad = registry.usable(instrument)
         except ToolkitError as error:
             checks.append(not_run(GROUP, instrument, str(error)))
             continue
-        checks += [not_run(GROUP, one.id, f"refused, {one.rule}: {one.reason}") for one in bad]
+        checks += [
+            not_run(GROUP, refusal.id, f"refused, {refusal.rule}: {refusal.reason}") for refusal in bad
+        ]
         for record in good:
             if record.golden.inputs:
                 checks += [_check(record, at) for at in range(len(record.loads))]
             else:
-                left.append(NotCovered(name=record.id, reason="a legacy import has no golden vectors"))
+                not_covered.append(NotCovered(name=record.id, reason="a legacy import has no golden vectors"))
     if not checks:
         checks.append(not_run(GROUP, "registry", "no record with golden vectors was found"))
-    return checks, left
+    return checks, not_covered
 
 
 def _check(record: CalibrationRecord, at: int) -> Check:
-    one: LoadFit = record.loads[at]
+    load: LoadFit = record.loads[at]
     inputs = np.asarray(record.golden.inputs)
-    matrix = term_matrix(one.terms, dict(zip(record.indications, inputs.T, strict=True)))
-    coefficients = np.asarray(one.coefficients)
+    matrix = term_matrix(load.terms, dict(zip(record.indications, inputs.T, strict=True)))
+    coefficients = np.asarray(load.coefficients)
     off = np.abs(matrix @ coefficients - np.asarray(record.golden.outputs[at]))
     # The rounding of the sum itself is allowed for, as at load time.
     rounding = 64 * np.finfo(float).eps * (np.abs(matrix) @ np.abs(coefficients))
     worst = int((off - rounding).argmax())
     return Check(
-        group=GROUP, name=record.id, quantity=one.load, measure="share of the largest load",
-        required=GOLDEN + float(rounding[worst]) / one.largest, reached=float(off[worst]) / one.largest,
-        passed=bool((off <= GOLDEN * one.largest + rounding).all()),
+        group=GROUP, name=record.id, quantity=load.load, measure="share of the largest load",
+        required=GOLDEN + float(rounding[worst]) / load.largest, reached=float(off[worst]) / load.largest,
+        passed=bool((off <= GOLDEN * load.largest + rounding).all()),
         note=f"{len(inputs)} vectors; the record refits from its own data",
     )  # fmt: skip

@@ -52,23 +52,23 @@ def read_set(name: str, folder: Path) -> CertifiedSet:
         the file is missing, no TOML, lacks an entry or holds no number where one belongs
     """
     path = folder / f"{name}.toml"
-    found = read_toml(path)
+    stored = read_toml(path)
     try:
-        certified = found["certified"]
+        certified = stored["certified"]
         terms: dict[str, Any] = certified["terms"]
-        data = {key: numbers(values, path) for key, values in found["data"].items()}
+        data = {key: numbers(values, path) for key, values in stored["data"].items()}
         pairs = [numbers(pair, path) for pair in terms.values()]
         return CertifiedSet(
-            name=str(found["name"]),
-            title=str(found["title"]),
+            name=str(stored["name"]),
+            title=str(stored["title"]),
             terms=tuple(terms),
             estimates=tuple(float(estimate) for estimate, _ in pairs),
             errors=tuple(float(error) for _, error in pairs),
             residual_sd=number(certified["residual_sd"], path),
             y=data.pop("y"),
             columns=data,
-            required=tuple(number(found["required"][one], path) for one in QUANTITIES),
-            public=tuple(number(found["public_qr"][one], path) for one in QUANTITIES),
+            required=tuple(number(stored["required"][quantity], path) for quantity in QUANTITIES),
+            public=tuple(number(stored["public_qr"][quantity], path) for quantity in QUANTITIES),
         )
     except (KeyError, TypeError, ValueError, AttributeError) as error:
         raise damaged(path, f"{type(error).__name__}: {error}") from error
@@ -103,14 +103,14 @@ def check_whole(folder: Path) -> Check:
         listed: dict[str, str] = read_toml(folder / DIGESTS)["sha256"]
         there = {path.name for path in folder.glob("*.toml")} - {DIGESTS}
         changed = [n for n in sorted(there & listed.keys()) if sha256_file(folder / n) != listed[n]]
-        found = [f"{n} is changed" for n in changed]
-        found += [f"{n} is missing" for n in sorted(listed.keys() - there)]
-        found += [f"{n} is not listed" for n in sorted(there - listed.keys())]
+        differences = [f"{n} is changed" for n in changed]
+        differences += [f"{n} is missing" for n in sorted(listed.keys() - there)]
+        differences += [f"{n} is not listed" for n in sorted(there - listed.keys())]
     except (ToolkitError, KeyError, AttributeError) as error:
-        found = [f"{DIGESTS} cannot be used: {error}".splitlines()[0]]
+        differences = [f"{DIGESTS} cannot be used: {error}".splitlines()[0]]
     return Check(
         group="packaged numbers", name="files", quantity="sha256", measure="text", required="as listed",
-        reached="; ".join(found) or "as listed", passed=not found,
+        reached="; ".join(differences) or "as listed", passed=not differences,
     )  # fmt: skip
 
 

@@ -7,13 +7,13 @@ from datetime import date
 from importlib.metadata import version
 from pathlib import Path
 
-from toolkit import __version__
 from toolkit.qualification import numbers
 from toolkit.qualification.certified import check_certified
 from toolkit.qualification.examples import check_e74, check_lines
 from toolkit.qualification.gates.run import check_gates
 from toolkit.qualification.golden import check_golden
 from toolkit.qualification.model import QualificationRecord
+from toolkit.version import __version__
 
 PACKAGES = ("numpy", "scipy", "statsmodels", "odrpack")
 

@@ -53,13 +53,13 @@ def read_members(data: bytes, *, where: object, only: tuple[str, ...] | None = N
             next_step="copy the file again from the machine; it was cut off or damaged on its way",
         )
     _check_names([member.filename for member in members], where)
-    left = MAX_TOTAL_BYTES
+    budget = MAX_TOTAL_BYTES
     contents: dict[str, bytes] = {}
     for member in members:
         if member.is_dir() or (only is not None and member.filename not in only):
             continue
-        content = _inflate(data, member, left, where)
-        left -= len(content)
+        content = _inflate(data, member, budget, where)
+        budget -= len(content)
         contents[member.filename] = content
     return contents
 
@@ -98,7 +98,7 @@ def _check_names(names: list[str], where: object) -> None:
             got=len(names),
             expected=f"at most {MAX_MEMBERS}",
         )
-    seen: set[str] = set()
+    lower_names: set[str] = set()
     for name in names:
         parts = name.replace("\\", "/").split("/")
         if not name or ".." in parts or name.startswith(("/", "\\")) or ":" in name or not name.isprintable():
@@ -109,13 +109,13 @@ def _check_names(names: list[str], where: object) -> None:
                 got=repr(name),
                 expected="names such as 'xl/worksheets/sheet1.xml'",
             )
-        if name.lower() in seen:
+        if name.lower() in lower_names:
             _refuse("member-path", "two members of the archive have the same name", where, got=repr(name),
                     expected="every name once")  # fmt: skip
-        seen.add(name.lower())
+        lower_names.add(name.lower())
 
 
-def _inflate(data: bytes, member: zipfile.ZipInfo, left: int, where: object) -> bytes:
+def _inflate(data: bytes, member: zipfile.ZipInfo, budget: int, where: object) -> bytes:
     name = member.filename
     if member.flag_bits & 0x41:
         _refuse("encrypted", "a member of the archive is encrypted", where, got=name,
@@ -129,11 +129,11 @@ def _inflate(data: bytes, member: zipfile.ZipInfo, left: int, where: object) -> 
     raw = _raw(data, member, where)
     if member.compress_type == zipfile.ZIP_STORED:
         content = raw
-        if len(content) > left:
+        if len(content) > budget:
             _too_large(name, where)
     else:
         # The sizes in the directory are claims: what comes out is counted, whatever they say.
-        bound = min(left, max(RATIO_FREE_BYTES, MAX_RATIO * len(raw)))
+        bound = min(budget, max(RATIO_FREE_BYTES, MAX_RATIO * len(raw)))
         engine = zlib.decompressobj(-zlib.MAX_WBITS)
         try:
             content = engine.decompress(raw, bound + 1)

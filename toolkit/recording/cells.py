@@ -103,8 +103,8 @@ def find_cells(xml: bytes, grid: Grid | None = None) -> Cells:
     """
     if grid is None:
         return _scan(xml) or _parse(xml)
-    rest = grid.rest(xml)
-    first = _few(rest) or find_cells(rest)
+    remainder = grid.without_rows(xml)
+    first = _few(remainder) or find_cells(remainder)
     rows, columns = np.indices(grid.starts.shape)
     return Cells(
         np.concatenate([first.rows, rows.ravel() + grid.first_row]),
@@ -119,20 +119,20 @@ def error_cells(xml: bytes) -> tuple[tuple[str, str], ...]:
     """
     if b"#" not in xml:
         return ()
-    found = []
+    errors = []
     for cell in _ERROR_CELL.finditer(xml):
-        own = _OWN_REFERENCE.search(cell.group(0).partition(b">")[0])
-        found.append((own.group(1).decode() if own else "?", cell.group(1).decode("utf-8", "replace")))
-    return tuple(found)
+        place = _OWN_REFERENCE.search(cell.group(0).partition(b">")[0])
+        errors.append((place.group(1).decode() if place else "?", cell.group(1).decode("utf-8", "replace")))
+    return tuple(errors)
 
 
 def _few(xml: bytes) -> Cells | None:
     # The same answer as `_scan`, in less time where there are few cells.
-    found = _PLAIN_CELL.findall(xml)
-    if not found or len(found) != len(_ANY_CELL.findall(xml)) or any(int(row) == 0 for _, row in found):
+    plain = _PLAIN_CELL.findall(xml)
+    if not plain or len(plain) != len(_ANY_CELL.findall(xml)) or any(int(row) == 0 for _, row in plain):
         return None
-    rows = np.array([int(row) for _, row in found])
-    return Cells(rows, np.array([_column(letters.decode()) for letters, _ in found]))
+    rows = np.array([int(row) for _, row in plain])
+    return Cells(rows, np.array([_column(letters.decode()) for letters, _ in plain]))
 
 
 def _scan(xml: bytes) -> Cells | None:
@@ -148,8 +148,8 @@ def _scan(xml: bytes) -> Cells | None:
     at = at[octets[at + 1] == ord("c")]
     after = octets[at + 2]
     at = at[((after | 0x20) < ord("a")) | ((after | 0x20) > ord("z"))]  # <c, not <col or <cellWatch
-    for step, wanted in enumerate(b' r="', start=2):
-        if not np.all(octets[at + step] == wanted):
+    for step, byte in enumerate(b' r="', start=2):
+        if not np.all(octets[at + step] == byte):
             return None
     rows, columns = np.zeros(len(at), np.int64), np.zeros(len(at), np.int64)
     state = np.zeros(len(at), np.int8)  # 0 in letters, 1 in digits, 2 past the closing quote
@@ -178,18 +178,18 @@ def _parse(xml: bytes) -> Cells:
         tag = name.rpartition(":")[2]
         if tag == "row":
             text = attributes.get("r", "")
-            row, column = (_whole(text) if text else row + 1), 0
+            row, column = (_row_number(text) if text else row + 1), 0
         elif tag == "c":
             column += 1
-            own = attributes.get("r")
-            if own is not None:
-                match = _REFERENCE.fullmatch(own)
+            text_reference = attributes.get("r")
+            if text_reference is not None:
+                match = _REFERENCE.fullmatch(text_reference)
                 if match is None or int(match.group(2)) == 0:
-                    raise MalformedSheetError(f"a cell with the reference {own[:40]!r}")
-                here, column = int(match.group(2)), _column(match.group(1))
+                    raise MalformedSheetError(f"a cell with the reference {text_reference[:40]!r}")
+                cell_row, column = int(match.group(2)), _column(match.group(1))
             else:
-                here = max(row, 1)
-            rows.append(here)
+                cell_row = max(row, 1)
+            rows.append(cell_row)
             columns.append(column)
 
     def doctype(*_: Any) -> None:
@@ -205,7 +205,7 @@ def _parse(xml: bytes) -> Cells:
     return Cells(np.array(rows, np.int64), np.array(columns, np.int64))
 
 
-def _whole(text: str) -> int:
+def _row_number(text: str) -> int:
     if not (text.isascii() and text.isdigit() and len(text) <= 9):
         raise MalformedSheetError(f"a row with the number {text[:40]!r}")
     return int(text)

@@ -57,12 +57,12 @@ def assign_columns(headers: Sequence[str], machine: Machine, *, where: object) -
     >>> [(one.symbol, one.unit) for one in assign_columns(row, load_machine("m15"), where="doctest")]
     [('SA', 'deg'), ('FZ', 'lbf'), ('D51', 'lbf'), ('D52', 'lbf'), ('E5', 'lbf'), ('t', 's')]
     """
-    found = tuple(
+    assigneds = tuple(
         _assign(index, header, machine, where) for index, header in enumerate(headers) if header.strip()
     )
-    _check_once(found, where)
-    _check_whole(found, machine, headers, where)
-    return found
+    _check_once(assigneds, where)
+    _check_whole(assigneds, machine, headers, where)
+    return assigneds
 
 
 def header_of(machine: Machine) -> Callable[[str], bool]:
@@ -121,12 +121,12 @@ def _machine_column(name: str, machine: Machine) -> Column | None:
 @lru_cache(maxsize=32)
 def _names(columns: tuple[Column, ...]) -> Mapping[str, Column]:
     # Every name of every column, once a machine; the first column that has a name keeps it.
-    known: dict[str, Column] = {}
+    by_name: dict[str, Column] = {}
     for column in columns:
         channel = CHANNELS.get(column.symbol)
-        for one in (column.header, column.symbol, *(channel.aliases if channel else ())):
-            known.setdefault(_plain(one), column)
-    return known
+        for alias in (column.header, column.symbol, *(channel.aliases if channel else ())):
+            by_name.setdefault(_plain(alias), column)
+    return by_name
 
 
 def _channel(name: str, header: str) -> Channel | None:
@@ -138,8 +138,8 @@ def _channel(name: str, header: str) -> Channel | None:
             channel
             for channel in CHANNELS.values()
             if any(
-                one in texts or _plain(one) in texts
-                for one in (channel.symbol, channel.name, *channel.aliases)
+                alias in texts or _plain(alias) in texts
+                for alias in (channel.symbol, channel.name, *channel.aliases)
             )
         ]
         if len(fits) == 1:
@@ -148,14 +148,14 @@ def _channel(name: str, header: str) -> Channel | None:
 
 
 def _check_dimension(
-    header: str, printed: str, dimension: str, wanted: str, example: str, where: object
+    header: str, printed: str, dimension: str, expected: str, example: str, where: object
 ) -> None:
-    if dimension != wanted:
+    if dimension != expected:
         raise ColumnError(
             f"column {header!r} has a unit of another kind",
             where=where,
             got=f"{printed} ({dimension})",
-            expected=f"a unit of {wanted}, such as {example}",
+            expected=f"a unit of {expected}, such as {example}",
             next_step="correct the header, or name the machine that wrote the file",
             rule="unit-dimension",
         )
@@ -171,40 +171,40 @@ def _no_unit(header: str, name: str, column: Column | None, machine: Machine, wh
             next_step=f"write the unit into the header, for example '{column.symbol} [{column.unit}]'",
             rule="unknown-unit",
         )
-    known = [column.header for column in machine.columns]
-    near = difflib.get_close_matches(_plain(name), [_plain(one) for one in known], n=1, cutoff=0.6)
-    match = next((one for one in known if near and _plain(one) == near[0]), None)
+    headers = [column.header for column in machine.columns]
+    near = difflib.get_close_matches(_plain(name), [_plain(header) for header in headers], n=1, cutoff=0.6)
+    match = next((header for header in headers if near and _plain(header) == near[0]), None)
     raise ColumnError(
         f"column {header!r} is not known and has no unit",
         where=where,
         got=header,
-        expected=f"{match!r}" if match else f"{', '.join(known)}, or 'NAME [unit]'",
+        expected=f"{match!r}" if match else f"{', '.join(headers)}, or 'NAME [unit]'",
         next_step=f"did you mean {match!r}?" if match else "write its unit into the header as 'NAME [unit]'",
         rule="unknown-unit",
     )
 
 
-def _check_once(found: tuple[Assigned, ...], where: object) -> None:
+def _check_once(assigneds: tuple[Assigned, ...], where: object) -> None:
     first: dict[str, Assigned] = {}
-    for one in found:
+    for assigned in assigneds:
         # `t` and `T` are two channels; everything else is the same in either case.
-        key = one.symbol if one.symbol in CHANNELS else one.symbol.casefold()
+        key = assigned.symbol if assigned.symbol in CHANNELS else assigned.symbol.casefold()
         if key in first:
             raise ColumnError(
-                f"channel {one.symbol} has two columns",
+                f"channel {assigned.symbol} has two columns",
                 where=where,
-                got=f"{first[key].header!r} and {one.header!r}",
+                got=f"{first[key].header!r} and {assigned.header!r}",
                 expected="one column a channel",
                 next_step="remove or rename one of them in a copy of the file",
                 rule="doubled-column",
             )
-        first[key] = one
+        first[key] = assigned
 
 
 def _check_whole(
-    found: tuple[Assigned, ...], machine: Machine, headers: Sequence[str], where: object
+    assigneds: tuple[Assigned, ...], machine: Machine, headers: Sequence[str], where: object
 ) -> None:
-    have = {one.symbol for one in found}
+    have = {assigned.symbol for assigned in assigneds}
     missing = [c for c in machine.columns if c.role not in _OPTIONAL and c.symbol not in have]
     if missing:
         raise ColumnError(

@@ -1,60 +1,56 @@
-"""What a report says beyond the measurement: ``[report]`` of ``test.toml``, by ISO/IEC 17025 7.8."""
+"""What a ``test.toml`` states: the test, its tire and tare, and what its report says by ISO/IEC 17025 7.8."""
 
 from __future__ import annotations
 
-import datetime as dt
-from collections.abc import Mapping
-from dataclasses import dataclass, fields
-from typing import Any
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Annotated, Any, ClassVar, Literal
 
-from toolkit.errors import ConfigError
-from toolkit.files import check_keys
+from toolkit.channels import Reversal, Rotation
+from toolkit.declared import Above, Day, Entry, Fault, Format, Keyed, Short, Source, Text, Unit, build
+
+# A series or a DOT code may be written as a number.
+_Text = Annotated[str | None, Text(empty=True, strip=True, numbers="any")]
+_Statement = Annotated[str | None, Text(strip=True)]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Opinion:
     """A statement that is not a result: an opinion or interpretation, and what it rests on (7.8.7)."""
 
-    statement: str
-    basis: str | None = None
+    statement: Annotated[str, Text(strip=True)]
+    basis: _Statement = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ReportDetails:
-    """Facts of one report; None where nothing is said.
+    """Facts of one report; None where nothing is said."""
 
-    Attributes
-    ----------
-    customer, customer_contact : for whom the test was made (7.8.2.1 e)
-    item, condition, received : what was tested, in which state, and the day it came, ISO 8601 (g, h)
-    location : where the activity was performed (c)
-    method, deviations, sampling : the method, what was added or left out, the sampling plan (f, n, k)
-    conformity : a statement of conformity with a requirement (7.8.3.1 b)
-    external : results that come from another laboratory (p)
-    authorised_by, function : who authorises the report (o)
-    amends, amendment : the report that this one replaces, and why (7.8.8)
-    opinions : opinions and interpretations
-    """
+    customer: Annotated[_Statement, Entry("for whom the test was made (7.8.2.1 e)")] = None
+    customer_contact: Annotated[_Statement, Entry("of the customer (7.8.2.1 e)")] = None
+    item: Annotated[_Statement, Entry("what was tested (7.8.2.1 g)")] = None
+    condition: Annotated[_Statement, Entry("state of the item (7.8.2.1 g)")] = None
+    received: Annotated[str | None, Day(moment=True), Entry("when the item came (7.8.2.1 h)")] = None
+    location: Annotated[_Statement, Entry("where the activity was performed (7.8.2.1 c)")] = None
+    method: Annotated[_Statement, Entry("of the test (7.8.2.1 f)")] = None
+    deviations: Annotated[_Statement, Entry("what was added to the method or left out (7.8.2.1 n)")] = None
+    sampling: Annotated[_Statement, Entry("the sampling plan (7.8.2.1 k)")] = None
+    conformity: Annotated[_Statement, Entry("statement of conformity with a requirement (7.8.3.1 b)")] = None
+    external: Annotated[_Statement, Entry("results that come from another laboratory (7.8.2.1 p)")] = None
+    authorised_by: Annotated[_Statement, Entry("who authorises the report (7.8.2.1 o)")] = None
+    function: Annotated[_Statement, Entry("of who authorises the report")] = None
+    amends: Annotated[_Statement, Entry("id of the report that this one replaces (7.8.8)")] = None
+    amendment: Annotated[_Statement, Entry("why it is replaced; with amends")] = None
+    opinions: Annotated[
+        tuple[Opinion, ...], Short("statement"),
+        Entry("opinions and interpretations, each a text or a table", expected="a list of statements"),
+    ] = ()  # fmt: skip
 
-    customer: str | None = None
-    customer_contact: str | None = None
-    item: str | None = None
-    condition: str | None = None
-    received: str | None = None
-    location: str | None = None
-    method: str | None = None
-    deviations: str | None = None
-    sampling: str | None = None
-    conformity: str | None = None
-    external: str | None = None
-    authorised_by: str | None = None
-    function: str | None = None
-    amends: str | None = None
-    amendment: str | None = None
-    opinions: tuple[Opinion, ...] = ()
-
-
-KEYS = tuple(field.name for field in fields(ReportDetails))
+    def faults(self) -> Iterator[Fault]:
+        """Yield an amendment without its report or its reason."""
+        if (self.amends is None) != (self.amendment is None):
+            key = "amendment" if self.amends is None else "amends"
+            yield Fault(key=(key,), got=getattr(self, key), expected="amends and amendment, both or none")
 
 
 def read_details(table: Any, *, where: object) -> ReportDetails:
@@ -65,66 +61,79 @@ def read_details(table: Any, *, where: object) -> ReportDetails:
     ConfigError
         no table, an unknown key, a value of the wrong type, an amendment without its report or its reason
     """
-    if not isinstance(table, dict):
-        raise wrong_value(where, "report", table, "a table [report]")
-    check_keys(table, KEYS, where=f"{where}, [report]")
-    texts = {
-        key: _text(value, key, where) for key, value in table.items() if key not in ("received", "opinions")
-    }
-    if ("amends" in texts) != ("amendment" in texts):
-        raise wrong_value(where, "report.amends", texts.get("amends"), "amends and amendment, both or none")
-    return ReportDetails(
-        **texts,
-        received=iso_day(table["received"], "report.received", where) if "received" in table else None,
-        opinions=tuple(_opinion(one, where) for one in _list(table.get("opinions", []), where)),
-    )
+    return build(ReportDetails, table, Source(where=f"{where}, [report]"))
 
 
-def _opinion(entry: Any, where: object) -> Opinion:
-    if isinstance(entry, Mapping):
-        check_keys(entry, ("statement", "basis"), where=f"{where}, [[report.opinions]]")
-        basis = _text(entry["basis"], "opinions.basis", where) if "basis" in entry else None
-        return Opinion(statement=_text(entry.get("statement"), "opinions.statement", where), basis=basis)
-    return Opinion(statement=_text(entry, "opinions", where))
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TireLabel:
+    """What stands on the tire."""
+
+    size: Annotated[_Text, Entry(example="205/55R16")] = None
+    company: Annotated[_Text, Entry("who made it")] = None
+    DOT: Annotated[_Text, Entry("its code")] = None
+    series: Annotated[_Text, Entry(example=55)] = None
+    construction: Annotated[_Text, Entry(example="radial")] = None
+    rim: Annotated[_Text, Entry(example="16x6.5")] = None
+    belt: Annotated[
+        Literal["regular", "reversed"] | None, Entry("how a prototype's belt cords were laid")
+    ] = None
 
 
-def _list(value: Any, where: object) -> list[Any]:
-    if not isinstance(value, list):
-        raise wrong_value(where, "report.opinions", value, "a list of statements")
-    return value
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Tare:
+    """The unloaded cells: a recording of them, or a value of every cell.
 
-
-def iso_day(value: Any, key: str, where: object) -> str:
-    """Return a date of a settings file, a TOML date or text, as YYYY-MM-DD.
-
-    Raises
-    ------
-    ConfigError
-        ``wrong-value``
+    A value without a unit is one in the unit of the cell's column: ``Quantity.unit`` is then empty.
     """
-    if isinstance(value, dt.datetime):
-        return value.date().isoformat()
-    if isinstance(value, dt.date):
-        return value.isoformat()
-    try:
-        return dt.date.fromisoformat(value).isoformat()
-    except (TypeError, ValueError) as error:
-        raise wrong_value(where, key, value, "a date such as 2026-03-31") from error
+
+    file: Annotated[_Text, Entry("recording with the tire off the road", example="zero.xlsx")] = None
+    values: Annotated[
+        tuple[tuple[str, float], ...] | None, Keyed(), Unit(plain=True),
+        Entry("of every cell, a number or { value, unit }", example={"D51": 0}),
+    ] = None  # fmt: skip
+
+    def faults(self) -> Iterator[Fault]:
+        """Yield a tare that is stated twice."""
+        if self.file is not None and self.values is not None:
+            yield Fault(got="file and values", what="stands twice", expected="one of the two")
 
 
-def _text(value: Any, key: str, where: object) -> str:
-    if not isinstance(value, str) or not value.strip():
-        raise wrong_value(where, f"report.{key}", value, "a text")
-    return value.strip()
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StatedTest:
+    """The test of a folder and of the folders below it."""
 
+    FORMAT: ClassVar[Format] = Format(title="test", schema=1)
 
-def wrong_value(where: object, key: str, got: object, expected: str) -> ConfigError:
-    """Return the error of a key whose value does not fit."""
-    return ConfigError(
-        f"{key!r} has a value that does not fit",
-        where=where,
-        got=got,
-        expected=expected,
-        next_step="correct the line",
-        rule="wrong-value",
-    )
+    machine: Annotated[
+        str, Text(empty=True, strip=True, numbers="any"),
+        Entry(
+            "name of the machine, or its definition's path", example="m15",
+            expected='machine = "m15", or the path of a machine definition',
+        ),
+    ]  # fmt: skip
+    date: Annotated[str | None, Day(moment=True), Entry("of the test")] = None
+    operator: Annotated[_Text, Entry("who tested")] = None
+    requestor: Annotated[_Text, Entry("who asked for the test")] = None
+    surface: Annotated[_Text, Entry("of the road")] = None
+    special: Annotated[_Text, Entry("what was special")] = None
+    mounting: Annotated[_Text, Entry("tells repeats apart")] = None
+    laboratory: Annotated[_Text, Entry("tells repeats apart")] = None
+    rotation: Annotated[Rotation, Entry("direction of the drum")] = "forward"
+    reversal: Annotated[
+        Reversal, Entry("what was turned for runs called reverse: the drum, or the tire on its hub")
+    ] = "drum"
+    simulated: Annotated[bool, Entry("whether the recordings are simulated")] = False
+    speed: Annotated[float | None, Unit("km/h"), Above(0), Entry("surface speed")] = None
+    pressure: Annotated[float | None, Unit("kPa"), Above(0), Entry("of inflation")] = None
+    rated_load: Annotated[float | None, Unit("N"), Above(0), Entry("of the tire")] = None
+    protocol: Annotated[
+        str | None, Text(empty=True, strip=True, numbers="any"),
+        Entry("the test's own protocol, relative to this file", example="protocol.toml"),
+    ] = None  # fmt: skip
+    tire: Annotated[TireLabel | None, Entry("what stands on the tire")] = None
+    rotations: Annotated[
+        tuple[tuple[str, Rotation], ...], Keyed(),
+        Entry("direction by recording, where it is another one", example={"run 2.xlsx": "reverse"}),
+    ] = ()  # fmt: skip
+    tare: Annotated[Tare | None, Entry("the unloaded cells")] = None
+    report: Annotated[ReportDetails | None, Entry("what the report says beyond the measurement")] = None

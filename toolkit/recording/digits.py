@@ -65,9 +65,9 @@ def half_last_place(values: ArrayLike) -> NDArray[np.float64]:
     >>> half_last_place([1.2345678806304932, 0.1234567984938621]).tolist()
     [5.960464477539063e-08, 3.725290353973065e-09]
     """
-    given = np.asarray(values, dtype=np.float64)
-    table = given.reshape(len(given), math.prod(given.shape[1:]))
-    return np.ascontiguousarray(_halves(np.ascontiguousarray(table.T)).T).reshape(given.shape)
+    array = np.asarray(values, dtype=np.float64)
+    table = array.reshape(len(array), math.prod(array.shape[1:]))
+    return np.ascontiguousarray(_halves(np.ascontiguousarray(table.T)).T).reshape(array.shape)
 
 
 def rounding(series: Series) -> NDArray[np.float64]:
@@ -80,10 +80,10 @@ def rounding(series: Series) -> NDArray[np.float64]:
 
 def roundings(series: Sequence[Series]) -> NDArray[np.float64]:
     """Return `rounding` of several channels of one file (channels, rows)."""
-    printed = _halves(np.stack([one.values for one in series]))
-    for one, half in zip(series, printed, strict=True):
-        if one.half is not None:
-            np.maximum(half, one.half, out=half)
+    printed = _halves(np.stack([channel.values for channel in series]))
+    for channel, half in zip(series, printed, strict=True):
+        if channel.half is not None:
+            np.maximum(half, channel.half, out=half)
     return printed
 
 
@@ -105,14 +105,14 @@ def _halves(columns: NDArray[np.float64]) -> NDArray[np.float64]:
     np.maximum.at(most, *counted)
     count = np.bincount(counted[0], minlength=len(most)).reshape(-1, 2)
     sides = most.reshape(-1, 2)
-    both = sides.max(axis=1)
+    finest = sides.max(axis=1)
     # A sign of which there are enough, beside the other one, has the place that it shows.
-    own = (count >= _FEW) & (count < count.sum(axis=1)[:, None]) & (both != _FULL)[:, None]
-    half: NDArray[np.float64] = _HALF[np.where(own, sides, both[:, None]).ravel()[side]]
+    enough = (count >= _FEW) & (count < count.sum(axis=1)[:, None]) & (finest != _FULL)[:, None]
+    half: NDArray[np.float64] = _HALF[np.where(enough, sides, finest[:, None]).ravel()[side]]
     single = _single_floats(columns, size, decade, places, zero)
     if any_zero:
         there = (count.sum(axis=1) > 0).reshape(n, decades)
-        smallest = np.where(there, _HALF[both].reshape(n, decades), np.inf).min(axis=1)
+        smallest = np.where(there, _HALF[finest].reshape(n, decades), np.inf).min(axis=1)
         half = np.where(zero, np.where(np.isinf(smallest), 0.0, smallest)[:, None], half)
     for column in np.flatnonzero(single):
         nearest = columns[column].astype(np.float32)
@@ -132,21 +132,21 @@ def _single_floats(
     zero: NDArray[np.bool_],
 ) -> NDArray[np.bool_]:
     """Return which columns (columns,) hold single floats, by the digits that their values show."""
-    found = np.zeros(len(columns), dtype=np.bool_)
+    single = np.zeros(len(columns), dtype=np.bool_)
     # Seven digits and less name a single float, whatever was measured: only longer values can tell.
     may = (((places + decade >= FULL_DIGITS // 2) | (places == _FULL)) & ~zero).any(axis=1)
     may &= ((size < _LARGEST_SINGLE) & ((size > _SMALLEST_SINGLE) | zero)).all(axis=1)
     for column in np.flatnonzero(may):
         values = size[column][~zero[column]]
-        own = np.where(places[column] == _FULL, FULL_DIGITS - 1 - decade[column], places[column])[
+        decimals = np.where(places[column] == _FULL, FULL_DIGITS - 1 - decade[column], places[column])[
             ~zero[column]
         ]
-        shown = 0.5 * 10.0 ** -own.astype(np.float64)
+        shown = 0.5 * 10.0 ** -decimals.astype(np.float64)
         nearest = values.astype(np.float32)
         if (np.abs(values - nearest) <= shown + np.spacing(values)).all():
             chance = np.minimum(2 * shown / np.spacing(nearest), 1.0)
-            found[column] = np.log10(chance).sum() <= _BY_CHANCE
-    return found
+            single[column] = np.log10(chance).sum() <= _BY_CHANCE
+    return single
 
 
 def _decades(size: NDArray[np.float64]) -> NDArray[np.int64]:
@@ -168,14 +168,14 @@ def _places(size: NDArray[np.float64], decade: NDArray[np.int64]) -> NDArray[np.
     if small.any():
         places[small] = [_decimals(value) for value in size[small].tolist()]
         most[small] = -1
-    left = most >= 0
+    undecided = most >= 0
     for k, ten in enumerate(_TEN.tolist()):
         fits = np.rint(size * ten) / ten == size
-        fits &= left
+        fits &= undecided
         places[fits] = k
-        left &= ~fits
-        left &= most > k
-        if not left.any():
+        undecided &= ~fits
+        undecided &= most > k
+        if not undecided.any():
             break
     return places
 

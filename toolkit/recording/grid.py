@@ -44,7 +44,7 @@ class Grid:
     starts: NDArray[np.int64]
     stops: NDArray[np.int64]
 
-    def rest(self, xml: bytes) -> bytes:
+    def without_rows(self, xml: bytes) -> bytes:
         """Return the worksheet without these rows."""
         return xml[: self.begin] + xml[self.end :]
 
@@ -54,8 +54,8 @@ class Grid:
         None where a text is no finite number in plain digits: a parser then tells what stands there.
         """
         starts, stops = self.starts.ravel(), self.stops.ravel()
-        values, known = _decimals(np.frombuffer(xml, np.uint8), starts, stops)
-        for at in np.flatnonzero(~known).tolist():
+        values, read = _decimals(np.frombuffer(xml, np.uint8), starts, stops)
+        for at in np.flatnonzero(~read).tolist():
             text = xml[starts[at] : stops[at]]
             if _NUMBER.fullmatch(text) is None:
                 return None
@@ -73,9 +73,9 @@ def find_grid(xml: bytes) -> Grid | None:
     if len(xml) > _LARGEST or top < 0 or first < 0:
         return None
     row = _ROW.match(xml, begin, end)
-    rest = xml[:begin] + xml[end:]
+    outside = xml[:begin] + xml[end:]
     # A comment, or a second list of rows, could make other rows of these; a declaration may begin the file.
-    if row is None or b"<!" in rest or b"<?" in rest[5:] or rest.count(b"sheetData") != 2:
+    if row is None or b"<!" in outside or b"<?" in outside[5:] or outside.count(b"sheetData") != 2:
         return None
     # Within the rows every < is counted for: nothing can stand there that was not looked at.
     tags = np.flatnonzero(np.frombuffer(xml, np.uint8, count=end - begin, offset=begin) == ord("<"))
@@ -147,13 +147,13 @@ def _decimals(
     dots, after = _sum(dot), _sum(dot * (back + np.uint8(1)))  # after: decimals + 1, of a single point
     minus = octets[starts] == ord("-")
     counted = _sum(is_digit)
-    known = (length <= _EXACT) & (dots <= 1) & (counted > 0) & (counted + dots + minus == length)
+    plain = (length <= _EXACT) & (dots <= 1) & (counted > 0) & (counted + dots + minus == length)
     # A point counts as a digit 0 so far: the digits before it come down by one place.
-    decimals = np.where(known & (dots > 0), after, 1) - 1
-    whole = _TEN[:width] @ digit.astype(np.float64)
-    below = np.fmod(whole, _TEN[decimals + 1])
-    size = np.where(dots > 0, below + (whole - below) / 10, whole) / _TEN[decimals]
-    return np.where(minus, -size, size), known
+    decimals = np.where(plain & (dots > 0), after, 1) - 1
+    mantissa = _TEN[:width] @ digit.astype(np.float64)
+    below = np.fmod(mantissa, _TEN[decimals + 1])
+    size = np.where(dots > 0, below + (mantissa - below) / 10, mantissa) / _TEN[decimals]
+    return np.where(minus, -size, size), plain
 
 
 def _sum(counts: NDArray[Any]) -> NDArray[np.uint8]:
@@ -188,5 +188,5 @@ def _bits(octets: int) -> np.uint64:
     return np.uint64((1 << 8 * octets) - 1)
 
 
-def _all(found: NDArray[np.bool_]) -> bool:
-    return bool(found.all())
+def _all(agree: NDArray[np.bool_]) -> bool:
+    return bool(agree.all())

@@ -123,33 +123,35 @@ def _filled(shell: bytes, rows: bytes, created: dt.datetime) -> bytes:
 
 
 def _layout(path: Path, machine: Machine, columns: Mapping[str, NDArray[np.float64]]) -> list[str]:
-    known = {column.symbol: column for column in machine.columns}
-    wrong = [name for name in columns if name not in known and "[" not in name]
-    missing = [n for n, column in known.items() if n not in columns and column.role not in _OPTIONAL_ROLES]
+    by_symbol = {column.symbol: column for column in machine.columns}
+    wrong = [name for name in columns if name not in by_symbol and "[" not in name]
+    missing = [
+        n for n, column in by_symbol.items() if n not in columns and column.role not in _OPTIONAL_ROLES
+    ]
     if wrong or missing:
         raise OutputError(
             "the columns are not those of the machine",
             where=path,
             got=", ".join(columns),
-            expected=", ".join(known),
+            expected=", ".join(by_symbol),
             next_step=f"add {missing}" if missing else f"write {wrong} as 'NAME [unit]'",
         )
-    return [name for name in known if name in columns] + [name for name in columns if "[" in name]
+    return [name for name in by_symbol if name in columns] + [name for name in columns if "[" in name]
 
 
 def _check(path: Path, names: list[str], values: list[NDArray[np.float64]]) -> None:
     rows = values[0].shape
-    for name, one in zip(names, values, strict=True):
-        if one.shape != rows or one.ndim != 1 or not len(one):
+    for name, value in zip(names, values, strict=True):
+        if value.shape != rows or value.ndim != 1 or not len(value):
             raise OutputError(
-                f"column {name} has another shape than the rest", where=path, got=one.shape, expected=rows,
+                f"column {name} has another shape than the rest", where=path, got=value.shape, expected=rows,
                 next_step="give one value a row for every column",
             )  # fmt: skip
-        if not np.isfinite(one).all():
+        if not np.isfinite(value).all():
             raise OutputError(
                 f"column {name} has a value that is not finite",
                 where=path,
-                got=one[~np.isfinite(one)][0],
+                got=value[~np.isfinite(value)][0],
                 expected="finite numbers; the reader refuses anything else",
                 next_step="find out where it was computed",
             )

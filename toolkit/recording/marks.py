@@ -59,7 +59,7 @@ def output_keywords(*, simulated: bool) -> str:
 def mark_workbook(book: Any, *, simulated: bool, machine: str, word: str | None = None) -> None:
     """Mark an openpyxl workbook as a result of the toolkit, before it is saved; ``word`` such as DRAFT."""
     book.properties.creator = GENERATOR
-    marks = "".join(f"{one}: " for one in (word, "SIMULATED" if simulated else None) if one)
+    marks = "".join(f"{word_mark}: " for word_mark in (word, "SIMULATED" if simulated else None) if word_mark)
     book.properties.title = f"{marks}tire test on {machine}"
     book.properties.keywords = output_keywords(simulated=simulated)
 
@@ -70,8 +70,8 @@ def keywords_of(core_xml: bytes) -> tuple[str, ...]:
     >>> keywords_of(b"<cp:keywords>toolkit-recording; simulated</cp:keywords>")
     ('toolkit-recording', 'simulated')
     """
-    found = _KEYWORDS.search(core_xml)
-    text = found.group(1).decode("utf-8", "replace") if found else ""
+    match = _KEYWORDS.search(core_xml)
+    text = match.group(1).decode("utf-8", "replace") if match else ""
     return tuple(word.strip() for word in text.split(";") if word.strip())
 
 
@@ -81,9 +81,9 @@ def saved_on(core_xml: bytes) -> dt.date | None:
     >>> saved_on(b"<dcterms:modified>2019-06-04T10:00:00Z</dcterms:modified>")
     datetime.date(2019, 6, 4)
     """
-    found = _MODIFIED.search(core_xml)
+    match = _MODIFIED.search(core_xml)
     try:
-        day = None if found is None else dt.date.fromisoformat(found.group(1).decode())
+        day = None if match is None else dt.date.fromisoformat(match.group(1).decode())
     except ValueError:
         return None
     return None if day == STAMP.date() and RECORDING in keywords_of(core_xml) else day

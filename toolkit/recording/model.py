@@ -69,7 +69,7 @@ class Recording:
 
     def has(self, symbol: str) -> bool:
         """Tell whether the recording has a channel."""
-        return any(one.symbol == symbol for one in self.series)
+        return any(channel.symbol == symbol for channel in self.series)
 
     def __getitem__(self, symbol: str) -> Series:
         """Return a channel.
@@ -79,13 +79,13 @@ class Recording:
         ColumnError
             the recording has no such channel
         """
-        for one in self.series:
-            if one.symbol == symbol:
-                return one
+        for channel in self.series:
+            if channel.symbol == symbol:
+                return channel
         raise ColumnError(
             f"the recording has no channel {symbol}",
             where=self.path,
-            got=", ".join(one.header for one in self.series),
+            got=", ".join(channel.header for channel in self.series),
             expected=symbol,
             next_step="check the file's header row",
             rule="missing-column",

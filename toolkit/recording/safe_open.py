@@ -182,10 +182,10 @@ def _check_relationships(name: str, xml: bytes, where: Path) -> None:
     except (ET.ParseError, ValueError, LookupError) as error:
         _refuse("xml", "a part of the workbook is not well-formed", where, f"{name}: {error}", "XML",
                 "copy the file again from the machine")  # fmt: skip
-    for one in root.iter(_RELATIONSHIP):
-        kind = one.get("Type", "").rpartition("/")[2]
-        target = one.get("Target", "")
-        outside = one.get("TargetMode", "").lower() == "external" or "://" in target
+    for relationship in root.iter(_RELATIONSHIP):
+        kind = relationship.get("Type", "").rpartition("/")[2]
+        target = relationship.get("Target", "")
+        outside = relationship.get("TargetMode", "").lower() == "external" or "://" in target
         if (outside and kind != "hyperlink") or kind in ("externalLink", "externalLinkPath"):
             _refuse("external-link", "the workbook takes content from outside", where,
                     f"{name}: {target[:120]}", "a workbook of values", _FOREIGN)  # fmt: skip

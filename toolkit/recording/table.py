@@ -38,7 +38,7 @@ class Table:
     errors: tuple[tuple[str, str], ...] = ()
     numbers: NDArray[np.float64] | None = None
 
-    def whole(self) -> Table:
+    def in_rows(self) -> Table:
         """Return the same table with all of its cells in ``rows``."""
         if self.numbers is None:
             return self
@@ -60,7 +60,7 @@ def read_table(table: Table, machine: Machine) -> tuple[Series, ...]:
     """
     first = next((i for i, row in enumerate(table.rows) if not _blank(row)), None)
     if table.numbers is not None and (first != len(table.rows) - 1 or _nameless(table.rows[-1])):
-        table = table.whole()  # a row of numbers above them, or a column to be told with its first cell
+        table = table.in_rows()  # a row of numbers above them, or a column to be told with its first cell
     if first is None:
         _no_data(table, "an empty sheet")
     header_row = table.rows[first]
@@ -82,17 +82,18 @@ def read_table(table: Table, machine: Machine) -> tuple[Series, ...]:
     if table.numbers is not None:
         columns = np.ascontiguousarray(table.numbers.T)
         columns.setflags(write=False)
-        return tuple(_named(one, columns[one.index]) for one in assigned)
+        return tuple(_as_series(column, columns[column.index]) for column in assigned)
     if last == first + 1:
         _no_data(table, "a header row and nothing below it")
     body = table.rows[first + 1 : last]
     _check_nameless(table, body, headers, first + 2)
-    found = _numbers(body)
-    if found is None:  # one by one, for the first cell that is to blame
+    matrix = _numbers(body)
+    if matrix is None:  # one by one, for the first cell that is to blame
         return tuple(
-            _series(one, [row[one.index] for row in body], table.where, first + 2) for one in assigned
+            _series(column, [row[column.index] for row in body], table.where, first + 2)
+            for column in assigned
         )
-    return tuple(_named(one, found[one.index]) for one in assigned)
+    return tuple(_as_series(column, matrix[column.index]) for column in assigned)
 
 
 def _numbers(body: Sequence[Sequence[Any]]) -> NDArray[np.float64] | None:
@@ -120,23 +121,25 @@ def _array(cells: list[Any]) -> NDArray[np.float64] | None:
     return values if np.isfinite(values).all() else None
 
 
-def _series(one: Assigned, cells: list[Any], where: str, first_row: int) -> Series:
+def _series(assigned: Assigned, cells: list[Any], where: str, first_row: int) -> Series:
     values = _array(cells)
     if values is None:
-        _refuse_first(one, cells, where, first_row)
+        _refuse_first(assigned, cells, where, first_row)
     values.setflags(write=False)
-    return _named(one, values)
+    return _as_series(assigned, values)
 
 
-def _named(one: Assigned, values: NDArray[np.float64]) -> Series:
-    return Series(symbol=one.symbol, header=one.header, unit=one.unit, role=one.role, values=values)
+def _as_series(assigned: Assigned, values: NDArray[np.float64]) -> Series:
+    return Series(
+        symbol=assigned.symbol, header=assigned.header, unit=assigned.unit, role=assigned.role, values=values
+    )
 
 
-def _refuse_first(one: Assigned, cells: list[Any], where: str, first_row: int) -> NoReturn:
+def _refuse_first(assigned: Assigned, cells: list[Any], where: str, first_row: int) -> NoReturn:
     for offset, cell in enumerate(cells):
         rule, got = judge(cell)
         if rule:
-            refuse_cell(rule, got, where, first_row + offset, one.index + 1, one.header)
+            refuse_cell(rule, got, where, first_row + offset, assigned.index + 1, assigned.header)
     raise AssertionError("a column was refused although all its cells are numbers")
 
 

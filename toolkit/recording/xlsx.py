@@ -23,7 +23,7 @@ _Errors = Mapping[str, tuple[tuple[str, str], ...]]  # sheet -> (reference, text
 _STRICT_ID = "{http://purl.oclc.org/ooxml/officeDocument/relationships}id"
 
 
-def read_sheet(gated: Gated, known: Callable[[str], bool], *, grids: bool = True) -> tuple[str, Table]:
+def read_sheet(gated: Gated, is_header: Callable[[str], bool], *, grids: bool = True) -> tuple[str, Table]:
     """Return the name and the cells of the one visible worksheet that holds the data.
 
     Hidden worksheets are never read. With several visible ones, it is the one whose first row has a
@@ -41,7 +41,9 @@ def read_sheet(gated: Gated, known: Callable[[str], bool], *, grids: bool = True
     errors = _errors_by_sheet(gated.members)
     sheets = (grids and _around_grid(gated, errors)) or _visible_sheets(gated, gated.members, errors)
     filled = [
-        (name, one) for name, one in sheets if any(any(c not in ("", None) for c in r) for r in one.rows)
+        (name, sheet)
+        for name, sheet in sheets
+        if any(any(c not in ("", None) for c in r) for r in sheet.rows)
     ]
     if not filled:
         raise UnreadableError(
@@ -52,7 +54,7 @@ def read_sheet(gated: Gated, known: Callable[[str], bool], *, grids: bool = True
             next_step="repeat the recording; hidden worksheets are not read",
             rule="no-data",
         )
-    fitting = [one for one in filled if any(map(known, _first(one[1].rows)))] or filled[:1]
+    fitting = [sheet for sheet in filled if any(map(is_header, _first(sheet[1].rows)))] or filled[:1]
     if len(fitting) > 1:
         raise RecordingError(
             "more than one worksheet looks like a recording",
@@ -79,17 +81,17 @@ def _around_grid(gated: Gated, errors: _Errors) -> list[tuple[str, Table]]:
     if numbers is None:
         return []
     try:
-        sheets = _visible_sheets(gated, {**gated.members, cells[0]: grid.rest(xml)}, errors)
+        sheets = _visible_sheets(gated, {**gated.members, cells[0]: grid.without_rows(xml)}, errors)
     except ToolkitError:
         return []
-    made: list[tuple[str, Table]] = []
-    for name, one in sheets:
-        if one.rows:  # of the part with the cells: there is no other
-            if len(one.rows) != grid.first_row - 1 or len(one.rows[-1]) != numbers.shape[1]:
+    tables: list[tuple[str, Table]] = []
+    for name, table in sheets:
+        if table.rows:  # of the part with the cells: there is no other
+            if len(table.rows) != grid.first_row - 1 or len(table.rows[-1]) != numbers.shape[1]:
                 return []
-            one = Table(where=one.where, rows=one.rows, errors=one.errors, numbers=numbers)
-        made.append((name, one))
-    return made if any(one.rows for _, one in made) else []
+            table = Table(where=table.where, rows=table.rows, errors=table.errors, numbers=numbers)
+        tables.append((name, table))
+    return tables if any(sheet.rows for _, sheet in tables) else []
 
 
 def _visible_sheets(gated: Gated, members: Mapping[str, bytes], errors: _Errors) -> list[tuple[str, Table]]:
@@ -148,11 +150,11 @@ def _errors_by_sheet(members: Mapping[str, bytes]) -> dict[str, tuple[tuple[str,
     parts = {name: error_cells(xml) for name, xml in members.items() if b"#" in xml and b"sheetData" in xml}
     if not any(parts.values()):
         return {}
-    found: dict[str, tuple[tuple[str, str], ...]] = {}
+    by_sheet: dict[str, tuple[tuple[str, str], ...]] = {}
     for name, part in _sheet_parts(members).items():
         if parts.get(part):
-            found[name] = parts[part]
-    return found
+            by_sheet[name] = parts[part]
+    return by_sheet
 
 
 def _sheet_parts(members: Mapping[str, bytes]) -> dict[str, str]:
@@ -162,7 +164,7 @@ def _sheet_parts(members: Mapping[str, bytes]) -> dict[str, str]:
         workbook = ET.fromstring(members["xl/workbook.xml"])  # noqa: S314
     except (KeyError, ET.ParseError, ValueError, LookupError):
         return {}
-    targets = {one.get("Id"): one.get("Target", "") for one in links}
+    targets = {link.get("Id"): link.get("Target", "") for link in links}
     sheets = [*workbook.iter(f"{_MAIN}sheet"), *workbook.iter(f"{_STRICT_MAIN}sheet")]
     return {
         sheet.get("name", ""): posixpath.normpath(

@@ -50,10 +50,10 @@ def free_radius_m(tire_size: str | None) -> float | None:
     >>> free_radius_m("unknown") is None
     True
     """
-    found = re.search(r"(\d{3})\s*/\s*(\d{2,3})\s*[A-Z]*\s*R?\s*[DB-]?\s*(\d{2}(?:\.5)?)", tire_size or "")
-    if found is None:
+    match = re.search(r"(\d{3})\s*/\s*(\d{2,3})\s*[A-Z]*\s*R?\s*[DB-]?\s*(\d{2}(?:\.5)?)", tire_size or "")
+    if match is None:
         return None
-    width, aspect, rim = (float(part) for part in found.groups())
+    width, aspect, rim = (float(part) for part in match.groups())
     return (rim * 25.4 / 2 + width * aspect / 100) / 1000
 
 
@@ -90,21 +90,23 @@ def revolutions(
     """
     tire = None if rolling_radius_m is None else 2 * np.pi * rolling_radius_m
     drum = machine.drum.circumference_m
-    wanted = tire if machine.protocol.revolutions_of == "tire" else drum
+    source = tire if machine.protocol.revolutions_of == "tire" else drum
     shafts = (("TIRE_ANGLE", tire, "tire"), ("DRUM_ANGLE", drum, "drum"))
-    for symbol, around, shaft in sorted(shafts, key=lambda one: one[2] != machine.protocol.revolutions_of):
+    for symbol, around, shaft in sorted(
+        shafts, key=lambda shaft: shaft[2] != machine.protocol.revolutions_of
+    ):
         if not recording.has(symbol):
             continue
         angle = np.unwrap(recording[symbol].si[block.rows])
         turns = np.asarray(np.abs(angle - angle[0]) / (2 * np.pi))
         if shaft == machine.protocol.revolutions_of:
             return turns
-        if around is not None and wanted is not None:
-            return np.asarray(turns * around / wanted)
-    if wanted is None:
+        if around is not None and source is not None:
+            return np.asarray(turns * around / source)
+    if source is None:
         return None
     protocol = machine.protocol
-    per_second = (protocol.speed_m_s or machine.drum.speed_m_s) / wanted
+    per_second = (protocol.speed_m_s or machine.drum.speed_m_s) / source
     if recording.has("t"):
         time = recording["t"].si[block.rows]
         return np.asarray((time - time[0]) * per_second)
@@ -132,12 +134,12 @@ def means(values: NDArray[np.float64], *, explained: NDArray[np.float64] | None 
     average = values.mean(axis=1)
     if n < 2:
         return tuple(Mean(value=value, sd=0.0, u=0.0) for value in average.tolist())
-    whole = values - average[:, None]
-    sd = np.sqrt(np.einsum("ij,ij->i", whole, whole) / (n - 1))
-    rest, used = _unexplained(whole, explained)
-    squares = np.einsum("ij,ij->i", rest, rest)
-    products = np.einsum("ij,ij->i", rest[:, 1:], rest[:, :-1])
-    noise = np.minimum(np.sqrt(squares / (n - 1 - used)), sd)
+    centred = values - average[:, None]
+    sd = np.sqrt(np.einsum("ij,ij->i", centred, centred) / (n - 1))
+    residual, explained_dof = _unexplained(centred, explained)
+    squares = np.einsum("ij,ij->i", residual, residual)
+    products = np.einsum("ij,ij->i", residual[:, 1:], residual[:, :-1])
+    noise = np.minimum(np.sqrt(squares / (n - 1 - explained_dof)), sd)
     rho = np.clip(products / np.where(squares > 0, squares, 1.0), 0.0, 0.999)
     u = np.minimum(noise * np.sqrt((1 + rho) / (1 - rho) / n), noise)
     return tuple(
@@ -158,16 +160,16 @@ def turning(rows: int, revolutions: float | None) -> NDArray[np.float64]:
 
 
 def _unexplained(
-    rest: NDArray[np.float64], explained: NDArray[np.float64] | None
+    residual: NDArray[np.float64], explained: NDArray[np.float64] | None
 ) -> tuple[NDArray[np.float64], int]:
     """Return what signals leave of rows about their mean (channels, rows), and the freedoms that it took."""
     count = 0 if explained is None else len(explained)
-    if explained is None or not count or rest.shape[1] < _ROWS_EACH * (count + 1):
-        return rest, 0
+    if explained is None or not count or residual.shape[1] < _ROWS_EACH * (count + 1):
+        return residual, 0
     centred = explained - explained.mean(axis=1, keepdims=True)
     basis, size, _ = np.linalg.svd(centred.T, full_matrices=False)
     basis = basis[:, size > _NO_SIGNAL * max(float(size[0]), 1e-300)]
-    return rest - (rest @ basis) @ basis.T, basis.shape[1]
+    return residual - (residual @ basis) @ basis.T, basis.shape[1]
 
 
 _WHOLE = 0.02  # of a turn

@@ -88,7 +88,7 @@ def physics_findings(
         return []
     cures = dict.fromkeys(text for text, changed in _changes(readings, cells) if not _all(*changed))
     more = f"all is possible with {' or '.join(cures)}" if cures else ""
-    return [one.finding(more=more if index == 0 else "") for index, one in enumerate(broken)]
+    return [departure.finding(more=more if index == 0 else "") for index, departure in enumerate(broken)]
 
 
 def checked(reduced: ReducedTest) -> ReducedTest:
@@ -98,8 +98,10 @@ def checked(reduced: ReducedTest) -> ReducedTest:
     """
     if reduced.impossible or not reduced.conditions:
         return reduced
-    found = tuple(one.finding() for one in departures(_readings(reduced.conditions, reduced.info)))
-    return dataclasses.replace(reduced, findings=(*found, *reduced.findings)) if found else reduced
+    findings = tuple(
+        departure.finding() for departure in departures(_readings(reduced.conditions, reduced.info))
+    )
+    return dataclasses.replace(reduced, findings=(*findings, *reduced.findings)) if findings else reduced
 
 
 def _all(readings: Readings, cells: Cells) -> tuple[Departure, ...]:
@@ -117,15 +119,15 @@ def pattern(readings: Readings, cells: Cells) -> tuple[Departure, ...]:
     design = np.column_stack([FY, FZ, np.ones(len(FY))])
     solution, *_ = np.linalg.lstsq(design, MX, rcond=None)
     lever = float(solution[0])
-    rest = MX - design @ solution
+    residual = MX - design @ solution
     low, high = limits.LEVER.low, limits.LEVER.high
     if cells.radius_m is not None:
         low, high = (
             part * cells.radius_m for part in (limits.LEVER_PER_RADIUS.low, limits.LEVER_PER_RADIUS.high)
         )
-    found = []
+    findings = []
     if not low <= lever <= high:
-        found.append(
+        findings.append(
             Departure(
                 rule="impossible-cells",
                 where=f"cells {', '.join(cells.names)}",
@@ -134,19 +136,19 @@ def pattern(readings: Readings, cells: Cells) -> tuple[Departure, ...]:
                 cause="two cells are exchanged, one is turned round, or one is dead",
             )
         )
-    left = float(np.sqrt(np.mean(rest**2)) / np.ptp(MX)) if np.ptp(MX) > 0 else 0.0
-    if left > _LEFT:
-        worst = int(np.argmax(np.abs(rest)))
-        found.append(
+    share = float(np.sqrt(np.mean(residual**2)) / np.ptp(MX)) if np.ptp(MX) > 0 else 0.0
+    if share > _LEFT:
+        worst = int(np.argmax(np.abs(residual)))
+        findings.append(
             Departure(
                 rule="impossible-cells",
                 where=readings.place[worst],
                 message=f"the overturning moment in the cells leaves the line of the side force by "
-                f"{100 * left:.0f} % of its span (rms; at most {100 * _LEFT:g} %)",
+                f"{100 * share:.0f} % of its span (rms; at most {100 * _LEFT:g} %)",
                 cause="a cell changed its sign, its place or its sensitivity during the test",
             )
         )
-    return tuple(found)
+    return tuple(findings)
 
 
 def _readings(conditions: Sequence[Condition], info: TestInfo) -> Readings:
@@ -171,7 +173,7 @@ def _cells(
     info: TestInfo,
     tares: Mapping[str, Tare],
 ) -> Cells:
-    per_FY, levers = _linear(record, "FY"), dict(machine.overturning_lever_m)
+    per_FY, levers = _linear(record, "FY"), dict(machine.layout.overturning_lever_m)
     turns = [signs(machine.axes, "SAE", seen_by_cells(c.rotation, info.reversal)) for c in conditions]
     zeros = {
         name: [
@@ -187,8 +189,8 @@ def _cells(
         per_MX=_overturning(record, per_FY, levers),
         radius_m=free_radius_m(info.tire_size),
         tares=np.array([zeros[c.file] for c in conditions]),
-        FY_sign=np.array([float(one["FY"]) for one in turns]),
-        MZ_sign=np.array([float(one["MZ"]) for one in turns]),
+        FY_sign=np.array([float(turn["FY"]) for turn in turns]),
+        MZ_sign=np.array([float(turn["MZ"]) for turn in turns]),
     )
 
 
@@ -198,30 +200,30 @@ def _overturning(
     # By the drawing, which the record did not touch; else by the record's own fit.
     if set(record.indications) <= set(levers):
         return per_FY * [levers[name] for name in record.indications]
-    return _linear(record, "MX") if any(one.load == "MX" for one in record.loads) else None
+    return _linear(record, "MX") if any(load.load == "MX" for load in record.loads) else None
 
 
 def _linear(record: CalibrationRecord, load: str) -> NDArray[np.float64]:
-    one = record.load(load)
-    by_term = dict(zip(one.terms, one.coefficients, strict=True))
-    return np.array([by_term.get(name, 0.0) for name in record.indications]) * si_scale(one.unit)
+    fit = record.load(load)
+    by_term = dict(zip(fit.terms, fit.coefficients, strict=True))
+    return np.array([by_term.get(name, 0.0) for name in record.indications]) * si_scale(fit.unit)
 
 
 def _changes(readings: Readings, cells: Cells) -> list[tuple[str, tuple[Readings, Cells]]]:
     """Return every single turn of a cell and exchange of two, in words, and the test with it undone."""
     n = len(cells.names)
-    raw, made = cells.indications + cells.tares, []
+    raw, changes = cells.indications + cells.tares, []
     for i in range(n):
         for when, tares in (("", np.zeros_like(raw)), (" after its tare", cells.tares)):
             if when and not tares[:, i].any():
                 continue
             now = np.where(np.arange(n) == i, -(cells.indications + tares) - tares, cells.indications)
-            made.append((f"{cells.names[i]} turned round{when}", now))
+            changes.append((f"{cells.names[i]} turned round{when}", now))
     for i, j in itertools.combinations(range(n), 2):
         order = list(range(n))
         order[i], order[j] = j, i
-        made.append((f"{cells.names[i]} and {cells.names[j]} exchanged", raw[:, order] - cells.tares))
-    return [(text, _with(readings, cells, now)) for text, now in made]
+        changes.append((f"{cells.names[i]} and {cells.names[j]} exchanged", raw[:, order] - cells.tares))
+    return [(text, _with(readings, cells, now)) for text, now in changes]
 
 
 def _with(readings: Readings, cells: Cells, now: NDArray[np.float64]) -> tuple[Readings, Cells]:

@@ -36,8 +36,8 @@ def at_one_angle(conditions: Sequence[Condition]) -> tuple[tuple[int, ...], ...]
     the protocol's step, those at no step by a gap in the angle, and a load that stands twice by its turn.
     """
     places: dict[tuple[str, float | None], list[int]] = {}
-    for index, one in enumerate(conditions):
-        places.setdefault((one.file, one.step_SA), []).append(index)
+    for index, condition in enumerate(conditions):
+        places.setdefault((condition.file, condition.step_SA), []).append(index)
     groups: dict[tuple[str, float | None, int, int], list[int]] = {}
     for (file, step), mine in places.items():
         angles = sorted({conditions[index].SA for index in mine})
@@ -46,12 +46,12 @@ def at_one_angle(conditions: Sequence[Condition]) -> tuple[tuple[int, ...], ...]
         for SA in angles:
             number = cluster.get(last, 0) + (step is None and SA - last > _GAP_RAD)
             cluster[SA], last = number, SA
-        seen: Counter[tuple[int, float | None]] = Counter()
+        count_by_place: Counter[tuple[int, float | None]] = Counter()
         for index in sorted(mine, key=lambda i: conditions[i].first_row):
-            one = conditions[index]
-            turn = seen[cluster[one.SA], one.step_FZ]
-            seen[cluster[one.SA], one.step_FZ] += one.step_FZ is not None
-            groups.setdefault((file, step, cluster[one.SA], turn), []).append(index)
+            condition = conditions[index]
+            turn = count_by_place[cluster[condition.SA], condition.step_FZ]
+            count_by_place[cluster[condition.SA], condition.step_FZ] += condition.step_FZ is not None
+            groups.setdefault((file, step, cluster[condition.SA], turn), []).append(index)
     return tuple(tuple(sorted(group)) for group in groups.values())
 
 
@@ -77,29 +77,29 @@ def slopes(FZ: NDArray[np.float64], y: NDArray[np.float64]) -> tuple[Slope | Non
     """
     n = len(FZ)
     order = np.argsort(FZ, kind="stable")
-    found: list[Slope | None] = [None] * n
+    slopes_found: list[Slope | None] = [None] * n
     if n < 2 or np.min(np.diff(FZ[order])) <= 0:
-        return tuple(found)
+        return tuple(slopes_found)
     x, values = FZ[order], y[order]
     secants = np.diff(values) / np.diff(x)
     if n == 2:
-        one = Slope(value=float(secants[0]), u=float(abs(secants[0])) / 2)
-        return (one, one)
+        slope = Slope(value=float(secants[0]), u=float(abs(secants[0])) / 2)
+        return (slope, slope)
     for place, block in enumerate(order):
         middle = min(max(place, 1), n - 2)
         terms = _terms(x, values, _nodes(x, place, middle))
         # The parabola ends with the second term, the cubic with the third.
         last = 3 if n >= 5 else 2
         u = abs(terms[last]) if n > 3 else abs(secants[middle] - secants[middle - 1]) / 2
-        found[block] = Slope(value=float(sum(terms[:last])), u=float(u) / np.sqrt(3))
-    return tuple(found)
+        slopes_found[block] = Slope(value=float(sum(terms[:last])), u=float(u) / np.sqrt(3))
+    return tuple(slopes_found)
 
 
 def _nodes(x: NDArray[np.float64], place: int, middle: int) -> list[int]:
     """Return up to five blocks in the order in which a polynomial at one of them takes them up."""
     nodes = [place, *(i for i in (middle - 1, middle, middle + 1) if i != place)]
-    rest = sorted(set(range(len(x))) - set(nodes), key=lambda i: abs(x[i] - x[place]))
-    return nodes + rest[:2]
+    outer = sorted(set(range(len(x))) - set(nodes), key=lambda i: abs(x[i] - x[place]))
+    return nodes + outer[:2]
 
 
 def _terms(x: NDArray[np.float64], y: NDArray[np.float64], nodes: Sequence[int]) -> list[float]:

@@ -1,7 +1,7 @@
 """A machine's corrections on the rows of a recording, in the machine's axes, before they are averaged.
 
-What an effect of the catalogue adds is taken away again, by the same equation: the loads first, then the slip
-angle, which the corrected moment may turn. The effects are not used themselves: they lie above this stage.
+What an effect of the catalogue adds is taken away again: the loads first, then the slip angle, which the
+corrected moment may turn.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from toolkit.effects import forward
 from toolkit.findings import Finding
 
 if TYPE_CHECKING:
@@ -24,36 +25,22 @@ if TYPE_CHECKING:
 def corrected(
     machine: Machine, channels: Mapping[str, NDArray[np.float64]]
 ) -> dict[str, NDArray[np.float64]]:
-    """Return SA, FZ, FY and MZ, each (n,), SI and machine axes, with every correction of the machine.
-
-    ``crosstalk``: load = shown - coefficient * other, the others as shown; ``steer_offset``: alpha = SA -
-    offset; ``steer_compliance``: alpha = SA - compliance * MZ, with the corrected moment.
-    """
-    made = dict(channels)
-    for one in machine.corrections:
-        if one.effect == "crosstalk":
-            name, source = str(one.channel), str(one.source)
-            made[name] = made[name] - one.value * one.factor * channels[source]
-    for one in machine.corrections:
-        if one.effect == "steer_offset":
-            made["SA"] = made["SA"] - one.value * one.factor
-        elif one.effect == "steer_compliance":
-            made["SA"] = made["SA"] - one.value * one.factor * made["MZ"]
-    return made
+    """Return SA, FZ, FY and MZ, each (n,), SI and machine axes, with every correction of the machine."""
+    return forward.corrected([correction.in_SI for correction in machine.corrections], channels)
 
 
 def u_SA(machine: Machine, MZ: NDArray[np.float64]) -> float:
     """Return the standard uncertainty [rad] that corrections leave in the slip angle.
 
-    That of a compliance at the largest moment (n,) [N·m] of the test: an upper bound for the other rows.
+    Where it goes with the moment, that at the largest moment (n,) [N·m] of the test: an upper bound for the
+    other rows.
     """
     parts = [0.0]
     largest = float(np.max(np.abs(MZ))) if len(MZ) else 0.0
-    for one in machine.corrections:
-        if one.effect == "steer_offset":
-            parts.append(one.u * one.factor)
-        elif one.effect == "steer_compliance":
-            parts.append(one.u * one.factor * largest)
+    for correction in machine.corrections:
+        way = correction.applied.effect.correctable
+        if way is not None and way.u_slip is not None:
+            parts.append(way.u_slip(correction.u * correction.factor, largest))
     return math.hypot(*parts)
 
 
@@ -63,8 +50,8 @@ def correction_findings(machine: Machine) -> list[Finding]:
         Finding(
             rule="machine-corrected",
             where=f"{machine.name}, version {machine.version}",
-            message=one.as_text(),
+            message=correction.as_text(),
             level="note",
         )
-        for one in machine.corrections
+        for correction in machine.corrections
     ]

@@ -97,7 +97,7 @@ class ReducedTest:
     @property
     def impossible(self) -> tuple[Finding, ...]:
         """The findings of the gate of physics: corrected values that no tire has, level ``error``."""
-        return tuple(one for one in self.findings if one.rule in RULES)
+        return tuple(finding for finding in self.findings if finding.rule in RULES)
 
     def used(self, rotation: Rotation | None = None) -> tuple[Condition, ...]:
         """Return the conditions that feed results, optionally of one direction of rotation."""

@@ -112,10 +112,10 @@ def departures(readings: Readings, *, share: float = 0.0) -> tuple[Departure, ..
 
     ``share``: so large a part of single values may break a bound before it is told (rows of a noisy table).
     """
-    found = [*_force(readings, share), *_moment(readings, share)]
+    findings = [*_force(readings, share), *_moment(readings, share)]
     if readings.signed:
-        found += [*_slopes(readings), *_reversal(readings), *_sliding(readings)]
-    return tuple(found)
+        findings += [*_slopes(readings), *_reversal(readings), *_sliding(readings)]
+    return tuple(findings)
 
 
 def _force(r: Readings, share: float) -> list[Departure]:
@@ -177,10 +177,10 @@ def _moment(r: Readings, share: float) -> list[Departure]:
 
 
 def _slopes(r: Readings) -> list[Departure]:
-    found = []
+    departures = []
     for reverse in (False, True):
         run = r.part(r.reverse == reverse)
-        slopes = [one for one in (_slope(run, load) for load in {b for _, b in run.block}) if one]
+        slopes = [slope for slope in (_slope(run, load) for load in {b for _, b in run.block}) if slope]
         if not slopes:
             continue
         FZ, CF, CM = (float(sum(column)) for column in zip(*slopes, strict=True))
@@ -194,7 +194,7 @@ def _slopes(r: Readings) -> list[Departure]:
                 if stiffness < 0
                 else "forces, loads or angles are in another unit, or a cell is dead"
             )
-            found.append(
+            departures.append(
                 Departure(
                     rule="impossible-slope",
                     where=f"{where}, FY",
@@ -204,7 +204,7 @@ def _slopes(r: Readings) -> list[Departure]:
                 )
             )
         elif not 0.0 <= trail <= r.trail_m:
-            found.append(
+            departures.append(
                 Departure(
                     rule="impossible-slope",
                     where=f"{where}, MZ",
@@ -215,7 +215,7 @@ def _slopes(r: Readings) -> list[Departure]:
                     "sign",
                 )
             )
-    return found
+    return departures
 
 
 def _slope(run: Readings, load: float | None) -> tuple[float, float, float] | None:
@@ -246,15 +246,15 @@ def _reversal(r: Readings) -> list[Departure]:
                 places.append(r.place[second])
     if not places:
         return []
-    same, other = (float(np.sqrt(np.mean(np.square(one)))) for one in (sums, differences))
-    if other <= same:
+    same, opposite = (float(np.sqrt(np.mean(np.square(values)))) for values in (sums, differences))
+    if opposite <= same:
         return []
     return [
         Departure(
             rule="impossible-reversal",
             where=places[0],
             message=f"at equal slip angle and load FY has opposite signs in {len(places)} of {len(sums)} "
-            f"pairs of runs: they differ by {other:.0f} N (rms) where their sum is {same:.0f} N; a tire "
+            f"pairs of runs: they differ by {opposite:.0f} N (rms) where their sum is {same:.0f} N; a tire "
             "keeps its side force in axes that follow the travel, but for its pull",
             cause="a reversed run is not named as such in test.toml, or a cell was turned round between the "
             "runs",

@@ -43,8 +43,8 @@ def nearest_step(SA: float, protocol: Protocol) -> float | None:
     """
     steps = sorted(set(protocol.slip_angles_rad))
     best = min(steps, key=lambda step: abs(step - SA))
-    others = [abs(step - best) for step in steps if step != best]
-    reach = max(protocol.slip_angle_tolerance_rad, min(others) / 2) if others else math.inf
+    distances = [abs(step - best) for step in steps if step != best]
+    reach = max(protocol.slip_angle_tolerance_rad, min(distances) / 2) if distances else math.inf
     return best if abs(best - SA) <= reach else None
 
 
@@ -59,16 +59,16 @@ def doubled(placed: Sequence[Placed], protocol: Protocol) -> tuple[int, ...]:
 
     Of more blocks than it asks for, the earlier files count.
     """
-    seen: Counter[tuple[Rotation, float, float]] = Counter()
+    counts: Counter[tuple[Rotation, float, float]] = Counter()
     later: list[int] = []
     for index in sorted(range(len(placed)), key=lambda i: placed[i].file_order):
-        one = placed[index]
-        if one.step_SA is None or one.step_FZ is None:
+        recording = placed[index]
+        if recording.step_SA is None or recording.step_FZ is None:
             continue
-        key = (one.rotation, one.step_SA, one.step_FZ)
-        if seen[key] >= protocol.times(one.step_SA):
+        key = (recording.rotation, recording.step_SA, recording.step_FZ)
+        if counts[key] >= protocol.times(recording.step_SA):
             later.append(index)
-        seen[key] += 1
+        counts[key] += 1
     return tuple(sorted(later))
 
 
@@ -85,11 +85,11 @@ def check(
 
 
 def _missing(placed: Sequence[Placed], protocol: Protocol, rotations: Sequence[Rotation]) -> list[Finding]:
-    found: list[Finding] = []
+    findings: list[Finding] = []
     for rotation in rotations:
         there = Counter((p.step_SA, p.step_FZ) for p in placed if p.rotation == rotation)
         if not there:
-            found.append(
+            findings.append(
                 Finding(
                     rule="missing",
                     where=f"drum {rotation}",
@@ -98,31 +98,31 @@ def _missing(placed: Sequence[Placed], protocol: Protocol, rotations: Sequence[R
             )
             continue
         steps = list(dict.fromkeys(protocol.slip_angles_rad))
-        gone = [step for step in steps if not any(step == s for s, _ in there)]
-        if gone:
-            found.append(
+        absent = [step for step in steps if not any(step == s for s, _ in there)]
+        if absent:
+            findings.append(
                 Finding(
                     rule="missing",
                     where=f"drum {rotation}",
-                    message=f"no file at slip angle {_angles_told(gone)}: the curves"
-                    + (", the +-1 deg secant" if _has_one_degree(gone) else "")
+                    message=f"no file at slip angle {_angles_told(absent)}: the curves"
+                    + (", the +-1 deg secant" if _has_one_degree(absent) else "")
                     + " and what they feed lack it",
                 )
             )
         for step in steps:
             where = f"drum {rotation}, slip angle {_angles_told([step])}"
             loads = [load for load in protocol.loads_N if (step, load) not in there]
-            if step not in gone and loads:
+            if step not in absent and loads:
                 message = f"no block at load {_loads_told(loads)}"
-                found.append(Finding(rule="missing", where=where, message=message))
+                findings.append(Finding(rule="missing", where=where, message=message))
             few = [load for load in protocol.loads_N if 0 < there[step, load] < protocol.times(step)]
             if few:
                 message = (
                     f"{min(there[step, load] for load in few)} of {protocol.times(step)} declared repeats "
                     f"at load {_loads_told(few)}"
                 )
-                found.append(Finding(rule="missing-repeat", where=where, message=message))
-    return found
+                findings.append(Finding(rule="missing-repeat", where=where, message=message))
+    return findings
 
 
 def _doubled(placed: Sequence[Placed], later: Sequence[int]) -> list[Finding]:
@@ -130,23 +130,23 @@ def _doubled(placed: Sequence[Placed], later: Sequence[int]) -> list[Finding]:
     for index in later:
         files.setdefault(placed[index].file, []).append(placed[index])
 
-    def angles(some: Sequence[Placed]) -> str:
-        return _angles_told(list(dict.fromkeys(one.step_SA or 0.0 for one in some)))
+    def angles(placeds: Sequence[Placed]) -> str:
+        return _angles_told(list(dict.fromkeys(placed.step_SA or 0.0 for placed in placeds)))
 
     return [
         Finding(
             rule="doubled",
             where=file,
-            message=f"slip angle {angles(some)}, drum {some[0].rotation}: "
-            f"{len(some)} block(s) of a condition that earlier files hold as often as "
+            message=f"slip angle {angles(doubles)}, drum {doubles[0].rotation}: "
+            f"{len(doubles)} block(s) of a condition that earlier files hold as often as "
             "the protocol declares; unused",
         )
-        for file, some in files.items()
+        for file, doubles in files.items()
     ]
 
 
 def _angles(placed: Sequence[Placed], protocol: Protocol) -> list[Finding]:
-    found: list[Finding] = []
+    findings: list[Finding] = []
     for file, step in dict.fromkeys((p.file, p.step_SA) for p in placed):
         SA = float(np.mean([p.SA for p in placed if (p.file, p.step_SA) == (file, step)]))
         if step is None:
@@ -160,12 +160,12 @@ def _angles(placed: Sequence[Placed], protocol: Protocol) -> list[Finding]:
             )
         else:
             continue
-        found.append(Finding(rule="slip-angle-tolerance", where=file, message=message))
-    return found
+        findings.append(Finding(rule="slip-angle-tolerance", where=file, message=message))
+    return findings
 
 
 def _loads(placed: Sequence[Placed], protocol: Protocol) -> list[Finding]:
-    found: list[Finding] = []
+    findings: list[Finding] = []
     for file in dict.fromkeys(p.file for p in placed):
         mine = [p for p in placed if p.file == file]
         unknown = [p.FZ for p in mine if p.step_FZ is None]
@@ -175,7 +175,7 @@ def _loads(placed: Sequence[Placed], protocol: Protocol) -> list[Finding]:
             if p.step_FZ is not None and abs(p.FZ - p.step_FZ) > protocol.load_tolerance * p.step_FZ
         ]
         if unknown:
-            found.append(
+            findings.append(
                 Finding(
                     rule="unplanned-load",
                     where=file,
@@ -183,7 +183,7 @@ def _loads(placed: Sequence[Placed], protocol: Protocol) -> list[Finding]:
                 )
             )
         if off:
-            found.append(
+            findings.append(
                 Finding(
                     rule="load-tolerance",
                     where=file,
@@ -192,7 +192,7 @@ def _loads(placed: Sequence[Placed], protocol: Protocol) -> list[Finding]:
                     f"{_loads_told([p.step_FZ for p in off if p.step_FZ is not None])}",
                 )
             )
-    return found
+    return findings
 
 
 def _feeds_of_direction(rotation: Rotation) -> str:

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolkit import __version__
 from toolkit.calibration.records.use import not_asked
 from toolkit.channels import Reversal, Rotation, seen_by_cells, signs
 from toolkit.reduction import protocol as plan
@@ -19,8 +18,9 @@ from toolkit.reduction.common_load import at_one_angle, carry, slopes
 from toolkit.reduction.corrections import correction_findings
 from toolkit.reduction.model import CalibrationUse, Condition, ReducedTest, Tare
 from toolkit.reduction.prepare_rows import OpenedFile, check_record, open_file, split_rests
-from toolkit.reduction.repeats import drift_findings
+from toolkit.reduction.remarks import drift_findings
 from toolkit.reduction.tare import choose_tares, zero_shifts
+from toolkit.version import __version__
 
 if TYPE_CHECKING:
     from toolkit.calibration.records.record import CalibrationRecord
@@ -68,9 +68,9 @@ def reduce_test(
     )
     files = [
         open_file(
-            name, recording, rotation, blocks=loads, tare=own, info=info, machine=machine, record=record
+            name, recording, rotation, blocks=loads, tare=tare, info=info, machine=machine, record=record
         )
-        for (name, recording, rotation), (loads, _), own in zip(recordings, blocks, tares, strict=True)
+        for (name, recording, rotation), (loads, _), tare in zip(recordings, blocks, tares, strict=True)
     ]
     measured, placed, later = _conditions(files, machine=machine, record=record, reversal=info.reversal)
     conditions = _ordered(_at_common_load(_own_loads(measured)), machine)
@@ -116,7 +116,9 @@ def _stated(machine: Machine, info: TestInfo, tare: Tare) -> tuple[TypeB, ...]:
         idle.add("zero")
     if info.pressure_Pa is None:
         idle.add("P")
-    return tuple(one for one in machine.type_b if one.symbol not in idle and (one.u or one.relative))
+    return tuple(
+        source for source in machine.type_b if source.symbol not in idle and (source.u or source.relative)
+    )
 
 
 def _conditions(
@@ -129,17 +131,19 @@ def _conditions(
         for block, rows in zip(file.blocks, file.windows, strict=True):
             if machine.protocol.acquisition == "continuous":
                 step = plan.nearest_step(float(np.mean(file.channels[0][rows.rows])), machine.protocol)
-            one = _condition(file, rows, step_SA=step, machine=machine, record=record, reversal=reversal)
-            conditions.append(one)
+            condition = _condition(
+                file, rows, step_SA=step, machine=machine, record=record, reversal=reversal
+            )
+            conditions.append(condition)
             placed.append(
                 plan.Placed(
                     file=file.name,
                     file_order=order,
                     rotation=file.rotation,
-                    SA=one.SA,
+                    SA=condition.SA,
                     FZ=block.mean_FZ,
                     step_SA=step,
-                    step_FZ=one.step_FZ,
+                    step_FZ=condition.step_FZ,
                 )
             )
     later = plan.doubled(placed, machine.protocol)
@@ -221,25 +225,26 @@ def _own_loads(conditions: Sequence[Condition]) -> list[Condition]:
     Groups are runs of the sorted loads; a new one begins at a gap, and where a file comes again: two
     blocks of one file are two loads, however near.
     """
-    found = list(conditions)
+    own_loads = list(conditions)
     groups: list[list[int]] = []
-    for index in sorted(range(len(found)), key=lambda i: found[i].FZ):
-        one = found[index]
-        if one.step_FZ is not None or not one.used:
+    for index in sorted(range(len(own_loads)), key=lambda i: own_loads[i].FZ):
+        condition = own_loads[index]
+        if condition.step_FZ is not None or not condition.used:
             continue
         last = groups[-1] if groups else []
-        near = bool(last) and one.FZ - found[last[-1]].FZ <= _SAME_LOAD * one.FZ
+        near = bool(last) and condition.FZ - own_loads[last[-1]].FZ <= _SAME_LOAD * condition.FZ
         if near and all(
-            (found[other].file, found[other].step_SA) != (one.file, one.step_SA) for other in last
+            (own_loads[place].file, own_loads[place].step_SA) != (condition.file, condition.step_SA)
+            for place in last
         ):
             last.append(index)
         else:
             groups.append([index])
     for group in groups:
-        nominal = float(np.median([found[index].FZ for index in group]))
+        nominal = float(np.median([own_loads[index].FZ for index in group]))
         for index in group:
-            found[index] = dataclasses.replace(found[index], step_FZ=nominal)
-    return found
+            own_loads[index] = dataclasses.replace(own_loads[index], step_FZ=nominal)
+    return own_loads
 
 
 def _at_common_load(conditions: Sequence[Condition]) -> list[Condition]:
@@ -249,30 +254,30 @@ def _at_common_load(conditions: Sequence[Condition]) -> list[Condition]:
         for step in {c.step_FZ for c in conditions if c.used}
         if step is not None
     }
-    found = list(conditions)
-    used = [index for index, c in enumerate(conditions) if c.used]
-    for group in at_one_angle([conditions[index] for index in used]):
-        mine = [used[place] for place in group]
+    at_load = list(conditions)
+    used_rows = [index for index, c in enumerate(conditions) if c.used]
+    for group in at_one_angle([conditions[index] for index in used_rows]):
+        mine = [used_rows[place] for place in group]
         FZ = np.array([conditions[i].FZ for i in mine])
         for_FY = slopes(FZ, np.array([conditions[i].FY for i in mine]))
         for_MZ = slopes(FZ, np.array([conditions[i].MZ for i in mine]))
         for place, index in enumerate(mine):
-            one = conditions[index]
-            if one.step_FZ is None:
+            condition = conditions[index]
+            if condition.step_FZ is None:
                 continue
-            delta = common[one.step_FZ] - one.FZ
-            FY, u_FY = carry(one.FY, one.u_FY, slope=for_FY[place], delta_FZ=delta)
-            MZ, u_MZ = carry(one.MZ, one.u_MZ, slope=for_MZ[place], delta_FZ=delta)
+            delta = common[condition.step_FZ] - condition.FZ
+            FY, u_FY = carry(condition.FY, condition.u_FY, slope=for_FY[place], delta_FZ=delta)
+            MZ, u_MZ = carry(condition.MZ, condition.u_MZ, slope=for_MZ[place], delta_FZ=delta)
             moved = for_FY[place] is not None
-            found[index] = dataclasses.replace(
-                one,
-                FZ_common=common[one.step_FZ] if moved else one.FZ,
+            at_load[index] = dataclasses.replace(
+                condition,
+                FZ_common=common[condition.step_FZ] if moved else condition.FZ,
                 FY_common=FY,
                 MZ_common=MZ,
                 u_FY_common=u_FY,
                 u_MZ_common=u_MZ,
             )
-    return found
+    return at_load
 
 
 def _ordered(conditions: Sequence[Condition], machine: Machine) -> tuple[Condition, ...]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
@@ -13,11 +14,10 @@ from toolkit.units import from_si, in_both, unit
 
 if TYPE_CHECKING:
     from toolkit.calibration.records.record import CalibrationRecord
-    from toolkit.machine import Machine
+    from toolkit.machine import Machine, Protocol
     from toolkit.recording.model import TestInfo
     from toolkit.reduction.model import Condition
     from toolkit.reduction.prepare_rows import OpenedFile
-
 
 # A cell may leave the range of the reference loads by this part of it before it is said aloud.
 _BEYOND = 0.05
@@ -40,7 +40,7 @@ def pressure_findings(info: TestInfo, machine: Machine) -> list[Finding]:
 
 def speed_findings(files: Sequence[OpenedFile], machine: Machine) -> list[Finding]:
     """Return the files whose own speed channel, averaged over a block, leaves the tolerance."""
-    found: dict[str, list[float]] = {}
+    speeds: dict[str, list[float]] = {}
     for file in files:
         if not file.recording.has("V"):
             continue
@@ -48,23 +48,23 @@ def speed_findings(files: Sequence[OpenedFile], machine: Machine) -> list[Findin
         for chosen in file.windows:
             mean = float(np.mean(V[chosen.rows]))
             if _speed([mean], file.name, machine):
-                found.setdefault(file.name, []).append(mean)
-    if not found:
+                speeds.setdefault(file.name, []).append(mean)
+    if not speeds:
         return []
-    return _speed([v for values in found.values() for v in values], _some(list(found)), machine)
+    return _speed([v for values in speeds.values() for v in values], _first_names(list(speeds)), machine)
 
 
 def _speed(speeds_m_s: Sequence[float], where: str, machine: Machine) -> list[Finding]:
     protocol, drum = machine.protocol, machine.drum
-    wanted = drum.speed_m_s if protocol.speed_m_s is None else protocol.speed_m_s
+    expected = drum.speed_m_s if protocol.speed_m_s is None else protocol.speed_m_s
     tolerance = (
         drum.speed_tolerance_m_s if protocol.speed_tolerance_m_s is None else protocol.speed_tolerance_m_s
     )
-    worst = max(speeds_m_s, key=lambda speed: abs(speed - wanted))
+    worst = max(speeds_m_s, key=lambda speed: abs(speed - expected))
     # A speed on the edge of the tolerance is inside it, however its unit rounds.
-    if abs(worst - wanted) <= tolerance * (1 + 1e-9):
+    if abs(worst - expected) <= tolerance * (1 + 1e-9):
         return []
-    got, nominal, room = from_si([worst, wanted, tolerance], "km/h")
+    got, nominal, room = from_si([worst, expected, tolerance], "km/h")
     message = f"speed {got:.2f} km/h is outside {nominal:.2f} +- {room:g} km/h"
     return [Finding(rule="speed", where=where, message=message)]
 
@@ -82,21 +82,25 @@ def tare_findings(files: Sequence[OpenedFile], record: CalibrationRecord) -> lis
             )
             + ("" if record.zero == "included" else "; the record was fitted on tared indications")
         )
-        return [Finding(rule="no-tare", where=_some([file.name for file in files]), message=message)]
+        return [Finding(rule="no-tare", where=_first_names([file.name for file in files]), message=message)]
     if source.startswith("mean of"):
         message = f"the {source} was subtracted from every file"
-        return [Finding(rule="tare-shared", where=_some([file.name for file in files]), message=message)]
+        return [
+            Finding(rule="tare-shared", where=_first_names([file.name for file in files]), message=message)
+        ]
     return []
 
 
 def angle_findings(files: Sequence[OpenedFile]) -> list[Finding]:
     """Name columns that look like a shaft angle and are none that the toolkit knows."""
     columns = dict.fromkeys(
-        one.header
+        channel.header
         for file in files
         if not (file.recording.has("TIRE_ANGLE") or file.recording.has("DRUM_ANGLE"))
-        for one in file.recording.series
-        if one.role == "covariate" and unit(one.unit).dimension == "angle" and one.symbol not in CHANNELS
+        for channel in file.recording.series
+        if channel.role == "covariate"
+        and unit(channel.unit).dimension == "angle"
+        and channel.symbol not in CHANNELS
     )
     if not columns:
         return []
@@ -104,7 +108,7 @@ def angle_findings(files: Sequence[OpenedFile]) -> list[Finding]:
         f"column {', '.join(columns)} is an angle but not known as TIRE_ANGLE or DRUM_ANGLE: no row was "
         "discarded by it"
     )
-    return [Finding(rule="unknown-angle", where=_some([file.name for file in files]), message=message)]
+    return [Finding(rule="unknown-angle", where=_first_names([file.name for file in files]), message=message)]
 
 
 def window_findings(files: Sequence[OpenedFile]) -> list[Finding]:
@@ -113,7 +117,7 @@ def window_findings(files: Sequence[OpenedFile]) -> list[Finding]:
     if not short:
         return []
     message = "a block ends before settling and averaging are complete; its last revolution was averaged"
-    return [Finding(rule="short-block", where=_some(short), message=message)]
+    return [Finding(rule="short-block", where=_first_names(short), message=message)]
 
 
 def acquired_findings(files: Sequence[OpenedFile], record: CalibrationRecord) -> list[Finding]:
@@ -125,7 +129,7 @@ def acquired_findings(files: Sequence[OpenedFile], record: CalibrationRecord) ->
     return [
         Finding(
             rule="acquired-differs",
-            where=_some(list(dict.fromkeys(d.file for d in wrong))),
+            where=_first_names(list(dict.fromkeys(d.file for d in wrong))),
             message=f"FY and MZ in the file were not computed by {record.id}: they differ by up to "
             f"{in_both(largest['FY'], 'N', '.1f')} and {in_both(largest['MZ'], 'N*m', '.2f')}; the values "
             "here are recomputed from the cells (toolkit inspect tells which calibration wrote them)",
@@ -143,7 +147,7 @@ def record_findings(record: CalibrationRecord) -> list[Finding]:
 
 def range_findings(conditions: Sequence[Condition], record: CalibrationRecord) -> list[Finding]:
     """Name the cells that left the range of the record's reference loads: the record extrapolates there."""
-    found = []
+    findings = []
     for place, cell in enumerate(record.cells):
         if cell.minimum is None or cell.maximum is None:
             continue
@@ -157,8 +161,10 @@ def range_findings(conditions: Sequence[Condition], record: CalibrationRecord) -
                 f"{cell.name} reads {min(values):.4g} to {max(values):.4g} {cell.unit} in {len(outside)} "
                 f"blocks; the reference loads of {record.id} reached {cell.minimum:.4g} to {cell.maximum:.4g}"
             )
-            found.append(Finding(rule="beyond-range", where=_some(_files(outside)), message=message))
-    return found
+            findings.append(
+                Finding(rule="beyond-range", where=_first_names(_files(outside)), message=message)
+            )
+    return findings
 
 
 def _files(conditions: Sequence[Condition]) -> list[str]:
@@ -188,5 +194,71 @@ def averaging_text(files: Sequence[OpenedFile], machine: Machine) -> str:
     )
 
 
-def _some(names: Sequence[str]) -> str:
+def _first_names(names: Sequence[str]) -> str:
     return names[0] if len(names) == 1 else f"{len(names)} files ({names[0]}, ...)"
+
+
+# Drift between the repeats that a protocol declares: the same condition, measured again later.
+
+_LEVEL = 2.0  # a drift inside its own expanded uncertainty is none
+
+
+def drift_findings(conditions: Sequence[Condition], protocol: Protocol) -> list[Finding]:
+    """Return one finding for each direction and channel whose repeats drift beyond the protocol's tolerance.
+
+    The tolerance is a part of the largest value of the channel at that load and direction. First repeat
+    against last, in the order of the files' names.
+    """
+    findings = []
+    for rotation in dict.fromkeys(c.rotation for c in conditions):
+        for channel, channel_unit in (("FY", "N"), ("MZ", "N*m")):
+            worst: tuple[float, float, Condition] | None = None
+            count = 0
+            for condition, difference, limit in _drifts(conditions, rotation, channel, protocol):
+                if abs(difference) > limit:
+                    count += 1
+                    if worst is None or abs(difference) / limit > abs(worst[0]) / worst[1]:
+                        worst = (difference, limit, condition)
+            if worst is None:
+                continue
+            difference, limit, condition = worst
+            angle = float(from_si(condition.step_SA or 0.0, "deg"))
+            message = (
+                f"{channel} drifts between repeats in {count} condition(s), at {angle:g} deg and "
+                f"{in_both(condition.step_FZ or 0.0, 'lbf', '.0f')} by "
+                f"{in_both(difference, channel_unit, '.3g')}; "
+                f"{in_both(limit, channel_unit, '.3g')} are tolerated"
+            )
+            findings.append(Finding(rule="repeat-drift", where=f"drum {rotation}", message=message))
+    return findings
+
+
+def _drifts(
+    conditions: Sequence[Condition], rotation: str, channel: str, protocol: Protocol
+) -> list[tuple[Condition, float, float]]:
+    """Return (last repeat, drift, tolerated drift) of every repeated condition of one direction."""
+
+    def value(condition: Condition) -> float:
+        return condition.FY_common if channel == "FY" else condition.MZ_common
+
+    def u(condition: Condition) -> float:
+        return condition.u_FY_common if channel == "FY" else condition.u_MZ_common
+
+    drifts = []
+    compared = [c for c in conditions if c.used and c.rotation == rotation and c.step_SA is not None]
+    for load in dict.fromkeys(c.step_FZ for c in compared):
+        repeated = sorted((c for c in compared if c.step_FZ == load), key=lambda c: (c.file, c.first_row))
+        largest = max(abs(value(c)) for c in repeated)
+        steps = sorted({c.step_SA for c in repeated if c.step_SA is not None})
+        angles = np.array([np.mean([c.SA for c in repeated if c.step_SA == s]) for s in steps])
+        means = np.array([np.mean([value(c) for c in repeated if c.step_SA == s]) for s in steps])
+        slopes = np.gradient(means, angles) if len(steps) > 1 else np.zeros(1)
+        for step, slope in zip(steps, slopes.tolist(), strict=True):
+            repeats = [c for c in repeated if c.step_SA == step]
+            if len(repeats) < 2:
+                continue
+            first, last = repeats[0], repeats[-1]
+            drift = value(last) - value(first) - slope * (last.SA - first.SA)
+            limit = max(protocol.repeat_tolerance * largest, _LEVEL * math.hypot(u(first), u(last)))
+            drifts.append((last, drift, limit))
+    return drifts

@@ -22,8 +22,8 @@ if TYPE_CHECKING:
 
 def tare_of_file(recording: Recording) -> Tare:
     """Return the tare from a recording that holds nothing else: the mean of every row."""
-    whole = Block(start=0, stop=recording.rows, mean_FZ=0.0)
-    return _tare([(recording, [whole])], source=f"file {recording.name}")
+    block = Block(start=0, stop=recording.rows, mean_FZ=0.0)
+    return _tare([(recording, [block])], source=f"file {recording.name}")
 
 
 def choose_tares(
@@ -53,7 +53,7 @@ def choose_tares(
             files
         )
     if len(having) == len(files):
-        return tuple(_tare([one], source="block") for one in having)
+        return tuple(_tare([block], source="block") for block in having)
     shared = _tare(having, source=f"mean of the tare blocks in {len(having)} of {len(files)} files")
     return (shared,) * len(files)
 
@@ -89,23 +89,23 @@ def _tare(files: Sequence[tuple[Recording, Sequence[Block]]], *, source: str) ->
     scatter of the files' own tares, which a drift of the zero enters too, where that is the larger.
     """
     first = files[0][0]
-    names = [one.symbol for one in first.series if one.role == "indication"]
+    names = [channel.symbol for channel in first.series if channel.role == "indication"]
     rows = [
         np.stack([np.concatenate([recording[name].values[b.rows] for b in blocks]) for name in names])
         for recording, blocks in files
     ]
-    everything = np.concatenate(rows, axis=1)
-    u = np.array([one.u for one in means(everything)])
+    every_row = np.concatenate(rows, axis=1)
+    u = np.array([mean.u for mean in means(every_row)])
     if len(rows) > 1:
-        own = np.array([one.mean(axis=1) for one in rows])
-        u = np.maximum(u, own.std(axis=0, ddof=1) / np.sqrt(len(rows)))
-    values = everything.mean(axis=1)
-    unit = next(one.unit for one in first.series if one.role == "indication")
+        block_means = np.array([row.mean(axis=1) for row in rows])
+        u = np.maximum(u, block_means.std(axis=0, ddof=1) / np.sqrt(len(rows)))
+    values = every_row.mean(axis=1)
+    unit = next(channel.unit for channel in first.series if channel.role == "indication")
     return Tare(
         source=source,
         values=tuple(zip(names, values.tolist(), strict=True)),
         unit=unit,
-        u=tuple(zip(names, u.tolist(), strict=True)) if everything.shape[1] > 1 else (),
+        u=tuple(zip(names, u.tolist(), strict=True)) if every_row.shape[1] > 1 else (),
     )
 
 

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 from toolkit.calibration.records.use import CalibrationUse, mark_of
 from toolkit.estimate import round_to_uncertainty
-from toolkit.report.columns import Column
 from toolkit.report.style import Style
 from toolkit.report.tags import format_number
-from toolkit.report.vocabulary import REPORT, Vocabulary
+from toolkit.report.vocabulary import Column, Vocabulary
 
 Cell = str | float | None
 
@@ -116,7 +117,7 @@ class ReportContent:
     issued: str
     marks: tuple[tuple[str, str], ...] = ()
     style: Style = field(default_factory=Style)
-    vocabulary: Vocabulary = REPORT
+    vocabulary: Vocabulary
 
     @property
     def page_mark(self) -> str | None:
@@ -131,16 +132,80 @@ class ReportContent:
     def draft_reasons(self) -> tuple[str, ...]:
         """Why this is a draft; empty where it is none."""
         return tuple(
-            dict.fromkeys(f"{one.id}: {reason}" for one in self.calibrations for reason in one.draft_reasons)
+            dict.fromkeys(
+                f"{calibration.id}: {reason}"
+                for calibration in self.calibrations
+                for reason in calibration.draft_reasons
+            )
         )
 
     def holds(self, name: str) -> bool:
         """Tell whether ``tk:if.<name>`` is kept: it is true, or the figure, table or value is there."""
         if name in self.conditions:
             return self.conditions[name]
-        family, _, rest = name.partition(".")
+        family, _, member = name.partition(".")
         if family == "figure":
-            return rest in self.plots
+            return member in self.plots
         if family == "table":
-            return rest in self.tables and bool(self.tables[rest].rows)
+            return member in self.tables and bool(self.tables[member].rows)
         return name in self.values and not self.values[name].missing
+
+
+# The organisation's words. What people wrote, names, notes and findings, is never touched: only the terms
+# that the toolkit itself prints.
+_OWN_TEXTS = (
+    "test.directions test.averaging test.tare simulated calibration.status report.title report.deviations"
+).split()
+_OWN_COLUMNS = ("rotation", "quantity", "level", "channel")
+
+
+def say(text: str, words: Mapping[str, str]) -> str:
+    """Return a text with every term replaced, the longest first, once each place.
+
+    >>> say("slip angle SA [deg]", {"slip angle": "Schräglaufwinkel", "angle": "Winkel"})
+    'Schräglaufwinkel SA [deg]'
+    """
+    if not words:
+        return text
+    terms = sorted(words, key=len, reverse=True)
+    pattern = "|".join(rf"(?<!\w){re.escape(term)}(?!\w)" for term in terms)
+    return re.sub(pattern, lambda term: words[term[0]], text)
+
+
+def say_values(values: dict[str, Value], words: Mapping[str, str]) -> dict[str, Value]:
+    """Return the values with the toolkit's own texts in the organisation's words."""
+    return values | {
+        path: replace(values[path], value=say(text, words))
+        for path in _OWN_TEXTS
+        if path in values and isinstance(text := values[path].value, str)
+    }
+
+
+def say_table(table: Table, words: Mapping[str, str]) -> Table:
+    """Return a table with its direction, quantity and level columns in the organisation's words."""
+    ours = [column.name in _OWN_COLUMNS for column in table.columns]
+    rows = tuple(
+        tuple(
+            say(cell, words) if our and isinstance(cell, str) else cell
+            for our, cell in zip(ours, row, strict=True)
+        )
+        for row in table.rows
+    )
+    return replace(table, rows=rows)
+
+
+def say_plot(plot: Plot, words: Mapping[str, str], alt: Mapping[str, str]) -> Plot:
+    """Return a figure with its axes, legend and caption in the organisation's words.
+
+    Its alternative text is made of sentences: for these ``alt`` has words that would be too short elsewhere.
+    """
+    return replace(
+        plot,
+        alt=say(plot.alt, {**words, **alt}),
+        x_label=say(plot.x_label, words),
+        y_label=say(plot.y_label, words),
+        caption=say(plot.caption, words),
+        watermark=None if plot.watermark is None else say(plot.watermark, words),
+        legend_title=None if plot.legend_title is None else say(plot.legend_title, words),
+        curves=tuple(replace(curve, label=say(curve.label, words)) for curve in plot.curves),
+    )

@@ -20,13 +20,13 @@ from toolkit.errors import OutputError, RenderError, ToolkitError
 from toolkit.recording.marks import refuse_original
 from toolkit.report.content import Plot, ReportContent
 from toolkit.report.handover import MANIFEST, content_hash, manifest_json
-from toolkit.report.pdf import Office
-from toolkit.report.template.fill import fill, needed_figures
-from toolkit.report.template.filled import Filled
-from toolkit.report.template.package import Template
-from toolkit.report.template.print_copy import Printed, print_copies
-from toolkit.report.template.verify import verify_docx, verify_pdf
-from toolkit.report.template.verify_text import Check
+from toolkit.report.word.contents_pages import Printed, print_copies
+from toolkit.report.word.fill import fill, needed_figures
+from toolkit.report.word.filled import Filled
+from toolkit.report.word.office import Office
+from toolkit.report.word.package import Template
+from toolkit.report.word.verify import verify_docx, verify_pdf
+from toolkit.report.word.verify_text import Check
 
 if TYPE_CHECKING:
     from toolkit.report.drawer import Drawer
@@ -64,8 +64,8 @@ class Job:
 
     def names(self) -> list[str]:
         """Return the names of every file that the job hands over."""
-        own = [f"{self.name}{suffix}" for suffix in (".docx", ".pdf", *self.companions)]
-        return [*own, *self.extras, *([MANIFEST] if self.provenance is not None else [])]
+        documents = [f"{self.name}{suffix}" for suffix in (".docx", ".pdf", *self.companions)]
+        return [*documents, *self.extras, *([MANIFEST] if self.provenance is not None else [])]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -90,8 +90,8 @@ class Delivered:
     @property
     def warnings(self) -> tuple[str, ...]:
         """What a person should look at although the report was delivered."""
-        said = [f"{one.rule}: {one.message}" for one in self.filled.lint]
-        said += [f"{one.name}: {one.message}" for one in self.checks if not one.ok]
+        said = [f"{finding.rule}: {finding.message}" for finding in self.filled.lint]
+        said += [f"{check.name}: {check.message}" for check in self.checks if not check.ok]
         said += [f"missing-value: {tag} prints a visible mark" for tag in self.filled.missing]
         said += [
             f"mark-added: the template has no place for the mark {name!r}" for name in self.filled.marks_added
@@ -120,10 +120,12 @@ def deliver(
         nothing is left in the output folder then
     """
     job = Job(template=template, content=content, out=out, name=name, companions=companions or {})
-    made = deliver_all([job], office=office, drawer=drawer, allow_missing=allow_missing, keep=keep, step=step)
-    if isinstance(made[0], ToolkitError):
-        raise made[0]
-    return made[0]
+    reports = deliver_all(
+        [job], office=office, drawer=drawer, allow_missing=allow_missing, keep=keep, step=step
+    )
+    if isinstance(reports[0], ToolkitError):
+        raise reports[0]
+    return reports[0]
 
 
 def deliver_all(
@@ -195,7 +197,7 @@ def _pictures(runs: Sequence[_Run], drawer: Drawer | None) -> Mapping[str, Pictu
         if run.error is None:
             run.attempt(run.choose)
             plots |= {f"{index}/{name}": run.job.content.plots[name] for name in run.figures}
-    return drawer.pictures(plots) if drawer else {one: draw(plot) for one, plot in plots.items()}
+    return drawer.pictures(plots) if drawer else {name: draw(plot) for name, plot in plots.items()}
 
 
 class _Run:
@@ -264,18 +266,18 @@ class _Run:
         self.filled = replace(self.filled, docx=copy.docx)
         docx.write_bytes(copy.docx)
         shutil.move(copy.pdf, pdf)
-        found, pages = verify_pdf(pdf, self.filled)
-        self.checks += found
+        checks, pages = verify_pdf(pdf, self.filled)
+        self.checks += checks
         _demand(self.checks)
         for suffix, data in job.companions.items():
             self._file(suffix).write_bytes(data)
         digest = content_hash(self.filled, job.template)
         names = job.names()
         if job.provenance is not None:
-            outputs = [self._stage() / one for one in names if one != MANIFEST]
+            outputs = [self._stage() / name for name in names if name != MANIFEST]
             text = manifest_json(job.provenance, job.content, job.template, digest, outputs)
             (self._stage() / MANIFEST).write_text(text, encoding="utf-8")
-        targets = _hand_over([self._stage() / one for one in names], job.out)
+        targets = _hand_over([self._stage() / name for name in names], job.out)
         beside = 2 + len(job.companions)
         self.delivered = Delivered(
             docx=targets[0],
@@ -306,12 +308,12 @@ class _Run:
 
 
 def _demand(checks: list[Check]) -> None:
-    failed = [one for one in checks if not one.ok and not one.warning]
+    failed = [check for check in checks if not check.ok and not check.warning]
     if failed:
         raise RenderError(
             "the report was not verified and is not delivered",
             where="PDF",
-            got="; ".join(f"{one.name}: {one.message}" for one in failed),
+            got="; ".join(f"{check.name}: {check.message}" for check in failed),
             expected="every value, figure and font of the report in its PDF",
             rule="not-verified",
             next_step="look at the rejected files with --keep and correct the template at that place",
@@ -325,7 +327,7 @@ def _staging(out: Path) -> Iterator[Path]:
     try:
         if out.exists() and not out.is_dir():
             raise NotADirectoryError(20, "a file stands where the folder should be")
-        made = [one for one in (parent, *parent.parents) if not one.exists()]
+        absent = [folder for folder in (parent, *parent.parents) if not folder.exists()]
         parent.mkdir(parents=True, exist_ok=True)
         stage = Path(tempfile.mkdtemp(prefix=".report-", dir=parent))
     except OSError as error:
@@ -334,7 +336,7 @@ def _staging(out: Path) -> Iterator[Path]:
         yield stage
     except BaseException:
         shutil.rmtree(stage, ignore_errors=True)
-        for folder in made:
+        for folder in absent:
             with contextlib.suppress(OSError):
                 folder.rmdir()
         raise
@@ -346,7 +348,7 @@ def _hand_over(files: list[Path], out: Path) -> list[Path]:
 
     try:
         out.mkdir(parents=True, exist_ok=True)
-        targets = [out / one.name for one in files]
+        targets = [out / file.name for file in files]
         for source, target in zip(files, targets, strict=True):
             source.replace(target)
         sync_folder(out)
@@ -370,7 +372,7 @@ def _reject(stage: Path, out: Path, name: str, reason: str) -> None:
     rejected = out / "rejected"
     rejected.mkdir(parents=True, exist_ok=True)
     for suffix in (".docx", ".pdf"):
-        made = stage / f"{name}{suffix}"
-        if made.is_file():
-            made.replace(rejected / made.name)
+        file = stage / f"{name}{suffix}"
+        if file.is_file():
+            file.replace(rejected / file.name)
     (rejected / "reason.txt").write_text(reason + "\n")

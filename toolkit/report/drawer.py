@@ -123,26 +123,26 @@ def _work(hands: int) -> None:
         names = list(plots)
         # What draws beside inherits matplotlib, which a process of its own would have to import again.
         beside = [_beside({name: plots[name] for name in names[i::hands]}) for i in range(1, hands)]
-        told = threading.Lock()
-        threads = [threading.Thread(target=_pass_on, args=(drawn, told)) for drawn in beside]
+        lock = threading.Lock()
+        threads = [threading.Thread(target=_pass_on, args=(drawn, lock)) for drawn in beside]
         for thread in threads:
             thread.start()
         for name in names[::hands]:
-            _tell(name, draw(plots[name]), told)
+            _tell(name, draw(plots[name]), lock)
         for thread in threads:
             thread.join()
 
 
-def _pass_on(drawn: IO[bytes], told: threading.Lock) -> None:
+def _pass_on(drawn: IO[bytes], lock: threading.Lock) -> None:
     # Taken as it comes: a pipe holds one figure or two, and its writer would stand still.
     with contextlib.suppress(EOFError):
         while True:
             name, picture = pickle.load(drawn)  # noqa: S301  a copy of this process wrote it
-            _tell(name, picture, told)
+            _tell(name, picture, lock)
 
 
-def _tell(name: str, picture: Picture, told: threading.Lock) -> None:
-    with told:
+def _tell(name: str, picture: Picture, lock: threading.Lock) -> None:
+    with lock:
         sys.stdout.buffer.write(pickle.dumps((name, picture)))
         sys.stdout.buffer.flush()
 

@@ -64,14 +64,22 @@ def draw_svg(plot: Plot) -> bytes:
     return stream.getvalue()
 
 
+def figure_of(plot: Plot) -> Figure:
+    """Return one figure as matplotlib holds it, before it is a picture: for a notebook."""
+    import matplotlib as mpl
+
+    with mpl.rc_context(_RC):
+        return _figure(plot)
+
+
 def _figure(plot: Plot) -> Figure:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=SIZE_IN, dpi=DPI)
     FigureCanvasAgg(figure)
-    named = {(c.label, c.group) for c in plot.curves if c.label}
-    aside = bool(plot.legend_title) or len(named) > 1
+    labels = {(c.label, c.group) for c in plot.curves if c.label}
+    aside = bool(plot.legend_title) or len(labels) > 1
     foot = 0.20 if plot.names else 0.135
     axes = figure.add_axes((0.115, foot, 0.70 if aside else 0.86, 0.97 - foot))
     _furnish(axes, plot)
@@ -196,11 +204,11 @@ def _curve(axes: Axes, curve: Curve) -> None:
 
 def _in_lines(label: str) -> str:
     """Return a legend's label in lines that end before the picture does."""
-    found = []
+    lines = []
     for part in label.replace(", ", ",\n").split("\n"):
         for line in textwrap.wrap(part, _LINE, break_long_words=False):
-            found += [line] if " " in line else _chopped(line)
-    return "\n".join(found)
+            lines += [line] if " " in line else _chopped(line)
+    return "\n".join(lines)
 
 
 def _chopped(word: str) -> list[str]:
@@ -212,7 +220,7 @@ def _chopped(word: str) -> list[str]:
             pieces[-1] += part
         else:
             pieces += [part[i : i + room] for i in range(0, len(part), room)]
-    return [one for one in pieces if one]
+    return [piece for piece in pieces if piece]
 
 
 def _legend(figure: Figure, plot: Plot) -> None:
@@ -220,13 +228,13 @@ def _legend(figure: Figure, plot: Plot) -> None:
     from matplotlib.patches import Patch
 
     handles: list[Artist] = []
-    seen = set()
+    labels = set()
     for curve in plot.curves:
         # A reversed run or a negative angle shares its colour and its entry with the other one.
         key = (curve.label, curve.group)
-        if not curve.label or key in seen:
+        if not curve.label or key in labels:
             continue
-        seen.add(key)
+        labels.add(key)
         colour = COLOURS[curve.group % len(COLOURS)]
         alone = curve.open and curve.style == "both" and not plot.legend_title
         if curve.style == "bars":

@@ -10,13 +10,13 @@ import numpy as np
 
 from toolkit.report.content import Curve, Plot
 from toolkit.report.figures import draw, draw_svg
-from toolkit.report.models import model_plot
+from toolkit.report.test.models import model_plot
 from toolkit.tires.comparison import Comparison, model_curve
 from toolkit.tires.evaluate import value_at
 from toolkit.tires.global_data import Measured, binned
 
 if TYPE_CHECKING:
-    from toolkit.tires.global_result import ModelFit
+    from toolkit.tires.global_model import ModelFit
     from toolkit.tires.model import CurveFit
 
 _LABELS = {
@@ -37,16 +37,16 @@ def fit_figures(
     watermark: str | None = None,
 ) -> dict[str, bytes]:
     """Return the figures by file name: two a model and channel (PNG), one comparison a channel (PNG, SVG)."""
-    made = {}
+    pictures = {}
     for plot in fit_plots(data, curves, models):
-        made[f"{plot.name}.png"] = draw(replace(plot, watermark=watermark)).png
+        pictures[f"{plot.name}.png"] = draw(replace(plot, watermark=watermark)).png
     if len(comparison.models) > 1:
         for condition, channel in comparison.conditions:
             name = f"comparison_{condition}_{channel}"
             bars = model_plot(comparison, condition, channel, name=name, watermark=watermark)
             if bars is not None:
-                made |= {f"{name}.png": draw(bars).png, f"{name}.svg": draw_svg(bars)}
-    return made
+                pictures |= {f"{name}.png": draw(bars).png, f"{name}.svg": draw_svg(bars)}
+    return pictures
 
 
 def fit_plots(data: Measured, curves: Sequence[CurveFit], models: Sequence[ModelFit]) -> tuple[Plot, ...]:
@@ -56,31 +56,31 @@ def fit_plots(data: Measured, curves: Sequence[CurveFit], models: Sequence[Model
 
     shown, _, _ = binned(data)
     plots = []
-    for name in dict.fromkeys(one.model for one in curves):
+    for name in dict.fromkeys(curve.model for curve in curves):
         for channel in ("FY", "MZ"):
-            own = [one for one in curves if one.model == name and one.channel == channel]
-            if own and channel in data.channels:
-                plots += _pair(shown, name, channel, _of_loads(own))
+            curves_of_model = [curve for curve in curves if curve.model == name and curve.channel == channel]
+            if curves_of_model and channel in data.channels:
+                plots += _pair(shown, name, channel, _of_loads(curves_of_model))
     for fit in models:
         model = find(fit.model)
         assert isinstance(model, GlobalModel)  # noqa: S101  only such a model has a ModelFit
-        for one in fit.fits:
-            if one.channel == "FX":
+        for channel_fit in fit.fits:
+            if channel_fit.channel == "FX":
                 continue
 
             def evaluate(
-                SA: np.ndarray, load: float, *, fit: ModelFit = fit, channel: str = one.channel
+                SA: np.ndarray, load: float, *, fit: ModelFit = fit, channel: str = channel_fit.channel
             ) -> np.ndarray | None:
                 model = find(fit.model)
                 assert isinstance(model, GlobalModel)  # noqa: S101
                 return model_curve(model, fit, data, channel, SA=SA, load_N=load)
 
-            plots += _pair(shown, fit.model, one.channel, evaluate)
+            plots += _pair(shown, fit.model, channel_fit.channel, evaluate)
     return tuple(plots)
 
 
 def _of_loads(fits: Sequence[CurveFit]) -> Evaluate:
-    loads = np.array([one.load_N or 0.0 for one in fits])
+    loads = np.array([fit.load_N or 0.0 for fit in fits])
 
     def evaluate(SA: np.ndarray, load: float) -> np.ndarray | None:
         nearest = int(np.argmin(np.abs(loads - load)))
@@ -96,14 +96,14 @@ def _pair(data: Measured, name: str, channel: str, evaluate: Evaluate) -> list[P
     grid = np.linspace(data.rows.SA.min(), data.rows.SA.max(), _POINTS)
     lines, points, apart = [], [], []
     for group, block in enumerate(np.unique(data.block)):
-        own = data.block == block
+        in_block = data.block == block
         load = float(data.loads[block])
         label = f"{load:.0f} N"
-        points.append(_curve(label, SA[own], data[channel][own], group, "points"))
-        line, at_rows = evaluate(grid, load), evaluate(data.rows.SA[own], load)
+        points.append(_curve(label, SA[in_block], data[channel][in_block], group, "points"))
+        line, at_rows = evaluate(grid, load), evaluate(data.rows.SA[in_block], load)
         if line is not None and at_rows is not None:
             lines.append(_curve(label, np.degrees(grid), line, group, "line"))
-            apart.append(_curve(label, SA[own], data[channel][own] - at_rows, group, "points"))
+            apart.append(_curve(label, SA[in_block], data[channel][in_block] - at_rows, group, "points"))
     x, where = "slip angle SA / deg", f"Axis system: {data.axes}."
     return [
         Plot(

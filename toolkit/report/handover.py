@@ -10,8 +10,8 @@ from typing import Any
 from toolkit.files import sha256_bytes, sha256_file
 from toolkit.recording.marks import GENERATOR
 from toolkit.report.content import ReportContent
-from toolkit.report.template.filled import Filled
-from toolkit.report.template.package import Template
+from toolkit.report.word.filled import Filled
+from toolkit.report.word.package import Template
 
 MANIFEST = "manifest.json"
 _OF_THE_DAY = ("tk:report.date",)
@@ -25,15 +25,17 @@ def content_hash(filled: Filled, template: Template) -> str:
     table with such a value is hashed by its other values, not as a row of cells.)
     """
     passing = {*_OF_THE_DAY, *filled.of_the_run}
-    told = {
+    printed = {
         "template": template.sha256,
-        "values": [[one.tag, one.text, one.part] for one in filled.manifest if one.tag not in passing],
+        "values": [
+            [entry.tag, entry.text, entry.part] for entry in filled.manifest if entry.tag not in passing
+        ],
         "cells": [row for at, row in enumerate(filled.cells) if at not in filled.rows_of_the_run],
         "figures": [[tag, alt] for tag, alt in filled.figures],
         "pictures": filled.pictures,
-        "contents": [[one.text, one.level] for one in filled.contents.entries],
+        "contents": [[entry.text, entry.level] for entry in filled.contents.entries],
     }
-    return sha256_bytes(json.dumps(told, ensure_ascii=False, separators=(",", ":")).encode())
+    return sha256_bytes(json.dumps(printed, ensure_ascii=False, separators=(",", ":")).encode())
 
 
 def manifest_json(
@@ -47,7 +49,7 @@ def manifest_json(
 
     ``provenance`` holds what the caller knows: the inputs and the software.
     """
-    told = {
+    manifest = {
         "generator": GENERATOR,
         "schema": 1,
         "report": content.identity,
@@ -56,10 +58,11 @@ def manifest_json(
         "template": {"name": template.path.name, "sha256": template.sha256},
         "draft": bool(content.draft_reasons),
         "draft_reasons": list(content.draft_reasons),
-        "calibrations": [one.as_dict() for one in content.calibrations],
+        "calibrations": [calibration.as_dict() for calibration in content.calibrations],
         **provenance,
         "outputs": [
-            {"name": one.name, "sha256": sha256_file(one), "bytes": one.stat().st_size} for one in outputs
+            {"name": output.name, "sha256": sha256_file(output), "bytes": output.stat().st_size}
+            for output in outputs
         ],
     }
-    return json.dumps(told, ensure_ascii=False, indent=2) + "\n"
+    return json.dumps(manifest, ensure_ascii=False, indent=2) + "\n"

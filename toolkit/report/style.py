@@ -64,9 +64,9 @@ class Style:
         table = dict(self.decimals)
         return next((table[name] for name in names if name in table), None)
 
-    def in_units_of(self, other: Style) -> Style:
+    def in_units_of(self, style: Style) -> Style:
         """Return this style with the units of forces and moments of another one."""
-        return replace(self, force=other.force, moment=other.moment)
+        return replace(self, force=style.force, moment=style.moment)
 
     def unit(self, unit: str | None) -> tuple[str | None, float]:
         """Return a report unit in the organisation's choice, and the factor from the SI-side one."""
@@ -121,7 +121,7 @@ def read_style(path: Path | None) -> Style:
         decimal_comma=_typed(table, "decimal_comma", bool, False, path),
         dates=_typed(table, "dates", str, "%Y-%m-%d", path),
         missing=missing,
-        required=tuple(dict.fromkeys([*_DEFAULT_REQUIRED, *(str(one) for one in required)])),
+        required=tuple(dict.fromkeys([*_DEFAULT_REQUIRED, *(str(tag) for tag in required)])),
         styles=tuple((str(k), str(v)) for k, v in parts["styles"].items()),
         decimals=tuple(parts["decimals"].items()),
         words=tuple((key, str(_text(parts["words"], key, path))) for key in parts["words"]),

@@ -1,10 +1,22 @@
-"""Where an effect can act on the virtual machine: the signals of the chain, and the unit of each."""
+"""Where an effect can act on the virtual machine, and what it does to the signals of the chain there."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping
+from typing import TYPE_CHECKING
+
 from toolkit.effects.effect import Effect
+from toolkit.effects.forward import through
 from toolkit.machine import Machine
 from toolkit.simulation.cells import CELLS
+from toolkit.units import from_si, to_si
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from toolkit.effects.applied import AppliedEffect
+    from toolkit.effects.signals import Setting
 
 # Units in which effects act on a signal; a cell is in the unit of the machine's own files.
 _UNITS = {"FY": "N", "MZ": "N*m", "MX": "N*m", "FZ": "N", "SA": "deg"}
@@ -12,8 +24,6 @@ _UNITS = {"FY": "N", "MZ": "N*m", "MX": "N*m", "FZ": "N", "SA": "deg"}
 _ROLLING = ("FZ", "FY", "MZ")
 _SENSED = (*CELLS, "FY", "MZ", "MX", "FZ")
 _RECORDED = (*CELLS, "FZ", "SA", "FY", "MZ")
-_PAIRED = ("crosstalk", "channel_swap")
-_SOURCES = {"crosstalk": (*CELLS, "FY", "MZ", "MX", "FZ"), "channel_swap": _RECORDED}
 
 
 def unit_of(machine: Machine, channel: str) -> str:
@@ -23,7 +33,7 @@ def unit_of(machine: Machine, channel: str) -> str:
 
 def channels_of(effect: Effect) -> tuple[str, ...]:
     """Return the signals on which an effect can be put; none where it acts on the whole machine."""
-    if effect.channel is None or effect.name == "wrong_calibration":
+    if effect.channel is None or effect.replaces_record:
         return ()
     if effect.stage in ("tire", "road"):
         return _ROLLING
@@ -32,26 +42,41 @@ def channels_of(effect: Effect) -> tuple[str, ...]:
 
 def is_paired(effect: Effect) -> bool:
     """Tell whether an effect joins two signals."""
-    return effect.name in _PAIRED
+    return effect.on_channel is not None and effect.on_channel.paired
 
 
 def can_join(effect: Effect, source: str, channel: str) -> bool:
     """Tell whether two signals are there at one stage: loads become cells, cells are computed into loads."""
     computed = ("FY", "MZ")
-    if effect.name == "channel_swap":
+    if effect.exchanges:
         return (source in computed) == (channel in computed)
     return channel in CELLS or source not in CELLS
 
 
 def sources_of(effect: Effect) -> tuple[str, ...]:
     """Return the signals that an effect of two signals can take."""
-    return _SOURCES.get(effect.name, ())
+    return channels_of(effect) if is_paired(effect) else ()
 
 
 def default_channels(effect: Effect) -> tuple[str, ...]:
     """Return where an effect acts when no signal is named: every cell, or the force that it is known by."""
     if not channels_of(effect) or is_paired(effect):
         return ()
-    if effect.name == "drum_runout":
-        return ("FZ",)
-    return ("FY",) if effect.stage == "tire" else CELLS
+    usual = None if effect.on_channel is None else effect.on_channel.usual
+    return CELLS if usual is None else (usual,)
+
+
+def through_machine(
+    signals: Mapping[str, NDArray[np.float64]],
+    effects: Iterable[AppliedEffect],
+    setting: Setting,
+    machine: Machine,
+) -> dict[str, NDArray[np.float64]]:
+    """Return signals [SI] by name when effects have acted on them, each in the signal's own unit."""
+    return through(
+        signals,
+        effects,
+        setting,
+        shown=lambda name, values: from_si(values, unit_of(machine, name)),
+        stored=lambda name, values: to_si(values, unit_of(machine, name)),
+    )

@@ -14,9 +14,11 @@ from pathlib import Path
 from typing import Any, Literal, cast
 
 from toolkit.channels import ROTATIONS, Rotation
+from toolkit.effects.applied import AppliedEffect
 from toolkit.errors import ConfigError
 from toolkit.files import check_keys, read_toml
-from toolkit.machine.definition import Machine, load_machine, quantity
+from toolkit.machine.definition import Machine, load_machine
+from toolkit.machine.quantity import quantity
 from toolkit.simulation.acquisition import AcquisitionTruth
 from toolkit.simulation.carriage import CarriageTruth
 from toolkit.simulation.case_plan import CasePlan, read_case_plan
@@ -38,7 +40,6 @@ from toolkit.simulation.plan_sections import (
 )
 from toolkit.simulation.road import RoadTruth
 from toolkit.simulation.steps import Motion, RunSteps, protocol_runs, read_motion, read_runs
-from toolkit.simulation.switched import Switched
 from toolkit.simulation.tire import TireTruth
 from toolkit.tires.tir_units import si_number
 
@@ -71,7 +72,7 @@ class Plan:
     cells: CellsTruth = field(default_factory=CellsTruth)
     acquisition: AcquisitionTruth = field(default_factory=AcquisitionTruth)
     session: SessionTruth = field(default_factory=SessionTruth)
-    effects: tuple[Switched, ...] = ()
+    effects: tuple[AppliedEffect, ...] = ()
     record: Record = "dwell"
     motion: Motion = field(default_factory=Motion)
     runs: tuple[RunSteps, ...] = ()
@@ -167,7 +168,7 @@ def with_effects(plan: Plan, given: list[str]) -> Plan:
     ConfigError
         an effect that cannot be read, that the plan's tire does not know, or that acts in none of its runs
     """
-    added: list[Switched] = []
+    added: list[AppliedEffect] = []
     for text in given:
         for one in parse_effect(text, plan.machine):
             _check_tire(plan, one, text)
@@ -176,29 +177,28 @@ def with_effects(plan: Plan, given: list[str]) -> Plan:
     return dataclasses.replace(plan, effects=(*plan.effects, *added))
 
 
-def _check_tire(plan: Plan, one: Switched, text: str) -> None:
-    file, name = plan.tire_file, one.effect.name
-    knows = {
-        "pressure_change": file is not None and file.has_pressure,
-        "camber_offset": file is None or file.has_camber,
+def _check_tire(plan: Plan, one: AppliedEffect, text: str) -> None:
+    file, what = plan.tire_file, one.effect.needs_tire
+    has = {
+        "pressure": file is not None and file.has_pressure,
+        "camber": file is None or file.has_camber,
     }
-    if not knows.get(name, True):
-        what = "pressure" if name == "pressure_change" else "camber"
+    if what is not None and not has[what]:
         raise ConfigError(
-            f"the plan's tire does not depend on its {what}", where=f"--effect {text}", got=name,
+            f"the plan's tire does not depend on its {what}", where=f"--effect {text}", got=one.effect.name,
             expected=f"a tire file with {what} coefficients",
             next_step=f"give the plan a .tir of MF 6.x with {what} terms, or leave the effect out",
             rule="effect-value",
         )  # fmt: skip
 
 
-def _check_runs(plan: Plan, one: Switched, text: str) -> None:
-    if one.only is None or any(one.acts_in(run.conditions) for run in plan.recordings):
+def _check_runs(plan: Plan, one: AppliedEffect, text: str) -> None:
+    if one.condition is None or any(one.acts_under(run.conditions) for run in plan.recordings):
         return
     known = sorted({f"{k}:{v}" for run in plan.recordings for k, v in run.conditions.items()})
     raise ConfigError(
         "no run has the condition of an effect", where=f"--effect {text}",
-        got=f"{one.only[0]}:{'+'.join(one.only[1])}", expected=", ".join(known),
+        got=f"{one.condition[0]}:{'+'.join(one.condition[1])}", expected=", ".join(known),
         next_step="name a condition of the plan's runs", rule="effect-value",
     )  # fmt: skip
 
@@ -242,7 +242,8 @@ def _stated_pressure(file: FileTire | None) -> float:
 def _texts(value: object, where: str) -> list[str]:
     if not isinstance(value, list) or not all(isinstance(one, str) for one in value):
         raise ConfigError(
-            "effects are a list of texts", where=where, got=value, expected='["relaxation=0.5m"]',
+            "effects are a list of texts", where=where, got=value,
+            expected='["NAME=VALUE"], each as --effect takes it',
             next_step="write each effect in quotes", rule="wrong-value",
         )  # fmt: skip
     return list(value)

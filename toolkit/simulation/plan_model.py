@@ -5,10 +5,9 @@ from __future__ import annotations
 import dataclasses
 from pathlib import Path
 
-from toolkit.effects.sense import turned
 from toolkit.errors import ConfigError
 from toolkit.simulation.file_tire import FileTire, read_file_tire
-from toolkit.simulation.model_file import ModelEffect, ModelFile, read_model
+from toolkit.simulation.model_file import FittedEffect, ModelFile, read_model
 from toolkit.tires.tir import TirFile, TirLine
 
 _NEW = "SCALING_COEFFICIENTS"  # where a coefficient goes that the file leaves to its default
@@ -61,7 +60,7 @@ def with_numbers(tir: TirFile, numbers: dict[str, float]) -> TirFile:
     return dataclasses.replace(tir, lines=tuple(lines))
 
 
-def effect_text(one: ModelEffect, model: ModelFile, *, where: str) -> str:
+def effect_text(one: FittedEffect, model: ModelFile, *, where: str) -> str:
     """Return an effect of a model as a plan writes it: ``steer_offset=offset:0.3deg``, machine axes.
 
     Raises
@@ -69,22 +68,26 @@ def effect_text(one: ModelEffect, model: ModelFile, *, where: str) -> str:
     ConfigError
         ``model-file``: the effect is in some runs only, by their names
     """
-    head = ".".join(part for part in (one.effect.name, one.source, one.channel) if part)
-    if one.effect.name == "wrong_calibration":
-        return f"wrong_calibration={one.source}"
-    if one.condition is not None:
-        key, values = one.condition
+    applied, effect = one.applied, one.applied.effect
+    if effect.replaces_record:
+        return f"{effect.name}={applied.source}"
+    head = applied.key.dotted
+    if applied.condition is not None:
+        key, values = applied.condition
         head += f"@{key}:{'+'.join(values)}"
-    elif one.runs is not None:
+    elif applied.runs is not None:
         raise _wrong(
             "an effect of the model is tied to single recordings", where,
-            f"{one.label} in {', '.join(one.runs)}", "an effect in all runs, or by a condition of runs",
+            f"{one.label} in {', '.join(sorted(applied.runs))}",
+            "an effect in all runs, or by a condition of runs",
         )  # fmt: skip
-    told = [
-        f"{each.name}:{each.value * turned(one.effect.name, each.name, model.axes, 'machine')!r}{each.unit}"
-        for each in one.parameters
+    written = [
+        f"{parameter.name}:"
+        f"{applied.values[parameter.name] * parameter.sign_between(model.axes, 'machine')!r}"
+        f"{applied.units[parameter.name]}"
+        for parameter in effect.parameters
     ]
-    return head + (f"={','.join(told)}" if told else "")
+    return head + (f"={','.join(written)}" if written else "")
 
 
 def _wrong(what: str, where: str, got: str, expected: str) -> ConfigError:

@@ -9,7 +9,7 @@ from typing import Any, Literal, TypeVar, cast
 
 from toolkit.errors import ConfigError
 from toolkit.files import check_keys
-from toolkit.machine.definition import quantity
+from toolkit.machine.quantity import quantity
 from toolkit.simulation.acquisition import AcquisitionTruth
 from toolkit.simulation.cells import CELLS, CellsTruth, CellTruth
 from toolkit.units import unit

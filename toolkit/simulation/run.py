@@ -8,29 +8,30 @@ others. What a tire remembers from file to file (slip work, warmth) and the cloc
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from toolkit.channels import Rotation
+from toolkit.effects.applied import AppliedEffect, acting, in_order
+from toolkit.effects.forward import with_source
 from toolkit.effects.signals import Setting
 from toolkit.errors import ConfigError
 from toolkit.simulation import acquisition, carriage, cells, timeline, tire
 from toolkit.simulation.acquisition import OwnProgram, true_program
-from toolkit.simulation.apply_effects import through
 from toolkit.simulation.cells import CELLS
 from toolkit.simulation.chain import Before, Walked, walk
+from toolkit.simulation.places import through_machine
 from toolkit.simulation.plan import Plan
 from toolkit.simulation.steps import RunSteps
-from toolkit.simulation.switched import Switched, here
 from toolkit.simulation.timeline import Block, Timeline
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from toolkit.simulation.apply_effects import Signals
+    Signals = dict[str, NDArray[np.float64]]
 
 _TARE_FILE = 1_000_000  # the tare's place among the seeds, beyond any file's number
 _TARE_ROWS = 100  # of the lifted wheel's one revolution, however few a recording has
@@ -97,20 +98,22 @@ def simulate(
     plan : with ``kind = "test"``
     program : what the acquisition program was given, before the plan's signs are turned; None for the
         true map of the cells
-    others : record id to program, for the effect ``wrong_calibration``
+    others : record id to program, for an effect that computes with another record
 
     Raises
     ------
     ConfigError
         a wrong calibration that ``others`` does not have
     """
-    given = (true_program(plan.cells) if program is None else program).with_negated(plan.acquisition.negated)
-    known = dict(others or {})
-    for one in plan.effects:
-        if one.record is not None and one.record not in known:
+    acquisition_program = (true_program(plan.cells) if program is None else program).with_negated(
+        plan.acquisition.negated
+    )
+    programs = dict(others or {})
+    for effect in plan.effects:
+        if effect.effect.replaces_record and effect.source not in programs:
             raise ConfigError(
-                "the record of a wrong calibration is not known", where="--effect wrong_calibration",
-                got=one.record, expected=", ".join(known) or "a registry with that record",
+                "the record of a wrong calibration is not known", where=f"--effect {effect.effect.name}",
+                got=effect.source, expected=", ".join(programs) or "a registry with that record",
                 next_step="give --calibrations DIR or --home DIR", rule="effect-value",
             )  # fmt: skip
     tare_rows, tare_dt = _tare(plan)
@@ -118,14 +121,14 @@ def simulate(
     files: list[VirtualFile] = []
     before = Before()
     for number, run in enumerate(plan.recordings, start=1):
-        made, before = _file(plan, given, known, run, number, before, tare_rows)
-        files.append(made)
+        recording, before = _file(plan, acquisition_program, programs, run, number, before, tare_rows)
+        files.append(recording)
     return VirtualTest(
         plan=plan,
         files=tuple(files),
         tare=tare,
         tare_unit=unit,
-        program=given,
+        program=acquisition_program,
         tare_rows=tare_rows,
         tare_dt=tare_dt,
     )
@@ -134,7 +137,7 @@ def simulate(
 def _file(
     plan: Plan,
     program: OwnProgram,
-    others: Mapping[str, OwnProgram],
+    own_programs: Mapping[str, OwnProgram],
     run: RunSteps,
     number: int,
     before: Before,
@@ -146,38 +149,43 @@ def _file(
     else:
         line = timeline.continuous(plan, run, rng)
     walked = walk(plan, run, line, before)
-    effects = here(plan.effects, run.conditions)
+    effects = acting(plan.effects, run.conditions)
     measured = _measured(plan, line, walked, effects)
     tared = {name: measured[name] - float(tare[name].mean()) for name in CELLS}
-    own = _computed(plan, program, others, measured, effects, walked.setting)
-    right = _computed(plan, true_program(plan.cells), others, measured | tared, effects, walked.setting)
-    kept = line.recorded
+    shown = _computed(plan, program, own_programs, measured, effects, walked.setting)
+    right = _computed(plan, true_program(plan.cells), own_programs, measured | tared, effects, walked.setting)
+    rows = line.recorded
     commands = {"SA_CMD": line.SA_CMD, "FZ_CMD": line.FZ_CMD}
     signals = {"t": walked.setting.elapsed_s, **walked.setting.channels, **commands, **measured, **right}
     name = plan.file_name.format(number=number)
     return VirtualFile(
         name=name,
         rotation=run.rotation,
-        columns=acquisition.printed(plan.machine, {k: v[kept] for k, v in (measured | own).items()}),
+        columns=acquisition.printed(plan.machine, {k: v[rows] for k, v in (measured | shown).items()}),
         truth=_truth(name, run, line, walked),
         run=run,
-        signals={symbol: values[kept] for symbol, values in signals.items()},
+        signals={symbol: values[rows] for symbol, values in signals.items()},
     ), walked.after
 
 
-def _measured(plan: Plan, line: Timeline, walked: Walked, effects: Any) -> Signals:
+def _measured(plan: Plan, line: Timeline, walked: Walked, effects: Sequence[AppliedEffect]) -> Signals:
     """Return the recorded cells [V/V], FZ [N] and SA [rad]: load cells, then the acquisition."""
     hub, machine = walked.hub, plan.machine
     loads = {"FY": hub.FY, "MZ": hub.MZ, "MX": hub.MX, "FZ": hub.FZ}
-    at_cells = [one for one in effects if one.effect.stage == "load_cells"]
-    sensed = through(loads, [one for one in at_cells if one.channel in loads], walked.setting, machine)
+    at_cells = in_order(effects, "load_cells")
+    sensed = through_machine(
+        loads, [at_cell for at_cell in at_cells if at_cell.channel in loads], walked.setting, machine
+    )
     bridge = cells.sense(
         plan.cells,
         hub=carriage.HubLoads(FY=sensed["FY"], MZ=sensed["MZ"], MX=sensed["MX"], FZ=hub.FZ),
     )
     shown = {name: bridge[:, i] for i, name in enumerate(CELLS)}
-    shown = through(
-        {**sensed, **shown}, [one for one in at_cells if one.channel in CELLS], walked.setting, machine
+    shown = through_machine(
+        {**sensed, **shown},
+        [at_cell for at_cell in at_cells if at_cell.channel in CELLS],
+        walked.setting,
+        machine,
     )
     channels = acquisition.digitise(
         plan.acquisition,
@@ -187,46 +195,46 @@ def _measured(plan: Plan, line: Timeline, walked: Walked, effects: Any) -> Signa
         noise=line.noise,
         dt=line.dt,
     )
-    return through(channels, _acquired(effects), walked.setting, machine)
+    return through_machine(channels, _acquired(effects), walked.setting, machine)
 
 
 def _computed(
     plan: Plan,
     program: OwnProgram,
-    others: Mapping[str, OwnProgram],
+    own_programs: Mapping[str, OwnProgram],
     channels: Signals,
-    effects: Any,
+    effects: Sequence[AppliedEffect],
     setting: Setting,
 ) -> Signals:
     """Return FY [N] and MZ [N·m] as a program makes them of recorded cells, with effects on them."""
-    made = acquisition.own_columns(program, channels)
-    for one in _acquired(effects):
-        if one.record is not None and one.effect.channel is not None:
-            other = acquisition.own_columns(others[one.record], channels)
-            for name in made:
-                seen = dataclasses.replace(setting, channels={**setting.channels, "from": other[name]})
-                made[name] = one.effect.channel(made[name], one.parameters, seen)
+    signals = acquisition.own_columns(program, channels)
+    for applied in _acquired(effects):
+        if applied.effect.replaces_record and applied.effect.channel is not None:
+            columns = acquisition.own_columns(own_programs[str(applied.source)], channels)
+            for name in signals:
+                replaced = with_source(setting, columns[name])
+                signals[name] = applied.effect.channel(signals[name], applied.values, replaced)
         else:
-            made = through(made, [one], setting, plan.machine)
-    return made
+            signals = through_machine(signals, [applied], setting, plan.machine)
+    return signals
 
 
-def _acquired(effects: Any) -> list[Switched]:
-    return [one for one in effects if one.effect.stage == "acquisition"]
+def _acquired(effects: Sequence[AppliedEffect]) -> Sequence[AppliedEffect]:
+    return in_order(effects, "acquisition")
 
 
 def _truth(name: str, run: RunSteps, line: Timeline, walked: Walked) -> tuple[BlockTruth, ...]:
     place = np.cumsum(line.recorded)
 
-    def block(one: Block) -> BlockTruth:
-        rows = slice(one.start, one.stop)
+    def block(part: Block) -> BlockTruth:
+        rows = slice(part.start, part.stop)
         return BlockTruth(
             file=name,
             rotation=run.rotation,
-            step_SA_rad=one.step_SA_rad,
-            step_FZ_N=one.step_FZ_N,
-            first_row=int(place[one.start]),
-            last_row=int(place[one.stop - 1]),
+            step_SA_rad=part.step_SA_rad,
+            step_FZ_N=part.step_FZ_N,
+            first_row=int(place[part.start]),
+            last_row=int(place[part.stop - 1]),
             SA_rad=float(walked.SA[rows].mean()),
             FZ_N=float(walked.hub.FZ[rows].mean()),
             FY_N=float(walked.hub.FY[rows].mean()),
@@ -234,7 +242,7 @@ def _truth(name: str, run: RunSteps, line: Timeline, walked: Walked) -> tuple[Bl
             MX_Nm=float(walked.hub.MX[rows].mean()),
         )
 
-    return tuple(block(one) for one in line.blocks)
+    return tuple(block(part) for part in line.blocks)
 
 
 def _tare(plan: Plan) -> tuple[Signals, float]:
@@ -262,8 +270,12 @@ def _tare(plan: Plan) -> tuple[Signals, float]:
         recorded=np.ones(rows, dtype=bool), blocks=(),
     )  # fmt: skip
     still = Walked(hub=hub, SA=none, sensed=none, setting=setting, after=Before())
-    effects = [one for one in here(plan.effects, {}) if one.effect.name != "zero_offset"]
+    effects = [applied for applied in acting(plan.effects, {}) if _is_in_tare(applied)]
     return _measured(at_rest, line, still, effects), dt
+
+
+def _is_in_tare(applied: AppliedEffect) -> bool:
+    return applied.effect.on_channel is None or applied.effect.on_channel.tare != "after"
 
 
 def _tare_values(plan: Plan, rows: Signals) -> tuple[tuple[tuple[str, float], ...], str]:

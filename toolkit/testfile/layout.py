@@ -8,9 +8,12 @@ import json
 import math
 from typing import TYPE_CHECKING, Any
 
+from toolkit.characteristics.model import answer_lists
+from toolkit.estimate import Estimate
 from toolkit.reduction.model import Condition
 
 if TYPE_CHECKING:
+    from toolkit.characteristics.model import Characteristics
     from toolkit.pipeline import TestResult
 
 SCHEMA = 1
@@ -67,7 +70,10 @@ def optional(value: Any) -> float | None:
 
 def content_hash(result: TestResult) -> str:
     """Return the SHA-256 of a result's canonical JSON: every number in its shortest exact form."""
-    content = dataclasses.asdict(result)
+    content = {
+        "reduced": dataclasses.asdict(result.reduced),
+        "characteristics": _characteristics(result.characteristics),
+    }
     if not result.reduced.stated:  # a file from before there were any keeps its hash
         del content["reduced"]["stated"]
     for name in ("draft_reasons", "since"):  # and one of a record in force has the hash of before too
@@ -75,3 +81,36 @@ def content_hash(result: TestResult) -> str:
             del content["reduced"]["calibration"][name]
     text = json.dumps(content, sort_keys=True, separators=(",", ":"), ensure_ascii=True)
     return hashlib.sha256(text.encode()).hexdigest()
+
+
+# The lists of the first files stand in their hash even where they are empty; later ones only with entries.
+_FIRST_LISTS = ("stiffness", "pull", "at_angles")
+
+
+def _characteristics(characteristics: Characteristics) -> dict[str, Any]:
+    """Return characteristics in the form that is hashed: lists of entries by characteristic, and budgets."""
+    lists = answer_lists(characteristics.rows)
+    return {
+        "fits": [dataclasses.asdict(fit) for fit in characteristics.fits],
+        "findings": [dataclasses.asdict(finding) for finding in characteristics.findings],
+        "points": [dataclasses.asdict(point) for point in characteristics.points],
+        "budgets": [
+            {
+                "load_N": row.load_N,
+                "rotation": row.rotation,
+                "name": row.name,
+                "unit": row.estimate.unit,
+                "sources": row.sources,
+            }
+            for row in characteristics.rows
+            if row.estimate is not None and row.SA_rad is None
+        ],
+        **{
+            name: [
+                {key: dataclasses.asdict(v) if isinstance(v, Estimate) else v for key, v in entry.items()}
+                for entry in entries
+            ]
+            for name, entries in lists.items()
+            if entries or name in _FIRST_LISTS
+        },
+    }

@@ -3,20 +3,16 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Sequence
 from io import BytesIO
 from pathlib import Path
 from typing import Any, cast, get_type_hints
 
 from toolkit.channels import Rotation
-from toolkit.characteristics.model import (
-    AtAngle,
-    Budget,
-    Characteristics,
-    DirectionFit,
-    Point,
-    Pull,
-    Stiffness,
-)
+from toolkit.characteristics.catalogue import by_name
+from toolkit.characteristics.groups import Direction, DirectionFit, group
+from toolkit.characteristics.model import Characteristics, Point, Row, in_order
+from toolkit.characteristics.rows import lacking_row
 from toolkit.errors import RecordingError
 from toolkit.estimate import Estimate
 from toolkit.findings import Finding, Level
@@ -37,7 +33,7 @@ from toolkit.testfile.layout import (
 )
 from toolkit.tires.model import CurveFit, Parameter
 
-Row = dict[str, Any]
+Cells = dict[str, Any]
 
 
 def is_test_file(path: Path) -> bool:
@@ -104,14 +100,14 @@ def _broken(path: Path, got: str, expected: str) -> RecordingError:
     )
 
 
-def _rows(table: list[list[Any]]) -> list[Row]:
+def _rows(table: list[list[Any]]) -> list[Cells]:
     if not table:
         return []
     head = [str(text) for text in table[0]]
     return [dict(zip(head, row, strict=True)) for row in table[1:]]
 
 
-def _result(sheets: dict[str, list[Row]], items: Row) -> TestResult:
+def _result(sheets: dict[str, list[Cells]], items: Cells) -> TestResult:
     reduced = ReducedTest(
         info=TestInfo(
             **{
@@ -148,25 +144,25 @@ def _result(sheets: dict[str, list[Row]], items: Row) -> TestResult:
         protocol=items["protocol"],
         stated=_stated(items),
     )
-    return TestResult(reduced=reduced, characteristics=_characteristics(sheets))
+    return TestResult(reduced=reduced, characteristics=_characteristics(sheets, reduced))
 
 
-def _stated(items: Row) -> tuple[TypeB, ...]:
-    found: dict[str, Row] = {}
+def _stated(items: Cells) -> tuple[TypeB, ...]:
+    cellses: dict[str, Cells] = {}
     for key, value in items.items():
         if key.startswith("stated."):
             _, symbol, name = key.split(".")
-            found.setdefault(symbol, {})[name] = value
+            cellses.setdefault(symbol, {})[name] = value
     return tuple(
         TypeB(
             symbol=symbol,
-            u=number(one["u"]),
-            relative=number(one["relative"]),
-            effect=number(one["effect"]),
-            source=str(one["source"]),
-            common=one["common"],
+            u=number(cellse["u"]),
+            relative=number(cellse["relative"]),
+            effect=number(cellse["effect"]),
+            source=str(cellse["source"]),
+            common=cellse["common"],
         )
-        for symbol, one in found.items()
+        for symbol, cellse in cellses.items()
     )
 
 
@@ -181,14 +177,16 @@ def _as(kind: Any, value: Any) -> Any:
     return int(value) if "int" in str(kind) else str(value)
 
 
-def _condition(row: Row) -> Condition:
+def _condition(row: Cells) -> Condition:
     hints = get_type_hints(Condition)
-    given = {name: _as(hints[name], row[header(name)]) for name in CONDITION_FIELDS if name != "indications"}
+    conditions = {
+        name: _as(hints[name], row[header(name)]) for name in CONDITION_FIELDS if name != "indications"
+    }
     cells = tuple(number(value) for key, value in row.items() if key.startswith("indication_"))
-    return Condition(**given, indications=cells)
+    return Condition(**conditions, indications=cells)
 
 
-def _findings(rows: list[Row]) -> tuple[Finding, ...]:
+def _findings(rows: list[Cells]) -> tuple[Finding, ...]:
     return tuple(
         Finding(
             level=cast("Level", row["level"]), rule=row["rule"], where=row["where"], message=row["message"]
@@ -197,7 +195,7 @@ def _findings(rows: list[Row]) -> tuple[Finding, ...]:
     )
 
 
-def _numbered(items: Row, name: str) -> tuple[str, ...]:
+def _numbered(items: Cells, name: str) -> tuple[str, ...]:
     return tuple(str(value) for key, value in items.items() if key.startswith(f"{name}."))
 
 
@@ -207,34 +205,34 @@ def _estimate(value: Any, u: Any, dof: Any, unit: Any) -> Estimate | None:
     return Estimate(value=number(value), u=number(u), dof=number(dof), unit=str(unit))
 
 
-def _interval(row: Row) -> tuple[float | None, float | None] | None:
+def _interval(row: Cells) -> tuple[float | None, float | None] | None:
     # Files of earlier versions have no such columns.
     low, high = optional(row.get("low_95")), optional(row.get("high_95"))
     return None if low is None and high is None else (low, high)
 
 
-def _fit(row: Row, parameters: list[Row], covariances: dict[tuple[str, str], float]) -> CurveFit:
+def _fit(row: Cells, parameters: list[Cells], covariances: dict[tuple[str, str], float]) -> CurveFit:
     hints = get_type_hints(CurveFit)
-    given: Row = {}
+    cells: Cells = {}
     for field in dataclasses.fields(CurveFit):
         if field.name in row:
             value = row[field.name]
             is_list = "tuple" in str(hints[field.name])
-            given[field.name] = tuple(str(value).split()) if is_list else _as(hints[field.name], value)
-    given["message"] = given["message"] or ""
-    names = [str(one["parameter"]) for one in parameters]
+            cells[field.name] = tuple(str(value).split()) if is_list else _as(hints[field.name], value)
+    cells["message"] = cells["message"] or ""
+    names = [str(parameter["parameter"]) for parameter in parameters]
     return CurveFit(
-        **given,
+        **cells,
         parameters=tuple(
             Parameter(
-                name=str(one["parameter"]),
-                value=number(one["value"]),
-                unit=str(one["unit"]),
-                standard_error=optional(one["standard_error"]),
-                dof=optional(one["dof"]),
-                interval95=_interval(one),
+                name=str(parameter["parameter"]),
+                value=number(parameter["value"]),
+                unit=str(parameter["unit"]),
+                standard_error=optional(parameter["standard_error"]),
+                dof=optional(parameter["dof"]),
+                interval95=_interval(parameter),
             )
-            for one in parameters
+            for parameter in parameters
         ),
         covariance=tuple(tuple(covariances[a, b] for b in names) for a in names) if covariances else (),
         slope_at_zero=_estimate(*(row[f"slope_at_zero {p}"] for p in ("value", "u", "dof", "unit"))),
@@ -242,11 +240,11 @@ def _fit(row: Row, parameters: list[Row], covariances: dict[tuple[str, str], flo
     )
 
 
-def _characteristics(sheets: dict[str, list[Row]]) -> Characteristics:
+def _characteristics(sheets: dict[str, list[Cells]], reduced: ReducedTest) -> Characteristics:
     covariances: dict[int, dict[tuple[str, str], float]] = {}
     for row in sheets["fit_covariance"]:
         covariances.setdefault(int(row["fit"]), {})[row["parameter"], row["with"]] = number(row["covariance"])
-    parameters: dict[int, list[Row]] = {}
+    parameters: dict[int, list[Cells]] = {}
     for row in sheets["fit_parameters"]:
         parameters.setdefault(int(row["fit"]), []).append(row)
     fits = {
@@ -255,36 +253,33 @@ def _characteristics(sheets: dict[str, list[Row]]) -> Characteristics:
         )
         for index, row in enumerate(sheets["fits"])
     }
-    rows = sheets["characteristics"]
-    groups = [(number(r["load_N"]), r["rotation"]) for r in rows if r["name"] == "group"]
-    values = {
-        (number(r["load_N"]), r["rotation"], r["name"]): _estimate(r["value"], r["u"], r["dof"], r["unit"])
-        for r in rows
-    }
+    described = sheets["characteristics"]
+    fitted = tuple(
+        DirectionFit(
+            rotation=cast("Rotation", cells["rotation"]),
+            load_N=number(cells["load_N"]),
+            FY=fits.get((cells["rotation"], number(cells["load_N"]), "FY")),
+            MZ=fits.get((cells["rotation"], number(cells["load_N"]), "MZ")),
+        )
+        for cells in described
+        if cells["name"] == "group"
+    )
+    groups = {(entry.load_N, entry.rotation): entry for entry in group(reduced)}
+    directions = [
+        Direction(group=groups[fit.load_N, fit.rotation], fit=fit)
+        for fit in fitted
+        if (fit.load_N, fit.rotation) in groups
+    ]
+    budgets = _budgets(sheets["budgets"])
+    rows = [
+        _row(cells, budgets, directions)
+        for cells in (*described, *sheets["at_angles"])
+        if cells["name"] != "group"
+    ]
     return Characteristics(
-        fits=tuple(
-            DirectionFit(
-                rotation=cast("Rotation", rotation),
-                load_N=load,
-                FY=fits.get((rotation, load, "FY")),
-                MZ=fits.get((rotation, load, "MZ")),
-            )
-            for load, rotation in groups
-        ),
-        stiffness=tuple(
-            Stiffness(
-                load_N=load,
-                rotation=cast("Rotation", rotation),
-                **{f.name: values[load, rotation, f.name] for f in dataclasses.fields(Stiffness)[2:]},
-            )
-            for load, rotation in groups
-        ),
-        pull=tuple(
-            Pull(load_N=load, **{f.name: values[load, "both", f.name] for f in dataclasses.fields(Pull)[1:]})
-            for load in dict.fromkeys(load for load, _ in groups)
-        ),
+        fits=fitted,
+        rows=in_order(rows, fitted),
         findings=_findings(sheets["characteristic_findings"]),
-        at_angles=_at_angles(sheets["at_angles"]),
         points=tuple(
             Point(
                 file=str(r["file"]),
@@ -294,38 +289,33 @@ def _characteristics(sheets: dict[str, list[Row]]) -> Characteristics:
             )
             for r in sheets["points"]
         ),
-        budgets=_budgets(sheets["budgets"]),
     )
 
 
-def _at_angles(rows: list[Row]) -> tuple[AtAngle, ...]:
-    keys = dict.fromkeys((number(r["load_N"]), r["rotation"], number(r["SA_rad"])) for r in rows)
-    found = {
-        (number(r["load_N"]), r["rotation"], number(r["SA_rad"]), r["name"]): _estimate(
-            r["value"], r["u"], r["dof"], r["unit"]
-        )
-        for r in rows
-    }
-    return tuple(
-        AtAngle(
-            load_N=load,
-            rotation=cast("Rotation", rotation),
-            SA_rad=angle,
-            FY=found[load, rotation, angle, "FY"],
-            MZ=found[load, rotation, angle, "MZ"],
-        )
-        for load, rotation, angle in keys
+_Budgets = dict[tuple[float, str, str], list[tuple[str, float]]]
+
+
+def _row(cells: Cells, budgets: _Budgets, directions: Sequence[Direction]) -> Row:
+    load, rotation, name = number(cells["load_N"]), str(cells["rotation"]), str(cells["name"])
+    SA = number(cells["SA_rad"]) if "SA_rad" in cells else None
+    estimate = _estimate(cells["value"], cells["u"], cells["dof"], cells["unit"])
+    if estimate is None:
+        there = [direction for direction in directions if direction.group.load_N == load]
+        return lacking_row(by_name()[name], (load, rotation, SA), there)
+    return Row(
+        name=by_name()[name].name,
+        load_N=load,
+        rotation=rotation,
+        SA_rad=SA,
+        estimate=estimate,
+        sources=() if SA is not None else tuple(budgets.get((load, rotation, name), ())),
     )
 
 
-def _budgets(rows: list[Row]) -> tuple[Budget, ...]:
-    sources: dict[tuple[float, str, str, str], list[tuple[str, float]]] = {}
-    for r in rows:
-        key = (number(r["load_N"]), str(r["rotation"]), str(r["name"]), str(r["unit"]))
-        lines = sources.setdefault(key, [])
-        if r["source"] not in ("", None):
-            lines.append((str(r["source"]), number(r["u"])))
-    return tuple(
-        Budget(load_N=load, rotation=rotation, name=name, unit=unit, sources=tuple(lines))
-        for (load, rotation, name, unit), lines in sources.items()
-    )
+def _budgets(rows: list[Cells]) -> _Budgets:
+    sources: _Budgets = {}
+    for cells in rows:
+        lines = sources.setdefault((number(cells["load_N"]), str(cells["rotation"]), str(cells["name"])), [])
+        if cells["source"] not in ("", None):
+            lines.append((str(cells["source"]), number(cells["u"])))
+    return sources

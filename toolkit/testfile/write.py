@@ -8,6 +8,7 @@ from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from toolkit.characteristics.characteristic import BOTH
 from toolkit.errors import OutputError
 from toolkit.estimate import Estimate
 from toolkit.files import write_atomic
@@ -66,9 +67,9 @@ def _workbook(result: TestResult, digest: str, recordings: Mapping[str, Recordin
         ("raw", _raw(recordings)),
     ):
         _sheet(book, name, rows, use.mark)
-    made = BytesIO()
-    book.save(made)
-    return made.getvalue()
+    bytes_io = BytesIO()
+    book.save(bytes_io)
+    return bytes_io.getvalue()
 
 
 def _sheet(book: Any, name: str, rows: Rows, mark: str | None) -> None:
@@ -92,12 +93,12 @@ def _sheet(book: Any, name: str, rows: Rows, mark: str | None) -> None:
         # A text is a text even where it begins like a formula: openpyxl would guess otherwise.
         if not (head or (isinstance(value, str) and value.startswith("="))):
             return value
-        one = WriteOnlyCell(sheet, value=value)
+        cell = WriteOnlyCell(sheet, value=value)
         if isinstance(value, str):
-            one.data_type = "s"
+            cell.data_type = "s"
         if head:
-            one.font = bold
-        return one
+            cell.font = bold
+        return cell
 
     for index, row in enumerate(rows):
         if index == 0:
@@ -137,9 +138,9 @@ def _provenance(result: TestResult, digest: str) -> Rows:
         yield (f"tare.values.{name}", value)
     for name, value in reduced.tare.u:
         yield (f"tare.u.{name}", value)
-    for one in reduced.stated:
-        for field in dataclasses.fields(one)[1:]:
-            yield (f"stated.{one.symbol}.{field.name}", getattr(one, field.name))
+    for statement in reduced.stated:
+        for field in dataclasses.fields(statement)[1:]:
+            yield (f"stated.{statement.symbol}.{field.name}", getattr(statement, field.name))
     for field in dataclasses.fields(reduced.info):
         yield (f"info.{field.name}", getattr(reduced.info, field.name))
 
@@ -149,8 +150,8 @@ def _reduced(result: TestResult) -> Rows:
     cells = len(conditions[0].indications) if conditions else 0
     plain = [name for name in CONDITION_FIELDS if name != "indications"]
     yield [*(header(name) for name in plain), *(f"indication_{i + 1}" for i in range(cells))]
-    for one in conditions:
-        yield [*(getattr(one, name) for name in plain), *one.indications]
+    for condition in conditions:
+        yield [*(getattr(condition, name) for name in plain), *condition.indications]
 
 
 def _all_fits(result: TestResult) -> list[tuple[str, float, CurveFit]]:
@@ -179,8 +180,8 @@ def _fits(result: TestResult) -> Rows:
     for rotation, load, fit in fits:
         flat = [getattr(fit, name) for name in plain]
         flat = [" ".join(value) if isinstance(value, tuple) else value for value in flat]
-        given = [part for name in estimates for part in _parts(getattr(fit, name))]
-        yield [rotation, load, *flat, *given]
+        numbers = [part for name in estimates for part in _parts(getattr(fit, name))]
+        yield [rotation, load, *flat, *numbers]
 
 
 def _parts(estimate: Estimate | None) -> list[Any]:
@@ -192,66 +193,74 @@ def _parts(estimate: Estimate | None) -> list[Any]:
 def _parameters(result: TestResult) -> Rows:
     yield ("fit", "parameter", "value", "standard_error", "dof", "low_95", "high_95", "unit")
     for index, (_, _, fit) in enumerate(_all_fits(result)):
-        for one in fit.parameters:
-            low, high = one.interval95 or (None, None)
-            yield (index, one.name, one.value, one.standard_error, one.dof, low, high, one.unit)
+        for parameter in fit.parameters:
+            low, high = parameter.interval95 or (None, None)
+            yield (
+                index,
+                parameter.name,
+                parameter.value,
+                parameter.standard_error,
+                parameter.dof,
+                low,
+                high,
+                parameter.unit,
+            )
 
 
 def _covariances(result: TestResult) -> Rows:
     yield ("fit", "parameter", "with", "covariance")
     for index, (_, _, fit) in enumerate(_all_fits(result)):
-        for one, row in zip(fit.parameters, fit.covariance, strict=False):
-            for other, value in zip(fit.parameters, row, strict=False):
-                yield (index, one.name, other.name, value)
+        for parameter, row in zip(fit.parameters, fit.covariance, strict=False):
+            for partner, value in zip(fit.parameters, row, strict=False):
+                yield (index, parameter.name, partner.name, value)
 
 
 def _characteristics(result: TestResult) -> Rows:
     yield ("load_N", "rotation", "name", "value", "u", "dof", "unit")
     for direction in result.characteristics.fits:
         yield (direction.load_N, direction.rotation, "group", None, None, None, None)
-    for stiffness in result.characteristics.stiffness:
-        for field in dataclasses.fields(stiffness)[2:]:
-            estimate = getattr(stiffness, field.name)
-            yield (stiffness.load_N, stiffness.rotation, field.name, *_parts(estimate))
-    for pull in result.characteristics.pull:
-        for field in dataclasses.fields(pull)[1:]:
-            yield (pull.load_N, "both", field.name, *_parts(getattr(pull, field.name)))
+    rows = [row for row in result.characteristics.rows if row.SA_rad is None]
+    for row in sorted(rows, key=lambda row: row.rotation == BOTH):
+        yield (row.load_N, row.rotation, row.name, *_parts(row.estimate))
 
 
 def _at_angles(result: TestResult) -> Rows:
     yield ("load_N", "rotation", "SA_rad", "name", "value", "u", "dof", "unit")
-    for one in result.characteristics.at_angles:
-        for name in ("FY", "MZ"):
-            yield (one.load_N, one.rotation, one.SA_rad, name, *_parts(getattr(one, name)))
+    for row in result.characteristics.rows:
+        if row.SA_rad is not None:
+            yield (row.load_N, row.rotation, row.SA_rad, row.name, *_parts(row.estimate))
 
 
 def _points(result: TestResult) -> Rows:
     yield ("file", "first_row", "u_FY [N]", "u_MZ [N*m]")
-    for one in result.characteristics.points:
-        yield (one.file, one.first_row, one.u_FY, one.u_MZ)
+    for point in result.characteristics.points:
+        yield (point.file, point.first_row, point.u_FY, point.u_MZ)
 
 
 def _budgets(result: TestResult) -> Rows:
     yield ("load_N", "rotation", "name", "source", "u", "unit")
-    for one in result.characteristics.budgets:
-        for source, u in one.sources or (("", None),):
-            yield (one.load_N, one.rotation, one.name, source, u, one.unit)
+    for row in result.characteristics.rows:
+        if row.SA_rad is None and row.estimate is not None:
+            for source, u in row.sources or (("", None),):
+                yield (row.load_N, row.rotation, row.name, source, u, row.estimate.unit)
 
 
 def _findings(findings: Sequence[Finding]) -> Rows:
     yield ("level", "rule", "where", "message")
-    for one in findings:
-        yield (one.level, one.rule, one.where, one.message)
+    for finding in findings:
+        yield (finding.level, finding.rule, finding.where, finding.message)
 
 
 def _raw(recordings: Mapping[str, Recording]) -> Rows:
     if not recordings:
         yield ("file", "row")
         return
-    columns = list(dict.fromkeys((s.symbol, s.unit) for one in recordings.values() for s in one.series))
+    columns = list(
+        dict.fromkeys((s.symbol, s.unit) for recording in recordings.values() for s in recording.series)
+    )
     yield ["file", "row", *(f"{symbol} [{unit}]" for symbol, unit in columns)]
-    for name, one in recordings.items():
-        mine = {(s.symbol, s.unit): s.values.tolist() for s in one.series}
-        lists = [mine.get(key, [None] * one.rows) for key in columns]
+    for name, recording in recordings.items():
+        mine = {(s.symbol, s.unit): s.values.tolist() for s in recording.series}
+        lists = [mine.get(key, [None] * recording.rows) for key in columns]
         for row, values in enumerate(zip(*lists, strict=True), start=1):
             yield [name, row, *values]

@@ -119,26 +119,26 @@ def balance(tread: Tread, sx: Array, sy: Array, *, lines: int = 1, near: Balance
     near : the balance of a state near each case, to start from; where that did not settle its slopes stand,
         for what is searched again there is another side of the same jump
     """
-    made = [
-        _balance(tread.take(one), sx[one], sy[one], lines, None if near is None else near.take(one))
-        for one in _parts(tread, sx, lines)
+    parts = [
+        _balance(tread.take(part), sx[part], sy[part], lines, None if near is None else near.take(part))
+        for part in _parts(tread, sx, lines)
     ]
     none = Balance(
         sums=np.zeros((3, 0)), slopes=np.zeros((2, 0)), inverse=np.zeros((2, 2, 0)), settled=np.zeros(0, bool)
     )
     return Balance(
-        sums=np.concatenate([none.sums, *(one.sums for one in made)], axis=1),
-        slopes=np.concatenate([none.slopes, *(one.slopes for one in made)], axis=1),
-        inverse=np.concatenate([none.inverse, *(one.inverse for one in made)], axis=2),
-        settled=np.concatenate([none.settled, *(one.settled for one in made)]),
+        sums=np.concatenate([none.sums, *(part.sums for part in parts)], axis=1),
+        slopes=np.concatenate([none.slopes, *(part.slopes for part in parts)], axis=1),
+        inverse=np.concatenate([none.inverse, *(part.inverse for part in parts)], axis=2),
+        settled=np.concatenate([none.settled, *(one.settled for one in parts)]),
     )
 
 
-def sharpened(tread: Tread, sx: Array, sy: Array, found: Balance, *, lines: int = 1) -> Balance:
+def sharpened(tread: Tread, sx: Array, sy: Array, balance: Balance, *, lines: int = 1) -> Balance:
     """Return a balance with the ``inverse`` of differences: worth it where many states start from one."""
-    inverse = found.inverse.copy()
+    inverse = balance.inverse.copy()
     for one in _parts(tread, sx, lines):
-        part, here = tread.take(one), found.take(one)
+        part, here = tread.take(one), balance.take(one)
         made = [here.sums]
         for nudge in np.eye(2) * _NUDGE:
             moved = here.slopes + nudge[:, None]
@@ -149,7 +149,7 @@ def sharpened(tread: Tread, sx: Array, sy: Array, found: Balance, *, lines: int 
         good = np.abs(det) > 1e-3
         sharp = np.array([[d, -b], [-c, a]]) / np.where(good, det, 1.0)
         inverse[..., one] = np.where(good, sharp, here.inverse)
-    return Balance(sums=found.sums, slopes=found.slopes, inverse=inverse, settled=found.settled)
+    return Balance(sums=balance.sums, slopes=balance.slopes, inverse=inverse, settled=balance.settled)
 
 
 def _parts(tread: Tread, sx: Array, lines: int) -> list[NDArray[np.intp]]:

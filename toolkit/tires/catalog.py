@@ -53,16 +53,18 @@ def model(name: str) -> TireModel:
     FitError
         no model of that name is built, or it is one over all loads
     """
-    found = find(name)
-    if isinstance(found, GlobalModel):
+    tire_model = find(name)
+    if isinstance(tire_model, GlobalModel):
         raise FitError(
             f"{name} is a model over all loads", where=name, got=name, expected="a model of one load",
             next_step="fit it by toolkit.tires.global_fit", rule="unknown-model",
         )  # fmt: skip
-    return found
+    return tire_model
 
 
-def fit_model(one: TireModel, curves: Sequence[Curve], *, loss: Loss = "linear") -> tuple[CurveFit, ...]:
+def fit_model(
+    tire_model: TireModel, curves: Sequence[Curve], *, loss: Loss = "linear"
+) -> tuple[CurveFit, ...]:
     """Return one fit a curve, without start values, by the model's own fitter.
 
     Raises
@@ -70,4 +72,4 @@ def fit_model(one: TireModel, curves: Sequence[Curve], *, loss: Loss = "linear")
     FitError
         a curve cannot be fitted
     """
-    return cast("tuple[CurveFit, ...]", import_module(one.fitter).fit_curves(curves, loss=loss))
+    return cast("tuple[CurveFit, ...]", import_module(tire_model.fitter).fit_curves(curves, loss=loss))

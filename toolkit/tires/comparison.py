@@ -13,8 +13,7 @@ from toolkit.channels import signs
 from toolkit.tires.evaluate import value_at
 from toolkit.tires.global_data import CHANNELS, Measured, cell
 from toolkit.tires.global_fit import undetermined
-from toolkit.tires.global_model import GlobalModel, make_rows
-from toolkit.tires.global_result import ModelFit, pooled_percent
+from toolkit.tires.global_model import GlobalModel, ModelFit, make_rows, pooled_percent
 from toolkit.tires.model import CurveFit
 from toolkit.tires.quality import scatter_floor_percent
 
@@ -93,8 +92,8 @@ def compare(
 ) -> Comparison:
     """Return the table of the models that were fitted to these rows; ``curves`` are of single loads."""
     made = []
-    for name in dict.fromkeys(one.model for one in curves):
-        own = [one for one in curves if one.model == name]
+    for name in dict.fromkeys(curve.model for curve in curves):
+        own = [curve for curve in curves if curve.model == name]
         for channel in ("FY", "MZ"):
             if channel in data.channels and any(one.channel == channel for one in own):
                 made += _of_curves(data, [one for one in own if one.channel == channel])
@@ -142,23 +141,23 @@ def _rows(
     not_determined: tuple[str, ...],
 ) -> list[ComparisonRow]:
     pure = np.abs(data.rows.KAPPA) <= _FREE
-    made = []
-    for condition, own in (("pure", known & pure), ("combined", known & ~pure)):
-        if own.any():
-            made.append(
+    rows = []
+    for condition, rows_of in (("pure", known & pure), ("combined", known & ~pure)):
+        if rows_of.any():
+            rows.append(
                 ComparisonRow(
                     model=name,
                     channel=channel,
                     condition=condition,
-                    n=int(own.sum()),
+                    n=int(rows_of.sum()),
                     parameters=parameters,
-                    error_percent=pooled_percent(model[own] - y[own], y[own]),
+                    error_percent=pooled_percent(model[rows_of] - y[rows_of], y[rows_of]),
                     prediction_error_percent=prediction if condition == "pure" or not pure.any() else None,
                     converged=converged,
                     not_determined=not_determined,
                 )
             )
-    return made
+    return rows
 
 
 def model_curve(
@@ -172,5 +171,5 @@ def model_curve(
         UNLOADED_RADIUS=r.UNLOADED_RADIUS,
     )  # fmt: skip
     with np.errstate(all="ignore"):
-        made = model.forces(fit.values.tolist(), rows)[channel]
-    return np.asarray(flip.get(channel, 1) * np.broadcast_to(made, len(rows)))
+        predicted = model.forces(fit.values.tolist(), rows)[channel]
+    return np.asarray(flip.get(channel, 1) * np.broadcast_to(predicted, len(rows)))

@@ -76,10 +76,10 @@ def zero_crossing(fit: CurveFit, near: float = 0.0) -> Estimate | None:
 
 def _estimate(fit: CurveFit, value: float, gradient: NDArray[np.float64], unit: str) -> Estimate:
     variance = float(gradient @ np.asarray(fit.covariance) @ gradient)
-    known = fit.value_at_zero or fit.slope_at_zero
+    at_zero = fit.value_at_zero or fit.slope_at_zero
     return Estimate(
         value=value,
         u=math.sqrt(max(variance, 0.0)),
         unit=unit,
-        dof=known.dof if known is not None else float(fit.dof),
+        dof=at_zero.dof if at_zero is not None else float(fit.dof),
     )

@@ -83,8 +83,8 @@ def fit_curves(curves: Sequence[Curve], *, loss: Loss = "linear") -> tuple[Curve
         parts = [[batch[i] for i in group] for group in groups]
         scaled = [_normalise(part) for part in parts]
         solved = _solved([problems for problems, _ in scaled], loss)
-        for group, part, (_, scale), one in zip(groups, parts, scaled, solved, strict=True):
-            fits.update(zip([first + i for i in group], _fit_group(part, scale, *one, loss), strict=True))
+        for group, part, (_, scale), fitted in zip(groups, parts, scaled, solved, strict=True):
+            fits.update(zip([first + i for i in group], _fit_group(part, scale, *fitted, loss), strict=True))
     return tuple(fits[i] for i in range(len(curves)))
 
 
@@ -191,9 +191,12 @@ def _normalise(curves: Sequence[Curve]) -> tuple[Problems, _Scale]:
 def _solved(groups: Sequence[Problems], loss: Loss) -> list[tuple[Problems, Solution, Array]]:
     # Each group's problems with their final weights, its minima, and the inflation of their variance.
     if loss == "robust":
-        robust = [solve_robust(one) for one in groups]
+        robust = [solve_robust(group) for group in groups]
         return [(problems, solution, inflation) for solution, problems, inflation in robust]
-    return [(one, solution, np.ones(len(one.u))) for one, solution in zip(groups, solve(groups), strict=True)]
+    return [
+        (group, solution, np.ones(len(group.u)))
+        for group, solution in zip(groups, solve(groups), strict=True)
+    ]
 
 
 def _fit_group(
@@ -211,13 +214,13 @@ def _fit_group(
     # Known uncertainties are a floor: scatter or misfit beyond them widens the intervals (Birge).
     cost = np.maximum(inflation * solution.state.cost, _TINY_VARIANCE * (lengths - 6))
     noise = noise_of(residual * problems.sw, columns, lengths, cost, scale.known)
-    found = spread(solution, problems, zero=-scale.middle / scale.half, noise=noise)
+    spreads = spread(solution, problems, zero=-scale.middle / scale.half, noise=noise)
     return [
         _result(
             curve,
             i,
             solution,
-            found,
+            spreads,
             scale,
             residual[i, : len(curve.y)],
             float(noise.time[i]),
@@ -231,25 +234,25 @@ def _result(
     curve: Curve,
     i: int,
     solution: Solution,
-    found: Spread,
+    spread: Spread,
     scale: _Scale,
     residual: Array,
     time: float,
     loss: Loss,
 ) -> CurveFit:
-    middle, half, top = (float(one[i]) for one in (scale.middle, scale.half, scale.top))
+    middle, half, top = (float(column[i]) for column in (scale.middle, scale.half, scale.top))
     factor = np.array([1 / half, 1.0, top, 1.0, half, top])
-    values = found.theta[i] * factor
+    values = spread.theta[i] * factor
     values[4] -= middle
-    covariance = found.covariance[i] * np.outer(factor, factor)
-    errors = found.error[i] * np.abs(factor)
-    ends = found.ends[i] * factor[:, None]
+    covariance = spread.covariance[i] * np.outer(factor, factor)
+    errors = spread.error[i] * np.abs(factor)
+    ends = spread.ends[i] * factor[:, None]
     ends[4] -= middle
     names = [spec.name for spec in MODEL.parameters]
-    determined, bound = found.determined[i], found.at_bound[i]
+    determined, bound = spread.determined[i], spread.at_bound[i]
     unit = CHANNEL_UNIT[curve.channel]
 
-    dof = [float(one) for one in found.dof[i]]
+    dof = [float(count) for count in spread.dof[i]]
 
     def estimate(value: float, u: float, factor: float, unit: str, dof: float) -> Estimate | None:
         if not np.isfinite(u):
@@ -284,8 +287,8 @@ def _result(
         at_bound=at_bound,
         error_percent=error_percent(residual * top, curve.y),
         scatter_floor_percent=scatter_floor_percent(curve.SA, curve.y),
-        slope_at_zero=estimate(found.slope[i], found.slope_se[i], top / half, f"{unit}/rad", dof[6]),
-        value_at_zero=estimate(found.value[i], found.value_se[i], top, unit, dof[7]),
+        slope_at_zero=estimate(spread.slope[i], spread.slope_se[i], top / half, f"{unit}/rad", dof[6]),
+        value_at_zero=estimate(spread.value[i], spread.value_se[i], top, unit, dof[7]),
         loss=loss,
         converged=converged,
         message=_message(curve, values, converged, not_determined, at_bound, time),
@@ -316,8 +319,8 @@ def _message(
         parts.append("the peak is not reached within the slip angles measured")
     if at_bound:
         parts.append(f"at its bound: {', '.join(at_bound)}")
-    if rest := [name for name in not_determined if name not in at_bound]:
-        parts.append(f"not determined by these data: {', '.join(rest)}")
+    if undetermined := [name for name in not_determined if name not in at_bound]:
+        parts.append(f"not determined by these data: {', '.join(undetermined)}")
     if curve.sigma is not None:
         parts.append("weighted by the stated standard uncertainties")
     if time > 1:

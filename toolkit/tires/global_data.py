@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from toolkit.channels import Axes, signs
-from toolkit.tires.blocks import load_blocks
 from toolkit.tires.global_model import Rows, make_rows
 
 if TYPE_CHECKING:
@@ -16,6 +15,43 @@ if TYPE_CHECKING:
 
     from toolkit.tires.global_model import Array
     from toolkit.tires.table import TireTable
+
+# Load blocks of a table: the gaps in the sorted loads, not a list of nominal ones.
+
+
+# Gaps are taken relative to the load above them: the spread within a block grows with the load.
+_SEPARATE = 0.04  # a smaller gap never parts two blocks
+_CONTRAST = 2.5  # between the smallest gap that parts blocks and the largest within one
+_RESOLVED = 0.008  # gaps below this are all alike
+
+
+def load_blocks(load: NDArray[np.float64]) -> tuple[NDArray[np.intp], ...]:
+    """Return the rows of each load block, ascending in load, rows in their order.
+
+    Parameters
+    ----------
+    load : (rows,) N, not negative
+
+    The sorted loads' gaps fall into large ones (between blocks) and small ones (within); the cut is where
+    the ratio of neighbouring gaps is largest. Without a clear cut there is one block.
+
+    >>> [block.tolist() for block in load_blocks(np.array([1000.0, 2000.0, 1010.0, 1995.0]))]
+    [[0, 2], [1, 3]]
+    """
+    order = np.argsort(load, kind="stable")
+    rising = load[order]
+    if len(load) < 2 or rising[-1] <= 0:
+        return (np.arange(len(load)),)
+    gaps = np.diff(rising) / np.maximum(rising[1:], 1e-9 * rising[-1])
+    falling = np.sort(gaps)[::-1]
+    following = np.maximum(np.append(falling[1:], 0.0), _RESOLVED)
+    contrast = np.where(falling >= _SEPARATE, falling / following, 0.0)
+    best = int(np.argmax(contrast))
+    if contrast[best] < _CONTRAST:
+        return (np.arange(len(load)),)
+    cuts = np.flatnonzero(gaps >= falling[best]) + 1
+    return tuple(np.sort(rows) for rows in np.split(order, cuts))
+
 
 CHANNELS = ("FX", "FY", "MZ")
 _NO_LOAD = 1.0  # N: a block below stands in the air
@@ -54,10 +90,10 @@ class Measured:
 
     def __getitem__(self, channel: str) -> Array:
         """Return a channel that was measured."""
-        found: Array | None = getattr(self, channel)
-        if found is None:
+        column: Array | None = getattr(self, channel)
+        if column is None:
             raise KeyError(channel)
-        return found
+        return column
 
     def take(self, index: NDArray[np.intp] | NDArray[np.bool_]) -> Measured:
         """Return some of the rows; blocks and loads keep their numbers."""
@@ -93,30 +129,30 @@ def measured(
     and LONGVL are the medians of what was recorded.
     """
     FZ = columns["FZ"]
-    blocks = [one for one in load_blocks(FZ) if FZ[one].mean() >= _NO_LOAD]
-    kept = np.sort(np.concatenate(blocks)) if blocks else np.zeros(0, dtype=np.intp)
+    blocks = [load_block for load_block in load_blocks(FZ) if FZ[load_block].mean() >= _NO_LOAD]
+    loaded = np.sort(np.concatenate(blocks)) if blocks else np.zeros(0, dtype=np.intp)
     number = np.zeros(len(FZ), dtype=np.intp)
-    for index, one in enumerate(blocks):
-        number[one] = index
-    loads = np.array([FZ[one].mean() for one in blocks])
+    for index, block in enumerate(blocks):
+        number[block] = index
+    loads = np.array([FZ[block].mean() for block in blocks])
     middle = (loads.min() + loads.max()) / 2 if len(loads) else 1.0
     nominal = rated_load_N or (float(loads[np.argmin(np.abs(loads - middle))]) if len(loads) else 1.0)
     pressure, speed = columns.get("P"), columns.get("V")
     rows = make_rows(
-        columns["SA"][kept],
-        FZ[kept],
-        IA=columns["IA"][kept] if "IA" in columns else 0.0,
-        P=None if pressure is None else pressure[kept],
-        V=None if speed is None else np.abs(speed[kept]),
-        KAPPA=columns["KAPPA"][kept] if "KAPPA" in columns else 0.0,
+        columns["SA"][loaded],
+        FZ[loaded],
+        IA=columns["IA"][loaded] if "IA" in columns else 0.0,
+        P=None if pressure is None else pressure[loaded],
+        V=None if speed is None else np.abs(speed[loaded]),
+        KAPPA=columns["KAPPA"][loaded] if "KAPPA" in columns else 0.0,
         FNOMIN=nominal,
         NOMPRES=200e3 if pressure is None else float(np.median(pressure)),
         LONGVL=16.7 if speed is None or not np.any(speed) else float(np.median(np.abs(speed))),
         UNLOADED_RADIUS=unloaded_radius_m,
     )
     return Measured(
-        rows=rows, axes=axes, block=number[kept], loads=loads, given=frozenset(columns),
-        **{name: columns[name][kept] for name in CHANNELS if name in columns},
+        rows=rows, axes=axes, block=number[loaded], loads=loads, given=frozenset(columns),
+        **{name: columns[name][loaded] for name in CHANNELS if name in columns},
     )  # fmt: skip
 
 
@@ -129,33 +165,33 @@ def of_table(table: TireTable, *, rated_load_N: float | None = None, radius_m: f
 
 def what_varies(data: Measured) -> frozenset[str]:
     """Return which of a parameter's ``needs`` the rows meet (`toolkit.tires.global_model.Need`)."""
-    r, found = data.rows, set()
+    r, varying = data.rows, set()
     if not len(r):
         return frozenset()
     loads = len(np.unique(data.block))
     sweeps = np.ptp(r.FZ) > _LOAD * r.FZ.max()
     if loads >= 2 or sweeps:
-        found.add("two_loads")
+        varying.add("two_loads")
     if loads >= _FEW or (loads == 1 and sweeps):
-        found.add("three_loads")
+        varying.add("three_loads")
     if _range(r.IA) > _CAMBER:
-        found.add("camber")
+        varying.add("camber")
     pressure = r.P / np.median(r.P)
     if _range(pressure) > _PRESSURE:
-        found.add("pressure")
+        varying.add("pressure")
         if len(np.unique(np.rint(pressure / _PRESSURE))) >= _FEW:
-            found.add("three_pressures")
+            varying.add("three_pressures")
     if _range(r.V) > _SPEED * np.median(r.V):
-        found.add("speed")
+        varying.add("speed")
     if r.SA.min() < -_ANGLE and r.SA.max() > _ANGLE:
-        found.add("both_signs")
+        varying.add("both_signs")
     if np.ptp(r.KAPPA) > _SLIP:
-        found.add("kappa")
+        varying.add("kappa")
         if r.KAPPA.min() < -_SLIP and r.KAPPA.max() > _SLIP:
-            found.add("both_kappas")
+            varying.add("both_kappas")
         if np.ptp(r.SA[np.abs(r.KAPPA) > _SLIP]) > _ANGLE if np.any(np.abs(r.KAPPA) > _SLIP) else False:
-            found.add("alpha_and_kappa")
-    return frozenset(found)
+            varying.add("alpha_and_kappa")
+    return frozenset(varying)
 
 
 def _range(column: Array) -> float:

@@ -11,12 +11,10 @@ import numpy as np
 from toolkit.channels import signs
 from toolkit.errors import FitError
 from toolkit.findings import Finding
-from toolkit.tires.global_checks import LACKS, why_not_global
 from toolkit.tires.global_data import CHANNELS, Measured, binned, what_varies
-from toolkit.tires.global_model import GlobalModel, Rows, Seeds
+from toolkit.tires.global_model import GlobalFit, GlobalModel, ModelFit, Rows, Seeds
 from toolkit.tires.global_report import Report
-from toolkit.tires.global_result import GlobalFit, ModelFit
-from toolkit.tires.global_seeds import seeds_of
+from toolkit.tires.global_seeds import LACKS, seeds_of, why_not_global
 from toolkit.tires.global_stage import Found, Task, refit, run
 from toolkit.tires.model import LOSSES, Loss
 
@@ -52,10 +50,10 @@ def fit_global(
     FitError
         what `why_not_global` says, an unknown loss or weighting
     """
-    for name, got, known in (("loss", loss, LOSSES), ("weights", weights, WEIGHTS)):
-        if got not in known:
+    for name, got, choices in (("loss", loss, LOSSES), ("weights", weights, WEIGHTS)):
+        if got not in choices:
             raise FitError(
-                f"unknown {name} {got!r}", where=f"--{name}", got=got, expected=", ".join(known),
+                f"unknown {name} {got!r}", where=f"--{name}", got=got, expected=", ".join(choices),
                 next_step="name one of those expected", rule=f"unknown-{name}",
             )  # fmt: skip
     if (problem := why_not_global(data, model)) is not None:
@@ -67,18 +65,18 @@ def fit_global(
 
 def global_findings(fit: ModelFit) -> list[Finding]:
     """Return a finding for each channel whose minimum is not confirmed, a note for what data do not say."""
-    found = []
-    for one in fit.fits:
-        where = f"{one.model} {one.channel} over all loads"
-        if not one.converged:
-            found.append(Finding(rule="not-converged", where=where, message=one.message))
-        if one.converged and (open_ := undetermined(one)):
+    findings = []
+    for channel_fit in fit.fits:
+        where = f"{channel_fit.model} {channel_fit.channel} over all loads"
+        if not channel_fit.converged:
+            findings.append(Finding(rule="not-converged", where=where, message=channel_fit.message))
+        if channel_fit.converged and (open_ := undetermined(channel_fit)):
             text = f"not determined by these data: {', '.join(open_)}"
-            found.append(Finding(rule="not-determined", where=where, message=text, level="note"))
-        if one.at_bound:
-            text = f"{', '.join(one.at_bound)}: the search ended at the bound"
-            found.append(Finding(rule="at-bound", where=where, message=text, level="note"))
-    return found
+            findings.append(Finding(rule="not-determined", where=where, message=text, level="note"))
+        if channel_fit.at_bound:
+            text = f"{', '.join(channel_fit.at_bound)}: the search ended at the bound"
+            findings.append(Finding(rule="at-bound", where=where, message=text, level="note"))
+    return findings
 
 
 def undetermined(fit: GlobalFit) -> tuple[str, ...]:
@@ -110,14 +108,14 @@ class _Fitter:
         self.data = data.turned(model.axes)
         self.flip = signs(model.axes, data.axes)
         self.varies = what_varies(data)
-        self.starts = np.stack([self._start(one) for one in model.starts(seeds)])
+        self.starts = np.stack([self._start(start) for start in model.starts(seeds)])
         self.values = self.starts[0].copy()
         self.sigma: dict[str, Array] = {}
 
-    def _start(self, given: object) -> Array:
-        low = np.array([one.low for one in self.model.parameters])
-        high = np.array([one.high for one in self.model.parameters])
-        return np.clip(self.model.values(given), low, high)  # type: ignore[arg-type]
+    def _start(self, stated: object) -> Array:
+        low = np.array([parameter.low for parameter in self.model.parameters])
+        high = np.array([parameter.high for parameter in self.model.parameters])
+        return np.clip(self.model.values(stated), low, high)  # type: ignore[arg-type]
 
     def stages(self) -> list[tuple[str, ...]]:
         """Return the channels of each stage."""
@@ -129,7 +127,7 @@ class _Fitter:
         return [(name,) for name in have]
 
     def result(self, *, predict: bool) -> ModelFit:
-        found: dict[tuple[str, ...], Found] = {}
+        founds: dict[tuple[str, ...], Found] = {}
         for channels in self.stages():
             free, fixed = self._free(channels)
             stage = self._run(channels, free, self.data)
@@ -138,13 +136,13 @@ class _Fitter:
                 stage = self._run(channels, free, self.data, (stage.values,))
             stage = replace(stage, fixed=(*fixed, *stage.fixed))
             self.values = stage.values
-            found[channels] = stage
+            founds[channels] = stage
         curves = self._curves(self.values, self.data)
         report = Report(
             model=self.model, given=self.given, data=self.data, values=self.values, curves=curves,
-            predicted=self._predict(found) if predict else {}, loss=self.loss, weights=self.weights,
+            predicted=self._predict(founds) if predict else {}, loss=self.loss, weights=self.weights,
         )  # fmt: skip
-        fits = [report.fit(name, channels, stage) for channels, stage in found.items() for name in channels]
+        fits = [report.fit(name, channels, stage) for channels, stage in founds.items() for name in channels]
         return ModelFit(
             model=self.model.name, values=self.values, fits=tuple(fits), curves=tuple(curves.items())
         )
@@ -152,16 +150,16 @@ class _Fitter:
     def _free(self, channels: tuple[str, ...]) -> tuple[tuple[int, ...], tuple[tuple[int, str], ...]]:
         # What a stage searches, and what it cannot, with the reason.
         free, fixed = [], []
-        for place, one in enumerate(self.model.parameters):
-            if one.stage not in channels and not (self.model.joint and one.stage in ("FY", "MZ")):
+        for place, parameter in enumerate(self.model.parameters):
+            if parameter.stage not in channels and not (self.model.joint and parameter.stage in ("FY", "MZ")):
                 continue
-            if self.model.joint and channels == ("FX",) and one.stage != "FX":
+            if self.model.joint and channels == ("FX",) and parameter.stage != "FX":
                 continue
-            lacks = [need for need in one.needs if need not in self.varies]
+            lacks = [need for need in parameter.needs if need not in self.varies]
             if lacks:
-                self.values[place] = one.default
-                self.starts[:, place] = one.default
-                fixed.append((place, f"{LACKS[lacks[0]]}: fixed at {one.default:g}"))
+                self.values[place] = parameter.default
+                self.starts[:, place] = parameter.default
+                fixed.append((place, f"{LACKS[lacks[0]]}: fixed at {parameter.default:g}"))
             else:
                 free.append(place)
         limit = len(self.data) * len(channels) - 2
@@ -205,33 +203,33 @@ class _Fitter:
         self.sigma[channels[0]] = np.clip(size, middle / 3, middle * 3)[self.data.block]
 
     def _curves(self, values: Array, data: Measured) -> dict[str, Array]:
-        made = self._forces(list(values), data.rows)
+        responses = self._forces(list(values), data.rows)
         return {
-            name: np.broadcast_to(self.flip.get(name, 1) * made[name], len(data)).astype(np.float64)
+            name: np.broadcast_to(self.flip.get(name, 1) * responses[name], len(data)).astype(np.float64)
             for stage in self.stages()
             for name in stage
         }
 
     def _forces(self, values: list[object], rows: Rows) -> dict[str, Array]:
         with np.errstate(all="ignore"):
-            made = self.model.forces(values, rows)
-        return {name: made[name] for name in self.model.channels if getattr(made, name) is not None}
+            responses = self.model.forces(values, rows)
+        return {name: responses[name] for name in self.model.channels if getattr(responses, name) is not None}
 
-    def _predict(self, found: dict[tuple[str, ...], Found]) -> dict[str, Array]:
+    def _predict(self, founds: dict[tuple[str, ...], Found]) -> dict[str, Array]:
         # Every block predicted by a fit that never saw it, from where the whole fit ended.
         blocks = np.unique(self.data.block)
         if len(blocks) < _PREDICT_FROM:
             return {}
-        predicted = {name: np.zeros(len(self.data)) for channels in found for name in channels}
+        predicted = {name: np.zeros(len(self.data)) for channels in founds for name in channels}
         kept_values, kept_starts, kept_sigma = self.values.copy(), self.starts, dict(self.sigma)
         for block in blocks:
             own = self.data.block == block
-            rest = self.data.take(~own)
+            others = self.data.take(~own)
             self.values = kept_values.copy()
-            self.sigma = {name: one[~own] for name, one in kept_sigma.items()}
-            for channels, stage in found.items():
+            self.sigma = {name: values[~own] for name, values in kept_sigma.items()}
+            for channels, stage in founds.items():
                 self.starts = self.values[None]
-                self.values = self._refit(channels, stage.left, rest)
+                self.values = self._refit(channels, stage.left, others)
             curves = self._curves(self.values, self.data.take(own))
             for name, column in predicted.items():
                 column[own] = curves[name]

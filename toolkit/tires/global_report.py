@@ -10,8 +10,7 @@ import numpy as np
 from toolkit.channels import signs
 from toolkit.estimate import Estimate
 from toolkit.tires.global_data import Measured, cell
-from toolkit.tires.global_model import GlobalModel, make_rows
-from toolkit.tires.global_result import GlobalFit, LoadShare, pooled_percent
+from toolkit.tires.global_model import GlobalFit, GlobalModel, LoadShare, make_rows, pooled_percent
 from toolkit.tires.global_stage import Found
 from toolkit.tires.model import Parameter
 from toolkit.tires.quality import scatter_floor_percent
@@ -50,9 +49,9 @@ class Report:
         no_slip = float(np.ptp(self.data.rows.KAPPA)) == 0.0
         own = [
             place
-            for place, one in enumerate(parameters)
-            if (one.stage == channel or (joint and one.stage in channels))
-            and not (no_slip and _SLIP & set(one.needs))
+            for place, parameter in enumerate(parameters)
+            if (parameter.stage == channel or (joint and parameter.stage in channels))
+            and not (no_slip and _SLIP & set(parameter.needs))
         ]
         errors = dict(zip(stage.left, np.sqrt(np.maximum(np.diag(stage.covariance), 0.0)), strict=True))
         fixed = dict(stage.fixed)
@@ -61,8 +60,8 @@ class Report:
         converged = stage.agreeing >= 2
         away = self.predicted.get(channel)
         floor = scatter_floor_percent(self.given.rows.SA, y, cell(self.given))
-        left = [place for place in stage.left if place in own]
-        index = [stage.left.index(place) for place in left]
+        free = [place for place in stage.left if place in own]
+        index = [stage.left.index(place) for place in free]
         at_bound = tuple(parameters[p].name for p in stage.bound if p in own)
         return GlobalFit(
             model=self.model.name,
@@ -99,11 +98,11 @@ class Report:
         )
 
     def _loads(self, channel: str, residual: Array, stage: Found) -> tuple[LoadShare, ...]:
-        y, away, made = self.given[channel], self.predicted.get(channel), []
+        y, away, errors = self.given[channel], self.predicted.get(channel), []
         for block in np.unique(self.data.block):
             own = self.data.block == block
             load = float(self.data.loads[block])
-            made.append(
+            errors.append(
                 LoadShare(
                     load_N=load,
                     n=int(own.sum()),
@@ -114,7 +113,7 @@ class Report:
                     ),
                 )
             )
-        return tuple(made)
+        return tuple(errors)
 
     def _slope(self, channel: str, load: float, stage: Found) -> Estimate | None:
         # The slope at SA = 0, upright, free rolling, at nominal pressure and speed; delta method.
@@ -125,24 +124,24 @@ class Report:
             [-_H, _H], load, FNOMIN=r.FNOMIN, NOMPRES=r.NOMPRES, LONGVL=r.LONGVL,
             UNLOADED_RADIUS=r.UNLOADED_RADIUS,
         )  # fmt: skip
-        left = [*stage.left, *stage.held]
-        size = np.array([self.model.parameters[place].size for place in left])
+        free = [*stage.left, *stage.held]
+        size = np.array([self.model.parameters[place].size for place in free])
         step = 1e-4 * size
         copies: list[object] = []
         for place, value in enumerate(self.values):
-            column = np.full((2 * len(left) + 1, 1), value)
-            if place in left:
-                i = left.index(place)
+            column = np.full((2 * len(free) + 1, 1), value)
+            if place in free:
+                i = free.index(place)
                 column[1 + i, 0] += step[i]
-                column[1 + len(left) + i, 0] -= step[i]
+                column[1 + len(free) + i, 0] -= step[i]
             copies.append(column)
         with np.errstate(all="ignore"):
-            made = self.model.forces(copies, rows)[channel]
-        y = np.broadcast_to(made, (2 * len(left) + 1, 2))
+            predicted = self.model.forces(copies, rows)[channel]
+        y = np.broadcast_to(predicted, (2 * len(free) + 1, 2))
         flip = signs(self.model.axes, self.given.axes)
         slopes = (y[:, 1] - y[:, 0]) / (2 * _H) * flip["SA"] * flip[channel]
-        gradient = (slopes[1 : len(left) + 1] - slopes[len(left) + 1 :]) / (2 * step)
-        variance = float(gradient @ stage.spread @ gradient) if left else 0.0
+        gradient = (slopes[1 : len(free) + 1] - slopes[len(free) + 1 :]) / (2 * step)
+        variance = float(gradient @ stage.spread @ gradient) if free else 0.0
         return Estimate(
             value=float(slopes[0]), u=float(np.sqrt(max(variance, 0.0))), unit=f"{_UNIT[channel]}/rad",
             dof=stage.dof,

@@ -67,11 +67,11 @@ def descend(residual: Residual, x: Array, box: Box, *, steps: int, tolerance: fl
     r, J = linearise(residual, x, box)
     cost = np.vecdot(r, r)
     for _ in range(steps):
-        here = x[alive]
+        place = x[alive]
         gradient = np.matvec(J, r)
-        frozen = ((here <= box.low) & (gradient > 0)) | ((here >= box.high) & (gradient < 0))
+        frozen = ((place <= box.low) & (gradient > 0)) | ((place >= box.high) & (gradient < 0))
         delta, predicted = _step(J, gradient, frozen, damping, radius)
-        trial = np.clip(here + delta * box.size, box.low, box.high)
+        trial = np.clip(place + delta * box.size, box.low, box.high)
         new_r = _call(residual, trial, box)
         new = np.vecdot(new_r, new_r)
         decrease = cost - new
@@ -161,14 +161,14 @@ def spread_starts(base: Array, box: Box, count: int, *, reach: float) -> Array:
 
 
 def _van_der_corput(count: int, base: int) -> Array:
-    found = np.zeros(count)
+    damping_used = np.zeros(count)
     for index in range(count):
         n, share = index + 17, 1.0  # the first terms of large bases are all small
         while n:
             share /= base
-            found[index] += share * (n % base)
+            damping_used[index] += share * (n % base)
             n //= base
-    return found
+    return damping_used
 
 
 def _primes(count: int) -> list[int]:

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from toolkit.estimate import coverage_factor
-from toolkit.tires.autocorrelation import autocorrelation_time
+from toolkit.tires.colour import autocorrelation_time
 from toolkit.tires.global_data import Measured
 from toolkit.tires.global_solver import Box, Descent, descend, linearise, spread_starts
 
@@ -92,9 +92,9 @@ class Misfit:
         for place, column in zip(self.free, x.T, strict=True):
             values[place] = column[:, None]
         with np.errstate(all="ignore"):
-            made = self.model.forces(values, self.data.rows)
+            responses = self.model.forces(values, self.data.rows)
         shape = (len(x), len(self.data))
-        parts = [np.broadcast_to(made[name] / self.scale[name], shape) for name in self.channels]
+        parts = [np.broadcast_to(responses[name] / self.scale[name], shape) for name in self.channels]
         r: Array = np.concatenate(parts, axis=1) - self.y
         return np.nan_to_num(r, nan=1e3, posinf=1e3, neginf=-1e3)
 
@@ -106,9 +106,9 @@ class Misfit:
         """Return bounds and sizes of the free parameters."""
         own = [self.model.parameters[place] for place in self.free]
         return Box(
-            low=np.array([one.low for one in own]),
-            high=np.array([one.high for one in own]),
-            size=np.array([one.size for one in own]),
+            low=np.array([parameter.low for parameter in own]),
+            high=np.array([parameter.high for parameter in own]),
+            size=np.array([parameter.size for parameter in own]),
             cost_per_copy=len(self.data) * self.model.grid,
         )
 
@@ -149,8 +149,8 @@ def run(task: Task, coarse: Measured, count: Array, width: float) -> Found:
     time, variance, dof = _noise(judged, x)
     fixed: list[tuple[int, str]] = []
     x = _prune(work, x, variance, dof, fixed)
-    for one in (judged, rows):
-        one.base, one.free = work.base.copy(), list(work.free)
+    for misfit_of in (judged, rows):
+        misfit_of.base, misfit_of.free = work.base.copy(), list(work.free)
     misfit = rows if cheap else search
     if cheap:
         x = descend(rows, x, rows.box(), steps=10, tolerance=1e-10).x
@@ -215,12 +215,12 @@ def _round(
     # A round of starts, joined with where the best of earlier rounds ended.
     first, keep, last = plan
     early = descend(misfit, x, box, steps=first, tolerance=1e-4)
-    found = descend(misfit, early.x[:keep].copy(), box, steps=last, tolerance=1e-6)
+    descent = descend(misfit, early.x[:keep].copy(), box, steps=last, tolerance=1e-6)
     if best is not None:
-        cost = np.concatenate([best.cost, found.cost])
+        cost = np.concatenate([best.cost, descent.cost])
         order = np.argsort(cost, kind="stable")
-        found = Descent(x=np.concatenate([best.x, found.x])[order], cost=cost[order])
-    return found, len(x)
+        descent = Descent(x=np.concatenate([best.x, descent.x])[order], cost=cost[order])
+    return descent, len(x)
 
 
 def _reweight(misfit: Misfit, x: Array) -> tuple[Array, Array]:
@@ -256,9 +256,9 @@ def _noise(rows: Misfit, x: Array) -> tuple[float, float, float]:
         autocorrelation_time(part, own)
         for part, own in zip(np.split(r, channels), np.split(columns, channels, axis=1), strict=True)
     )
-    used = float(np.count_nonzero(rows.weight > 1e-3 * rows.weight.max()))  # outliers are no rows
-    left = max(used - len(rows.free), 1.0)
-    return time, max(float(r @ r) / left, 1e-26) * time, max(used / time - len(rows.free), 1.0)
+    effective_rows = float(np.count_nonzero(rows.weight > 1e-3 * rows.weight.max()))  # outliers are no rows
+    freedom = max(effective_rows - len(rows.free), 1.0)
+    return time, max(float(r @ r) / freedom, 1e-26) * time, max(effective_rows / time - len(rows.free), 1.0)
 
 
 def _covariance(misfit: Misfit, x: Array, variance: float) -> tuple[Array, Array]:
@@ -277,7 +277,7 @@ def _covariance(misfit: Misfit, x: Array, variance: float) -> tuple[Array, Array
 
 def _at_bound(x: Array, box: Box) -> Sequence[bool]:
     margin = 1e-4 * box.size
-    return [bool(one) for one in (x <= box.low + margin) | (x >= box.high - margin)]
+    return [bool(is_at_bound) for is_at_bound in (x <= box.low + margin) | (x >= box.high - margin)]
 
 
 def _prune(misfit: Misfit, x: Array, variance: float, dof: float, fixed: list[tuple[int, str]]) -> Array:
@@ -288,7 +288,7 @@ def _prune(misfit: Misfit, x: Array, variance: float, dof: float, fixed: list[tu
     factor = coverage_factor(dof)
     kept: set[int] = set()
     r = misfit(x)[0]
-    whole, rounding = float(r @ r), _EXACT * float(np.sum((misfit.y * misfit.weight) ** 2))
+    total, rounding = float(r @ r), _EXACT * float(np.sum((misfit.y * misfit.weight) ** 2))
     while misfit.free:
         box = misfit.box()
         _, errors = _covariance(misfit, x, variance)
@@ -306,8 +306,8 @@ def _prune(misfit: Misfit, x: Array, variance: float, dof: float, fixed: list[tu
         misfit.hold(place, spec.default)
         trial = descend(misfit, others.copy(), misfit.box(), steps=12, tolerance=1e-7)
         count = len(fixed) + 1
-        allowed_rise = min(count * float(fdtri(count, dof, _LEVEL)) * variance, _SAME * whole)
-        if trial.cost[0] <= whole + allowed_rise + rounding:
+        allowed_rise = min(count * float(fdtri(count, dof, _LEVEL)) * variance, _SAME * total)
+        if trial.cost[0] <= total + allowed_rise + rounding:
             x = trial.x
             fixed.append((place, f"not determined by these data, fixed at its default {spec.default:g}"))
         else:

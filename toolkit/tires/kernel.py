@@ -79,15 +79,15 @@ class State:
         """Return the states of an index."""
         return State(**{name: getattr(self, name)[index] for name in _FIELDS})
 
-    def put(self, where: NDArray[np.bool_], other: State) -> None:
+    def put(self, where: NDArray[np.bool_], state: State) -> None:
         """Take over the other's entries where a mask is true."""
         for name in _FIELDS:
-            getattr(self, name)[where] = getattr(other, name)[where]
+            getattr(self, name)[where] = getattr(state, name)[where]
 
-    def put_at(self, index: NDArray[np.intp], other: State) -> None:
+    def put_at(self, index: NDArray[np.intp], state: State) -> None:
         """Write the other's entries to positions."""
         for name in _FIELDS:
-            getattr(self, name)[index] = getattr(other, name)
+            getattr(self, name)[index] = getattr(state, name)
 
     def curvature(self) -> Array:
         """Return the Gauss-Newton matrix of the shape (problems, 4, 4), the linear part eliminated."""
@@ -99,11 +99,11 @@ class State:
         by_one = np.where(free[:, 1], np.where(np.isinf(safe), 1.0 / ww, ss / safe), 0.0)
         mixed = s1 / safe
         # Two rank-one products written out: a product of such small matrices is all overhead.
-        s, one = self.cross[:, :, 0], self.cross[:, :, 1]
-        left_s = s * by_s[:, None] - one * mixed[:, None]
-        left_one = one * by_one[:, None] - s * mixed[:, None]
+        s, moment = self.cross[:, :, 0], self.cross[:, :, 1]
+        left_s = s * by_s[:, None] - moment * mixed[:, None]
+        left_one = moment * by_one[:, None] - s * mixed[:, None]
         eliminated = left_s[:, :, None] * s[:, None, :]
-        eliminated += left_one[:, :, None] * one[:, None, :]
+        eliminated += left_one[:, :, None] * moment[:, None, :]
         return np.asarray(np.subtract(self.square, eliminated, out=eliminated))
 
 
@@ -142,7 +142,7 @@ def assess(p: Array, problems: Problems) -> State:
     scratch = _Scratch(size, points)
     if count <= size:
         return _assess(p, problems, scratch)
-    whole = State(
+    state = State(
         p=p,
         linear=np.empty((count, 2)),
         cost=np.empty(count),
@@ -161,10 +161,10 @@ def assess(p: Array, problems: Problems) -> State:
             low=problems.low,
             high=problems.high,
         )
-        found = _assess(p[block], part, scratch)
+        assessed = _assess(p[block], part, scratch)
         for name in _FIELDS[1:]:
-            getattr(whole, name)[block] = getattr(found, name)
-    return whole
+            getattr(state, name)[block] = getattr(assessed, name)
+    return state
 
 
 _BLOCK = 24_576  # points
@@ -183,7 +183,7 @@ def _assess(p: Array, problems: Problems, scratch: _Scratch) -> State:
     u, y, sw = problems.u, problems.y, problems.sw
     count = len(p)
     a = scratch.columns[:count]
-    z, bend, psi, phi, one, two = scratch.rows[:, :count]
+    z, bend, psi, phi, sine, two = scratch.rows[:, :count]
     C, h = p[:, 1:2], p[:, 3:4]
     B, eq = np.exp(p[:, 0:1]), np.exp(p[:, 2:3])
     E = E_TOP - eq
@@ -195,14 +195,14 @@ def _assess(p: Array, problems: Problems, scratch: _Scratch) -> State:
     np.subtract(z, psi, out=psi)
     np.arctan(psi, out=phi)
     # Sine and cosine from the tangent of the half angle: one quick function in place of two slow ones.
-    np.multiply(phi, 0.5 * C, out=one)
-    np.tan(one, out=one)
-    np.multiply(one, one, out=two)
+    np.multiply(phi, 0.5 * C, out=sine)
+    np.tan(sine, out=sine)
+    np.multiply(sine, sine, out=two)
     two += 1.0
     np.divide(2.0, two, out=two)
-    one *= two  # the sine
+    sine *= two  # the sine
     two -= 1.0  # the cosine
-    np.multiply(one, sw, out=a[:, 4])
+    np.multiply(sine, sw, out=a[:, 4])
     two *= sw
     np.multiply(two, phi, out=a[:, 1])
     psi *= psi
@@ -211,22 +211,22 @@ def _assess(p: Array, problems: Problems, scratch: _Scratch) -> State:
     two /= psi  # the derivative by psi
     bend *= two
     np.multiply(bend, eq, out=a[:, 2])
-    np.multiply(z, z, out=one)
-    np.add(one, 1.0, out=psi)
-    one /= psi
-    one *= E
-    np.subtract(1.0, one, out=one)
-    two *= one
+    np.multiply(z, z, out=sine)
+    np.add(sine, 1.0, out=psi)
+    sine /= psi
+    sine *= E
+    np.subtract(1.0, sine, out=sine)
+    two *= sine
     np.multiply(two, z, out=a[:, 0])
     np.multiply(two, B, out=a[:, 3])
     a[:, 5] = sw
     target = np.multiply(y, sw, out=z)
     gram = a @ a.transpose(0, 2, 1)
     D, Sv = solve_linear(gram[:, 4:, 4:], np.matvec(a[:, 4:], target))
-    np.multiply(a[:, 4], D[:, None], out=one)
-    residual = np.subtract(target, one, out=bend)
-    np.multiply(sw, Sv[:, None], out=one)
-    residual -= one
+    np.multiply(a[:, 4], D[:, None], out=sine)
+    residual = np.subtract(target, sine, out=bend)
+    np.multiply(sw, Sv[:, None], out=sine)
+    residual -= sine
     scale, linear = D[:, None, None], np.stack([D, Sv], axis=1)
     return State(
         p=p,

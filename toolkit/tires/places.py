@@ -46,7 +46,7 @@ def median(values: Array, share: Array, at: float = 0.5) -> Array:
     spare = 1e-9 * below[:, -1:]
     # Of an even number the mean of the middle two.
     low, high = (below >= part - spare).argmax(axis=1), (below > part + spare).argmax(axis=1)
-    found = np.take_along_axis(
+    places = np.take_along_axis(
         values, np.take_along_axis(order, np.stack([low, high], axis=1), axis=1), axis=1
     )
-    return np.asarray(found.mean(axis=1))
+    return np.asarray(places.mean(axis=1))

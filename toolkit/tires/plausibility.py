@@ -23,7 +23,7 @@ LARGEST = {
     "TIRE_ANGLE": math.inf, "DRUM_ANGLE": math.inf, "angle": math.pi, "force": 1e6, "moment": 1e5,
     "pressure": 1e8, "speed": 1e3, "ratio": 1e3, "temperature": 5e3, "time": 1e12,
 }  # fmt: skip
-# Of a tire's characteristics, by SI unit: no residual angle is as large as a quarter turn.
+# Of a tire's characteristics, by SI unit: no residual angle is as large as a quarter turn; of others any.
 _CHARACTERISTIC = {
     "N": LARGEST["force"], "N*m": LARGEST["moment"], "N/rad": 1e8, "N*m/rad": 1e7, "rad": math.pi / 2,
 }  # fmt: skip
@@ -41,7 +41,7 @@ def demand_possible(value: float, unit: str, *, where: str, U: bool = False) -> 
 
     >>> demand_possible(4000.0, "N", where="maker.csv, row 2, column FZ")
     """
-    limit = _CHARACTERISTIC[unit]
+    limit = _CHARACTERISTIC.get(unit, math.inf)
     if abs(value) <= limit and not (U and value < 0):
         return
     shown = _SHOWN.get(unit, f"{limit:g} {unit}")
@@ -67,11 +67,11 @@ def size_findings(fits: Sequence[CurveFit], where: str) -> tuple[Finding, ...]:
         if fit.slope_at_zero is not None and fit.load_N:
             slopes[fit.channel, fit.load_N] = abs(fit.slope_at_zero.value), fit.slope_at_zero.u
     ratios = [(value / load, u / load) for (name, load), (value, u) in slopes.items() if name == "FY"]
-    found = []
+    findings = []
     low, high = STIFFNESS.low, STIFFNESS.high
     odd = [value for value, u in ratios if value + _SURE * u < low or value - _SURE * u > high]
     if 2 * len(odd) > len(ratios):
-        found.append(
+        findings.append(
             Finding(
                 rule="implausible-stiffness",
                 where=f"{where}, FY",
@@ -87,7 +87,7 @@ def size_findings(fits: Sequence[CurveFit], where: str) -> tuple[Finding, ...]:
     ]
     long = [value for value, u in trails if value - _SURE * u > LARGEST_TRAIL_M]
     if 2 * len(long) > len(trails):
-        found.append(
+        findings.append(
             Finding(
                 rule="implausible-stiffness",
                 where=f"{where}, MZ",
@@ -98,7 +98,7 @@ def size_findings(fits: Sequence[CurveFit], where: str) -> tuple[Finding, ...]:
         )
     loads = [load for _, load in slopes]
     if loads and max(loads) < LEAST_LOAD_N:
-        found.append(
+        findings.append(
             Finding(
                 rule="implausible-load",
                 where=f"{where}, FZ",
@@ -106,9 +106,11 @@ def size_findings(fits: Sequence[CurveFit], where: str) -> tuple[Finding, ...]:
                 "forces in another unit than their headers say?",
             )
         )
-    return tuple(found)
+    return tuple(findings)
 
 
 def _range(values: Sequence[float]) -> str:
-    low, high = (f"{one:.0f}" if one >= 100 else f"{one:.3g}" for one in (min(values), max(values)))
+    low, high = (
+        f"{extreme:.0f}" if extreme >= 100 else f"{extreme:.3g}" for extreme in (min(values), max(values))
+    )
     return low if low == high else f"{low} to {high}"

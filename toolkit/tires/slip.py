@@ -92,7 +92,7 @@ def state(
     V0 : the file's LONGVL [m/s]; with it and LMUV (4.E7) friction falls with the slip speed
     """
     s = Reader(p, 1.0)
-    angle, load, camber = (np.asarray(one, dtype=np.float64) for one in (SA, FZ, IA))
+    angle, load, camber = (np.asarray(column, dtype=np.float64) for column in (SA, FZ, IA))
     speed, kappa = np.asarray(V, dtype=np.float64), np.asarray(KAPPA, dtype=np.float64)
     a = np.tan(angle) if angles == "star" else angle
     F0 = FNOMIN * s("LFZO")

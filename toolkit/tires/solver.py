@@ -59,14 +59,14 @@ def solve(groups: Sequence[Problems]) -> list[Solution]:
     """
     if not groups:
         return []
-    coarse = _join([compress(one) for one in groups])
+    coarse = _join([compress(group) for group in groups])
     floor = _EXACT * np.sum((coarse.sw * coarse.y) ** 2, axis=1)
     state, count = _search(coarse, floor, _SWIFT)
     agreeing = _agreeing(state.cost.reshape(-1, count), floor)
     if (open_ := np.flatnonzero(agreeing < _ENOUGH)).size:
-        again, _ = _search(coarse.take(open_), floor[open_], _PATIENT)
+        patient, _ = _search(coarse.take(open_), floor[open_], _PATIENT)
         first = state.take(_rows(open_, count))
-        both = np.concatenate([first.cost.reshape(-1, count), again.cost.reshape(-1, count)], axis=1)
+        both = np.concatenate([first.cost.reshape(-1, count), patient.cost.reshape(-1, count)], axis=1)
         order = np.argsort(both, axis=1)[:, :count]
         own = np.arange(len(open_))[:, None] * count
         taken, new = (
@@ -74,33 +74,33 @@ def solve(groups: Sequence[Problems]) -> list[Solution]:
             np.where(order < count, 0, order - count + own),
         )
         merged = first.take(taken)
-        merged.put((order >= count).ravel(), again.take(new.ravel()))
+        merged.put((order >= count).ravel(), patient.take(new.ravel()))
         state.put_at(_rows(open_, count), merged)
         agreeing = _agreeing(state.cost.reshape(-1, count), floor)
     # The best goes to its end on the bins, where steps are cheap: on the rows few are left to do.
     best = state.cost.reshape(-1, count).argmin(axis=1) + count * np.arange(len(coarse.u))
     state.put_at(best, descend(state.take(best), coarse, steps=30, tolerance=_SETTLED))
     cost, p = state.cost.reshape(-1, count), state.p.reshape(-1, count, 4)
-    cuts = np.cumsum([0, *(len(one.u) for one in groups)])
+    cuts = np.cumsum([0, *(len(group.u) for group in groups)])
     return [
-        _finish(one, p[low:high], cost[low:high], agreeing[low:high], floor[low:high])
-        for one, low, high in zip(groups, cuts[:-1], cuts[1:], strict=True)
+        _finish(group, p[low:high], cost[low:high], agreeing[low:high], floor[low:high])
+        for group, low, high in zip(groups, cuts[:-1], cuts[1:], strict=True)
     ]
 
 
 def _join(parts: Sequence[Problems]) -> Problems:
     # One batch, padded to one width.
-    width = max(one.u.shape[1] for one in parts)
+    width = max(part.u.shape[1] for part in parts)
 
     def padded(columns: Sequence[Array]) -> Array:
-        return np.concatenate([np.pad(one, ((0, 0), (0, width - one.shape[1]))) for one in columns])
+        return np.concatenate([np.pad(column, ((0, 0), (0, width - column.shape[1]))) for column in columns])
 
     return Problems(
-        u=padded([one.u for one in parts]),
-        y=padded([one.y for one in parts]),
-        sw=padded([one.sw for one in parts]),
-        low=np.concatenate([one.low for one in parts]),
-        high=np.concatenate([one.high for one in parts]),
+        u=padded([part.u for part in parts]),
+        y=padded([part.y for part in parts]),
+        sw=padded([part.sw for part in parts]),
+        low=np.concatenate([part.low for part in parts]),
+        high=np.concatenate([part.high for part in parts]),
     )
 
 

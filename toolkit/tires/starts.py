@@ -74,15 +74,15 @@ def _pick(problems: Problems, count: int) -> Array:
     return np.clip(shapes[best], problems.low[:, None, :], problems.high[:, None, :])
 
 
-def _product(left: Array32, right: Array32) -> Array32:
+def _product(array32: Array32, right: Array32) -> Array32:
     # In blocks too small for the linear algebra to share among threads: their start and their waiting for a
     # core that is busy otherwise cost many times the product.
-    result = np.empty((len(left), right.shape[1]), dtype=np.float32)
+    result = np.empty((len(array32), right.shape[1]), dtype=np.float32)
     height, breadth = _BLOCK
-    for top in range(0, len(left), height):
+    for top in range(0, len(array32), height):
         for side in range(0, right.shape[1], breadth):
             place = (slice(top, top + height), slice(side, side + breadth))
-            np.matmul(left[place[0]], right[:, place[1]], out=result[place])
+            np.matmul(array32[place[0]], right[:, place[1]], out=result[place])
     return result
 
 
@@ -92,9 +92,9 @@ def _is_basin(score: Array32) -> NDArray[np.bool_]:
     basin = np.ones(grid.shape, dtype=np.bool_)
     for axis in range(1, grid.ndim):
         lead = (slice(None),) * axis
-        one, other = (*lead, slice(None, -1)), (*lead, slice(1, None))
-        basin[one] &= grid[one] <= grid[other]
-        basin[other] &= grid[other] <= grid[one]
+        before, after = (*lead, slice(None, -1)), (*lead, slice(1, None))
+        basin[before] &= grid[before] <= grid[after]
+        basin[after] &= grid[after] <= grid[before]
     return basin.reshape(score.shape)
 
 
@@ -103,9 +103,9 @@ def _deposit(problems: Problems) -> tuple[Array32, Array32]:
     curves = len(problems.u)
     w = problems.sw**2
     place = np.clip((problems.u + 1.0) * (0.5 * (_NODES - 1)), 0.0, _NODES - 1 - 1e-9)
-    left = place.astype(np.intp)
-    share = place - left
-    slot = left + _NODES * np.arange(curves)[:, None]
+    lower = place.astype(np.intp)
+    share = place - lower
+    slot = lower + _NODES * np.arange(curves)[:, None]
     size = curves * _NODES + 1
 
     def deposit(amount: Array) -> Array32:

@@ -138,7 +138,13 @@ def read_table(
         with np.errstate(over="ignore"):
             si = column * factor + offset
         _refuse_impossible(
-            symbol, cell.strip(), column, si, (factor, offset), path, [one for one, _ in lines[1:]]
+            symbol,
+            cell.strip(),
+            column,
+            si,
+            (factor, offset),
+            path,
+            [cell_text for cell_text, _ in lines[1:]],
         )
         columns.append((symbol, np.abs(si) if symbol == "FZ" else si))
     return TireTable(
@@ -160,8 +166,8 @@ def _without_marks(
     if len(at) != 1:
         return lines, ()
     rest = [(row, cells[: at[0]] + cells[at[0] + 1 :]) for row, cells in lines]
-    told = [cells[at[0]].strip() for _, cells in lines[1:] if len(cells) > at[0]]
-    return rest, tuple(dict.fromkeys(mark for mark in told if mark))
+    texts = [cells[at[0]].strip() for _, cells in lines[1:] if len(cells) > at[0]]
+    return rest, tuple(dict.fromkeys(mark for mark in texts if mark))
 
 
 def _cells(path: Path) -> list[tuple[int, list[str]]]:
@@ -212,13 +218,13 @@ def _symbol(cell: str, path: Path) -> tuple[str, float, float]:
             path, "unknown-unit", f"the column {name} has no unit", repr(cell), f"'{name} [unit]', e.g. [N]"
         )
     where = f"{path}, column {cell.strip()!r}"
-    found = unit(match[2], where=where)
-    wanted = CHANNELS[symbol].dimension
-    if found.dimension != wanted:
+    stated = unit(match[2], where=where)
+    dimension = CHANNELS[symbol].dimension
+    if stated.dimension != dimension:
         from toolkit.units import si_scale
 
-        si_scale(match[2], wanted, where=where)
-    return symbol, found.factor, found.offset
+        si_scale(match[2], dimension, where=where)
+    return symbol, stated.factor, stated.offset
 
 
 def _numbers(cells: list[str], header: list[str], path: Path, row: int) -> list[float]:

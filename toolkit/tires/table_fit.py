@@ -13,18 +13,74 @@ from toolkit.errors import FitError
 from toolkit.findings import Finding
 from toolkit.reduction.limits import LARGEST_TRAIL_M, LEAST_LOAD_N
 from toolkit.reduction.physics import departures, of_sizes
-from toolkit.tires.blocks import load_blocks
 from toolkit.tires.catalog import fit_model
-from toolkit.tires.evaluate import slope_estimate_at
-from toolkit.tires.fit import Curve, why_not
-from toolkit.tires.model import CurveFit, Loss, TireModel
-from toolkit.tires.outliers import gross_outliers
+from toolkit.tires.evaluate import slope_estimate_at, value_at
+from toolkit.tires.fit import Curve, fit_curves, why_not
+from toolkit.tires.global_data import load_blocks
+from toolkit.tires.model import CHANNEL_UNIT, CurveFit, Loss, TireModel
+from toolkit.tires.places import median, shares
 from toolkit.tires.plausibility import size_findings
 from toolkit.tires.table import TireTable
 from toolkit.units import in_both
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
+
+# Gross outliers that a least squares fit has followed: told, never removed.
+
+
+_SUSPECT_PERCENT = 5.0  # fit error above which the curve is looked at again, whatever its residuals
+_SUSPECT_SD = 4.0
+_SURE_SD = 10.0  # robust standard deviations: misfit of a model and heavy tails of noise stay below
+_SURE_SHARE = 0.05  # of the curve's largest value: what matters to the fit
+_SD_OF_MEDIAN = 1.4826  # sd of a normal over the median of its absolute values
+
+
+def gross_outliers(curves: Sequence[Curve], fits: Sequence[CurveFit]) -> tuple[Finding, ...]:
+    """Return a finding for every Magic Formula fit by least squares whose rows hold gross outliers."""
+    suspects = [
+        curve
+        for curve, fit in zip(curves, fits, strict=True)
+        if fit.loss == "linear"
+        and (fit.error_percent > _SUSPECT_PERCENT or _largest(_residual(fit, curve), curve) > _SUSPECT_SD)
+    ]
+    if not suspects:
+        return ()
+    findings = []
+    for curve, fit in zip(suspects, fit_curves(suspects, loss="robust"), strict=True):
+        residual = _residual(fit, curve)
+        size = np.abs(residual)
+        away = size > np.maximum(
+            _SURE_SD * _SD_OF_MEDIAN * _typical(size, curve), _SURE_SHARE * np.abs(curve.y - residual).max()
+        )
+        if away.any():
+            worst, unit = int(np.argmax(size)), CHANNEL_UNIT[curve.channel]
+            load = "all loads" if curve.load_N is None else in_both(curve.load_N, "N", ".0f")
+            text = (
+                f"{int(away.sum())} of {len(size)} rows lie far from the curve of the others, the farthest "
+                f"{in_both(curve.y[worst], unit, '.5g')} at {np.degrees(curve.SA[worst]):.2f} deg, by "
+                f"{in_both(size[worst], unit)}: least squares follows them"
+            )
+            findings.append(Finding(rule="gross-outliers", where=f"{curve.channel} at {load}", message=text))
+    return tuple(findings)
+
+
+def _residual(fit: CurveFit, curve: Curve) -> NDArray[np.float64]:
+    return np.asarray(curve.y - value_at(fit, curve.SA))
+
+
+def _largest(residual: NDArray[np.float64], curve: Curve) -> float:
+    # In robust standard deviations; an exact fit has none.
+    size = np.abs(residual)
+    middle = _typical(size, curve)
+    return float(size.max()) / (_SD_OF_MEDIAN * middle) if middle > 0 else 0.0
+
+
+def _typical(size: NDArray[np.float64], curve: Curve) -> float:
+    low, high = curve.SA.min(), curve.SA.max()
+    u = (2 * curve.SA - low - high) / (high - low)
+    return float(median(size[None], shares(u[None], np.ones((1, len(u)), dtype=np.bool_)))[0])
+
 
 # Sign of dy/dSA at small angles of a tire, see `toolkit.channels`.
 _SLOPE_SIGN: dict[Axes, dict[str, int]] = {
@@ -100,11 +156,11 @@ def fit_table(table: TireTable, models: tuple[TireModel, ...], *, loss: Loss = "
     fits = [fit for model in models for fit in fit_model(model, good, loss=loss)]
     findings = [
         Finding(
-            rule=one.rule or "not-fitted",
-            where=one.where or str(table.path),
-            message=f"{one.what}: {one.got}",
+            rule=refusal.rule or "not-fitted",
+            where=refusal.where or str(table.path),
+            message=f"{refusal.what}: {refusal.got}",
         )
-        for one in refused
+        for refusal in refused
     ]
     findings += fit_findings(fits)
     if own := [fit for fit in fits if fit.model == "magic_formula"]:
@@ -128,15 +184,15 @@ def _no_load(curve: Curve) -> FitError | None:
 
 def fit_findings(fits: list[CurveFit]) -> list[Finding]:
     """Return a finding for every fit whose minimum is not confirmed, and a note for every limitation."""
-    found = []
+    findings = []
     for fit in fits:
         load = "all loads" if fit.load_N is None else in_both(fit.load_N, "N", ".0f")
         where = f"{fit.model} {fit.channel} at {load}"
         if not fit.converged:
-            found.append(Finding(rule="not-converged", where=where, message=fit.message))
+            findings.append(Finding(rule="not-converged", where=where, message=fit.message))
         elif fit.not_determined:
-            found.append(Finding(rule="not-determined", where=where, message=fit.message, level="note"))
-    return found
+            findings.append(Finding(rule="not-determined", where=where, message=fit.message, level="note"))
+    return findings
 
 
 def row_findings(table: TireTable) -> tuple[Finding, ...]:
@@ -160,7 +216,9 @@ def row_findings(table: TireTable) -> tuple[Finding, ...]:
         IA=column("IA"), trail_m=LARGEST_TRAIL_M,
     )  # fmt: skip
     cause = "is a column in another unit than its header says?"
-    return tuple(one.finding("warning", cause=cause) for one in departures(readings, share=_OUTLIERS))
+    return tuple(
+        departure.finding("warning", cause=cause) for departure in departures(readings, share=_OUTLIERS)
+    )
 
 
 def repeat_findings(table: TireTable) -> list[Finding]:
@@ -182,7 +240,7 @@ def repeat_findings(table: TireTable) -> list[Finding]:
 
 def axes_findings(table: TireTable, fits: Sequence[CurveFit]) -> list[Finding]:
     """Return a finding for a channel whose slopes at small angles contradict the axes of the table."""
-    found = []
+    findings = []
     for channel in ("FY", "MZ"):
         votes = []
         for fit in fits:
@@ -194,7 +252,7 @@ def axes_findings(table: TireTable, fits: Sequence[CurveFit]) -> list[Finding]:
         against = votes.count(-expected)
         if against and 2 * against > len(votes):
             word = "rises" if expected < 0 else "falls"
-            found.append(
+            findings.append(
                 Finding(
                     rule="axes-contradiction",
                     where=f"{table.path.name}, {channel}",
@@ -202,7 +260,7 @@ def axes_findings(table: TireTable, fits: Sequence[CurveFit]) -> list[Finding]:
                     f"blocks: that contradicts the declared axes {table.axes}; nothing was flipped",
                 )
             )
-    return found
+    return findings
 
 
 def _turn(source: Axes | str, target: Axes, channel: str) -> int:

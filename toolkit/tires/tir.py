@@ -8,12 +8,40 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 from toolkit.errors import CellError, ConfigError, UnreadableError
 from toolkit.findings import Finding
-from toolkit.tires.mf_versions import FOREIGN, ignored
+
+# Which names of a tire file belong to which Magic Formula.
+
+
+_ONLY_6X = frozenset(
+    "PPX1 PPX2 PPX3 PPX4 RBX3 PEY5 PKY4 PKY5 PKY6 PKY7 PPY1 PPY2 PPY3 PPY4 PPY5 RBY4 QDZ10 QDZ11 PPZ1 PPZ2 "
+    "LKYC LKZC LMUV".split()
+)
+_ONLY_52 = frozenset(["PHY3", "LGAX", "LGAY", "LGAZ"])
+FOREIGN: Mapping[str, frozenset[str]] = {"5.2": _ONLY_6X, "6.x": _ONLY_52}
+"""By the version of a file: names of forces and moments that only the other version has."""
+
+# What a number is where a name changes nothing: a scale factor 1, a coefficient 0.
+_NEUTRAL = {"PKY4": 2.0, "LMUV": 0.0}
+
+
+def ignored(version: str, coefficients: Mapping[str, float]) -> tuple[str, ...]:
+    """Return the names that a file's Magic Formula has not, and whose numbers would change a force.
+
+    >>> ignored("5.2", {"PCY1": 1.3, "RBX3": -2.0, "RBY4": 0.0, "PKY4": 2.0})
+    ('RBX3',)
+    """
+    return tuple(
+        name
+        for name, value in coefficients.items()
+        if name in FOREIGN[version] and value != _NEUTRAL.get(name, 1.0 if name.startswith("L") else 0.0)
+    )
+
 
 # What other programs write: 5, 6, 21 and 52 are MF 5.2, 60 to 62 are MF 6.x.
 _MF52, _MF6 = (5, 6, 21, 52), (60, 61, 62)
@@ -110,8 +138,10 @@ class TirFile:
     def _kind_as_written(self, fittyp: object) -> str:
         if fittyp is not None:
             return f"FITTYP = {fittyp:g}" if isinstance(fittyp, float) else f"FITTYP = {fittyp}"
-        told = self.get("PROPERTY_FILE_FORMAT")
-        return "no FITTYP" + (f", and PROPERTY_FILE_FORMAT = {told}" if told is not None else "")
+        file_format = self.get("PROPERTY_FILE_FORMAT")
+        return "no FITTYP" + (
+            f", and PROPERTY_FILE_FORMAT = {file_format}" if file_format is not None else ""
+        )
 
     def coefficients(self) -> dict[str, float]:
         """Return the numbers of the coefficient and scaling sections by their names; LFZ0 is LFZO.
@@ -194,9 +224,9 @@ def parse_tir(text: str, *, where: str = "") -> TirFile:
             lines.append(TirLine(section=section, text=line.rstrip()))
     if not section:
         raise _no_tir(where, "no [SECTION]")
-    found = TirFile(lines=tuple(lines), where=where)
-    _refuse_contradictions(found)
-    return found
+    tir_file = TirFile(lines=tuple(lines), where=where)
+    _refuse_contradictions(tir_file)
+    return tir_file
 
 
 def _no_tir(where: object, got: str) -> UnreadableError:
@@ -225,13 +255,13 @@ _NO_NUMBERS = ("nan", "inf", "infinity", "1.#inf", "1.#qnan", "1.#ind")
 
 
 def _refuse_contradictions(tir: TirFile) -> None:
-    seen: dict[tuple[str, str], str | float] = {}
+    entries: dict[tuple[str, str], str | float] = {}
     for line in tir.lines:
         if not isinstance(line.value, float):
             continue
         coefficient = line.section.endswith("COEFFICIENTS")
         key = _ALIASES.get(line.key, line.key)
-        first = seen.setdefault(("COEFFICIENTS" if coefficient else line.section, key), line.value)
+        first = entries.setdefault(("COEFFICIENTS" if coefficient else line.section, key), line.value)
         if first != line.value:
             raise CellError(
                 f"the tire file gives {line.key} twice", where=f"{tir.where}, [{line.section}]",

@@ -81,12 +81,14 @@ def evaluate_tir(
             p, SA=SA, FZ=FZ, FNOMIN=FNOMIN, IA=IA, KAPPA=KAPPA, pressure_change=change,
             V=(speed or 1.0) if V is None else V, V0=speed if version == "6.x" else None, angles=angles,
         )  # fmt: skip
-        made = (mf52 if version == "5.2" else mf61).forces(p, q, UNLOADED_RADIUS=radius)
-    FX, FY, MZ, _ = np.broadcast_arrays(made.FX, made.FY, made.MZ, np.asarray(SA, dtype=np.float64))
+        responses = (mf52 if version == "5.2" else mf61).forces(p, q, UNLOADED_RADIUS=radius)
+    FX, FY, MZ, _ = np.broadcast_arrays(
+        responses.FX, responses.FY, responses.MZ, np.asarray(SA, dtype=np.float64)
+    )
     result = Forces(FX=FX, FY=FY, MZ=MZ)
     _refuse_infinite(tir, result)
-    given = {"SA": SA, "FZ": FZ, "IA": IA, "KAPPA": KAPPA} | ({} if P is None else {"P": P})
-    findings += [*tir.findings(), *_lacking(tir, p), *_beyond(tir, given)]
+    inputs = {"SA": SA, "FZ": FZ, "IA": IA, "KAPPA": KAPPA} | ({} if P is None else {"P": P})
+    findings += [*tir.findings(), *_lacking(tir, p), *_beyond(tir, inputs)]
     return result, tuple(findings)
 
 
@@ -119,26 +121,26 @@ def _pressure_change(
 
 
 def _lacking(tir: TirFile, p: Mapping[str, float]) -> list[Finding]:
-    found = []
+    findings = []
     for channel, names in _MAKES.items():
         absent = [name for name in names if name not in p]
         if len(absent) == len(names):
             text = f"the file has none of {', '.join(names)}: {channel} holds nothing of pure slip"
-            found.append(_note("tir-no-coefficients", tir, text))
+            findings.append(_note("tir-no-coefficients", tir, text))
         elif absent:
             text = f"the file has no {', '.join(absent)}, which count as zero: {channel} is doubtful"
-            found.append(Finding(rule="tir-no-coefficients", where=tir.where, message=text))
-    return found
+            findings.append(Finding(rule="tir-no-coefficients", where=tir.where, message=text))
+    return findings
 
 
-def _beyond(tir: TirFile, given: Mapping[str, ArrayLike]) -> list[Finding]:
-    found, units = [], factors(tir)
+def _beyond(tir: TirFile, array_likes: Mapping[str, ArrayLike]) -> list[Finding]:
+    findings, units = [], factors(tir)
     for channel, low_key, high_key, unit in _RANGES:
         low, high = tir.get(low_key), tir.get(high_key)
-        if channel not in given or not isinstance(low, float) or not isinstance(high, float):
+        if channel not in array_likes or not isinstance(low, float) or not isinstance(high, float):
             continue
         low, high = low * (scale(low_key, units) or 1.0), high * (scale(high_key, units) or 1.0)
-        values = np.asarray(given[channel], dtype=np.float64)
+        values = np.asarray(array_likes[channel], dtype=np.float64)
         edge = _EDGE * max(abs(low), abs(high))
         outside = (values < low - edge) | (values > high + edge)
         if outside.any():
@@ -146,8 +148,8 @@ def _beyond(tir: TirFile, given: Mapping[str, ArrayLike]) -> list[Finding]:
                 f"{channel} from {values.min():.6g} to {values.max():.6g} {unit} leaves the file's range "
                 f"{low:.6g} to {high:.6g} {unit} in {int(outside.sum())} of {outside.size} rows: extrapolated"
             )
-            found.append(Finding(rule="tir-range", where=tir.where, message=text))
-    return found
+            findings.append(Finding(rule="tir-range", where=tir.where, message=text))
+    return findings
 
 
 def _refuse_infinite(tir: TirFile, result: Forces) -> None:

@@ -70,18 +70,18 @@ def factors(tir: TirFile) -> dict[str, float]:
     UnitError
         a unit's spelling is not known
     """
-    given = tir.section("UNITS")
-    found = {}
+    stated = tir.section("UNITS")
+    scales = {}
     for kind, table in _KNOWN.items():
-        text = given.get(kind, SI[kind])
+        text = stated.get(kind, SI[kind])
         factor = table.get(str(text).strip().lower())
         if factor is None:
             raise UnitError(
                 f"the tire file's unit of {kind} is not known", where=f"{tir.where}, [UNITS]", got=text,
                 expected=", ".join(table), next_step=f"correct {kind} in [UNITS]", rule="unknown-unit",
             )  # fmt: skip
-        found[kind] = factor
-    return found
+        scales[kind] = factor
+    return scales
 
 
 def scale(key: str, units: dict[str, float]) -> float | None:

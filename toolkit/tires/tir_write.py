@@ -16,8 +16,7 @@ from toolkit.errors import ConfigError
 from toolkit.files import write_atomic
 from toolkit.findings import Finding
 from toolkit.tires.global_data import Measured
-from toolkit.tires.global_model import GlobalModel, GlobalParameter
-from toolkit.tires.global_result import ModelFit
+from toolkit.tires.global_model import GlobalModel, GlobalParameter, ModelFit
 from toolkit.tires.tir import TirFile, TirLine
 from toolkit.tires.tir_units import SI, factors, scale
 
@@ -75,17 +74,23 @@ def tire_fit(model: GlobalModel, fit: ModelFit, data: Measured, *, side: str = "
     turned = data.turned("ISO-W").rows
     values = dict(zip(model.names, fit.values.tolist(), strict=True))
     slips = bool(np.ptp(turned.KAPPA))
-    made: list[tuple[str, tuple[tuple[str, str | float], ...]]] = []
+    sections: list[tuple[str, tuple[tuple[str, str | float], ...]]] = []
     for channel in _SECTIONS:
-        if any(one.channel == channel for one in fit.fits):
-            own = [one for one in model.parameters if one.stage == channel and (slips or not _of_slip(one))]
+        if any(channel_fit.channel == channel for channel_fit in fit.fits):
+            own = [
+                parameter
+                for parameter in model.parameters
+                if parameter.stage == channel and (slips or not _of_slip(parameter))
+            ]
             extra: list[tuple[str, str | float]] = (
                 [("PKY4", 2.0)] if channel == "FY" and FITTYP[model.name] > 60 else []
             )
-            made.append((channel, (*((one.name, values[one.name]) for one in own), *extra)))
+            sections.append(
+                (channel, (*((parameter.name, values[parameter.name]) for parameter in own), *extra))
+            )
     return TireFit(
         FITTYP=FITTYP[model.name],
-        coefficients=tuple(made),
+        coefficients=tuple(sections),
         FNOMIN=turned.FNOMIN,
         UNLOADED_RADIUS=turned.UNLOADED_RADIUS,
         SA_range=_range(turned.SA),
@@ -99,8 +104,8 @@ def tire_fit(model: GlobalModel, fit: ModelFit, data: Measured, *, side: str = "
     )
 
 
-def _of_slip(one: GlobalParameter) -> bool:
-    return bool({"kappa", "both_kappas", "alpha_and_kappa"} & set(one.needs))
+def _of_slip(parameter: GlobalParameter) -> bool:
+    return bool({"kappa", "both_kappas", "alpha_and_kappa"} & set(parameter.needs))
 
 
 def _range(values: np.ndarray) -> tuple[float, float]:
@@ -132,7 +137,7 @@ def tir_text(fit: TireFit, *, comments: Sequence[str] = ()) -> str:
         ("VERTICAL_FORCE_RANGE", _limits("FZ", fit.FZ_range)),
         ("INFLATION_PRESSURE_RANGE", _limits("PRES", fit.P_range)),
         ("SCALING_COEFFICIENTS", [(name, 1.0) for name in _SCALES[fit.FITTYP].split()]),
-        *((_SECTIONS[channel], list(given)) for channel, given in fit.coefficients),
+        *((_SECTIONS[channel], list(entries)) for channel, entries in fit.coefficients),
     ]
     lines = [f"! {comment}" for comment in comments]
     for name, entries in sections:

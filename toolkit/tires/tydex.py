@@ -90,82 +90,91 @@ def read_tydex(path: Path) -> TydexFile:
         _channel(number, line, rows[:, i], path)
         for i, (number, line) in enumerate(_lines(sections["MEASURCHANNELS"]))
     ]
-    other = [f"**{name}" for name, lines in sections.items() if name not in _KNOWN and _lines(lines)]
-    other += [f"{name} ({_lines(sections[name])[0][1].strip()[:30]} ...)" for name in ("COMMENTS",)
+    ignored = [f"**{name}" for name, lines in sections.items() if name not in _KNOWN and _lines(lines)]
+    ignored += [f"{name} ({_lines(sections[name])[0][1].strip()[:30]} ...)" for name in ("COMMENTS",)
               if name in sections and _lines(sections[name])]  # fmt: skip
-    other += [line[:_WIDTH].strip() for _, line in _lines(sections.get("HEADER", []))]
-    known = {one.symbol for one in measured}
+    ignored += [line[:_WIDTH].strip() for _, line in _lines(sections.get("HEADER", []))]
+    symbols = {channel.symbol for channel in measured}
     findings = []
     for number, line in _lines(sections.get("CONSTANTS", [])):
         name, value = line[:_WIDTH].strip(), line[50:].strip()
         symbol = SYMBOLS.get(name.upper())
         if symbol is None:
-            other.append(f"{name} = {value}")
-        elif symbol in known:
+            ignored.append(f"{name} = {value}")
+        elif symbol in symbols:
             text = f"{name} is measured and a constant of {value}: the measured values count"
             findings.append(Finding(rule="tydex-constant", where=str(path), message=text, level="note"))
         else:
             number_of = _number(value, f"{path}, line {number}", f"the constant {name}")
             column = np.full(len(rows), number_of)
             measured.append(_made(name, symbol, line[40:50].strip(), column, f"{path}, line {number}"))
-            known.add(symbol)
+            symbols.add(symbol)
     measured, carried = _from_carrier(measured, str(path))
     findings += carried
-    known |= {one.symbol for one in measured}
+    symbols |= {channel.symbol for channel in measured}
     if misaligned:
         text = f"{misaligned} rows do not stand in columns of 10: read by their spaces"
         findings.append(Finding(rule="tydex-columns", where=str(path), message=text))
-    for symbol in known - {None}:
-        if sum(one.symbol == symbol for one in measured) > 1:
+    for symbol in symbols - {None}:
+        if sum(channel.symbol == symbol for channel in measured) > 1:
             raise _refuse(path, "doubled-column", f"{symbol} is measured twice", symbol, "one such channel")
-    return TydexFile(where=str(path), channels=tuple(measured), other=tuple(other), findings=tuple(findings))
+    return TydexFile(
+        where=str(path), channels=tuple(measured), other=tuple(ignored), findings=tuple(findings)
+    )
 
 
 def _from_carrier(measured: list[TydexChannel], where: str) -> tuple[list[TydexChannel], list[Finding]]:
     # What C and W have in common is read from C where the file has no W.
-    have = {one.symbol for one in measured}
-    names = [one.name for one in measured if _CARRIER.get(one.name.upper(), "FX") not in have | {"FX"}]
+    have = {channel.symbol for channel in measured}
+    names = [
+        channel.name for channel in measured if _CARRIER.get(channel.name.upper(), "FX") not in have | {"FX"}
+    ]
     if not names:
         return measured, []
     shown = ", ".join(names)
-    if any(one.symbol == "IA" and np.any(one.values) for one in measured):
+    if any(channel.symbol == "IA" and np.any(channel.values) for channel in measured):
         text = (
             f"{shown}: not read, for with camber the axes of the wheel carrier (C) are not those of the road"
         )
         return measured, [Finding(rule="tydex-axes", where=where, message=text)]
-    said = "the camber is zero" if "IA" in have else "the file names no camber, so that it counts as zero"
-    text = f"{shown}: read from the axes of the wheel carrier (C) as of the road (W), for {said}"
-    made = [
-        _made(one.name, _CARRIER[one.name.upper()], one.unit, one.values, where) if one.name in names else one
-        for one in measured
+    statement = (
+        "the camber is zero" if "IA" in have else "the file names no camber, so that it counts as zero"
+    )
+    text = f"{shown}: read from the axes of the wheel carrier (C) as of the road (W), for {statement}"
+    channels = [
+        _made(channel.name, _CARRIER[channel.name.upper()], channel.unit, channel.values, where)
+        if channel.name in names
+        else channel
+        for channel in measured
     ]
-    return made, [Finding(rule="tydex-axes", where=where, message=text, level="note")]
+    return channels, [Finding(rule="tydex-axes", where=where, message=text, level="note")]
 
 
 _KNOWN = ("HEADER", "COMMENTS", "CONSTANTS", "MEASURCHANNELS", "MEASURDATA", "END")
 
 
 def _sections(text: str, path: Path) -> dict[str, list[tuple[int, str]]]:
-    found: dict[str, list[tuple[int, str]]] = {}
+    sections: dict[str, list[tuple[int, str]]] = {}
     name = ""
     for number, line in enumerate(text.splitlines(), start=1):
         if line.startswith("**"):
-            name, *rest = line[2:].split(maxsplit=1) or [""]
+            name, *tail = line[2:].split(maxsplit=1) or [""]
             name = name.upper()
-            if name in found:
+            if name in sections:
                 raise _refuse(path, "not-a-tydex", f"**{name} stands twice", f"line {number}", "each once")
-            found[name] = [(0, rest[0])] if rest and name == "MEASURDATA" else []
+            sections[name] = [(0, tail[0])] if tail and name == "MEASURDATA" else []
         elif name:
-            found[name].append((number, line.rstrip()))
+            sections[name].append((number, line.rstrip()))
     for needed in ("MEASURCHANNELS", "MEASURDATA"):
-        if not _lines(found.get(needed, [])):
+        if not _lines(sections.get(needed, [])):
             raise _refuse(
                 path, "not-a-tydex", f"the file has no **{needed}",
-                ", ".join(f"**{one}" for one in found) or "no section", "a TYDEX file with channels and data",
+                ", ".join(f"**{section}" for section in sections) or "no section",
+                "a TYDEX file with channels and data",
             )  # fmt: skip
-    if "END" not in found:
+    if "END" not in sections:
         raise _refuse(path, "tydex-end", "the file ends before **END", f"the last line is {number}", "**END")
-    return found
+    return sections
 
 
 def _lines(section: Sequence[tuple[int, str]]) -> list[tuple[int, str]]:
@@ -187,10 +196,10 @@ def _data(section: list[tuple[int, str]], count: int, path: Path) -> tuple[NDArr
                 expected=f"{count} channels", next_step="export the file again", rule="ragged-row",
             )  # fmt: skip
         rows.append([_number(cell, where, "a value") for cell in fixed])
-    said = section[0][1] if section and section[0][0] == 0 else ""
-    if said.strip().isdigit() and int(said) != len(rows):
+    comment = section[0][1] if section and section[0][0] == 0 else ""
+    if comment.strip().isdigit() and int(comment) != len(rows):
         raise _refuse(
-            path, "tydex-end", "rows of the file are missing", f"{len(rows)} rows", f"{int(said)} rows"
+            path, "tydex-end", "rows of the file are missing", f"{len(rows)} rows", f"{int(comment)} rows"
         )
     return np.array(rows, dtype=np.float64), misaligned
 
@@ -213,12 +222,12 @@ def _channel(number: int, line: str, values: NDArray[np.float64], path: Path) ->
 def _made(name: str, symbol: str | None, text: str, values: NDArray[np.float64], where: str) -> TydexChannel:
     if symbol is not None:
         text = text or ("1" if symbol == "KAPPA" else "")
-        found = unit(text if text != "-" else "1", where=f"{where}, {name}")
-        if found.dimension != CHANNELS[symbol].dimension:
+        stated = unit(text if text != "-" else "1", where=f"{where}, {name}")
+        if stated.dimension != CHANNELS[symbol].dimension:
             from toolkit.units import si_scale
 
             si_scale(text, CHANNELS[symbol].dimension, where=f"{where}, {name}")
-        text = found.text
+        text = stated.text
     return TydexChannel(name=name, symbol=symbol, unit=text, values=values)
 
 

@@ -10,22 +10,118 @@ from __future__ import annotations
 
 import datetime as dt
 import json
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolkit.calibration.control.errors import errors_by
-from toolkit.calibration.control.in_use import in_use_before
-from toolkit.calibration.registry.registry import load_many
+from toolkit.calibration.apply import apply_record
+from toolkit.calibration.registry.registry import load_checked, load_many
 from toolkit.calibration.registry.status import status_of
 from toolkit.calibration.registry.stored import stored_loads
-from toolkit.errors import ToolkitError
+from toolkit.errors import ToolkitError, UnitError
 from toolkit.findings import Finding
+from toolkit.units import si_scale
 
 if TYPE_CHECKING:
-    from toolkit.calibration.records.record import CalibrationRecord
+    from numpy.typing import NDArray
+
+    from toolkit.calibration.records.record import CalibrationRecord, Zero
+    from toolkit.calibration.registry.ledger import Ledger
     from toolkit.calibration.registry.registry import Registry
+    from toolkit.calibration.session.table import Table
+
+# Errors of a session's rows by a record that was not fitted to them.
+
+
+def errors_by(record: CalibrationRecord, table: Table, *, zero: Zero) -> dict[str, NDArray[np.float64]] | str:
+    """Return fitted minus reference (rows,) of each load that both have, in the table's unit.
+
+    ``zero`` is the session's. A text tells why the record cannot be held against these rows: another
+    indication or unit, or indications that were not tared where the record needs that. Tared rows under a
+    record that includes the zero are compared without its intercept.
+    """
+    if record.zero != "included" and zero == "included":
+        return f"{record.id} was fitted to tared indications, the session's are not tared"
+    missing = [name for name in record.indications if not table.has(name)]
+    if missing:
+        return f"{record.id} needs {', '.join(missing)}, which the session does not have"
+    units = dict(zip(record.indications, record.indication_units, strict=True))
+    try:
+        in_units = table.in_units(units)
+    except UnitError as error:
+        return f"{record.id}: {error.what}"
+    loads = [load.load for load in record.loads if table.has(load.load)]
+    if not loads:
+        return f"{record.id} has none of the session's loads"
+    tare = dict.fromkeys(units, 0.0) if (record.zero == "included") != (zero == "included") else None
+    try:
+        fitted = apply_record(
+            record, in_units.columns(record.indications), units=units, tare=tare, only=loads
+        )
+        return {
+            load: fitted[load] / si_scale(table.unit(load), where=f"column {load}") - table.column(load)
+            for load in loads
+        }
+    except ToolkitError as error:
+        return f"{record.id}: {error.what}"
+
+
+# Which record an instrument was used with when it came to a session.
+
+
+def in_use_before(
+    registry: Registry,
+    instrument: str,
+    on: dt.date,
+    *,
+    but: str | None = None,
+    ledger: Ledger | None = None,
+    checked: Mapping[str, CalibrationRecord] | None = None,
+) -> CalibrationRecord | None:
+    """Return the record that was in force when a session of day ``on`` began; None where there was none.
+
+    A session cannot be judged by itself: the record ``but`` is left out, and so is every fitted record of
+    the same day or later, whose approval may reach back. Else the rule is that of `Registry.in_force`, as
+    known on the session's day: a withdrawal that came later does not change what was in force then.
+
+    ``ledger`` and ``checked`` (records by id that passed their gates) are what a caller has read already.
+
+    Raises
+    ------
+    RegistryError, RecordError
+        the ledger is damaged, or that record fails a gate
+    """
+    ledger = registry.ledger(instrument) if ledger is None else ledger
+    ranks = [
+        rank
+        for record_id in ledger.entered()
+        if record_id != but
+        for rank in _approvals(ledger, record_id, on)
+    ]
+    for rank in sorted(ranks, reverse=True):
+        record = (checked or {}).get(rank[3]) or load_checked(registry.folder / instrument, rank[3], ledger)
+        if record.kind != "fit" or dt.date.fromisoformat(record.date) < on:
+            return record
+    return None
+
+
+def _approvals(ledger: Ledger, record_id: str, on: dt.date) -> list[tuple[bool, dt.date, int, str]]:
+    entries = ledger.of(record_id)
+    if not any(
+        entry.event == "approved" and entry.since is not None and entry.since <= on for entry in entries
+    ):
+        return []
+    status = status_of(record_id, entries, on)
+    if status.void_from is not None and on >= status.void_from:
+        return []
+    return [
+        (entry.known_on is not None and entry.known_on <= on, entry.since, entry.seq, record_id)
+        for entry in entries
+        if entry.event == "approved" and entry.since is not None and entry.since <= on
+    ]
+
 
 _SLACK = 1 + 1e-9
 
@@ -74,12 +170,12 @@ class AsFound:
     @property
     def within(self) -> bool | None:
         """Whether every load was within its tolerance; None where nothing could be compared."""
-        return all(one.within for one in self.loads) if self.loads else None
+        return all(load.within for load in self.loads) if self.loads else None
 
     @property
     def worst_share(self) -> float | None:
         """Largest |error| of all loads as a share of its tolerance; None where nothing was compared."""
-        return max((abs(one.max_error) / one.tolerance for one in self.loads), default=None)
+        return max((abs(load.max_error) / load.tolerance for load in self.loads), default=None)
 
 
 def phase_of(record: CalibrationRecord) -> str | None:
@@ -123,22 +219,22 @@ def as_found(registry: Registry, record: CalibrationRecord) -> AsFound:
     )
 
 
-def as_found_findings(found: AsFound) -> tuple[Finding, ...]:
+def as_found_findings(as_found: AsFound) -> tuple[Finding, ...]:
     """Return a finding for each load that was out of tolerance, or a note where nothing was compared."""
-    if found.reason is not None:
-        message = f"the as-found session could not be judged: {found.reason}"
-        level = "note" if found.record is None else "warning"
-        return (Finding(rule="as-found", where=found.session_record, message=message, level=level),)  # type: ignore[arg-type]
+    if as_found.reason is not None:
+        message = f"the as-found session could not be judged: {as_found.reason}"
+        level = "note" if as_found.record is None else "warning"
+        return (Finding(rule="as-found", where=as_found.session_record, message=message, level=level),)  # type: ignore[arg-type]
     return tuple(
         Finding(
             rule="as-found",
-            where=one.load,
-            message=f"as found, {found.record} is off by {one.max_error:+.4g} {one.unit} in row "
-            f"{one.worst_row} ({one.max_percent_fs:.3g} % of full scale), tolerance {one.tolerance:.4g} "
-            f"{one.unit}",
+            where=load.load,
+            message=f"as found, {as_found.record} is off by {load.max_error:+.4g} {load.unit} in row "
+            f"{load.worst_row} ({load.max_percent_fs:.3g} % of full scale), tolerance {load.tolerance:.4g} "
+            f"{load.unit}",
         )
-        for one in found.loads
-        if not one.within
+        for load in as_found.loads
+        if not load.within
     )
 
 
@@ -150,7 +246,9 @@ def as_found_history(registry: Registry, instrument: str) -> tuple[AsFound, ...]
     RegistryError, RecordError
         the ledger is damaged, or a record fails a gate
     """
-    return tuple(as_found(registry, one) for one in _of_phase(registry, instrument, "as_found"))
+    return tuple(
+        as_found(registry, session_record) for session_record in _of_phase(registry, instrument, "as_found")
+    )
 
 
 def as_found_before(registry: Registry, as_left: CalibrationRecord) -> AsFound | None:
@@ -162,14 +260,14 @@ def as_found_before(registry: Registry, as_left: CalibrationRecord) -> AsFound |
     entered = list(registry.ledger(as_left.instrument).entered())
     at = (as_left.date, entered.index(as_left.id) if as_left.id in entered else len(entered))
 
-    def place(one: CalibrationRecord) -> tuple[str, int]:
-        return one.date, entered.index(one.id)
+    def place(record: CalibrationRecord) -> tuple[str, int]:
+        return record.date, entered.index(record.id)
 
-    found = [o for o in _of_phase(registry, as_left.instrument, "as_found") if place(o) < at]
-    left = [o for o in _of_phase(registry, as_left.instrument, "as_left") if place(o) < at]
-    if not found or (left and place(left[-1]) > place(found[-1])):
+    earlier = [o for o in _of_phase(registry, as_left.instrument, "as_found") if place(o) < at]
+    settled = [o for o in _of_phase(registry, as_left.instrument, "as_left") if place(o) < at]
+    if not earlier or (settled and place(settled[-1]) > place(earlier[-1])):
         return None
-    newest = found[-1]
+    newest = earlier[-1]
     return as_found(registry, newest) if dt.date.fromisoformat(newest.date) <= day else None
 
 
@@ -180,13 +278,13 @@ def _of_phase(registry: Registry, instrument: str, phase: str) -> list[Calibrati
         for record_id in ledger.entered()
         if not status_of(record_id, ledger.of(record_id), dt.date.max).ended
     ]
-    made = []
+    dated = []
     for at, record in enumerate(load_many(registry.folder / instrument, standing, ledger).values()):
         if isinstance(record, ToolkitError):
             raise record
         if phase_of(record) == phase:
-            made.append((record.date, at, record))
-    return [record for _, _, record in sorted(made, key=lambda one: one[:2])]
+            dated.append((record.date, at, record))
+    return [record for _, _, record in sorted(dated, key=lambda entry: entry[:2])]
 
 
 def _load(
@@ -195,15 +293,15 @@ def _load(
     reference: np.ndarray[tuple[int, ...], np.dtype[np.float64]],
     error: np.ndarray[tuple[int, ...], np.dtype[np.float64]],
 ) -> AsFoundLoad:
-    one = record.load(name)
+    load = record.load(name)
     worst = int(np.abs(error).argmax())
     full = float(np.abs(reference).max())
     return AsFoundLoad(
         load=name,
-        unit=one.unit,
+        unit=load.unit,
         reference=tuple(reference.tolist()),
         error=tuple(error.tolist()),
-        tolerance=one.tolerance or 1e-3 * one.largest,
+        tolerance=load.tolerance or 1e-3 * load.largest,
         full_scale=full,
         max_error=float(error[worst]),
         max_percent_fs=100 * abs(float(error[worst])) / full,

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
-from collections.abc import Callable
+import tempfile
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from toolkit.calibration.control.as_found import as_found, as_found_findings, phase_of
 from toolkit.calibration.control.chart import chart_findings, control_chart
+from toolkit.calibration.registry import store
 from toolkit.calibration.registry.candidate import Candidate
 from toolkit.calibration.registry.candidate import calibrate as enter
-from toolkit.calibration.registry.rehearsal import rehearsal
+from toolkit.calibration.registry.registry import Registry
 from toolkit.calibration.registry.stored import reason_of
 from toolkit.calibration.session.read import read_session
 from toolkit.errors import ToolkitError
@@ -19,7 +22,29 @@ from toolkit.findings import Finding
 
 if TYPE_CHECKING:
     from toolkit.calibration.records.record import CalibrationRecord
-    from toolkit.calibration.registry.registry import Registry
+
+# A copy of an instrument's folder in which a change can be tried: the registry itself is only read.
+
+
+@contextlib.contextmanager
+def rehearsal(registry: Registry, instrument: str) -> Iterator[Registry]:
+    """Yield a registry of one instrument that is thrown away at the end.
+
+    What is done there meets the same gates and answers the same as in the registry; an interrupted write is
+    finished in the copy alone. Errors name the places of the registry.
+    """
+    with tempfile.TemporaryDirectory(prefix="toolkit-rehearsal-") as place:
+        copy = Path(place)
+        store.copy_files(registry.folder / instrument, copy / instrument)
+        try:
+            yield Registry(copy)
+        except ToolkitError as error:
+            parts = {
+                key: text.replace(place, str(registry.folder)) if text else text
+                for key, text in error.as_dict().items()
+                if key != "what"
+            }
+            raise type(error)(error.what, **parts) from error
 
 
 def calibrate(
@@ -34,8 +59,10 @@ def calibrate(
     ToolkitError
         as `registry.candidate.calibrate`; nothing is written
     """
-    made = enter(session_file, registry, machine=machine, again=again)
-    return dataclasses.replace(made, findings=made.findings + control_findings(registry, made.record))
+    candidate = enter(session_file, registry, machine=machine, again=again)
+    return dataclasses.replace(
+        candidate, findings=candidate.findings + control_findings(registry, candidate.record)
+    )
 
 
 def rehearse(
@@ -52,20 +79,20 @@ def rehearse(
     """
     instrument = read_session(session_file).instrument
     with rehearsal(registry, instrument) as copy:
-        made = calibrate(session_file, copy, machine=machine, again=again)
-    return dataclasses.replace(made, path=registry.folder / made.path.relative_to(copy.folder))
+        candidate = calibrate(session_file, copy, machine=machine, again=again)
+    return dataclasses.replace(candidate, path=registry.folder / candidate.path.relative_to(copy.folder))
 
 
 def control_findings(registry: Registry, record: CalibrationRecord) -> tuple[Finding, ...]:
     """Return the findings of a session's record against the sessions and records before it."""
-    found: tuple[Finding, ...] = ()
+    findings: tuple[Finding, ...] = ()
     if phase_of(record) == "as_found":
-        found += _judged("as-found", record, lambda: as_found_findings(as_found(registry, record)))
+        findings += _judged("as-found", record, lambda: as_found_findings(as_found(registry, record)))
     if record.data_file("check") is not None and len(registry.ids(record.instrument)) > 1:
-        found += _judged(
+        findings += _judged(
             "chart", record, lambda: chart_findings(control_chart(registry, record.instrument), record.id)
         )
-    return found
+    return findings
 
 
 def _judged(

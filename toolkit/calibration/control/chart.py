@@ -9,16 +9,13 @@ measured after an adjustment that the record before it does not know.
 from __future__ import annotations
 
 import datetime as dt
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolkit.calibration.control.as_found import phase_of
-from toolkit.calibration.control.errors import errors_by
-from toolkit.calibration.control.in_use import in_use_before
-from toolkit.calibration.control.rules import Break
-from toolkit.calibration.control.shewhart import LEAST_BASELINE, Limits, breaks_of, limits_of
+from toolkit.calibration.control.as_found import errors_by, in_use_before, phase_of
 from toolkit.calibration.registry.registry import load_many
 from toolkit.calibration.registry.status import status_of
 from toolkit.calibration.registry.stored import stored_check
@@ -32,6 +29,138 @@ if TYPE_CHECKING:
     from toolkit.calibration.records.record import CalibrationRecord
     from toolkit.calibration.registry.ledger import Ledger
     from toolkit.calibration.registry.registry import Registry
+
+__all__ = ["LEAST_BASELINE", "Chart", "ChartPoint", "CheckLoad", "Series", "chart_findings", "control_chart"]
+
+# Shewhart chart for individuals and moving range, one point a session.
+
+
+# Run rules of a control chart: patterns that a process in control hardly ever draws.
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RunRule:
+    """A rule of Nelson's list: its ``number``, in words, and the ``length`` of the stretch it looks at."""
+
+    number: int
+    text: str
+    length: int
+    test: Callable[[NDArray[np.float64]], bool]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Break:
+    """A rule that is broken by the points that end at ``index`` (from 0)."""
+
+    rule: RunRule
+    index: int
+
+
+def broken_rules(z: NDArray[np.float64]) -> tuple[Break, ...]:
+    """Return every rule that a stretch of points breaks, at the last point of the stretch, in their order.
+
+    >>> [(one.rule.number, one.index) for one in broken_rules(np.array([0.0, 0.5, 3.5]))]
+    [(1, 2)]
+    """
+    return tuple(
+        Break(rule=rule, index=end)
+        for end in range(len(z))
+        for rule in RULES
+        if end + 1 >= rule.length and rule.test(z[end + 1 - rule.length : end + 1])
+    )
+
+
+def _beyond(limit: float, least: int) -> Callable[[NDArray[np.float64]], bool]:
+    # The last point itself must be out: else a point back in the middle would be told as breaking the rule.
+    def test(z: NDArray[np.float64]) -> bool:
+        return any(
+            side * z[-1] > limit and int(np.count_nonzero(side * z > limit)) >= least for side in (1, -1)
+        )
+
+    return test
+
+
+def _one_side(z: NDArray[np.float64]) -> bool:
+    return bool((z > 0).all() or (z < 0).all())
+
+
+def _steady(z: NDArray[np.float64]) -> bool:
+    step = np.diff(z)
+    return bool((step > 0).all() or (step < 0).all())
+
+
+def _alternating(z: NDArray[np.float64]) -> bool:
+    step = np.diff(z)
+    return bool((step[:-1] * step[1:] < 0).all())
+
+
+def _quiet(z: NDArray[np.float64]) -> bool:
+    return bool((np.abs(z) <= 1).all())
+
+
+def _none_in_the_middle(z: NDArray[np.float64]) -> bool:
+    return bool((np.abs(z) > 1).all() and (z > 0).any() and (z < 0).any())
+
+
+RULES = (
+    RunRule(number=1, text="one point beyond 3 sigma", length=1, test=_beyond(3, 1)),
+    RunRule(number=2, text="nine in a row on one side of the centre", length=9, test=_one_side),
+    RunRule(number=3, text="six in a row rising or falling", length=6, test=_steady),
+    RunRule(number=4, text="fourteen in a row alternating up and down", length=14, test=_alternating),
+    RunRule(number=5, text="two of three beyond 2 sigma on one side", length=3, test=_beyond(2, 2)),
+    RunRule(number=6, text="four of five beyond 1 sigma on one side", length=5, test=_beyond(1, 4)),
+    RunRule(number=7, text="fifteen in a row within 1 sigma", length=15, test=_quiet),
+    RunRule(number=8, text="eight in a row beyond 1 sigma on both sides", length=8, test=_none_in_the_middle),
+)
+
+
+D2, D4 = 1.128, 3.267
+LEAST_BASELINE = 4
+SETTLED = 20
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Limits:
+    """Centre, sigma and control limits in the unit of the points; ``points`` of the baseline."""
+
+    centre: float
+    sigma: float
+    lower: float
+    upper: float
+    mean_range: float
+    upper_range: float
+    points: int
+
+    @property
+    def provisional(self) -> bool:
+        """Whether the baseline is too short for settled limits."""
+        return self.points < SETTLED
+
+
+def limits_of(values: NDArray[np.float64]) -> Limits | None:
+    """Return the limits of a baseline (points,); None where it is too short or does not scatter at all."""
+    if len(values) < LEAST_BASELINE:
+        return None
+    centre, mean_range = float(values.mean()), float(np.abs(np.diff(values)).mean())
+    sigma = mean_range / D2
+    # Equal to the last digits: a sigma of rounding would call every later point an alarm.
+    if sigma <= 1e-12 * float(np.abs(values).max()):
+        return None
+    return Limits(
+        centre=centre,
+        sigma=sigma,
+        lower=centre - 3 * sigma,
+        upper=centre + 3 * sigma,
+        mean_range=mean_range,
+        upper_range=D4 * mean_range,
+        points=len(values),
+    )
+
+
+def breaks_of(values: NDArray[np.float64], limits: Limits) -> tuple[Break, ...]:
+    """Return the run rules that the points (points,) break against these limits."""
+    return broken_rules((values - limits.centre) / limits.sigma)
+
 
 SAME_PERCENT = 1.0
 
@@ -79,7 +208,7 @@ class Series:
     @property
     def ranges(self) -> tuple[float, ...]:
         """Moving ranges, one fewer than the points."""
-        return tuple(np.abs(np.diff([one.error for one in self.points])).tolist())
+        return tuple(np.abs(np.diff([point.error for point in self.points])).tolist())
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -147,28 +276,28 @@ def control_chart(
 
 def chart_findings(chart: Chart, session_record: str) -> tuple[Finding, ...]:
     """Return a finding for each rule that the points of one session break."""
-    found = []
-    for one in chart.series:
-        for broken in one.breaks:
-            point = one.points[broken.index]
-            if point.session_record != session_record or one.limits is None:
+    findings = []
+    for series in chart.series:
+        for broken in series.breaks:
+            point = series.points[broken.index]
+            if point.session_record != session_record or series.limits is None:
                 continue
-            found.append(
+            findings.append(
                 Finding(
                     rule="chart",
-                    where=f"{one.load} at {one.check_load}",
+                    where=f"{series.load} at {series.check_load}",
                     message=f"rule {broken.rule.number} ({broken.rule.text}) is broken: error "
-                    f"{point.error:+.4g} {one.unit} by {point.record}, centre {one.limits.centre:+.4g}, "
-                    f"limits {one.limits.lower:+.4g} to {one.limits.upper:+.4g} "
-                    f"of {one.limits.points} sessions",
+                    f"{point.error:+.4g} {series.unit} by {point.record}, "
+                    f"limits {series.limits.lower:+.4g} to {series.limits.upper:+.4g} "
+                    f"of {series.limits.points} sessions",
                 )
             )
-    return tuple(found)
+    return tuple(findings)
 
 
 def _sessions(registry: Registry, instrument: str) -> tuple[list[_Session], list[tuple[str, str]]]:
     ledger = registry.ledger(instrument)
-    made: list[tuple[str, int, _Session]] = []
+    dated: list[tuple[str, int, _Session]] = []
     left_out: list[tuple[str, str]] = []
     standing = []
     for record_id in ledger.entered():
@@ -178,17 +307,17 @@ def _sessions(registry: Registry, instrument: str) -> tuple[list[_Session], list
         else:
             standing.append(record_id)
     checked: dict[str, CalibrationRecord] = {}
-    for record_id, one in load_many(registry.folder / instrument, standing, ledger).items():
-        if isinstance(one, ToolkitError):
-            raise one
-        checked[record_id] = one
+    for record_id, loaded in load_many(registry.folder / instrument, standing, ledger).items():
+        if isinstance(loaded, ToolkitError):
+            raise loaded
+        checked[record_id] = loaded
     for at, record in enumerate(checked.values()):
-        found = _session(registry, record, ledger, checked)
-        if isinstance(found, str):
-            left_out.append((record.id, found))
+        evaluated = _session(registry, record, ledger, checked)
+        if isinstance(evaluated, str):
+            left_out.append((record.id, evaluated))
         else:
-            made.append((record.date, at, found))
-    return [session for _, _, session in sorted(made, key=lambda one: one[:2])], left_out
+            dated.append((record.date, at, evaluated))
+    return [session for _, _, session in sorted(dated, key=lambda entry: entry[:2])], left_out
 
 
 def _session(
@@ -229,11 +358,13 @@ def _groups(sessions: list[_Session], same_percent: float) -> list[list[tuple[_S
     return groups
 
 
-def _same(one: tuple[_Session, int], other: tuple[_Session, int], same_percent: float) -> bool:
-    (a, i), (b, j) = one, other
+def _same(early: tuple[_Session, int], late: tuple[_Session, int], same_percent: float) -> bool:
+    (a, i), (b, j) = early, late
     if a.names != b.names:
         return False
-    full = np.array([max(one.record.load(n).largest * one.scale(n) for one in (a, b)) for n in a.names])
+    full = np.array(
+        [max(session.record.load(n).largest * session.scale(n) for session in (a, b)) for n in a.names]
+    )
     return bool((np.abs(a.references[i] - b.references[j]) <= same_percent / 100 * full).all())
 
 
@@ -257,7 +388,7 @@ def _series(
                 rows=len(members),
             )
         )
-    values = np.array([one.error for one in points])
+    values = np.array([point.error for point in points])
     count = min(baseline, len(values)) if baseline is not None else max(len(values) - 1, 0)
     limits = limits_of(values[:count])
     return Series(
@@ -270,6 +401,3 @@ def _series(
         limits=limits,
         breaks=() if limits is None else breaks_of(values, limits),
     )
-
-
-__all__ = ["LEAST_BASELINE", "Chart", "ChartPoint", "CheckLoad", "Series", "chart_findings", "control_chart"]

@@ -76,7 +76,7 @@ def due_of(registry: Registry, instrument: str, on: dt.date) -> Due:
     status = registry.status(record.id)
     day = dt.date.fromisoformat(record.date)
     due = due_date(record, status)
-    history = [one for one in as_found_history(registry, instrument) if one.date <= on]
+    history = [as_found for as_found in as_found_history(registry, instrument) if as_found.date <= on]
     return Due(
         instrument=instrument,
         on=on,
@@ -92,9 +92,9 @@ def due_of(registry: Registry, instrument: str, on: dt.date) -> Due:
 def recommend(history: list[AsFound], *, present_days: int | None) -> Recommendation:
     """Recommend an interval from as-found results; ``present_days`` is the interval in use."""
     rates = [
-        one.worst_share / (one.date - one.since).days
-        for one in history
-        if one.worst_share is not None and one.since is not None and one.date > one.since
+        as_found.worst_share / (as_found.date - as_found.since).days
+        for as_found in history
+        if as_found.worst_share is not None and as_found.since is not None and as_found.date > as_found.since
     ]
     if len(rates) < LEAST_RESULTS:
         reason = (

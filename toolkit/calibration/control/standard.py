@@ -43,7 +43,7 @@ def evaluate_record(
             "a fitted record",
             "calibrate the instrument from a session",
         )
-    loads = tuple(one.load for one in record.loads)
+    loads = tuple(load.load for load in record.loads)
     if (load is None and len(loads) > 1) or (indication is None and len(record.indications) > 1):
         raise _refused(
             record_id,

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolkit.calibration.fit.dilution import NOISE_SHARE, noise_terms
+from toolkit.calibration.fit.basis import build_basis
 from toolkit.calibration.terms import INTERCEPT, term_matrix
 from toolkit.errors import ConfigError, SessionError
 
@@ -16,6 +16,76 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from toolkit.calibration.session.read import Session
+
+# Which terms the loads tell, and which only the noise of the cells (regression dilution).
+
+
+# Of the size of a term's own part. Terms that the loads do not tell lie at 1. Straight cells at enough levels
+# stay below 0.01, cells of which one has a curve of 5 % below 0.1, and balances that bend by 3 % with
+# products of loads, which the clean indications have not, below 0.35.
+NOISE_SHARE = 0.5
+_CURVE = 3
+# Columns that agree to this, of unit size, are one: levels that differ by less are the same level.
+_SAME = 1e-6
+
+
+def noise_shares(
+    terms: Sequence[str], columns: Mapping[str, NDArray[np.float64]], loads: NDArray[np.float64]
+) -> dict[str, float]:
+    """Return how much of the part that tells each nonlinear term is noise, as a share of its size.
+
+    Parameters
+    ----------
+    terms : terms that are not dependent on these indications
+    columns : indications (rows,), by name
+    loads : reference loads (rows, loads)
+
+    Notes
+    -----
+    Fewer loads than indications leave loads unnamed that move the cells too: nothing is judged then.
+    """
+    higher = [i for i, term in enumerate(terms) if term not in (*columns, INTERCEPT)]
+    if not higher or loads.shape[1] < len(columns):
+        return {}
+    basis = build_basis(terms, columns)
+    triangle = np.linalg.qr(basis.design, mode="r")
+    back = np.linalg.inv(triangle)
+    inverse = back @ back.T
+    # Column j: the combination of terms, 1 of term j, that is at right angles to all other terms.
+    apart = (inverse / np.diag(inverse))[:, higher]
+    noise = (basis.design - basis.at(_clean(columns, loads))) @ apart
+    size = np.linalg.norm(basis.design @ apart, axis=0)
+    shares = np.linalg.norm(noise, axis=0) / size
+    return {terms[i]: share for i, share in zip(higher, shares.tolist(), strict=True)}
+
+
+def noise_terms(
+    terms: Sequence[str], columns: Mapping[str, NDArray[np.float64]], loads: NDArray[np.float64]
+) -> dict[str, float]:
+    """Return terms without which the loads tell all others, the last first, each with its `noise_shares`."""
+    remaining, shares = list(terms), {}
+    while noisy := {t: s for t, s in noise_shares(remaining, columns, loads).items() if s > NOISE_SHARE}:
+        # The highest goes first: where it is gone the lower ones are often told.
+        term, share = list(noisy.items())[-1]
+        shares[term] = share
+        remaining.remove(term)
+    return shares
+
+
+def _clean(
+    columns: Mapping[str, NDArray[np.float64]], loads: NDArray[np.float64]
+) -> dict[str, NDArray[np.float64]]:
+    """Return the indications by the reference loads alone: each cell's curve over each load."""
+    rows, axes = loads.shape
+    size = np.abs(loads).max(axis=0)
+    scaled = loads / np.where(size > 0, size, 1.0)
+    # Few rows would be followed by a curve, noise and all: they get a plane.
+    highest = _CURVE if rows >= 2 * (_CURVE * axes + 1) else 1
+    design = np.column_stack([np.ones(rows), *(scaled**power for power in range(1, highest + 1))])
+    cells = np.array(list(columns.values())).T
+    fitted = design @ np.linalg.lstsq(design, cells, rcond=_SAME)[0]
+    return dict(zip(columns, fitted.T, strict=True))
+
 
 COLLINEAR_FINDING = 30.0
 COLLINEAR_REFUSED = 300.0
@@ -144,13 +214,13 @@ def check_levels(session: Session) -> None:
     untold = noise_terms(session.terms, session.table.columns(session.indications), loads)
     if not untold:
         return
-    named = [term for term in session.terms if term in untold]
+    unresolved = [term for term in session.terms if term in untold]
     worst = max(untold, key=untold.__getitem__)
-    drop = ", ".join(f'"{term}"' for term in named)
+    drop = ", ".join(f'"{term}"' for term in unresolved)
     raise _refused(
         session,
-        f"the loads do not tell {', '.join(named)}: only the noise of the cells would decide about "
-        f"{'it' if len(named) == 1 else 'them'}",
+        f"the loads do not tell {', '.join(unresolved)}: only the noise of the cells would decide about "
+        f"{'it' if len(unresolved) == 1 else 'them'}",
         f"{min(untold[worst], 1.0):.0%} of what sets {worst} apart from the other terms is noise",
         f"at most {NOISE_SHARE:.0%}", "load-levels",
         "apply more load levels on each axis, and combined loads for products of cells, or leave the terms "
@@ -201,8 +271,8 @@ def _unnamed(session: Session) -> list[str]:
 
     present = {load.name for load in session.loads}
     try:
-        known = session.instrument in machine_names()
-        levers = known and bool(load_machine(session.instrument).overturning_lever_m)
+        is_machine = session.instrument in machine_names()
+        levers = is_machine and bool(load_machine(session.instrument).layout.overturning_lever_m)
     except ConfigError:
         levers = False
     if levers and "MX" not in present:

@@ -91,8 +91,8 @@ def fit_balance(
             f"{len(responses)} indications, {len(names)} loads", "an indication for each load",
             "leave loads out, or use the direct form alone",
         )  # fmt: skip
-    wanted = model_terms("balance", names)
-    terms = _excited(wanted, loads, constant=zero is None)
+    balance_terms = model_terms("balance", names)
+    terms = _excited(balance_terms, loads, constant=zero is None)
     rows = len(next(iter(loads.values())))
     if not set(names) <= set(terms) or rows - len(terms) < 1:
         raise _failed(
@@ -105,15 +105,15 @@ def fit_balance(
         fit_terms(terms=fitted, columns=loads, load=response if zero is None else response - zero[name])
         for name, response in responses.items()
     )
-    rest = [() if zero is None else (zero[name],) for name in responses]
+    fixed = [() if zero is None else (zero[name],) for name in responses]
     return BalanceForm(
         responses=tuple(responses),
         loads=names,
         terms=terms,
-        coefficients=np.array([(*one.coefficients, *more) for one, more in zip(fits, rest, strict=True)]),
+        coefficients=np.array([(*fit.coefficients, *more) for fit, more in zip(fits, fixed, strict=True)]),
         fits=fits,
         full_scale=np.array([float(np.abs(values).max()) for values in loads.values()]),
-        not_excited=tuple(name for name in wanted if name not in terms),
+        not_excited=tuple(name for name in balance_terms if name not in terms),
     )
 
 
@@ -131,17 +131,17 @@ def loads_by_iteration(
         ``not-converged``: the steps are spent, or the loads leave ten times full scale
     """
     inverse = np.linalg.pinv(form.linear)
-    found = start = (responses - form.coefficients[:, -1]) @ inverse.T
+    loads = start = (responses - form.coefficients[:, -1]) @ inverse.T
     for step in range(1, steps + 1):
         # predict = a + C1 F + C2 G(F), so that F - C1^-1 (predict - R) is the iteration.
         with np.errstate(over="ignore", invalid="ignore"):
-            new = found - (form.predict(found) - responses) @ inverse.T
-        change = np.abs(new - found) / form.full_scale
-        found = new
-        if not np.isfinite(found).all() or (np.abs(found) > 10 * (form.full_scale + np.abs(start))).any():
+            new = loads - (form.predict(loads) - responses) @ inverse.T
+        change = np.abs(new - loads) / form.full_scale
+        loads = new
+        if not np.isfinite(loads).all() or (np.abs(loads) > 10 * (form.full_scale + np.abs(start))).any():
             break
         if float(change.max()) <= tolerance:
-            return Solved(loads=found, steps=step)
+            return Solved(loads=loads, steps=step)
     row, load = np.unravel_index(int(np.argmax(np.nan_to_num(change, nan=np.inf))), change.shape)
     raise _failed(
         "the load iteration of the balance form does not converge",
@@ -159,15 +159,15 @@ def loads_by_newton(
 
     The two agree to ``tolerance`` where there are as many responses as loads. Raises as the iteration does.
     """
-    found = (responses - form.coefficients[:, -1]) @ np.linalg.pinv(form.linear).T
+    loads = (responses - form.coefficients[:, -1]) @ np.linalg.pinv(form.linear).T
     size = np.full(len(form.loads), np.inf)
     for step in range(1, steps + 1):
-        slope = form.slopes(found)
-        move = np.einsum("rlj,rj->rl", np.linalg.pinv(slope), responses - form.predict(found))
-        found = found + move
+        slope = form.slopes(loads)
+        move = np.einsum("rlj,rj->rl", np.linalg.pinv(slope), responses - form.predict(loads))
+        loads = loads + move
         size = np.abs(move).max(axis=0) / form.full_scale
         if float(size.max()) <= tolerance:
-            return Solved(loads=found, steps=step)
+            return Solved(loads=loads, steps=step)
     raise _failed(
         "Newton's method does not find the loads of the balance form",
         f"still changing by {100 * float(size.max()):.3g} % of full scale",
@@ -182,21 +182,21 @@ def _excited(
     """Return the terms that the data tell apart, the first of dependent ones kept."""
     matrix = term_matrix(terms, columns)
     basis = [np.full(len(matrix), 1 / np.sqrt(len(matrix)))] if constant else []
-    kept = []
+    orthogonal = []
     for name, column in zip(terms, matrix.T, strict=True):
         if name == INTERCEPT:
-            kept.append(name)
+            orthogonal.append(name)
             continue
         length = float(np.linalg.norm(column))
-        rest = column / length if length > 0 else column
+        remainder = column / length if length > 0 else column
         for _ in range(2):  # twice is enough: Gram-Schmidt loses orthogonality once
-            for one in basis:
-                rest = rest - (one @ rest) * one
-        size = float(np.linalg.norm(rest))
+            for direction in basis:
+                remainder = remainder - (direction @ remainder) * direction
+        size = float(np.linalg.norm(remainder))
         if size > _INDEPENDENT:
-            kept.append(name)
-            basis.append(rest / size)
-    return tuple(kept)
+            orthogonal.append(name)
+            basis.append(remainder / size)
+    return tuple(orthogonal)
 
 
 def _derivatives(name: str, loads: Sequence[str], at: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -220,4 +220,144 @@ def _failed(
 ) -> SessionError:
     return SessionError(
         what, where="balance form", got=got, expected=expected, next_step=next_step, rule=rule
+    )
+
+
+# Tare loads of a balance calibration: what hangs on the balance in each run, besides the applied loads.
+
+
+CHANGE = 1e-6
+MAX_TARE_STEPS = 50
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Tares:
+    """``values`` (runs, loads) in the loads' units, by ``runs``; ``form`` is fitted on the sums.
+
+    ``relative``: no natural zero was given, so that the constant of the form takes up what all runs share,
+    and the tares are counted from their mean. ``standard_errors`` (runs, loads) for given coefficients.
+    """
+
+    runs: tuple[int, ...]
+    values: NDArray[np.float64]
+    standard_errors: NDArray[np.float64]
+    form: BalanceForm
+    steps: int
+    relative: bool
+
+
+def estimate_tares(
+    *,
+    loads: Mapping[str, NDArray[np.float64]],
+    responses: Mapping[str, NDArray[np.float64]],
+    run: NDArray[np.float64],
+    natural_zero: Mapping[str, float] | None = None,
+) -> Tares:
+    """Return tares and coefficients that belong together.
+
+    Parameters
+    ----------
+    loads, responses : applied loads and indications (rows,) by name, in their units
+    run : run of each row (rows,)
+    natural_zero : indications with no load at all, measured apart; without them only differences of tares
+        between runs are determined
+
+    It ends where no tare changes by more than 1e-6 of full scale.
+
+    Raises
+    ------
+    SessionError
+        ``not-converged``: the tares still change after 50 steps; ``balance``: the runs do not determine them
+    """
+    numbers, index = np.unique(run, return_inverse=True)
+    index = index.ravel()
+    applied = np.column_stack(list(loads.values()))
+    names, full = tuple(loads), np.abs(applied).max(axis=0)
+    measured = np.column_stack(list(responses.values()))
+    member = (index[:, None] == np.arange(len(numbers))).astype(np.float64)
+    if natural_zero is None:
+        # Differences from the mean: the last run's is minus the sum of the others'.
+        member = member[:, :-1] - member[:, -1:]
+    shape = (member.shape[1], len(names))
+    to_runs = np.eye(shape[0])
+    if natural_zero is None:
+        to_runs = np.vstack([to_runs, -np.ones(shape[0])])
+    tares = np.zeros(shape)
+    for step in range(1, MAX_TARE_STEPS + 1):
+        total = applied + member @ tares
+        form = fit_balance(
+            loads=dict(zip(names, total.T, strict=True)), responses=responses, zero=natural_zero
+        )
+        if not shape[0]:
+            return _tares(numbers, to_runs, tares, np.zeros((0, 0)), form, step, natural_zero)
+        move, covariance = _move(form, total, measured, member, natural_zero is not None)
+        tares = tares + move
+        if float((np.abs(to_runs @ move) / full).max()) <= CHANGE:
+            return _tares(numbers, to_runs, tares, covariance, form, step, natural_zero)
+    raise SessionError(
+        "the tare iteration does not converge",
+        where="balance form",
+        got=f"a tare still changes by {float((np.abs(move) / full).max()):.2g} of full scale",
+        expected=f"changes under {CHANGE:g} of full scale within {MAX_TARE_STEPS} steps",
+        next_step="check the column run: each run has one set of fixtures",
+        rule="not-converged",
+    )
+
+
+def _move(
+    form: BalanceForm,
+    total: NDArray[np.float64],
+    measured: NDArray[np.float64],
+    member: NDArray[np.float64],
+    absolute: bool,
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the tares' step (free runs, loads), and its covariance."""
+    terms = [t for t in form.terms if not (absolute and t == INTERCEPT)]
+    design = term_matrix(terms, dict(zip(form.loads, total.T, strict=True)))
+    q, _ = np.linalg.qr(design / np.linalg.norm(design, axis=0))
+    slopes, residual = form.slopes(total), measured - form.predict(total)
+    scale = np.maximum(np.array([fit.residual_sd for fit in form.fits]), 1e-12 * np.abs(measured).max(axis=0))
+    rows, right = [], []
+    for j, sd in enumerate(scale):
+        column = (member[:, :, None] * slopes[:, j, None, :]).reshape(len(total), -1)
+        rows.append((column - q @ (q.T @ column)) / sd)
+        right.append(residual[:, j] / sd)
+    matrix, target = np.vstack(rows), np.concatenate(right)
+    length = np.linalg.norm(matrix, axis=0)
+    scaled = matrix / np.where(length > 0, length, 1.0)
+    values = np.linalg.svd(scaled, compute_uv=False)
+    if values[-1] < 1e-8 * values[0] or (length == 0).any():
+        raise SessionError(
+            "the runs do not determine the tares",
+            where="balance form", got=f"{member.shape[1]} free runs, {len(total)} rows",
+            expected="runs in which the loads vary independently of the run",
+            next_step="apply several loads in every run",
+            rule="balance",
+        )  # fmt: skip
+    solution = np.linalg.lstsq(scaled, target, rcond=None)[0] / length
+    covariance = np.linalg.inv(scaled.T @ scaled) / np.outer(length, length)
+    return solution.reshape(member.shape[1], -1), covariance
+
+
+def _tares(
+    numbers: NDArray[np.float64],
+    to_runs: NDArray[np.float64],
+    moves: NDArray[np.float64],
+    covariance: NDArray[np.float64],
+    form: BalanceForm,
+    steps: int,
+    zero: Mapping[str, float] | None,
+) -> Tares:
+    free, loads = moves.shape
+    spread = covariance.reshape(free, loads, free, loads)
+    variance = np.zeros((len(numbers), loads))
+    if free:
+        variance = np.einsum("ra,albl,rb->rl", to_runs, spread, to_runs)
+    return Tares(
+        runs=tuple(int(n) for n in numbers),
+        values=to_runs @ moves,
+        standard_errors=np.sqrt(variance),
+        form=form,
+        steps=steps,
+        relative=zero is None,
     )

@@ -11,8 +11,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolkit.calibration.fit.balance import BalanceForm, fit_balance, loads_by_iteration, loads_by_newton
-from toolkit.calibration.fit.tares import Tares, estimate_tares
+from toolkit.calibration.fit.balance import (
+    BalanceForm,
+    Tares,
+    estimate_tares,
+    fit_balance,
+    loads_by_iteration,
+    loads_by_newton,
+)
 from toolkit.errors import SessionError
 from toolkit.findings import Finding
 
@@ -64,7 +70,7 @@ def report_balance(fit: SessionFit) -> BalanceReport:
         ``balance``: the loads do not determine the form; ``not-converged``
     """
     session, table = fit.session, fit.session.table
-    names = [one.name for one in session.loads]
+    names = [load.name for load in session.loads]
     loads, responses = table.columns(names), table.columns(session.indications)
     applied, measured = table.matrix(names), table.matrix(session.indications)
     tares = None
@@ -77,20 +83,20 @@ def report_balance(fit: SessionFit) -> BalanceReport:
     solved = loads_by_iteration(form, measured)
     newton = loads_by_newton(form, measured)
     full = np.abs(table.matrix(names)).max(axis=0)
-    rest = 100 * (applied - solved.loads) / full
+    residual = 100 * (applied - solved.loads) / full
     check = _check(fit, form, full)
     rows = []
-    for j, one in enumerate(fit.loads):
-        direct = 100 * one.fit.residuals / full[j]
+    for j, load in enumerate(fit.loads):
+        direct = 100 * load.fit.residuals / full[j]
         rows.append(
             BalanceLoad(
-                load=one.setting.name,
-                unit=one.setting.unit,
-                direct_sd_percent_fs=100 * one.fit.residual_sd / float(full[j]),
+                load=load.setting.name,
+                unit=load.setting.unit,
+                direct_sd_percent_fs=100 * load.fit.residual_sd / float(full[j]),
                 direct_max_percent_fs=float(np.abs(direct).max()),
-                iterated_sd_percent_fs=float(np.sqrt(rest[:, j] @ rest[:, j] / form.fits[0].dof)),
-                iterated_max_percent_fs=float(np.abs(rest[:, j]).max()),
-                check_direct_percent_fs=one.check_max_percent_fs,
+                iterated_sd_percent_fs=float(np.sqrt(residual[:, j] @ residual[:, j] / form.fits[0].dof)),
+                iterated_max_percent_fs=float(np.abs(residual[:, j]).max()),
+                check_direct_percent_fs=load.check_max_percent_fs,
                 check_iterated_percent_fs=None if check is None else float(check[j]),
             )
         )
@@ -115,17 +121,17 @@ def balance_findings(fit: SessionFit) -> list[Finding]:
         return [Finding(rule="balance", where=fit.session.path.name, message=message, level="note")]
     if report.tares is None:
         return []
-    found = []
+    findings = []
     for number, values in zip(report.tares.runs, report.tares.values, strict=True):
-        for one, value in zip(fit.loads, values.tolist(), strict=True):
-            if abs(value) > one.setting.tolerance:
+        for load, value in zip(fit.loads, values.tolist(), strict=True):
+            if abs(value) > load.setting.tolerance:
                 message = (
-                    f"run {number} carries {value:+.4g} {one.setting.unit} more than the runs' mean, "
-                    f"tolerance {one.setting.tolerance:.4g} {one.setting.unit}: weigh the fixtures, and add "
-                    "them to the reference loads"
+                    f"run {number} carries {value:+.4g} {load.setting.unit} more than the runs' mean, "
+                    f"tolerance {load.setting.tolerance:.4g} {load.setting.unit}: weigh the fixtures, and "
+                    "add them to the reference loads"
                 )
-                found.append(Finding(rule="tare", where=one.setting.name, message=message, level="note"))
-    return found
+                findings.append(Finding(rule="tare", where=load.setting.name, message=message, level="note"))
+    return findings
 
 
 def _check(fit: SessionFit, form: BalanceForm, full: NDArray[np.float64]) -> NDArray[np.float64] | None:
@@ -133,6 +139,6 @@ def _check(fit: SessionFit, form: BalanceForm, full: NDArray[np.float64]) -> NDA
     if check is None:
         return None
     solved = loads_by_iteration(form, check.matrix(fit.session.indications))
-    reference = check.matrix([one.name for one in fit.session.loads])
+    reference = check.matrix([load.name for load in fit.session.loads])
     off: NDArray[np.float64] = 100 * np.abs(solved.loads - reference).max(axis=0) / full
     return off

@@ -63,8 +63,8 @@ def diagnose(
     size = max(-load.min(), load.max()) if w is None else np.abs(load * w).max()
     floor = (1e-12 * float(size)) ** 2
     tiny = max(floor, np.finfo(float).tiny)
-    kept = 1 - h
-    freed = e / np.sqrt(kept)
+    complement = 1 - h
+    freed = e / np.sqrt(complement)
     internal = freed / np.sqrt(max(variance, tiny))
     if dof > 1:
         left = sse - freed**2
@@ -72,14 +72,14 @@ def diagnose(
         external = freed / np.sqrt(np.maximum(left, tiny, out=left))
     else:
         external = internal
-    deleted = e / kept
+    deleted = e / complement
     if w is not None:
         deleted /= w
     quiet = variance <= floor
     return Diagnostics(
         internal=internal,
         external=external,
-        cook=internal**2 * (h / (p * kept)),
+        cook=internal**2 * (h / (p * complement)),
         press=float(np.sqrt(inner(deleted, deleted) / n)),
         outliers=() if quiet or dof < 2 else _outliers(external, dof - 1),
         reversibility=_reversibility(fit.residuals, up),
@@ -103,11 +103,11 @@ def replicate_groups(rows: NDArray[np.float64]) -> NDArray[np.intp]:
     cut = (key >> (np.uint64(64) - size)).astype(np.intp)
     few = np.flatnonzero(np.bincount(cut)[cut] > 1)
     order = np.sort(key[few])
-    again = np.unique(order[1:][order[1:] == order[:-1]])
+    repeated = np.unique(order[1:][order[1:] == order[:-1]])
     groups = np.arange(len(rows), dtype=np.intp)
-    if not again.size:
+    if not repeated.size:
         return groups
-    several = np.isin(key, again)
+    several = np.isin(key, repeated)
     _, inverse = np.unique(rows[several], axis=0, return_inverse=True)
     alone = int((~several).sum())
     groups[~several] = np.arange(alone)

@@ -24,6 +24,7 @@ from toolkit.findings import Finding
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from toolkit.calibration.fit.readings import SessionReadings, ShuntCheck
     from toolkit.calibration.fit.session_fit import LoadResult, SessionFit
     from toolkit.calibration.session.read import Session
     from toolkit.calibration.session.table import Table
@@ -38,31 +39,31 @@ _RISK = 0.01
 def session_findings(fit: SessionFit) -> tuple[Finding, ...]:
     """Return the findings of a session's data and fit."""
     session = fit.session
-    found = [*_data_findings(session), *_model_findings(fit), *balance_findings(fit)]
+    findings = [*_data_findings(session), *_model_findings(fit), *balance_findings(fit)]
     if fit.condition_number > COLLINEAR_FINDING:
         message = (
             f"condition number {fit.condition_number:.3g} of the indications, over {COLLINEAR_FINDING:g}"
         )
-        found.append(Finding(rule="collinear", where=session.path.name, message=message))
-    for one in fit.loads:
-        found += _load_findings(session, one)
-    found += _robust_findings(fit)
-    return tuple(found)
+        findings.append(Finding(rule="collinear", where=session.path.name, message=message))
+    for load in fit.loads:
+        findings += _load_findings(session, load)
+    findings += _robust_findings(fit)
+    return tuple(findings)
 
 
 def _repeated(rows: NDArray[np.float64], where: str) -> list[Finding]:
     """Return which rows repeat another one: a finding where they are many, else a note."""
     groups = replicate_groups(rows)
     _, first, inverse = np.unique(groups, return_index=True, return_inverse=True)
-    again = np.flatnonzero(first[inverse] != np.arange(len(rows)))
-    if not again.size:
+    repeated = np.flatnonzero(first[inverse] != np.arange(len(rows)))
+    if not repeated.size:
         return []
-    pairs = [f"{at + 1} = {first[inverse[at]] + 1}" for at in again[:MOST_NAMED].tolist()]
-    more = f" and {again.size - MOST_NAMED} more" if again.size > MOST_NAMED else ""
-    share = again.size / len(rows)
+    pairs = [f"{at + 1} = {first[inverse[at]] + 1}" for at in repeated[:MOST_NAMED].tolist()]
+    more = f" and {repeated.size - MOST_NAMED} more" if repeated.size > MOST_NAMED else ""
+    share = repeated.size / len(rows)
     message = (
-        f"{again.size} of {len(rows)} rows ({100 * share:.2g} %) repeat another row, indications and loads "
-        f"alike: rows {', '.join(pairs)}{more}"
+        f"{repeated.size} of {len(rows)} rows ({100 * share:.2g} %) repeat another row, indications and "
+        f"loads alike: rows {', '.join(pairs)}{more}"
     )
     return [
         Finding(
@@ -83,29 +84,29 @@ def _beyond(session: Session, check: Table) -> list[Finding]:
         fitted, values = session.table.column(name), check.column(name)
         low, high = float(fitted.min()), float(fitted.max())
         for at in np.flatnonzero((values < low - slack) | (values > high + slack)).tolist():
-            told = f"{name} = {values[at]:.6g} {text} (fitted: {low:.6g} to {high:.6g})"
-            outside.setdefault(at, []).append(told)
+            excess = f"{name} = {values[at]:.6g} {text} (fitted: {low:.6g} to {high:.6g})"
+            outside.setdefault(at, []).append(excess)
     return [
         Finding(
             rule="check-beyond-range",
             where=f"check row {at + 1}",
-            message=f"{', '.join(told)}: a check load there verifies an extrapolation, which neither the fit "
-            "nor its uncertainty covers",
+            message=f"{', '.join(excess)}: a check load there verifies an extrapolation, which neither the "
+            "fit nor its uncertainty covers",
             level="note",  # as where there are no check loads: the range that was fitted stands
         )
-        for at, told in sorted(outside.items())
+        for at, excess in sorted(outside.items())
     ]
 
 
 def _data_findings(session: Session) -> list[Finding]:
-    found: list[Finding] = []
+    findings: list[Finding] = []
     table, where = session.table, session.path.name
     if table.rows < FEW_POINTS:
         message = f"{table.rows} points; ASTM E74 asks for at least {FEW_POINTS}"
-        found.append(Finding(rule="few-points", where=where, message=message))
+        findings.append(Finding(rule="few-points", where=where, message=message))
     names = [*session.indications, *(load.name for load in session.loads)]
     rows = table.matrix(names)
-    found += _repeated(rows, where)
+    findings += _repeated(rows, where)
     factor, group = groups_of(table)
     if session.method == "ols" and not group.any() and not session_statements(session).between_runs:
         message = (
@@ -113,22 +114,22 @@ def _data_findings(session: Session) -> list[Finding]:
             f"a second {factor} of the same loads would tell, a third and more tell it better; what is known "
             "from elsewhere goes into [between_runs]"
         )
-        found.append(Finding(rule="one-run", where=where, message=message, level="note"))
+        findings.append(Finding(rule="one-run", where=where, message=message, level="note"))
     if session.check is None:
         message = "no check loads: no term can be verified on approval"
-        found.append(Finding(rule="no-check", where=where, message=message, level="note"))
+        findings.append(Finding(rule="no-check", where=where, message=message, level="note"))
     else:
         check = session.check.matrix(names)
-        found += [*_repeated(check, f"{where}, check loads"), *_beyond(session, session.check)]
+        findings += [*_repeated(check, f"{where}, check loads"), *_beyond(session, session.check)]
         # Most rows of a long session share no first value with a check load.
         fitted = {tuple(row) for row in rows[np.isin(rows[:, 0], check[:, 0])].tolist()}
         for number, row in enumerate(check.tolist(), start=1):
             if tuple(row) in fitted:
                 message = "a check load equals a row of the fit: it checks nothing"
-                found.append(Finding(rule="check-not-apart", where=f"check row {number}", message=message))
+                findings.append(Finding(rule="check-not-apart", where=f"check row {number}", message=message))
     if session.reference_due is not None and session.reference_due < session.date:
         message = f"the reference standard was due on {session.reference_due.isoformat()}"
-        found.append(Finding(rule="reference-due", where=where, message=message))
+        findings.append(Finding(rule="reference-due", where=where, message=message))
     stated = session_statements(session).reference
     for load in session.loads:
         largest = float(np.abs(table.column(load.name)).max())
@@ -137,7 +138,7 @@ def _data_findings(session: Session) -> list[Finding]:
                 f"the reference's standard uncertainty is {100 * u / largest:.3g} % of the largest load: "
                 "with such a standard nothing is calibrated; is its unit right?"
             )
-            found.append(Finding(rule="coarse-reference", where=load.name, message=message))
+            findings.append(Finding(rule="coarse-reference", where=load.name, message=message))
     if session.method == "gls":
         name = undeclared_standard(session_statements(session).reference, table)
         if name is not None:
@@ -145,30 +146,29 @@ def _data_findings(session: Session) -> list[Finding]:
                 f"shared_group {name!r} is no column of the data: taken as the name of one standard behind "
                 "every row; say so by [reference] standard, or name a column"
             )
-            found.append(Finding(rule="shared-group", where=where, message=message, level="note"))
-    return found
+            findings.append(Finding(rule="shared-group", where=where, message=message, level="note"))
+    return findings
 
 
-def _load_findings(session: Session, one: LoadResult) -> list[Finding]:
-    found: list[Finding] = []
-    name, unit = one.setting.name, one.setting.unit
-    for row in one.diagnostics.outliers:
+def _load_findings(session: Session, load: LoadResult) -> list[Finding]:
+    findings: list[Finding] = []
+    name, unit = load.setting.name, load.setting.unit
+    for row in load.diagnostics.outliers:
         message = (
-            f"residual {one.fit.residuals[row - 1]:+.4g} {unit}, "
-            f"{abs(one.diagnostics.external[row - 1]):.1f} standard deviations from the other rows"
+            f"residual {load.fit.residuals[row - 1]:+.4g} {unit}, "
+            f"{abs(load.diagnostics.external[row - 1]):.1f} standard deviations from the other rows"
         )
-        found.append(Finding(rule="outlier", where=f"{name}, row {row}", message=message))
-    if one.check_residuals is not None:
-        for row in np.flatnonzero(np.abs(one.check_residuals) > one.setting.tolerance).tolist():
-            message = (
-                f"off by {one.check_residuals[row]:+.4g} {unit}, tolerance {one.setting.tolerance:.4g} {unit}"
-            )
-            found.append(Finding(rule="check-load", where=f"{name}, check row {row + 1}", message=message))
-    spread = one.diagnostics.heteroscedasticity
+        findings.append(Finding(rule="outlier", where=f"{name}, row {row}", message=message))
+    if load.check_residuals is not None:
+        for row in np.flatnonzero(np.abs(load.check_residuals) > load.setting.tolerance).tolist():
+            off, tolerance = load.check_residuals[row], load.setting.tolerance
+            message = f"off by {off:+.4g} {unit}, tolerance {tolerance:.4g} {unit}"
+            findings.append(Finding(rule="check-load", where=f"{name}, check row {row + 1}", message=message))
+    spread = load.diagnostics.heteroscedasticity
     if spread is not None and spread < _RISK / len(session.loads) and session.method == "ols":
         message = 'the scatter grows or shrinks with the load; consider method = "wls" with u_ columns'
-        found.append(Finding(rule="method", where=name, message=message, level="note"))
-    return found
+        findings.append(Finding(rule="method", where=name, message=message, level="note"))
+    return findings
 
 
 def _model_findings(fit: SessionFit) -> list[Finding]:
@@ -176,7 +176,7 @@ def _model_findings(fit: SessionFit) -> list[Finding]:
     session = fit.session
     if session.method not in ("ols", "wls"):
         return []
-    found: list[Finding] = []
+    findings: list[Finding] = []
     wider = recommend_wider(fit)
     if wider is not None:
         message = (
@@ -185,7 +185,7 @@ def _model_findings(fit: SessionFit) -> list[Finding]:
             f"to use it write in SESSION.toml: {_inline(wider.lines)}"
         )
         where = ", ".join(wider.loads)
-        found.append(Finding(rule="model", where=where, message=message, level="note"))
+        findings.append(Finding(rule="model", where=where, message=message, level="note"))
     spare = recommend_drop(fit)
     if spare is not None:
         small = f"under {NEGLIGIBLE_PERCENT:g} % of full scale in every load"
@@ -199,20 +199,20 @@ def _model_findings(fit: SessionFit) -> list[Finding]:
             f"candidates to drop: {'; '.join(parts)}; all at once: p = {spare.probability:.1g}; "
             f"to drop them write in SESSION.toml: {_inline(spare.lines)}"
         )
-        found.append(Finding(rule="terms", where=session.path.name, message=message, level="note"))
+        findings.append(Finding(rule="terms", where=session.path.name, message=message, level="note"))
     if wider is None:
-        found += _misfits(fit)
-    return found
+        findings += _misfits(fit)
+    return findings
 
 
 def _misfits(fit: SessionFit) -> list[Finding]:
     table = fit.session.table
-    level = load_levels(table.matrix([one.name for one in fit.session.loads]))
-    found = []
-    for one in fit.loads:
-        lack = lack_of_fit(one.fit, level)
+    level = load_levels(table.matrix([load.name for load in fit.session.loads]))
+    findings = []
+    for load in fit.loads:
+        lack = lack_of_fit(load.fit, level)
         # Scatter that is rounding has no pure error to judge by.
-        if lack is None or one.fit.residual_sd <= 1e-9 * one.setting.tolerance:
+        if lack is None or load.fit.residual_sd <= 1e-9 * load.setting.tolerance:
             continue
         if lack.probability < _RISK / len(fit.loads):
             message = (
@@ -220,28 +220,32 @@ def _misfits(fit: SessionFit) -> list[Finding]:
                 f"{lack.pure_dof} degrees of freedom, p = {lack.probability:.1g}), and no model that a "
                 "session can name fits better: look at the residuals against the load and against the order"
             )
-            found.append(Finding(rule="lack-of-fit", where=one.setting.name, message=message, level="note"))
-    return found
+            findings.append(
+                Finding(rule="lack-of-fit", where=load.setting.name, message=message, level="note")
+            )
+    return findings
 
 
 def _robust_findings(fit: SessionFit) -> list[Finding]:
     """Point at rows that hide each other; those already named as outliers are not named twice."""
     columns = fit.session.table.columns(fit.session.indications)
-    found = []
-    for one in fit.loads:
-        load = fit.session.table.column(one.setting.name) - one.of_runs
-        within = within_runs(one.fit, one.of_runs)
+    findings = []
+    for load_result in fit.loads:
+        load = fit.session.table.column(load_result.setting.name) - load_result.of_runs
+        within = within_runs(load_result.fit, load_result.of_runs)
         weights = robust_weights(within, columns=columns, load=load)
         hidden = hidden_outliers(within, weights, columns=columns)
-        rows = [row for row in hidden if row not in one.diagnostics.outliers]
+        rows = [row for row in hidden if row not in load_result.diagnostics.outliers]
         if rows:
             message = (
                 f"row{'s' if len(rows) > 1 else ''} {_some(rows)}: almost no weight in a robust fit "
                 "(Huber, then Tukey's biweight); rows that are wrong together hide from the ordinary "
                 "residuals. The fit is unchanged: look at these loadings"
             )
-            found.append(Finding(rule="robust", where=one.setting.name, message=message, level="note"))
-    return found
+            findings.append(
+                Finding(rule="robust", where=load_result.setting.name, message=message, level="note")
+            )
+    return findings
 
 
 def _some(rows: list[int], most: int = 20) -> str:
@@ -251,3 +255,73 @@ def _some(rows: list[int], most: int = 20) -> str:
 
 def _inline(lines: str) -> str:
     return "; ".join(lines.split("\n"))
+
+
+# Findings of a session's readings: what a person should look at before the candidate is approved.
+
+
+LARGEST_RATIO_MV_V = 10.0  # metal foil bridges give 1 to 4 mV/V at capacity
+TEMPERATURE_C = (18.0, 28.0)  # ISO 376
+
+
+def readings_findings(readings: SessionReadings, where: str) -> tuple[Finding, ...]:
+    """Return the findings of a session's readings; ``where`` names the session."""
+    findings = [
+        Finding(
+            rule="bridge-range",
+            where=name,
+            message=f"a bridge output of {ratio:.4g} mV/V, over {LARGEST_RATIO_MV_V:g}: is its unit, "
+            "excitation or scale right?",
+        )
+        for name, ratio in readings.largest_ratio
+        if ratio > LARGEST_RATIO_MV_V
+    ]
+    findings += [
+        Finding(
+            rule="zero-drift",
+            where=zero.load,
+            message=f"the zeros of {', '.join(zero.cells)} moved by {zero.drift:+.4g} {zero.unit} "
+            f"({zero.percent_fs:+.3g} % of full scale), tolerance {zero.tolerance:.4g} {zero.unit}",
+        )
+        for zero in readings.zero_loads
+        if abs(zero.drift) > zero.tolerance
+    ]
+    findings += [finding for shunt in readings.shunts if (finding := _shunt(shunt)) is not None]
+    findings += [
+        Finding(
+            rule="creep",
+            where=f"creep at {load}",
+            message="two readings of one indication, or of the load, are needed: nothing was evaluated",
+            level="note",
+        )
+        for load in readings.creep_left_out
+    ]
+    findings += [
+        Finding(
+            rule="scale-unit",
+            where=name,
+            message='a scale without a unit is not applied: write scale = { value, unit = "mV/V" }',
+            level="note",
+        )
+        for name in readings.unscaled
+    ]
+    low, high = TEMPERATURE_C
+    if readings.temperature_C is not None and not low <= readings.temperature_C <= high:
+        message = f"{readings.temperature_C:.4g} degC; ISO 376 asks for {low:g} to {high:g} degC"
+        findings.append(Finding(rule="temperature", where=where, message=message, level="note"))
+    return tuple(findings)
+
+
+def _shunt(shunt: ShuntCheck) -> Finding | None:
+    where = f"{shunt.name}, {shunt.source}"
+    if shunt.difference_percent is None or shunt.expected is None:
+        message = f"a shunt step of {shunt.measured:.6g} {shunt.unit} without an expected one in that unit"
+        return Finding(rule="shunt", where=where, message=message, level="note")
+    if shunt.within:
+        return None
+    zero = "" if shunt.zero is not None or shunt.source == "shunt_measured" else ", no zero reading before it"
+    message = (
+        f"the shunt gives {shunt.measured:.6g} {shunt.unit} for {shunt.expected:.6g}: "
+        f"{shunt.difference_percent:+.3g} %, tolerance {shunt.tolerance_percent:g} %{zero}"
+    )
+    return Finding(rule="shunt", where=where, message=message)

@@ -14,10 +14,10 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 
-def inner(one: NDArray[Any], other: NDArray[Any]) -> float:
+def inner(a: NDArray[Any], b: NDArray[Any]) -> float:
     """Return the sum of products of two columns (rows,).
 
     >>> inner(np.array([1.0, 2.0]), np.array([3.0, 4.0]))
     11.0
     """
-    return float(np.einsum("i,i->", one, other))
+    return float(np.einsum("i,i->", a, b))

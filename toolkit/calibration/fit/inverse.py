@@ -96,13 +96,13 @@ def y_from_x(line: StraightLine, x0: float, *, u_x0: float = 0.0) -> Evaluated:
     return Evaluated(value=line.a + line.b * x0, u=_combined(line, x0, line.b * u_x0))
 
 
-def _combined(line: StraightLine, x0: float, other: float) -> float:
+def _combined(line: StraightLine, x0: float, u: float) -> float:
     # The quadratic form as a sum of squares, so that a strong correlation cannot leave a negative variance:
     # (u_a + r x0 u_b)^2 + (1 - r^2) x0^2 u_b^2, with r the correlation of a and b.
     spread = line.u_a * line.u_b
     r = max(-1.0, min(1.0, line.cov_ab / spread)) if spread else 0.0
     tilt = x0 * line.u_b
-    return math.hypot(other, line.u_a + r * tilt, math.sqrt((1 - r) * (1 + r)) * tilt)
+    return math.hypot(u, line.u_a + r * tilt, math.sqrt((1 - r) * (1 + r)) * tilt)
 
 
 def _finite(**values: float) -> None:

@@ -117,22 +117,22 @@ def reversals(
         return ()
     full = float(np.abs(load).max())
     runs = np.zeros(len(load)) if run is None else run
-    both, key = np.unique(np.column_stack([runs, level.astype(np.float64)]), axis=0, return_inverse=True)
+    visited, key = np.unique(np.column_stack([runs, level.astype(np.float64)]), axis=0, return_inverse=True)
     key = key.ravel()
-    count = [np.bincount(key[side], minlength=len(both)) for side in (up, ~up)]
-    found = np.flatnonzero((count[0] > 0) & (count[1] > 0))
-    total = [np.bincount(key[s], weights=residuals[s], minlength=len(both)) for s in (up, ~up)]
+    count = [np.bincount(key[side], minlength=len(visited)) for side in (up, ~up)]
+    paired = np.flatnonzero((count[0] > 0) & (count[1] > 0))
+    total = [np.bincount(key[s], weights=residuals[s], minlength=len(visited)) for s in (up, ~up)]
     at = np.bincount(key, weights=load) / np.bincount(key)
     # residual = reference - indicated: (indicated down) - (indicated up) = residual up - residual down.
     rows = []
-    for i in found.tolist():
+    for i in paired.tolist():
         difference = float(total[0][i] / count[0][i] - total[1][i] / count[1][i])
         rows.append(
             Reversal(
-                run=None if run is None else int(both[i, 0]),
+                run=None if run is None else int(visited[i, 0]),
                 load=float(at[i]),
                 difference=difference,
                 percent_fs=100 * difference / full,
             )
         )
-    return tuple(sorted(rows, key=lambda one: (one.run or 0, one.load)))
+    return tuple(sorted(rows, key=lambda row: (row.run or 0, row.load)))

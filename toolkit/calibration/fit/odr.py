@@ -59,23 +59,23 @@ def fit_odr(
     beta = np.linalg.solve(basis.back, np.asarray(start.coefficients))
 
     def slopes(at: NDArray[np.float64], beta: NDArray[np.float64]) -> NDArray[np.float64]:
-        found = term_slopes(terms, basis.back @ beta, dict(zip(names, at, strict=True)))
-        return np.array([np.broadcast_to(found[name], load.shape) for name in names])
+        gradients = term_slopes(terms, basis.back @ beta, dict(zip(names, at, strict=True)))
+        return np.array([np.broadcast_to(gradients[name], load.shape) for name in names])
 
     def design(at: NDArray[np.float64]) -> NDArray[np.float64]:
         return basis.at(dict(zip(names, at, strict=True)))
 
-    one = len(names) == 1
+    single = len(names) == 1
     eps = float(np.finfo(float).eps)
     found = odr_fit(
         lambda at, b: design(np.atleast_2d(at)) @ b,
-        x[0] if one else x,
+        x[0] if single else x,
         load,
         beta,
-        weight_x=float(u_cells[0] ** -2) if one else u_cells**-2.0,
+        weight_x=float(u_cells[0] ** -2) if single else u_cells**-2.0,
         weight_y=u**-2.0,
         jac_beta=lambda at, _b: design(np.atleast_2d(at)).T,
-        jac_x=lambda at, b: slopes(np.atleast_2d(at), b)[0] if one else slopes(np.atleast_2d(at), b),
+        jac_x=lambda at, b: slopes(np.atleast_2d(at), b)[0] if single else slopes(np.atleast_2d(at), b),
         sstol=eps,
         partol=eps,
         maxit=_ITERATIONS,
@@ -93,10 +93,10 @@ def fit_odr(
         # At fixed slopes the problem is linear: its load is carried back to the observed indications.
         carried = load + (slope * delta).sum(axis=0)
         factor = Factor.of(at, 1 / spread)
-        (solution,), (rest,) = factor.solve(carried[None, :])
+        (solution,), (residual,) = factor.solve(carried[None, :])
         moved = np.abs(at @ (np.asarray(solution, dtype=np.float64) - beta)).max()
         beta = np.asarray(solution, dtype=np.float64)
-        adjusted = slope * u_cells[:, None] ** 2 * rest / spread**2
+        adjusted = slope * u_cells[:, None] ** 2 * residual / spread**2
         moved = max(moved, np.abs((slope * (adjusted - delta)).sum(axis=0)).max())
         delta = adjusted
         # Steps stop shrinking where they round at the size of what the indications make of the load.
@@ -110,7 +110,7 @@ def fit_odr(
     fitted = design(x).astype(np.longdouble) @ solution
     residuals = np.asarray(load - fitted, dtype=np.float64)
     dof = len(load) - len(terms)
-    scaled = rest / spread
+    scaled = residual / spread
     raw = basis.moved_back(zero)
     return TermFit(
         terms=tuple(terms),

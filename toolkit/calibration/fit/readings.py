@@ -94,8 +94,8 @@ class ShuntCheck:
     @property
     def within(self) -> bool | None:
         """Whether the step is inside its tolerance; None where nothing can be compared."""
-        found = self.difference_percent
-        return None if found is None else abs(found) <= self.tolerance_percent
+        difference = self.difference_percent
+        return None if difference is None else abs(difference) <= self.tolerance_percent
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -162,15 +162,15 @@ def readings_of(record: CalibrationRecord, loads: Table) -> SessionReadings:
     cells = settings.get("cells", {})
     zero = zero_entries(zero_readings(settings), scope)
     creep = creep_entries(settings.get("creep", []), scope)
-    rest = _rest(record, loads)
+    at_rest = _rest(record, loads)
     columns = loads.columns(record.indications)
-    full = {name: float(np.abs(columns[name] - rest[name]).max()) for name in record.indications}
+    full = {name: float(np.abs(columns[name] - at_rest[name]).max()) for name in record.indications}
     drifts = _zero_drifts(zero, scope, full)
-    series, left_out = _creeps(creep, scope, full, {one.load: one.largest for one in record.loads})
+    series, left_out = _creeps(creep, scope, full, {load.load: load.largest for load in record.loads})
     return SessionReadings(
         full_scale=tuple(full.items()),
         zero=drifts,
-        zero_loads=tuple(_load_drift(record, one, drifts, zero, rest) for one in record.loads if drifts),
+        zero_loads=tuple(_load_drift(record, load, drifts, zero, at_rest) for load in record.loads if drifts),
         shunts=tuple(_shunts(zero, cells, scope)),
         creep=series,
         creep_left_out=left_out,
@@ -191,27 +191,27 @@ def readings_of(record: CalibrationRecord, loads: Table) -> SessionReadings:
     )
 
 
-def readings_json(found: SessionReadings) -> dict[str, Any]:
+def readings_json(readings: SessionReadings) -> dict[str, Any]:
     """Return the readings as JSON values, by indication and load."""
 
     def named(parts: Iterable[Any], key: str) -> dict[str, Any]:
-        made = [dataclasses.asdict(one) for one in parts]
-        return {one.pop(key): one for one in made}
+        entries = [dataclasses.asdict(part) for part in parts]
+        return {entry.pop(key): entry for entry in entries}
 
     return {
-        "full_scale": dict(found.full_scale),
-        "zero": named(found.zero, "name"),
-        "zero_loads": named(found.zero_loads, "load"),
-        "shunt": [{**dataclasses.asdict(one), "within": one.within} for one in found.shunts],
-        "creep": [dataclasses.asdict(one) for one in found.creep],
-        "reversibility": named(found.reversibility, "load"),
-        "temperature_C": found.temperature_C,
+        "full_scale": dict(readings.full_scale),
+        "zero": named(readings.zero, "name"),
+        "zero_loads": named(readings.zero_loads, "load"),
+        "shunt": [{**dataclasses.asdict(shunt), "within": shunt.within} for shunt in readings.shunts],
+        "creep": [dataclasses.asdict(series) for series in readings.creep],
+        "reversibility": named(readings.reversibility, "load"),
+        "temperature_C": readings.temperature_C,
     }
 
 
 def _rest(record: CalibrationRecord, table: Table) -> dict[str, float]:
     """Return each indication without load: the mean of the unloaded rows, else by a line through all rows."""
-    matrix = table.matrix([one.load for one in record.loads])
+    matrix = table.matrix([load.load for load in record.loads])
     cells = table.matrix(record.indications)
     idle = (np.abs(matrix) <= _NO_LOAD * np.abs(matrix).max(axis=0)).all(axis=1)
     if idle.any():
@@ -223,43 +223,45 @@ def _rest(record: CalibrationRecord, table: Table) -> dict[str, float]:
 
 
 def _zero_drifts(zero: tuple[ZeroEntry, ...], scope: Scope, full: dict[str, float]) -> tuple[ZeroDrift, ...]:
-    made = []
+    zero_drifts = []
     for name in scope.indications:
-        told = [
-            (one.when, dict(one.values)[name]) for one in zero if not one.shunt and name in dict(one.values)
+        stated = [
+            (entry.when, dict(entry.values)[name])
+            for entry in zero
+            if not entry.shunt and name in dict(entry.values)
         ]
-        if len(told) < 2:
+        if len(stated) < 2:
             continue
-        said = [when.casefold() for when, _ in told]
-        first = next((i for i, text in enumerate(said) if text.startswith("before")), 0)
-        last = max((i for i, text in enumerate(said) if text.startswith("after")), default=len(told) - 1)
-        drift = told[last][1] - told[first][1]
-        made.append(
+        moments = [when.casefold() for when, _ in stated]
+        first = next((i for i, text in enumerate(moments) if text.startswith("before")), 0)
+        last = max((i for i, text in enumerate(moments) if text.startswith("after")), default=len(stated) - 1)
+        drift = stated[last][1] - stated[first][1]
+        zero_drifts.append(
             ZeroDrift(
-                name=name, unit=scope.unit(name), before=told[first][0], after=told[last][0], drift=drift,
+                name=name, unit=scope.unit(name), before=stated[first][0], after=stated[last][0], drift=drift,
                 percent_fs=100 * drift / full[name],
             )
         )  # fmt: skip
-    return tuple(made)
+    return tuple(zero_drifts)
 
 
 def _load_drift(
     record: CalibrationRecord,
-    one: LoadFit,
+    load: LoadFit,
     drifts: tuple[ZeroDrift, ...],
     zero: tuple[ZeroEntry, ...],
-    rest: dict[str, float],
+    at_rest: dict[str, float],
 ) -> LoadDrift:
-    start = dict(rest)
+    start = dict(at_rest)
     for entry in reversed(zero):
         start |= {} if entry.shunt else dict(entry.values)
     moved = start | {drift.name: start[drift.name] + drift.drift for drift in drifts}
     points = {name: np.array([start[name], moved[name]]) for name in record.indications}
-    before, after = _equation(one, points).tolist()
-    tolerance = one.tolerance or 1e-3 * one.largest
+    before, after = _equation(load, points).tolist()
+    tolerance = load.tolerance or 1e-3 * load.largest
     return LoadDrift(
-        load=one.load, unit=one.unit, cells=tuple(drift.name for drift in drifts), drift=after - before,
-        percent_fs=100 * (after - before) / one.largest, tolerance=tolerance,
+        load=load.load, unit=load.unit, cells=tuple(drift.name for drift in drifts), drift=after - before,
+        percent_fs=100 * (after - before) / load.largest, tolerance=tolerance,
     )  # fmt: skip
 
 
@@ -300,34 +302,34 @@ def _creeps(
     entries: tuple[CreepEntry, ...], scope: Scope, full: dict[str, float], largest: dict[str, float]
 ) -> tuple[tuple[Creep, ...], tuple[str, ...]]:
     series: dict[tuple[str, str, bool], dict[float, float]] = {}
-    told: dict[str, bool] = {}
+    evaluated: dict[str, bool] = {}
     for entry in entries:
-        told.setdefault(entry.load, False)
+        evaluated.setdefault(entry.load, False)
         for name, value in (*entry.values, *([entry.shown] if entry.shown else ())):
             series.setdefault((entry.load, name, entry.unloaded), {})[entry.seconds] = value
-    made = []
+    creeps = []
     for (load, name, unloaded), values in series.items():
         if len(values) < 2:
             continue
         standard = CREEP_FROM_S in values and CREEP_TO_S in values
         first, last = (CREEP_FROM_S, CREEP_TO_S) if standard else (min(values), max(values))
         change, of_load = values[last] - values[first], name in largest
-        made.append(
+        creeps.append(
             Creep(
                 of=name, unit=scope.loads[name] if of_load else scope.unit(name), load=load,
                 unloaded=unloaded, from_s=first, to_s=last, change=change,
                 percent_fs=100 * abs(change) / (largest[name] if of_load else full[name]),
             )
         )  # fmt: skip
-        told[load] = True
-    return tuple(made), tuple(load for load, used in told.items() if not used)
+        evaluated[load] = True
+    return tuple(creeps), tuple(load for load, is_evaluated in evaluated.items() if not is_evaluated)
 
 
 def _reversibility(record: CalibrationRecord, table: Table) -> tuple[Reversibility, ...]:
     if table.run is None or table.up is None:
         return ()
     up = table.up
-    names = [one.load for one in record.loads]
+    names = [load.load for load in record.loads]
     matrix = table.matrix(names)
     largest = np.abs(matrix).max(axis=0)
     loaded = (np.abs(matrix) > SAME_LOAD * largest).any(axis=1)
@@ -340,26 +342,26 @@ def _reversibility(record: CalibrationRecord, table: Table) -> tuple[Reversibili
         _, key = np.unique(key * (int(levels.max()) + 1) + levels, return_inverse=True)
     rises = up[loaded]
     ups, downs = (np.bincount(key[which], minlength=int(key.max()) + 1) for which in (rises, ~rises))
-    both = (ups > 0) & (downs > 0)
-    if not both.any():
+    paired = (ups > 0) & (downs > 0)
+    if not paired.any():
         return ()
     columns = table.columns(record.indications)
-    made = []
-    for one, full in zip(record.loads, largest.tolist(), strict=True):
-        error = (_equation(one, columns) - table.column(one.load))[loaded]
+    reversals = []
+    for load, full in zip(record.loads, largest.tolist(), strict=True):
+        error = (_equation(load, columns) - table.column(load.load))[loaded]
         mean_up, mean_down = (
-            np.bincount(key[which], weights=error[which], minlength=len(ups))[both] / count[both]
+            np.bincount(key[which], weights=error[which], minlength=len(ups))[paired] / count[paired]
             for which, count in ((rises, ups), (~rises, downs))
         )
         apart = mean_up - mean_down
         worst, rms = float(np.abs(apart).max()), float(np.sqrt(np.mean(apart**2)))
-        made.append(
+        reversals.append(
             Reversibility(
-                load=one.load, unit=one.unit, pairs=int(both.sum()), worst=worst, rms=rms,
+                load=load.load, unit=load.unit, pairs=int(paired.sum()), worst=worst, rms=rms,
                 worst_percent_fs=100 * worst / full, rms_percent_fs=100 * rms / full,
             )
         )  # fmt: skip
-    return tuple(made)
+    return tuple(reversals)
 
 
 def _levels(values: NDArray[np.float64], within: float) -> NDArray[np.int64]:
@@ -370,11 +372,11 @@ def _levels(values: NDArray[np.float64], within: float) -> NDArray[np.int64]:
     ends = np.append(starts[1:], len(values)) - 1
     if (values[order][ends] - values[order][starts] > within).any():
         return np.unique(values, return_inverse=True)[1].astype(np.int64)
-    made = np.empty(len(values), dtype=np.int64)
-    made[order] = steps
-    return made
+    numbers = np.empty(len(values), dtype=np.int64)
+    numbers[order] = steps
+    return numbers
 
 
-def _equation(one: LoadFit, columns: dict[str, NDArray[np.float64]]) -> NDArray[np.float64]:
-    value: NDArray[np.float64] = term_matrix(one.terms, columns) @ np.asarray(one.coefficients)
+def _equation(load: LoadFit, columns: dict[str, NDArray[np.float64]]) -> NDArray[np.float64]:
+    value: NDArray[np.float64] = term_matrix(load.terms, columns) @ np.asarray(load.coefficients)
     return value

@@ -18,9 +18,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolkit.calibration.fit.adequacy import RANK, terms_condition_number
+from toolkit.calibration.fit.adequacy import NOISE_SHARE, RANK, noise_shares, terms_condition_number
 from toolkit.calibration.fit.basis import build_basis
-from toolkit.calibration.fit.dilution import NOISE_SHARE, noise_shares
 from toolkit.calibration.terms import INTERCEPT, model_terms, term_matrix
 
 if TYPE_CHECKING:
@@ -98,17 +97,17 @@ def holm(probabilities: Sequence[float]) -> tuple[float, ...]:
 def recommend_wider(fit: SessionFit) -> Wider | None:
     """Return the simplest wider model on which no other improves; None where the session's is as good."""
     session, columns = fit.session, fit.session.table.columns(fit.session.indications)
-    loads = [one for one in fit.loads if not _exact(one)]
-    own = _Model(name="session", lines="", terms=session.terms)
+    loads = [load for load in fit.loads if not _exact(load)]
+    current = _Model(name="session", lines="", terms=session.terms)
     applied = session.table.matrix([load.name for load in session.loads])
     models = [m for m in _models(session) if _determined(m.terms, columns, applied)]
     if not models or not loads:
         return None
-    solved = {(own.name, one.setting.name): _sum_of(one.fit) for one in loads}
+    solved = {(current.name, load.setting.name): _sum_of(load.fit) for load in loads}
     for model in models:
         sums = _refit(fit, loads, model.terms, columns)
-        solved |= {(model.name, one.setting.name): found for one, found in zip(loads, sums, strict=True)}
-    better = _better(own, models, loads, solved)
+        solved |= {(model.name, load.setting.name): total for load, total in zip(loads, sums, strict=True)}
+    better = _better(current, models, loads, solved)
     enough = [
         m
         for m in models
@@ -117,12 +116,12 @@ def recommend_wider(fit: SessionFit) -> Wider | None:
     ]
     if not enough:
         return None
-    model = min(enough, key=lambda m: _information([solved[m.name, one.setting.name] for one in loads]))
+    model = min(enough, key=lambda m: _information([solved[m.name, load.setting.name] for load in loads]))
     rows = better[model.name]
     ratio, probability, most = min(rows, key=lambda row: (row[1], -row[0]))
     full = float(np.abs(session.table.column(most)).max())
-    before = 100 * next(one.fit.residual_sd for one in loads if one.setting.name == most) / full
-    old, new = solved[own.name, most], solved[model.name, most]
+    before = 100 * next(load.fit.residual_sd for load in loads if load.setting.name == most) / full
+    old, new = solved[current.name, most], solved[model.name, most]
     shrink = float(np.sqrt(new.squares / new.dof / (old.squares / old.dof)))
     return Wider(
         name=model.name,
@@ -142,27 +141,27 @@ def recommend_drop(fit: SessionFit) -> Droppable | None:
     """
     session, columns = fit.session, fit.session.table.columns(fit.session.indications)
     higher = [name for name in session.terms if name not in (*session.indications, INTERCEPT)]
-    loads = [one for one in fit.loads if not _exact(one)]
+    loads = [load for load in fit.loads if not _exact(load)]
     if not higher or not loads:
         return None
     extent = dict(zip(session.terms, np.abs(term_matrix(session.terms, columns)).max(axis=0), strict=True))
     small, tests = set(higher), []
-    for one in loads:
-        full = float(np.abs(session.table.column(one.setting.name)).max())
-        named = dict(zip(session.terms, one.fit.coefficients, strict=True))
-        error = dict(zip(session.terms, one.fit.standard_errors.tolist(), strict=True))
-        small -= {t for t in higher if 100 * abs(named[t]) * extent[t] >= NEGLIGIBLE_PERCENT * full}
-        tests += [(t, _two_sided(named[t] / error[t], one.fit)) for t in higher]
+    for load in loads:
+        full = float(np.abs(session.table.column(load.setting.name)).max())
+        coefficients = dict(zip(session.terms, load.fit.coefficients, strict=True))
+        error = dict(zip(session.terms, load.fit.standard_errors.tolist(), strict=True))
+        small -= {t for t in higher if 100 * abs(coefficients[t]) * extent[t] >= NEGLIGIBLE_PERCENT * full}
+        tests += [(t, _two_sided(coefficients[t] / error[t], load.fit)) for t in higher]
     adjusted = holm([p for _, p in tests])
     needed = {t for (t, _), p in zip(tests, adjusted, strict=True) if p < RISK}
     idle = [t for t in higher if t not in needed]
     out = [t for t in higher if t in small or t in idle]
     if not out:
         return None
-    left = tuple(t for t in session.terms if t not in out)
+    remaining = tuple(t for t in session.terms if t not in out)
     ratios = [
-        _f_test(narrow, _sum_of(one.fit))
-        for narrow, one in zip(_refit(fit, loads, left, columns), loads, strict=True)
+        _f_test(narrow, _sum_of(load.fit))
+        for narrow, load in zip(_refit(fit, loads, remaining, columns), loads, strict=True)
     ]
     if idle and min(p for _, p in ratios) < RISK / len(loads):
         # Parallel terms share their effect: each seems idle while the other is there.
@@ -170,14 +169,14 @@ def recommend_drop(fit: SessionFit) -> Droppable | None:
         idle = [t for t in idle if t in small]
         if not out:
             return None
-        left = tuple(t for t in session.terms if t not in out)
+        remaining = tuple(t for t in session.terms if t not in out)
         ratios = [
-            _f_test(narrow, _sum_of(one.fit))
-            for narrow, one in zip(_refit(fit, loads, left, columns), loads, strict=True)
+            _f_test(narrow, _sum_of(load.fit))
+            for narrow, load in zip(_refit(fit, loads, remaining, columns), loads, strict=True)
         ]
     base = model_terms(session.model, session.indications, degree=session.degree)
     dropped = [t for t in base if t not in session.terms]
-    keeps = [t for t in left if t not in (*session.indications, INTERCEPT)]
+    keeps = [t for t in remaining if t not in (*session.indications, INTERCEPT)]
     return Droppable(
         small=tuple(t for t in out if t in small),
         idle=tuple(idle),
@@ -190,27 +189,27 @@ def recommend_drop(fit: SessionFit) -> Droppable | None:
 
 def _models(session: Session) -> list[_Model]:
     """Return the models that a session may name and that hold all of its own terms, simplest first."""
-    names, own, degree = session.indications, set(session.terms), session.degree
+    names, present, degree = session.indications, set(session.terms), session.degree
     linear = model_terms("linear", names)
     balance = model_terms("balance", names)
     # What the session leaves out of the linear part on purpose stays out.
-    gone = [t for t in linear if t not in own]
-    found = []
+    dropped = [t for t in linear if t not in present]
+    models = []
     cross = [t for t in balance if "*" in t and "abs" not in t]
     squares = [t for t in balance if t.endswith("^2")]
     for name, added in (("interaction", cross), ("interaction and squares", cross + squares)):
-        wanted = own | set(added)
-        if cross and wanted <= set(balance):
-            kept = tuple(t for t in balance if t in wanted)
-            drop = [t for t in balance if t not in wanted]
-            found.append(_Model(name=name, lines=_lines("balance", drop), terms=kept))
+        requested = present | set(added)
+        if cross and requested <= set(balance):
+            ordered = tuple(t for t in balance if t in requested)
+            drop = [t for t in balance if t not in requested]
+            models.append(_Model(name=name, lines=_lines("balance", drop), terms=ordered))
     for higher in range(max(degree, 1) + 1, min(max(degree, 1) + 2, HIGHEST_DEGREE) + 1):
-        terms = model_terms("polynomial", names, degree=higher, drop=gone)
-        lines = f'model = "polynomial"\ndegree = {higher}' + ("\n" + _drop_line(gone) if gone else "")
-        found.append(_Model(name=f"degree {higher}", lines=lines, terms=terms))
-    terms = tuple(t for t in balance if t not in gone)
-    found.append(_Model(name="balance", lines=_lines("balance", gone), terms=terms))
-    return [m for m in found if own < set(m.terms)]
+        terms = model_terms("polynomial", names, degree=higher, drop=dropped)
+        lines = f'model = "polynomial"\ndegree = {higher}' + ("\n" + _drop_line(dropped) if dropped else "")
+        models.append(_Model(name=f"degree {higher}", lines=lines, terms=terms))
+    terms = tuple(t for t in balance if t not in dropped)
+    models.append(_Model(name="balance", lines=_lines("balance", dropped), terms=terms))
+    return [m for m in models if present < set(m.terms)]
 
 
 def _better(
@@ -223,12 +222,12 @@ def _better(
     tests = [
         (m.name, load, *_f_test(solved[base.name, load], solved[m.name, load]))
         for m in models
-        for load in (one.setting.name for one in loads)
+        for load in (load.setting.name for load in loads)
     ]
     rows: dict[str, list[tuple[float, float, str]]] = {}
     for (name, load, ratio, _), p in zip(tests, holm([t[3] for t in tests]), strict=True):
         rows.setdefault(name, []).append((ratio, p, load))
-    return {name: found for name, found in rows.items() if min(p for _, p, _ in found) < RISK}
+    return {name: row for name, row in rows.items() if min(p for _, p, _ in row) < RISK}
 
 
 def _f_test(narrow: _Sum, wide: _Sum) -> tuple[float, float]:
@@ -246,9 +245,9 @@ def _information(sums: Sequence[_Sum]) -> float:
     """Return the Bayesian information criterion, summed over the loads (Schwarz, Ann. Statist. 6, 1978)."""
     tiny = float(np.finfo(float).tiny)
     return sum(
-        one.rows * float(np.log(max(one.squares, tiny) / one.rows))
-        + (one.rows - one.dof) * float(np.log(one.rows))
-        for one in sums
+        total.rows * float(np.log(max(total.squares, tiny) / total.rows))
+        + (total.rows - total.dof) * float(np.log(total.rows))
+        for total in sums
     )
 
 
@@ -270,12 +269,12 @@ def _refit(
 ) -> list[_Sum]:
     """Return what other terms leave over of each load; the coefficients themselves are not wanted."""
     table, design = fit.session.table, build_basis(terms, columns).design
-    load = np.array([table.column(one.setting.name) for one in loads]).T
-    if all(one.fit.weights is None for one in loads):
+    load = np.array([table.column(load.setting.name) for load in loads]).T
+    if all(load.fit.weights is None for load in loads):
         return _left_over(design, load)
     return [
         _left_over(design * root[:, None], (y * root)[:, None])[0]
-        for y, root in zip(load.T, (_root(one, len(design)) for one in loads), strict=True)
+        for y, root in zip(load.T, (_root(load, len(design)) for load in loads), strict=True)
     ]
 
 
@@ -284,16 +283,16 @@ def _left_over(design: NDArray[np.float64], loads: NDArray[np.float64]) -> list[
     n, p = design.shape
     # Of a triangle of both, what stands below the design's rows is as long as the residuals.
     below = np.asarray(np.linalg.qr(np.hstack([design, loads]), mode="r"))[p:, p:]
-    return [_Sum(squares=float(one @ one), rows=n, dof=n - p) for one in below.T]
+    return [_Sum(squares=float(residual @ residual), rows=n, dof=n - p) for residual in below.T]
 
 
-def _root(one: LoadResult, rows: int) -> NDArray[np.float64]:
-    return np.ones(rows) if one.fit.weights is None else np.sqrt(one.fit.weights)
+def _root(load: LoadResult, rows: int) -> NDArray[np.float64]:
+    return np.ones(rows) if load.fit.weights is None else np.sqrt(load.fit.weights)
 
 
-def _exact(one: LoadResult) -> bool:
+def _exact(load: LoadResult) -> bool:
     # The tolerance is 0.1 % of full scale unless stated: scatter this small is rounding of the arithmetic.
-    return one.fit.residual_sd <= 1e-9 * one.setting.tolerance
+    return load.fit.residual_sd <= 1e-9 * load.setting.tolerance
 
 
 def _determined(

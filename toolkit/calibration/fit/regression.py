@@ -17,11 +17,99 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from toolkit.calibration.fit.basis import Basis, build_basis
-from toolkit.calibration.fit.exact_products import CutDesign, Residuals
 from toolkit.calibration.fit.inner import inner
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
+
+# Products of tall matrices without their rounding: matrices cut into parts whose products are exact.
+
+
+_MANTISSA = 53
+
+
+def exact_bits(rows: int) -> int:
+    """Return how many bits two factors may each keep so that a sum of ``rows`` products is exact.
+
+    >>> exact_bits(1024)
+    21
+    """
+    return (_MANTISSA - max(rows - 1, 1).bit_length()) // 2
+
+
+def leading(values: NDArray[np.float64], bits: int) -> NDArray[np.float64]:
+    """Return the leading bits of each line of (lines, rows), on a grid of 2^-bits of its largest value.
+
+    What is left, ``values`` minus the result, is exact.
+    """
+    _, exponent = np.frexp(_largest(values))
+    # Added to a number of this size, a value is rounded to the grid; taken away again, it stands there.
+    size = np.ldexp(1.5, exponent + (_MANTISSA - 1 - bits))[:, None]
+    moved: NDArray[np.float64] = values + size
+    moved -= size
+    return moved
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Residuals:
+    """``high`` + ``low`` (loads, rows), the first cut to the bits that exact products allow."""
+
+    high: NDArray[np.float64]
+    low: NDArray[np.float64]
+
+    @classmethod
+    def of(cls, values: NDArray[np.float64], bits: int) -> Residuals:
+        """Cut residuals (loads, rows)."""
+        high = leading(values, bits)
+        return cls(high=high, low=values - high)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class CutDesign:
+    """A design in two parts (terms, rows), ``high`` + ``low``, exactly."""
+
+    high: NDArray[np.float64]
+    low: NDArray[np.float64]
+    bits: int
+
+    @classmethod
+    def of(cls, design: NDArray[np.float64]) -> CutDesign:
+        """Cut a design (terms, rows)."""
+        bits = exact_bits(design.shape[1])
+        high = leading(design, bits)
+        return cls(high=high, low=design - high, bits=bits)
+
+    def residuals(self, loads: NDArray[np.float64], solution: NDArray[np.longdouble]) -> Residuals:
+        """Return loads (loads, rows) minus solution (loads, terms) times design, to 70 bits or so."""
+        x = np.asarray(solution, dtype=np.float64)
+        _, of_terms = np.frexp(_largest(self.high))
+        _, of_sums = np.frexp(np.abs(x) @ np.ldexp(1.0, of_terms))
+        # One grid for the products of all terms: a small term's coefficient keeps fewer bits.
+        grid = np.ldexp(1.0, of_sums[:, None] - _MANTISSA + 1 - of_terms[None, :] + self.bits)
+        head = np.rint(x / grid) * grid
+        fitted = head @ self.high
+        high_part = loads - fitted
+        # What that difference rounds away (Knuth, The Art of Computer Programming 2, 4.2.2, theorem B).
+        back = loads - high_part
+        lost = (loads - (high_part + back)) + (back - fitted)
+        correction = np.asarray(solution - head, dtype=np.float64) @ self.high
+        correction += x @ self.low
+        high = leading(high_part - correction, self.bits)
+        high_part -= high
+        high_part -= correction
+        high_part += lost
+        return Residuals(high=high, low=high_part)
+
+    def gradient(self, residuals: Residuals) -> NDArray[np.longdouble]:
+        """Return the products of residuals and design (loads, terms)."""
+        exact = residuals.high @ self.high.T
+        projected = residuals.low @ self.high.T + (residuals.high + residuals.low) @ self.low.T
+        return np.asarray(exact, dtype=np.longdouble) + projected
+
+
+def _largest(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.asarray(np.maximum(values.max(axis=1), -values.min(axis=1)), dtype=np.float64)
+
 
 _REFINEMENTS = 3
 _SETTLED = 1e-15
@@ -135,8 +223,8 @@ class Factor:
         from scipy.linalg import qr
 
         weighted = design if root is None else design * root[:, None]
-        found = qr(weighted, mode="economic", check_finite=False)
-        q, r = (np.asarray(one, dtype=np.float64) for one in found)
+        factors = qr(weighted, mode="economic", check_finite=False)
+        q, r = (np.asarray(factor, dtype=np.float64) for factor in factors)
         if not np.abs(np.diag(r)).all():
             raise np.linalg.LinAlgError("the terms are exactly dependent")
         # Elimination has nothing to do in a triangle: this is back-substitution.
@@ -158,17 +246,21 @@ class Factor:
         square = None if self.root is None else self.root**2
         first = self._first(loads)
         solution = first.astype(np.longdouble)
-        rest = cut.residuals(loads, solution)
+        residuals = cut.residuals(loads, solution)
         for _ in range(_REFINEMENTS):
             # A weight rounds once a row, as if its uncertainty were stated to 53 bits.
-            weighed = rest if square is None else Residuals.of(square * (rest.high + rest.low), cut.bits)
+            weighed = (
+                residuals
+                if square is None
+                else Residuals.of(square * (residuals.high + residuals.low), cut.bits)
+            )
             step = np.asarray(cut.gradient(weighed), dtype=np.float64) @ self.inverse
             solution = solution + step
             # A step is small: its product in doubles is exact enough for the residuals' low part.
-            rest = Residuals(high=rest.high, low=rest.low - step @ self.design.T)
+            residuals = Residuals(high=residuals.high, low=residuals.low - step @ self.design.T)
             if not (np.abs(step) > _SETTLED * np.abs(first)).any():
                 break
-        return solution, rest.high + rest.low
+        return solution, residuals.high + residuals.low
 
     def _first(self, loads: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return statsmodels' solution by QR (loads, terms).
@@ -180,11 +272,11 @@ class Factor:
 
         y = loads if self.root is None else loads * self.root
         head = y @ self.q
-        left = y - head @ self.q.T
-        length = np.sqrt(np.einsum("ij,ij->i", left, left))
+        residual = y - head @ self.q.T
+        length = np.sqrt(np.einsum("ij,ij->i", residual, residual))
         rows = np.vstack([self.r, np.zeros(len(self.r))])
-        found = [OLS(column, rows).fit(method="qr").params for column in np.column_stack([head, length])]
-        return np.asarray(found, dtype=np.float64)
+        solutions = [OLS(column, rows).fit(method="qr").params for column in np.column_stack([head, length])]
+        return np.asarray(solutions, dtype=np.float64)
 
 
 def raw_coefficients(basis: Basis, solution: NDArray[Any]) -> tuple[float, ...]:

@@ -117,7 +117,7 @@ def report_session(fit: SessionFit) -> tuple[FitReport, ...]:
     """Return the report of every load of a fitted session."""
     table = fit.session.table
     level = load_levels(table.matrix([load.name for load in fit.session.loads]))
-    return tuple(_report(fit, one, level) for one in fit.loads)
+    return tuple(_report(fit, load, level) for load in fit.loads)
 
 
 def prediction_half_width(
@@ -161,9 +161,9 @@ def coefficient_rows(fit: TermFit, extent: NDArray[np.float64], full_scale: floa
     )  # fmt: skip
 
 
-def _report(fit: SessionFit, one: LoadResult, level: NDArray[np.int64] | None) -> FitReport:
-    session, table, solved, more = fit.session, fit.session.table, one.fit, one.diagnostics
-    load = table.column(one.setting.name)
+def _report(fit: SessionFit, load_result: LoadResult, level: NDArray[np.int64] | None) -> FitReport:
+    session, table, solved, more = fit.session, fit.session.table, load_result.fit, load_result.diagnostics
+    load = table.column(load_result.setting.name)
     columns = table.columns(session.indications)
     full = float(np.abs(load).max())
     extent = np.abs(term_matrix(solved.terms, columns)).max(axis=0)
@@ -171,13 +171,13 @@ def _report(fit: SessionFit, one: LoadResult, level: NDArray[np.int64] | None) -
     total, within, left_out = _sums(solved, load, weighted=session.method == "wls")
     error = solved.standard_errors
     size = np.where(error > 0, error, 1.0)
-    found = reversals(residuals=solved.residuals, load=load, level=level, up=table.up, run=table.run)
+    reversal = reversals(residuals=solved.residuals, load=load, level=level, up=table.up, run=table.run)
     sizes = np.array([]) if level is None else np.bincount(level)
     at = int(np.argmax(np.abs(load)))
     check = session.check
     return FitReport(
-        load=one.setting.name,
-        unit=one.setting.unit,
+        load=load_result.setting.name,
+        unit=load_result.setting.unit,
         full_scale=full,
         coefficients=coefficient_rows(solved, extent, full),
         covariance=solved.covariance,
@@ -209,11 +209,13 @@ def _report(fit: SessionFit, one: LoadResult, level: NDArray[np.int64] | None) -
         prediction_half_width=float(
             prediction_half_width(solved, {name: column[[at]] for name, column in columns.items()})[0]
         ),
-        check_reference=None if check is None else check.column(one.setting.name),
-        check_percent_fs=None if one.check_residuals is None else 100 * one.check_residuals / full,
-        tolerance_percent_fs=100 * one.setting.tolerance / full,
-        reversals=found,
-        reversibility_percent_fs=max((r.percent_fs for r in found), key=abs, default=None),
+        check_reference=None if check is None else check.column(load_result.setting.name),
+        check_percent_fs=None
+        if load_result.check_residuals is None
+        else 100 * load_result.check_residuals / full,
+        tolerance_percent_fs=100 * load_result.setting.tolerance / full,
+        reversals=reversal,
+        reversibility_percent_fs=max((r.percent_fs for r in reversal), key=abs, default=None),
         noise_free=noise_free,
     )
 

@@ -54,23 +54,23 @@ def robust_weights(
     design = build_basis(fit.terms, columns).design
     y = load if w is None else load * w
     floor = 1e-12 * float(np.abs(y).max())
-    rest = fit.residuals if w is None else fit.residuals * w
-    if math.sqrt(inner(rest, rest) / n) <= floor:
+    residuals = fit.residuals if w is None else fit.residuals * w
+    if math.sqrt(inner(residuals, residuals) / n) <= floor:
         return None
     q, _ = np.linalg.qr(design if w is None else design * w[:, None])
     q = np.ascontiguousarray(q.T)
     reach = math.sqrt(float(np.einsum("ij,ij->j", q, q).max()))
     for weights_of in (_huber, _biweight):
-        rest = _reweighted(q, rest, weights_of, reach, floor)
-    scale = _mad(rest) * math.sqrt(n / fit.dof)
+        residuals = _reweighted(q, residuals, weights_of, reach, floor)
+    scale = _mad(residuals) * math.sqrt(n / fit.dof)
     if scale <= floor:
         return None
-    return _biweight(rest / (scale * np.sqrt(1 - np.minimum(fit.leverage, 1 - 1e-9))))
+    return _biweight(residuals / (scale * np.sqrt(1 - np.minimum(fit.leverage, 1 - 1e-9))))
 
 
 def _reweighted(
     q: NDArray[np.float64],
-    rest: NDArray[np.float64],
+    residuals: NDArray[np.float64],
     weights_of: Callable[[NDArray[np.float64]], NDArray[np.float64]],
     reach: float,
     floor: float,
@@ -82,22 +82,22 @@ def _reweighted(
     the median's, anew in every step.
     """
     for _ in range(_STEPS):
-        scale = _mad(rest)
+        scale = _mad(residuals)
         if scale <= floor:
             break
-        weighted = q * weights_of(rest / scale)
+        weighted = q * weights_of(residuals / scale)
         try:
-            step = np.linalg.solve(weighted @ q.T, np.einsum("ij,j->i", weighted, rest))
+            step = np.linalg.solve(weighted @ q.T, np.einsum("ij,j->i", weighted, residuals))
         except np.linalg.LinAlgError:
             break
-        rest = rest - step @ q
+        residuals = residuals - step @ q
         if reach * float(np.linalg.norm(step)) <= _SETTLED * scale:
             break
-    return rest
+    return residuals
 
 
-def _mad(rest: NDArray[np.float64]) -> float:
-    return float(np.median(np.abs(rest))) / _NORMAL_MEDIAN
+def _mad(residuals: NDArray[np.float64]) -> float:
+    return float(np.median(np.abs(residuals))) / _NORMAL_MEDIAN
 
 
 def _huber(z: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -135,9 +135,9 @@ def hidden_outliers(
     # Rows left out together: e_out = (1 - H)^-1 e, and so much less is left of the sum of squares.
     spread = np.linalg.pinv(np.eye(len(out)) - q[out] @ q[out].T)
     deviation = spread @ e[out]
-    rest = float(e @ e - e[out] @ deviation)
-    if rest <= 0:
+    remaining = float(e @ e - e[out] @ deviation)
+    if remaining <= 0:
         return ()
-    ratio = np.abs(deviation) / np.sqrt(rest / dof * np.diag(spread))
+    ratio = np.abs(deviation) / np.sqrt(remaining / dof * np.diag(spread))
     limit = float(stdtrit(dof, 1 - RISK / (2 * len(weights))))
     return tuple(int(row) + 1 for row in out[ratio > limit])

@@ -48,7 +48,7 @@ def estimate(rows: SessionRows) -> RunScatter | None:
     """Return the scatter of a load; None where one run cannot tell how runs differ, or nothing scatters."""
     n, p = rows.mean.columns.shape
     groups = rows.groups
-    left = rows.dof
+    dof = rows.dof
     if groups < 2 or n - p < FEWEST_DOF:
         return None
     problem, size = _problem(rows)
@@ -58,7 +58,7 @@ def estimate(rows: SessionRows) -> RunScatter | None:
     within = size * math.sqrt(float(problem.deviance(np.array([ratios]))[1][0]))
     return RunScatter(
         factor=rows.factor, groups=groups, within=within, zero=within * zero, gain=within * gain,
-        correlation=correlation ** (1 / rows.stride), dof=left,
+        correlation=correlation ** (1 / rows.stride), dof=dof,
     )  # fmt: skip
 
 
@@ -115,24 +115,26 @@ def spread(rows: SessionRows, scatter: RunScatter) -> NDArray[np.float64]:
     gains = between * np.outer(relative, relative)
     within, zero, gain = scatter.variances
     inverse = np.linalg.inv(within * R + zero * between + gain * gains)
-    told = inverse @ mean
-    P = inverse - told @ np.linalg.pinv(mean.T @ told, hermitian=True) @ told.T
+    weights = inverse @ mean
+    P = inverse - weights @ np.linalg.pinv(mean.T @ weights, hermitian=True) @ weights.T
     free = [True, *(high > 0 for _, high in rows.bounds)]
-    seen = [P @ part for part, use in zip((R, between, gains, slope), free, strict=True) if use]
+    projected = [P @ part for part, use in zip((R, between, gains, slope), free, strict=True) if use]
     # Variances in their own unit: the information of newtons and of a correlation differ by powers of ten.
     unit = np.array([within, within, within, 1.0])[free]
-    information = np.array([[0.5 * np.sum(a * b.T) for b in seen] for a in seen]) * np.outer(unit, unit)
-    found = np.zeros((4, 4))
-    found[np.ix_(free, free)] = np.linalg.pinv(information, hermitian=True) * np.outer(unit, unit)
-    return found
+    information = np.array([[0.5 * np.sum(a * b.T) for b in projected] for a in projected]) * np.outer(
+        unit, unit
+    )
+    expected = np.zeros((4, 4))
+    expected[np.ix_(free, free)] = np.linalg.pinv(information, hermitian=True) * np.outer(unit, unit)
+    return expected
 
 
 def _problem(rows: SessionRows) -> tuple[_Problem, float]:
     """Return the products of the rows at unit scatter, and that scatter [the load's unit]."""
     columns, load = rows.mean.columns, rows.load
-    rest = load - columns @ (columns.T @ load)
-    size = math.sqrt(float(rest @ rest) / len(rest))
-    return _Problem.of(columns, rows.relative, rest / (size or 1.0), rows.group), size
+    residual = load - columns @ (columns.T @ load)
+    size = math.sqrt(float(residual @ residual) / len(residual))
+    return _Problem.of(columns, rows.relative, residual / (size or 1.0), rows.group), size
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -161,18 +163,18 @@ class _Problem:
     ) -> _Problem:
         order = np.argsort(group, kind="stable")
         # Orthonormal columns of unit mean square: products of one size.
-        whole = np.column_stack([mean * math.sqrt(len(load)), np.ones(len(load)), relative, load])[order]
+        columns = np.column_stack([mean * math.sqrt(len(load)), np.ones(len(load)), relative, load])[order]
         counts = np.bincount(group)
         starts = np.concatenate([[0], np.cumsum(counts)[:-1]])
         # Of the first row of a run nothing stands before.
-        before = np.concatenate([np.zeros((1, whole.shape[1])), whole[:-1]])
+        before = np.concatenate([np.zeros((1, columns.shape[1])), columns[:-1]])
         before[starts] = 0.0
-        own = np.add.reduceat(whole[:, :, None] * whole[:, None, :], starts)
-        first = whole[starts][:, :, None] * whole[starts][:, None, :]
-        crossed = np.add.reduceat(whole[:, :, None] * before[:, None, :], starts)
+        products = np.add.reduceat(columns[:, :, None] * columns[:, None, :], starts)
+        first = columns[starts][:, :, None] * columns[starts][:, None, :]
+        crossed = np.add.reduceat(columns[:, :, None] * before[:, None, :], starts)
         return cls(
             first=first,
-            own=own - first,
+            own=products - first,
             crossed=crossed + crossed.transpose(0, 2, 1),
             before=np.add.reduceat(before[:, :, None] * before[:, None, :], starts),
             counts=counts,
@@ -191,12 +193,12 @@ class _Problem:
         root = points[:, None, None, :2]
         inner = np.eye(2) + root.transpose(0, 1, 3, 2) * products[:, :, p:-1, p:-1] * root
         across = products[:, :, :, p:-1] * root
-        told = np.linalg.solve(inner, across.transpose(0, 1, 3, 2))
-        reduced = (products - across @ told).sum(axis=1)
+        solved = np.linalg.solve(inner, across.transpose(0, 1, 3, 2))
+        reduced = (products - across @ solved).sum(axis=1)
         lower = np.linalg.cholesky(reduced[:, :p, :p])
-        seen = np.linalg.solve(lower, reduced[:, :p, -1:])[:, :, 0]
+        reached = np.linalg.solve(lower, reduced[:, :p, -1:])[:, :, 0]
         dof = self.rows - p
-        variance = np.maximum(reduced[:, -1, -1] - np.sum(seen**2, axis=1), 1e-300) / dof
+        variance = np.maximum(reduced[:, -1, -1] - np.sum(reached**2, axis=1), 1e-300) / dof
         logs = np.linalg.slogdet(inner)[1].sum(axis=1)
         logs += 2 * np.log(np.diagonal(lower, axis1=1, axis2=2)).sum(axis=1)
         logs += (self.counts - 1).sum() * np.log(white[:, 0, 0, 0])
@@ -243,12 +245,17 @@ def _search(
     axes = [np.unique(np.minimum(start, end)) for start, end in zip(scales, top, strict=True)]
     grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
     start = grid[int(np.argmin(problem.deviance(ratios(grid))[0]))]
-    found = minimize(
+    optimum = minimize(
         slope, start, jac=True, bounds=Bounds(low, top), method="L-BFGS-B", options={"ftol": 1e-13}
     ).x
     # A ratio that is not told apart from none is none.
     candidates = np.vstack(
-        [np.where(found < _GRID[0], 0.0, found), *np.where(np.eye(3, dtype=bool), 0.0, found), found, start]
+        [
+            np.where(optimum < _GRID[0], 0.0, optimum),
+            *np.where(np.eye(3, dtype=bool), 0.0, optimum),
+            optimum,
+            start,
+        ]
     )
     points = ratios(candidates)
     best = points[int(np.argmin(problem.deviance(points)[0]))]

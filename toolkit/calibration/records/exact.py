@@ -29,8 +29,8 @@ def solve_exactly(
         the terms are exactly dependent
     """
     names = sorted({name for t in terms for name in _names(t)})
-    whole = {name: _integers(columns[name]) for name in names}
-    matrix = [_term_integers(term, whole, len(load)) for term in terms]
+    integers = {name: _integers(columns[name]) for name in names}
+    matrix = [_term_integers(term, integers, len(load)) for term in terms]
     y, y_denominator = _integers(load)
     w, w_denominator = ([1] * len(y), 1) if weights is None else _integers(weights)
     weighted = [list(map(mul, column, w)) for column, _ in matrix]
@@ -79,20 +79,22 @@ def _integers(values: Sequence[float]) -> tuple[list[int], int]:
     return [number * (common // denominator) for number, denominator in ratios], common
 
 
-def _term_integers(term: str, whole: Mapping[str, tuple[list[int], int]], rows: int) -> tuple[list[int], int]:
+def _term_integers(
+    term: str, integers: Mapping[str, tuple[list[int], int]], rows: int
+) -> tuple[list[int], int]:
     parsed = parse_term(term)
     column, denominator = [1] * rows, 1
     for name, power in parsed.powers:
-        column = [a * b**power for a, b in zip(column, whole[name][0], strict=True)]
-        denominator *= whole[name][1] ** power
+        column = [a * b**power for a, b in zip(column, integers[name][0], strict=True)]
+        denominator *= integers[name][1] ** power
     for name in parsed.absolutes:
-        column = [a * abs(b) for a, b in zip(column, whole[name][0], strict=True)]
-        denominator *= whole[name][1]
+        column = [a * abs(b) for a, b in zip(column, integers[name][0], strict=True)]
+        denominator *= integers[name][1]
     return column, denominator
 
 
-def _dot(one: Sequence[int], other: Sequence[int]) -> int:
-    return sum(map(mul, one, other))
+def _dot(a: Sequence[int], b: Sequence[int]) -> int:
+    return sum(map(mul, a, b))
 
 
 def _eliminate(rows: list[list[Fraction]]) -> tuple[Fraction, ...]:

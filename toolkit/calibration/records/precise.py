@@ -42,8 +42,8 @@ def solve_gls_precisely(
     with localcontext() as context:
         context.prec = _digits(terms, columns)
         x, y = _rows(terms, columns), [Decimal(value) for value in load]
-        one = Decimal(1)
-        ordinary = _least_squares(x, y, [one] * len(y))
+        unit = Decimal(1)
+        ordinary = _least_squares(x, y, [unit] * len(y))
         fitted = [_dot(row, ordinary) for row in x]
         if u is None:
             square = sum(((a - b) ** 2 for a, b in zip(y, fitted, strict=True)), Decimal(0))
@@ -56,17 +56,17 @@ def solve_gls_precisely(
         size, groups = len(ordinary), max(group) + 1
         normal, right = _normal(x, y, weights)
         cross = [[Decimal(0)] * size for _ in range(groups)]
-        own, against = [one] * groups, [Decimal(0)] * groups
+        variances, against = [unit] * groups, [Decimal(0)] * groups
         for row, value, w, s, g in zip(x, y, weights, v, group, strict=True):
-            own[g] += w * s * s
+            variances[g] += w * s * s
             against[g] += w * s * value
             for i in range(size):
                 cross[g][i] += w * s * row[i]
         for g in range(groups):
             for i in range(size):
-                right[i] -= cross[g][i] * against[g] / own[g]
+                right[i] -= cross[g][i] * against[g] / variances[g]
                 for j in range(size):
-                    normal[i][j] -= cross[g][i] * cross[g][j] / own[g]
+                    normal[i][j] -= cross[g][i] * cross[g][j] / variances[g]
         return tuple(Fraction(value) for value in _solve(normal, right))
 
 
@@ -106,13 +106,13 @@ def solve_odr_precisely(
                 slopes.append(slope)
                 carried.append(value + _dot(slope, off))
                 weights.append(1 / (square + sum(s * s * c for s, c in zip(slope, cells2, strict=True))))
-            found = _least_squares(rows, carried, weights)
+            solution = _least_squares(rows, carried, weights)
             moved = max(
-                abs(_dot(row, [a - b for a, b in zip(found, coefficients, strict=True)])) for row in rows
+                abs(_dot(row, [a - b for a, b in zip(solution, coefficients, strict=True)])) for row in rows
             )
-            coefficients, before = found, delta
+            coefficients, before = solution, delta
             delta = [
-                [s * c * (value - _dot(row, found)) * w for s, c in zip(slope, cells2, strict=True)]
+                [s * c * (value - _dot(row, solution)) * w for s, c in zip(slope, cells2, strict=True)]
                 for row, slope, value, w in zip(rows, slopes, carried, weights, strict=True)
             ]
             # The first step moves no coefficient where all weights are equal: the adjustments must rest too.
@@ -142,8 +142,8 @@ def _rows(terms: Sequence[str], columns: Mapping[str, Sequence[float]]) -> _Rows
     return [_terms(parsed, {n: Decimal(v) for n, v in zip(names, row, strict=True)}) for row in points]
 
 
-def _dot(one: Sequence[Decimal], other: Sequence[Decimal]) -> Decimal:
-    return sum((a * b for a, b in zip(one, other, strict=True)), Decimal(0))
+def _dot(left_row: Sequence[Decimal], right_row: Sequence[Decimal]) -> Decimal:
+    return sum((a * b for a, b in zip(left_row, right_row, strict=True)), Decimal(0))
 
 
 def _normal(x: _Rows, y: Sequence[Decimal], weights: Sequence[Decimal]) -> tuple[_Rows, list[Decimal]]:

@@ -164,21 +164,21 @@ class CalibrationRecord:
         RecordError
             the record has no such load
         """
-        for one in self.loads:
-            if one.load == name:
-                return one
+        for entry in self.loads:
+            if entry.load == name:
+                return entry
         raise RecordError(
             f"record {self.id} has no load {name}",
             where=self.id,
             got=name,
-            expected=", ".join(one.load for one in self.loads),
+            expected=", ".join(load.load for load in self.loads),
             next_step="use one of those loads, or calibrate with a session that has it",
             rule="load",
         )
 
     def data_file(self, role: str) -> DataFile | None:
         """Return the file of a role, None where the record has none."""
-        return next((one for one in self.data if one.role == role), None)
+        return next((part for part in self.data if part.role == role), None)
 
 
 _BREAK = re.compile(r"\n *")
@@ -203,8 +203,8 @@ def content_of(record: CalibrationRecord) -> dict[str, Any]:
         "date": record.date,
         "entered_by": record.entered_by,
         "zero": record.zero,
-        "cells": [_cell_content(one) for one in record.cells],
-        "loads": [_load_content(one) for one in record.loads],
+        "cells": [_cell_content(cell) for cell in record.cells],
+        "loads": [_load_content(load) for load in record.loads],
         "golden": {"inputs": record.golden.inputs, "outputs": record.golden.outputs},
         "data": [{"role": d.role, "file": d.file, "sha256": d.sha256} for d in record.data],
         "settings": json.loads(record.settings),
@@ -218,35 +218,35 @@ _LOAD_KEYS = (
 ).split()
 
 
-def _cell_content(one: Indication) -> dict[str, Any]:
+def _cell_content(cell: Indication) -> dict[str, Any]:
     content: dict[str, Any] = {
-        "name": one.name, "unit": one.unit, "minimum": one.minimum, "maximum": one.maximum,
-        "serial": one.serial,
+        "name": cell.name, "unit": cell.unit, "minimum": cell.minimum, "maximum": cell.maximum,
+        "serial": cell.serial,
     }  # fmt: skip
     # Only where it says something: records of data that needed no conversion keep their hash.
-    return content if one.column_unit is None else content | {"column_unit": one.column_unit}
+    return content if cell.column_unit is None else content | {"column_unit": cell.column_unit}
 
 
-def _load_content(one: LoadFit) -> dict[str, Any]:
-    content = {key: getattr(one, key) for key in _LOAD_KEYS}
+def _load_content(load: LoadFit) -> dict[str, Any]:
+    content = {key: getattr(load, key) for key in _LOAD_KEYS}
     # As with cells: records made without it keep their hash.
-    if one.scatter is not None:
-        content["scatter"] = asdict(one.scatter)
-    if one.reference_u is not None:
-        content["reference_u"] = one.reference_u
+    if load.scatter is not None:
+        content["scatter"] = asdict(load.scatter)
+    if load.reference_u is not None:
+        content["reference_u"] = load.reference_u
     return content
 
 
 def _scatter(entry: Any) -> RunScatter | None:
     if entry is None:
         return None
-    found = RunScatter(**entry)
-    _floats((found.within, found.zero, found.gain, found.correlation))
-    if found.model != MODEL:
-        raise ValueError(f"the scatter's model is not known: {found.model}")
-    for count in (found.groups, found.dof):
+    scatter = RunScatter(**entry)
+    _floats((scatter.within, scatter.zero, scatter.gain, scatter.correlation))
+    if scatter.model != MODEL:
+        raise ValueError(f"the scatter's model is not known: {scatter.model}")
+    for count in (scatter.groups, scatter.dof):
         _optional(count, int)
-    return found
+    return scatter
 
 
 def content_hash(content: dict[str, Any]) -> str:
@@ -343,7 +343,7 @@ def _from_content(
 ) -> CalibrationRecord:
     loads = []
     for entry in content["loads"]:
-        one = LoadFit(
+        load = LoadFit(
             **{
                 **entry,
                 "terms": tuple(entry["terms"]),
@@ -358,9 +358,9 @@ def _from_content(
                 "reference_u": _optional(entry.get("reference_u"), float),
             }
         )
-        if not len(one.terms) == len(one.coefficients) == len(one.issued) == len(one.polarity):
-            raise ValueError(f"{one.load}: terms and coefficients differ in number")
-        loads.append(one)
+        if not len(load.terms) == len(load.coefficients) == len(load.issued) == len(load.polarity):
+            raise ValueError(f"{load.load}: terms and coefficients differ in number")
+        loads.append(load)
     golden = content["golden"]
     if content["kind"] not in ("fit", "legacy") or content["zero"] not in ZEROS:
         raise ValueError("kind or zero is not known")

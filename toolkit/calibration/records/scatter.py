@@ -102,13 +102,13 @@ class Rows:
         root = np.array([scatter.zero, scatter.gain])
         if scatter.groups < 2 or not root.any() or not scatter.within:
             return np.zeros_like(residuals)
-        ones, relative = np.ones_like(residuals), self.relative
-        products = [ones, relative, relative * relative, residuals, residuals * relative]
-        one, first, second, zero, gain = (np.bincount(self.group, weights=values) for values in products)
-        inner = np.array([[one, first], [first, second]]).transpose(2, 0, 1) * np.outer(root, root)
+        constant, relative = np.ones_like(residuals), self.relative
+        products = [constant, relative, relative * relative, residuals, residuals * relative]
+        counts, first, second, zero, gain = (np.bincount(self.group, weights=values) for values in products)
+        inner = np.array([[counts, first], [first, second]]).transpose(2, 0, 1) * np.outer(root, root)
         inner = inner + scatter.within**2 * np.eye(2)
-        told = np.linalg.solve(inner, (np.stack([zero, gain], axis=1) * root)[:, :, None])[:, :, 0] * root
-        effects = told[self.group]
+        solved = np.linalg.solve(inner, (np.stack([zero, gain], axis=1) * root)[:, :, None])[:, :, 0] * root
+        effects = solved[self.group]
         return np.asarray(effects[:, 0] + effects[:, 1] * relative)
 
     def variance(self, scatter: RunScatter, J: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]:

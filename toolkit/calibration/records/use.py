@@ -43,10 +43,12 @@ class CalibrationUse:
     @property
     def status(self) -> str:
         """The record's status in words, as the first page of a document says it."""
-        said = "unverified (legacy import)" if self.unverified else "verified"
+        standing = "unverified (legacy import)" if self.unverified else "verified"
         if self.draft:
-            said = f"not approved: {'; '.join(self.draft_reasons)}" + (f"; {said}" if self.unverified else "")
-        return said + (f"; known since: {'; '.join(self.since)}" if self.since else "")
+            standing = f"not approved: {'; '.join(self.draft_reasons)}" + (
+                f"; {standing}" if self.unverified else ""
+            )
+        return standing + (f"; known since: {'; '.join(self.since)}" if self.since else "")
 
     @property
     def word(self) -> str | None:
@@ -60,8 +62,8 @@ class CalibrationUse:
 
     def as_dict(self) -> dict[str, Any]:
         """Return the use under the keys of the answers and manifests."""
-        said = {"id": self.id, "sha256": self.sha256, "unverified": self.unverified}
-        return said | ({"draft": True} if self.draft else {})
+        content = {"id": self.id, "sha256": self.sha256, "unverified": self.unverified}
+        return content | ({"draft": True} if self.draft else {})
 
 
 def mark_of(uses: Sequence[CalibrationUse]) -> str | None:
@@ -69,18 +71,18 @@ def mark_of(uses: Sequence[CalibrationUse]) -> str | None:
 
     It names every record; why, as far as a line of a page has room for it.
     """
-    said = []
+    marks = []
     for word, chosen, why in (
-        (DRAFT_MARK, [one for one in uses if one.draft], "draft_reasons"),
-        (UNVERIFIED, [one for one in uses if one.unverified], None),
-        (SINCE, [one for one in uses if one.since], "since"),
+        (DRAFT_MARK, [use for use in uses if use.draft], "draft_reasons"),
+        (UNVERIFIED, [use for use in uses if use.unverified], None),
+        (SINCE, [use for use in uses if use.since], "since"),
     ):
         if chosen:
-            text = f"{word}: {', '.join(dict.fromkeys(one.id for one in chosen))}"
+            text = f"{word}: {', '.join(dict.fromkeys(use.id for use in chosen))}"
             if why and len(chosen) == 1:
                 text += f": {'; '.join(getattr(chosen[0], why))}"
-            said.append(text if len(text) <= _LONGEST else f"{text[: _LONGEST - 3].rstrip()}...")
-    return " - ".join(said) or None
+            marks.append(text if len(text) <= _LONGEST else f"{text[: _LONGEST - 3].rstrip()}...")
+    return " - ".join(marks) or None
 
 
 def not_asked(record: CalibrationRecord) -> CalibrationUse:

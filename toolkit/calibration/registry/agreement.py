@@ -67,10 +67,10 @@ def check_transcribed(record: CalibrationRecord, source: bytes) -> None:
     stored = record.data_file("source")
     file = "the source" if stored is None else stored.file
     try:
-        told = read_legacy(source, where=file)
+        legacy = read_legacy(source, where=file)
     except ToolkitError as error:
         raise _differs(record, file, "its text", error.what, f"a legacy file: {error.expected}") from error
-    if record.loads != told.loads:
+    if record.loads != legacy.loads:
         raise RecordError(
             f"record {record.id} does not reproduce from its own data: its coefficients",
             where=f"{record.id}, loads",
@@ -80,8 +80,8 @@ def check_transcribed(record: CalibrationRecord, source: bytes) -> None:
             rule="refit",
         )
     for name in ("instrument", "date", "entered_by", "zero", "cells", "golden", "settings", "inputs_sha256"):
-        if getattr(record, name) != getattr(told, name):
-            raise _differs(record, file, name, getattr(record, name), getattr(told, name))
+        if getattr(record, name) != getattr(legacy, name):
+            raise _differs(record, file, name, getattr(record, name), getattr(legacy, name))
 
 
 def check_inputs(record: CalibrationRecord) -> None:
@@ -94,7 +94,7 @@ def check_inputs(record: CalibrationRecord) -> None:
     RecordError
         ``data``
     """
-    hashes = {one.role: one.sha256 for one in record.data}
+    hashes = {part.role: part.sha256 for part in record.data}
     expected = inputs_hash(record.settings, hashes["loads"], hashes.get("check"))
     if record.inputs_sha256 != expected:
         raise _differs(record, "with its data files", "inputs_sha256", record.inputs_sha256, expected)
@@ -109,13 +109,13 @@ def _entries(
     yield "zero", record.zero, settings.zero
     yield "indications", record.indications, settings.indications
     yield "serial", tuple(cell.serial for cell in record.cells), settings.serials
-    yield "loads", tuple(one.load for one in record.loads), settings.loads
-    for one in record.loads:
-        yield f"{one.load}, terms", one.terms, settings.terms
-        yield f"{one.load}, method", one.method, settings.method
-        largest = float(np.abs(table.column(one.load)).max())
-        tolerance = settings.tolerance(one.load, table.unit(one.load), largest, file)
-        yield f"{one.load}, tolerance", one.tolerance, tolerance
+    yield "loads", tuple(load.load for load in record.loads), settings.loads
+    for load in record.loads:
+        yield f"{load.load}, terms", load.terms, settings.terms
+        yield f"{load.load}, method", load.method, settings.method
+        largest = float(np.abs(table.column(load.load)).max())
+        tolerance = settings.tolerance(load.load, table.unit(load.load), largest, file)
+        yield f"{load.load}, tolerance", load.tolerance, tolerance
     if record.settings != settings.text:
         yield _first_difference(record.settings, settings.text)
     hashes = {one.role: one.sha256 for one in record.data}
@@ -126,11 +126,11 @@ def _entries(
 
 
 def _first_difference(got: str, expected: str) -> tuple[str, object, object]:
-    one, other = json.loads(got), json.loads(expected)
-    if isinstance(one, dict):
-        for key in sorted({*one, *other}):
-            if one.get(key) != other.get(key):
-                return f"settings, {key}", one.get(key), other.get(key)
+    stored, refitted = json.loads(got), json.loads(expected)
+    if isinstance(stored, dict):
+        for key in sorted({*stored, *refitted}):
+            if stored.get(key) != refitted.get(key):
+                return f"settings, {key}", stored.get(key), refitted.get(key)
     return "settings", got, expected
 
 

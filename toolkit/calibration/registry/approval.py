@@ -6,17 +6,16 @@ Both only add a line to the ledger.
 from __future__ import annotations
 
 import datetime as dt
+import unicodedata
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from toolkit.calibration.records.record import from_bytes
 from toolkit.calibration.registry import gates
 from toolkit.calibration.registry.clock import check_begun, now, today, untimely
-from toolkit.calibration.registry.interval import parse_interval
 from toolkit.calibration.registry.judgement import judge_stored, machine_of, read_polarity_file
-from toolkit.calibration.registry.names import check_names
 from toolkit.calibration.registry.registry import Registry, instrument_of
-from toolkit.calibration.registry.status import RecordStatus, status_of
+from toolkit.calibration.registry.status import RecordStatus, parse_interval, status_of
 from toolkit.calibration.registry.store import Change, commit
 from toolkit.calibration.registry.stored import stored_check
 from toolkit.errors import RegistryError, ToolkitError
@@ -28,6 +27,52 @@ if TYPE_CHECKING:
 
     from toolkit.calibration.records.record import CalibrationRecord
     from toolkit.calibration.registry.ledger import Ledger
+
+# Entered, checked and approved by different names: not the same name written another way.
+
+
+# Small letters that are drawn like Latin ones, of the confusables of Unicode Technical Standard 39.
+_CYRILLIC = str.maketrans("асеіјорѕухһԁԛԝвкмнт", "aceijopsyxhdqwbkmht")
+_GREEK = str.maketrans("αορνυικτχβηζ", "aopvuiktxbhz")
+
+
+def check_names(record: CalibrationRecord, checked_by: str, approved_by: str | None) -> None:
+    """Refuse a decision whose names are not different.
+
+    Raises
+    ------
+    RegistryError
+        ``names``
+    """
+    names = [("entered by", record.entered_by), ("checked by", checked_by)]
+    names += [("approved by", approved_by)] if approved_by is not None else []
+    roles: dict[str, str] = {}
+    for role, name in names:
+        key = name_key(name)
+        if not key or key in roles:
+            raise RegistryError(
+                "entered, checked and approved must be different names",
+                where=record.id,
+                got=f"{role} {name!r}" + (f", also {roles[key]}" if key in roles else ""),
+                expected=f"a name that is none of {', '.join(f'{n!r} ({r})' for r, n in names if r != role)}",
+                next_step=f"nothing was changed; see 'toolkit calibration show {record.id}'",
+                rule="names",
+            )
+        roles[key] = role
+
+
+def name_key(name: str) -> str:
+    """Return what two spellings of one name have in common; empty where nothing can be seen.
+
+    >>> name_key(" J.  Smith ") == name_key("j. smith") == name_key("J. S\u200bmith")
+    True
+    """
+    # Compatibility forms first: they may unfold to spaces, capitals and marks.
+    text = unicodedata.normalize("NFKC", unicodedata.normalize("NFKC", name).casefold())
+    visible = "".join(
+        c for c in text if unicodedata.category(c) not in ("Cf", "Cc", "Cn", "Co") or c.isspace()
+    )
+    return " ".join(visible.split()).translate(_CYRILLIC).translate(_GREEK)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -129,8 +174,13 @@ def approve(
         judged = judge_stored(registry, record, ledger, machine=definition, readings=readings, reason=reason)
         failed = judged.failed
         terms = gates.unverifiable(record, stored_check(registry.folder, record))
-        findings = tuple(Finding(rule=one.rule, where=one.where, message=one.message) for one in failed)
-        evidence = (*judged.evidence, *(f"{one.rule}: {one.where}: {one.message}" for one in judged.told))
+        findings = tuple(
+            Finding(rule=result.rule, where=result.where, message=result.message) for result in failed
+        )
+        evidence = (
+            *judged.evidence,
+            *(f"{result.rule}: {result.where}: {result.message}" for result in judged.told),
+        )
         decided.append(
             Decision(
                 id=record_id,
@@ -261,3 +311,51 @@ def _refused(record_id: str, what: str, got: str, expected: str, rule: str) -> R
         what, where=record_id, got=got, expected=expected,
         next_step="nothing was changed; see 'toolkit calibration show " + record_id + "'", rule=rule,
     )  # fmt: skip
+
+
+# The end of a candidate: a line in the ledger. The record stays, and is known for ever.
+
+
+def discard(registry: Registry, record_id: str, *, reason: str, by: str = "not stated") -> RecordStatus:
+    """Discard a candidate: it can never be approved, and nothing is compared with it.
+
+    The record is not read: a candidate that fails its gates may be discarded too.
+
+    Raises
+    ------
+    RegistryError
+        ``discard``: no reason, or the record was approved, withdrawn or discarded before; ``missing``; the
+        ledger is damaged. Nothing is written
+    """
+    folder = registry.folder / instrument_of(record_id)
+    if not reason.strip():
+        raise _refused(record_id, "a discard needs a reason", "nothing", "--reason TEXT", "discard")
+
+    def build(ledger: Ledger) -> Change:
+        if record_id not in ledger.entered():
+            raise _refused(record_id, "no such record", record_id, ", ".join(ledger.entered()), "missing")
+        entries = ledger.of(record_id)
+        status = status_of(record_id, entries, dt.date.max)
+        if status.state != "candidate":
+            standing = f"{status.state}: {status.reason}" if status.reason else status.state
+            raise _refused(
+                record_id, f"the record is {status.state}, and only a candidate can be discarded", standing,
+                "a candidate that was never approved; an approved record is withdrawn", "discard",
+            )  # fmt: skip
+        return Change(
+            files={},
+            event={
+                "event": "discarded",
+                "id": record_id,
+                "time": now(),
+                "by": by,
+                "known_on": today().isoformat(),
+                "reason": reason.strip(),
+            },
+        )
+
+    if not folder.is_dir():
+        instruments = ", ".join(registry.instruments()) or "a record"
+        raise _refused(record_id, "no such record", record_id, instruments, "missing")
+    commit(folder, build)
+    return registry.status(record_id)

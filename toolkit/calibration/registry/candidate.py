@@ -10,9 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from toolkit.calibration.fit.adequacy import check_levels
-from toolkit.calibration.fit.findings import session_findings
+from toolkit.calibration.fit.findings import readings_findings, session_findings
 from toolkit.calibration.fit.readings import SessionReadings, readings_of
-from toolkit.calibration.fit.readings_findings import readings_findings
 from toolkit.calibration.fit.session_fit import (
     LoadResult,
     SessionFit,
@@ -100,7 +99,7 @@ def calibrate(
             record=existing, path=path, existing=True, fit=fit, readings=readings, findings=findings
         )
     check_levels(session)
-    made: list[CalibrationRecord] = []
+    records: list[CalibrationRecord] = []
     unnumbered = _record(fit)
     # Before anything is written: what cannot be evaluated must not leave a record behind.
     readings = readings_of(unnumbered, session.table)
@@ -110,30 +109,32 @@ def calibrate(
         # Under the lock: another writer may have recorded this very session meanwhile.
         twin = _recorded(folder, session, ledger, again=again)
         if twin is not None:
-            made.append(twin)
+            records.append(twin)
             return None
         record = _numbered(unnumbered, next_id(folder, session.instrument, ledger), session)
         check_agrees(record, session.session_bytes, session.table)
         check_reproduces(record, session.table)
         check_inputs(record)
-        made.append(record)
+        records.append(record)
         return entering(record, _contents(session, record), by=session.operator)
 
     # Before the write: a last approved record that fails its gates must stop this, not follow it.
     ledger = registry.ledger(session.instrument)
     history = history_of(registry, unnumbered, ledger)
-    written = commit(folder, build)
-    record = made[0]
-    if written:
+    record_id = commit(folder, build)
+    record = records[0]
+    if record_id:
         judged = judge(
             unnumbered, history=history, machine=definition, loads=session.table, check=session.check
         )
-        said = {(one.rule, one.where) for one in findings}
-        findings += tuple(one.finding() for one in judged.results if (one.rule, one.where) not in said)
+        present = {(finding.rule, finding.where) for finding in findings}
+        findings += tuple(
+            result.finding() for result in judged.results if (result.rule, result.where) not in present
+        )
     return Candidate(
         record=record,
         path=folder / f"{record.id}.json",
-        existing=not written,
+        existing=not record_id,
         fit=fit,
         readings=readings,
         findings=findings,
@@ -190,7 +191,7 @@ def _recorded(
 
 def _contents(session: Session, record: CalibrationRecord) -> dict[str, bytes]:
     by_role = {"loads": session.data_bytes, "check": session.check_bytes, "session": session.session_bytes}
-    return {one.file: by_role[one.role] or b"" for one in record.data}
+    return {part.file: by_role[part.role] or b"" for part in record.data}
 
 
 def _record(fit: SessionFit) -> CalibrationRecord:
@@ -215,7 +216,7 @@ def _record(fit: SessionFit) -> CalibrationRecord:
             )
             for c, (low, high) in zip(session.cells, ranges, strict=True)
         ),
-        loads=tuple(_load_fit(session, one) for one in fit.loads),
+        loads=tuple(_load_fit(session, load) for load in fit.loads),
         golden=_golden(session, ranges),
         data=(),
         settings=session.settings,
@@ -243,29 +244,29 @@ def _suffix(role: str, data: bytes) -> str:
     return "toml" if role == "session" else "xlsx" if sniff(data).id == "zip" else "csv"
 
 
-def _load_fit(session: Session, one: LoadResult) -> LoadFit:
-    values = session.table.column(one.setting.name)
+def _load_fit(session: Session, load: LoadResult) -> LoadFit:
+    values = session.table.column(load.setting.name)
     largest = float(np.abs(values).max())
     terms = term_matrix(session.terms, session.table.columns(session.indications))
     extent = np.abs(terms).max(axis=0).tolist()
-    c = one.fit.coefficients
+    c = load.fit.coefficients
     return LoadFit(
-        load=one.setting.name,
-        unit=one.setting.unit,
-        terms=one.fit.terms,
+        load=load.setting.name,
+        unit=load.setting.unit,
+        terms=load.fit.terms,
         coefficients=c,
         issued=tuple(issued_value(value, e, largest) for value, e in zip(c, extent, strict=True)),
         polarity=polarity(c),
-        covariance=tuple(tuple(row) for row in one.fit.covariance.tolist()),
+        covariance=tuple(tuple(row) for row in load.fit.covariance.tolist()),
         method=session.method,
         n=len(values),
-        dof=one.fit.dof,
-        residual_sd=one.fit.residual_sd,
+        dof=load.fit.dof,
+        residual_sd=load.fit.residual_sd,
         minimum=float(values.min()),
         maximum=float(values.max()),
-        tolerance=one.setting.tolerance,
-        scatter=one.scatter,
-        reference_u=reference_u(session.table, one.setting.name, one.setting.unit, session.method),
+        tolerance=load.setting.tolerance,
+        scatter=load.scatter,
+        reference_u=reference_u(session.table, load.setting.name, load.setting.unit, session.method),
     )
 
 
@@ -311,7 +312,7 @@ def _software() -> tuple[tuple[str, str], ...]:
     import platform
     from importlib.metadata import version
 
-    import toolkit
+    from toolkit.version import __version__
 
     packages = tuple((name, version(name)) for name in ("numpy", "scipy", "statsmodels"))
-    return tuple(sorted((*packages, ("python", platform.python_version()), ("toolkit", toolkit.__version__))))
+    return tuple(sorted((*packages, ("python", platform.python_version()), ("toolkit", __version__))))

@@ -45,25 +45,27 @@ class TermDifference:
 def differences(one: CalibrationRecord, other: CalibrationRecord) -> tuple[TermDifference, ...]:
     """Compare two records term by term, in the order of the first."""
     names = dict.fromkeys(load.load for record in (one, other) for load in record.loads)
-    found: list[TermDifference] = []
+    terms_apart: list[TermDifference] = []
     for name in names:
         terms = (_coefficients(_load(record, name)) for record in (one, other))
-        found += [_difference(one, other, name, term) for term in dict.fromkeys(t for x in terms for t in x)]
-    return tuple(found)
+        terms_apart += [
+            _difference(one, other, name, term) for term in dict.fromkeys(t for x in terms for t in x)
+        ]
+    return tuple(terms_apart)
 
 
-def _difference(one: CalibrationRecord, other: CalibrationRecord, name: str, term: str) -> TermDifference:
-    a, b = _load(one, name), _load(other, name)
+def _difference(record: CalibrationRecord, other: CalibrationRecord, name: str, term: str) -> TermDifference:
+    a, b = _load(record, name), _load(other, name)
     first, second = _coefficients(a).get(term), _coefficients(b).get(term)
     unit_of_load = next(x.unit for x in (a, b) if x is not None)
-    changed = _changed_units(one, other, a, b, term)
+    changed = _changed_units(record, other, a, b, term)
     comparable = a is not None and b is not None and all(same_dimension(x, y) for _, x, y in changed)
     change = percent = effect = None
     if first is not None and second is not None and a is not None and b is not None and comparable:
-        factor = _scale(other, b, term) / _scale(one, a, term) if changed else 1.0
+        factor = _scale(other, b, term) / _scale(record, a, term) if changed else 1.0
         change = second * factor - first
         percent = 100 * change / abs(first) if first else None
-        extent = _extent(term, one, other)
+        extent = _extent(term, record, other)
         effect = None if extent is None else abs(change) * extent
     scale = unit(unit_of_load).factor
     largest = max(
@@ -81,7 +83,7 @@ def _difference(one: CalibrationRecord, other: CalibrationRecord, name: str, ter
         effect=effect,
         effect_percent_fs=None if effect is None or math.isnan(largest) else 100 * effect / largest,
         differs=first != second or bool(changed),
-        note=_note(one, other, (a, b), term, changed),
+        note=_note(record, other, (a, b), term, changed),
     )
 
 
@@ -157,11 +159,11 @@ def _indications(term: str) -> set[str]:
     return {name for name, _ in parsed.powers} | set(parsed.absolutes)
 
 
-def _extent(term: str, one: CalibrationRecord, other: CalibrationRecord) -> float | None:
+def _extent(term: str, record: CalibrationRecord, other: CalibrationRecord) -> float | None:
     """Return the largest absolute value of a term over the ranges of both records, in units of ``one``."""
     ranges: dict[str, float] = {}
-    units = {cell.name: cell.unit for cell in one.cells}
-    for cell in (*one.cells, *other.cells):
+    units = {cell.name: cell.unit for cell in record.cells}
+    for cell in (*record.cells, *other.cells):
         if cell.minimum is not None and cell.maximum is not None and cell.name in units:
             same = same_unit(cell.unit, units[cell.name])
             factor = 1.0 if same else unit(cell.unit).factor / unit(units[cell.name]).factor

@@ -67,14 +67,14 @@ def sign_and_span(
     """
     failed: list[GateResult] = []
     before = {cell.name: cell for cell in old.cells}
-    for one in new.loads:
-        other = next((o for o in old.loads if o.load == one.load), None)
-        if other is None or not same_dimension(one.unit, other.unit):
+    for load in new.loads:
+        before_load = next((o for o in old.loads if o.load == load.load), None)
+        if before_load is None or not same_dimension(load.unit, before_load.unit):
             continue
         for cell in new.cells:
             if cell.name in before and (only is None or cell.name in only):
-                found = _change((new, one, cell), (old, other, before[cell.name]))
-                failed += [] if found is None else [found]
+                change = _change((new, load, cell), (old, before_load, before[cell.name]))
+                failed += [] if change is None else [change]
     return tuple(failed)
 
 
@@ -103,8 +103,8 @@ def _change(new: _Place, old: _Place) -> GateResult | None:
         return GateResult(rule="sign", where=where, message=f"the sign changed: {text}")
     if change > SPAN * abs(before.value):
         ratio = now.value / before.value if before.value else math.inf
-        told = f"by {100 * (ratio - 1):+.2f} %" if 0.1 < ratio < 10 else f"by a factor of {ratio:.4g}"
-        return GateResult(rule="span", where=where, message=f"the span changed {told}: {text}")
+        size = f"by {100 * (ratio - 1):+.2f} %" if 0.1 < ratio < 10 else f"by a factor of {ratio:.4g}"
+        return GateResult(rule="span", where=where, message=f"the span changed {size}: {text}")
     return None
 
 
@@ -118,8 +118,8 @@ def _negligible(
     no larger than that part either: a main response that is not known does not pass for an unchanged one.
     ``used`` is the indication's range in the earlier record.
     """
-    scale = [SPAN * largest_load(one) for one in loads if not math.isnan(one.largest)]
-    limits = [tolerance(one) for one in loads if not math.isnan(tolerance(one))] + scale
+    scale = [SPAN * largest_load(load) for load in loads if not math.isnan(load.largest)]
+    limits = [tolerance(load) for load in loads if not math.isnan(tolerance(load))] + scale
     # A legacy record has no range of its own: all that is left to compare is the response itself.
     if now.extent is None or not limits:
         return change <= noise
@@ -129,7 +129,7 @@ def _negligible(
 
 def layout(new: CalibrationRecord, old: CalibrationRecord) -> tuple[GateResult, ...]:
     """Return what changed in units, loads and indications: no fault by itself, and always told."""
-    told: list[GateResult] = []
+    gate_results: list[GateResult] = []
     kinds = (
         ("load", {o.load: (o.unit, None) for o in new.loads}, {o.load: (o.unit, None) for o in old.loads}),
         (
@@ -142,34 +142,38 @@ def layout(new: CalibrationRecord, old: CalibrationRecord) -> tuple[GateResult, 
         for name, units in now.items():
             if name not in before:
                 message = f"the {kind} is new: {old.id} does not have it"
-                told.append(GateResult(rule="layout-changed", where=name, message=message, effect="tells"))
+                gate_results.append(
+                    GateResult(rule="layout-changed", where=name, message=message, effect="tells")
+                )
                 continue
-            unit_now, unit_before = (one[1] or one[0] for one in (units, before[name]))
+            unit_now, unit_before = (cell_unit[1] or cell_unit[0] for cell_unit in (units, before[name]))
             if same_unit(unit_now, unit_before) and same_unit(units[0], before[name][0]):
                 continue
             message = f"the unit changed: {unit_now}, in {old.id} {unit_before}"
             if not same_dimension(units[0], before[name][0]):
                 message += "; they measure different kinds of quantity, so that the span cannot be compared"
-            told.append(GateResult(rule="unit-changed", where=name, message=message, effect="tells"))
+            gate_results.append(GateResult(rule="unit-changed", where=name, message=message, effect="tells"))
         for name in before:
             if name not in now:
                 message = f"the {kind} of {old.id} is missing"
-                told.append(GateResult(rule="layout-changed", where=name, message=message, effect="tells"))
-    return tuple(told)
+                gate_results.append(
+                    GateResult(rule="layout-changed", where=name, message=message, effect="tells")
+                )
+    return tuple(gate_results)
 
 
 def check_loads(record: CalibrationRecord, check: Table) -> tuple[GateResult, ...]:
     """Return the check loads that the record's coefficients miss by more than the tolerance."""
     failed: list[GateResult] = []
-    for one in record.loads:
-        fitted = term_matrix(one.terms, check.columns(record.indications)) @ np.asarray(one.coefficients)
-        off = fitted - check.column(one.load)
-        tolerance = one.tolerance or 1e-3 * one.largest
+    for load in record.loads:
+        fitted = term_matrix(load.terms, check.columns(record.indications)) @ np.asarray(load.coefficients)
+        off = fitted - check.column(load.load)
+        tolerance = load.tolerance or 1e-3 * load.largest
         failed += [
             GateResult(
                 rule="check-load",
-                where=f"{one.load}, check row {row + 1}",
-                message=f"off by {off[row]:+.4g} {one.unit}, tolerance {tolerance:.4g} {one.unit}",
+                where=f"{load.load}, check row {row + 1}",
+                message=f"off by {off[row]:+.4g} {load.unit}, tolerance {tolerance:.4g} {load.unit}",
             )
             for row in np.flatnonzero(np.abs(off) > tolerance)
         ]
@@ -184,17 +188,17 @@ def unverifiable(record: CalibrationRecord, check: Table | None) -> tuple[str, .
     has no range; it is verified with the rank alone.
     """
     names: list[str] = []
-    for one in record.loads:
+    for load in record.loads:
         if check is None:
-            names += [f"{one.load}: {term}" for term in one.terms]
+            names += [f"{load.load}: {term}" for term in load.terms]
             continue
-        matrix = term_matrix(one.terms, check.columns(record.indications))
+        matrix = term_matrix(load.terms, check.columns(record.indications))
         lost = _undetermined(matrix)
-        tolerance = one.tolerance or 1e-3 * one.largest
-        effect = np.abs(one.coefficients) * np.ptp(matrix, axis=0)
+        tolerance = load.tolerance or 1e-3 * load.largest
+        effect = np.abs(load.coefficients) * np.ptp(matrix, axis=0)
         names += [
-            f"{one.load}: {term}"
-            for at, term in enumerate(one.terms)
+            f"{load.load}: {term}"
+            for at, term in enumerate(load.terms)
             if lost[at] or (term != INTERCEPT and not effect[at] > VERIFIED * tolerance)
         ]
     return tuple(names)

@@ -78,11 +78,11 @@ def history_of(registry: Registry, record: CalibrationRecord, ledger: Ledger, *,
         except (ToolkitError, OSError):
             # `verify` names it; what it held cannot be told.
             continue
-        found = {cell.name for cell in had.cells if serials.get(cell.name) == cell.serial} & sought
-        if found:
+        unchanged = {cell.name for cell in had.cells if serials.get(cell.name) == cell.serial} & sought
+        if unchanged:
             checked = load_checked(folder, record_id, ledger)
-            returned |= dict.fromkeys(found, checked)
-            sought -= found
+            returned |= dict.fromkeys(unchanged, checked)
+            sought -= unchanged
         if not sought:
             break
     return History(last=last, returned=returned)
@@ -114,7 +114,7 @@ def agreeing(
     """
     if history.last is None:
         return frozenset()
-    units = {one.load: one.unit for one in history.last.loads}
+    units = {load.load: load.unit for load in history.last.loads}
     before = {cell.name: cell.unit for cell in history.last.cells}
     cells = {
         cell.name
@@ -123,13 +123,13 @@ def agreeing(
         and same_dimension(cell.unit, before[cell.name])
         and cell.name not in replaced(new, history)
     }
-    changed = {one.where for one in results if one.rule == "sign"}
+    changed = {result.where for result in results if result.rule == "sign"}
     return frozenset(
-        (one.load, name)
-        for one in new.loads
-        if one.load in units and same_dimension(one.unit, units[one.load])
-        for name in main_indications(new, one)
-        if name in cells and f"{one.load}, {name}" not in changed
+        (load.load, name)
+        for load in new.loads
+        if load.load in units and same_dimension(load.unit, units[load.load])
+        for name in main_indications(new, load)
+        if name in cells and f"{load.load}, {name}" not in changed
     )
 
 
@@ -159,18 +159,18 @@ def compared(
         results += sign_and_span(new, older, only=(name,))
         message = f"serial {_serial(new, name)} returns: its sign and span history goes on from {older.id}"
         results.append(GateResult(rule="serial", where=name, message=message, effect="tells"))
-    for one in sign_and_span(new, last, only=out):
-        load, name = one.where.split(", ")
-        settled = one.rule == "sign" and (load, name) in confirmed
-        allowed = one.rule == "span" and _within(new, last, load, name)
-        told = "; the cell is a replacement"
-        if one.rule == "sign":
-            told += " and its sign is confirmed" if settled else (
+    for result in sign_and_span(new, last, only=out):
+        load, name = result.where.split(", ")
+        settled = result.rule == "sign" and (load, name) in confirmed
+        allowed = result.rule == "span" and _within(new, last, load, name)
+        remark = "; the cell is a replacement"
+        if result.rule == "sign":
+            remark += " and its sign is confirmed" if settled else (
                 ": the machine definition or a polarity reading must confirm the new sign"
             )  # fmt: skip
         results.append(
             dataclasses.replace(
-                one, message=one.message + told, effect="tells" if settled or allowed else "blocks"
+                result, message=result.message + remark, effect="tells" if settled or allowed else "blocks"
             )
         )
     for name in out:

@@ -95,10 +95,10 @@ class Ledger:
 
     @cached_property
     def _events(self) -> dict[str, tuple[Entry, ...]]:
-        found: dict[str, tuple[Entry, ...]] = {}
+        entries: dict[str, tuple[Entry, ...]] = {}
         for entry in self.entries:
-            found[entry.id] = (*found.get(entry.id, ()), entry)
-        return found
+            entries[entry.id] = (*entries.get(entry.id, ()), entry)
+        return entries
 
     @cached_property
     def _entered(self) -> dict[str, Entry]:
@@ -164,8 +164,8 @@ def _entry(line: bytes, number: int, prev: str) -> Entry:
     stated = body.pop("sha256")
     # Of a canonical text, the entry can be cut out: what is left is canonical too.
     entry = f'"sha256":"{stated}",'
-    rest = text.replace(entry, "") if text.count(entry) == 1 else canonical(body)
-    if sha256_bytes(rest.encode()) != stated:
+    remainder = text.replace(entry, "") if text.count(entry) == 1 else canonical(body)
+    if sha256_bytes(remainder.encode()) != stated:
         raise ValueError("its hash does not match")
     if body["seq"] != number or body["prev"] != prev:
         raise ValueError("it does not follow the line before")

@@ -52,15 +52,15 @@ def import_legacy(path: Path, registry: Registry, *, again: bool = False) -> tup
     """
     import datetime as dt
 
-    import toolkit
+    from toolkit.version import __version__
 
     source = read_bytes(path)
     unnumbered = read_legacy(source, where=path)
     check_possible(unnumbered, where=path)
     check_begun(dt.date.fromisoformat(unnumbered.date), "the source's date", f"{path}: date")
-    unnumbered = dataclasses.replace(unnumbered, software=(("toolkit", toolkit.__version__),))
+    unnumbered = dataclasses.replace(unnumbered, software=(("toolkit", __version__),))
     folder = registry.folder / unnumbered.instrument
-    made: list[CalibrationRecord] = []
+    records: list[CalibrationRecord] = []
 
     def build(ledger: Ledger) -> Change | None:
         ended: list[str] = []
@@ -72,18 +72,18 @@ def import_legacy(path: Path, registry: Registry, *, again: bool = False) -> tup
             if twin.inputs_sha256 != unnumbered.inputs_sha256:
                 continue
             if not is_discarded(ledger, record_id):
-                made.append(twin)
+                records.append(twin)
                 return None
             ended.append(record_id)
         if ended and not again:
             raise discarded_before(ledger, ended[-1], "the file", path)
         record = _numbered(unnumbered, next_id(folder, unnumbered.instrument, ledger), source)
         check_transcribed(record, source)
-        made.append(record)
+        records.append(record)
         return entering(record, {record.data[0].file: source}, by=record.entered_by)
 
     written = commit(folder, build)
-    return made[0], not written
+    return records[0], not written
 
 
 def _numbered(record: CalibrationRecord, record_id: str, source: bytes) -> CalibrationRecord:

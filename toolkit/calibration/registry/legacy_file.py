@@ -80,16 +80,16 @@ def check_possible(record: CalibrationRecord, *, where: object) -> None:
         ``unit-dimension``: a force or moment in another unit, an indication without a dimension
     """
     names = [cell.name for cell in record.cells]
-    loads = [one.load for one in record.loads]
-    for key, found in (("indications", names), ("loads", loads)):
-        if any(not NAME.match(name) or name in (INTERCEPT, "abs") for name in found):
-            raise _wrong(where, key, ", ".join(found), "names such as FY, MZ, D51")
+    loads = [load.load for load in record.loads]
+    for key, entries in (("indications", names), ("loads", loads)):
+        if any(not NAME.match(name) or name in (INTERCEPT, "abs") for name in entries):
+            raise _wrong(where, key, ", ".join(entries), "names such as FY, MZ, D51")
     for key, found in (("indications", names), ("loads", loads)):
         twice = [name for name in dict.fromkeys(found) if found.count(name) > 1]
         if twice:
             raise _wrong(where, key, f"{', '.join(twice)} more than once", f"each of the {key} once")
-    if both := set(names) & set(loads):
-        raise _wrong(where, "loads", ", ".join(sorted(both)), "names that are no indications")
+    if shared := set(names) & set(loads):
+        raise _wrong(where, "loads", ", ".join(sorted(shared)), "names that are no indications")
     for cell in record.cells:
         place = f"{where}: indications, {cell.name}"
         si_scale(cell.unit, where=place)
@@ -100,12 +100,12 @@ def check_possible(record: CalibrationRecord, *, where: object) -> None:
                 next_step="state the unit in which the coefficients take it; nothing was written",
                 rule="unit-dimension",
             )  # fmt: skip
-    for one in record.loads:
-        check_load_unit(one.load, one.unit, where=f"{where}: {one.load}.unit")
-        missing = [name for name in names if name not in one.terms]
+    for load in record.loads:
+        check_load_unit(load.load, load.unit, where=f"{where}: {load.load}.unit")
+        missing = [name for name in names if name not in load.terms]
         if missing:
             raise _wrong(
-                where, f"{one.load}.coefficients", f"no {', '.join(missing)} among {', '.join(one.terms)}",
+                where, f"{load.load}.coefficients", f"no {', '.join(missing)} among {', '.join(load.terms)}",
                 f"a coefficient of every indication ({', '.join(names)}); write 0 where it has none",
             )  # fmt: skip
 
@@ -133,15 +133,15 @@ def _load(entry: Any, cells: tuple[Indication, ...], where: object) -> LoadFit:
     name, text = entry.get("load"), entry.get("unit")
     if not isinstance(name, str) or not isinstance(text, str) or not isinstance(typed, dict) or not typed:
         raise _wrong(where, "loads", entry, "load, unit and coefficients")
-    known = {cell.name for cell in cells}
+    cell_names = {cell.name for cell in cells}
     for term, value in typed.items():
         try:
             parsed = parse_term(term)
         except ToolkitError as error:
             raise _wrong(where, f"{name}.{term}", term, str(error.expected)) from error
-        named = {n for n, _ in parsed.powers} | set(parsed.absolutes)
-        if not named <= known:
-            raise _wrong(where, f"{name}.{term}", term, ", ".join((*sorted(known), INTERCEPT)))
+        used_names = {n for n, _ in parsed.powers} | set(parsed.absolutes)
+        if not used_names <= cell_names:
+            raise _wrong(where, f"{name}.{term}", term, ", ".join((*sorted(cell_names), INTERCEPT)))
         if not is_number(value) or abs(value) >= 1e300:
             raise _wrong(where, f"{name}.{term}", value, "a number")
     terms = tuple(typed)

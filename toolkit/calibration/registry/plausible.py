@@ -8,14 +8,22 @@ and the output against what a strain-gauge bridge can give.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from toolkit.calibration.registry.gates import GateResult
-from toolkit.calibration.registry.response import largest_load, response, same_dimension
+from toolkit.calibration.registry.response import largest_load, response, same_dimension, tolerance
+from toolkit.calibration.terms import INTERCEPT, term_matrix
+from toolkit.calibration.uncertainty.scatter import scatter_of
 from toolkit.units import unit
 
 if TYPE_CHECKING:
-    from toolkit.calibration.records.record import CalibrationRecord, Indication
+    from numpy.typing import NDArray
+
+    from toolkit.calibration.records.record import CalibrationRecord, Indication, LoadFit
+    from toolkit.calibration.session.table import Table
     from toolkit.machine.definition import Machine
 
 # Between a session that stays at a twentieth of the range, which calibrates nothing, and a twentyfold
@@ -34,21 +42,21 @@ def plausible(
     """Return the sizes that cannot be: rules ``range``, ``lever``, ``bridge-range``, ``check-tolerance``."""
     failed: list[GateResult] = [] if machine is None else _levers(new, machine)
     rated = {} if machine is None else dict(machine.rated_loads)
-    for one in new.loads:
-        size, si = largest_load(one), unit(one.unit).si
+    for load in new.loads:
+        size, si = largest_load(load), unit(load.unit).si
         if math.isnan(size):
             continue
-        other = None if old is None else next((o for o in old.loads if o.load == one.load), None)
-        if old is not None and other is not None and same_dimension(one.unit, other.unit):
-            failed += _range(one.load, size, largest_load(other), si, f"in {old.id}")
-        if machine is not None and one.load in rated:
-            failed += _range(one.load, size, rated[one.load], si, f"as rated by machine {machine.name}")
-        if one.tolerance is not None and one.tolerance > TOLERANCE * one.largest:
+        earlier = None if old is None else next((o for o in old.loads if o.load == load.load), None)
+        if old is not None and earlier is not None and same_dimension(load.unit, earlier.unit):
+            failed += _range(load.load, size, largest_load(earlier), si, f"in {old.id}")
+        if machine is not None and load.load in rated:
+            failed += _range(load.load, size, rated[load.load], si, f"as rated by machine {machine.name}")
+        if load.tolerance is not None and load.tolerance > TOLERANCE * load.largest:
             message = (
-                f"the check loads' tolerance of {one.tolerance:.4g} {one.unit} is "
-                f"{100 * one.tolerance / one.largest:.3g} % of the largest load: is its unit right?"
+                f"the check loads' tolerance of {load.tolerance:.4g} {load.unit} is "
+                f"{100 * load.tolerance / load.largest:.3g} % of the largest load: is its unit right?"
             )
-            failed.append(GateResult(rule="check-tolerance", where=one.load, message=message))
+            failed.append(GateResult(rule="check-tolerance", where=load.load, message=message))
     bridges = [_largest(cell) for cell in new.cells if unit(cell.unit).dimension == "bridge_ratio"]
     strongest = max((size for size in bridges if not math.isnan(size)), default=math.nan)
     for cell in new.cells:
@@ -73,12 +81,12 @@ def _levers(new: CalibrationRecord, machine: Machine) -> list[GateResult]:
 
     It needs no history: one of two units that slipped moves a lever by 4.45 (lbf, N), 305 or 1000.
     """
-    loads = {one.load: one for one in new.loads}
+    loads = {load.load: load for load in new.loads}
     if "FY" not in loads:
         return []
     failed = []
-    drawn = {name: abs(lever) for name, lever in machine.overturning_lever_m}
-    pitch = machine.cell_pitch_diameter_m
+    drawn = {name: abs(lever) for name, lever in machine.layout.overturning_lever_m}
+    pitch = machine.layout.pitch_diameter_m
     for cell in new.cells:
         stated = machine.cell(cell.name)
         limits = {
@@ -100,12 +108,12 @@ def _levers(new: CalibrationRecord, machine: Machine) -> list[GateResult]:
     return failed
 
 
-def _range(name: str, size: float, other: float, si: str, where: str) -> list[GateResult]:
-    if math.isnan(other) or not other > 0 or 1 / RANGE <= size / other <= RANGE:
+def _range(name: str, size: float, reference: float, si: str, where: str) -> list[GateResult]:
+    if math.isnan(reference) or not reference > 0 or 1 / RANGE <= size / reference <= RANGE:
         return []
     message = (
-        f"the largest value is {size:.4g} {si} against {other:.4g} {si} {where}, a factor of "
-        f"{size / other:.3g}: is the unit right?"
+        f"the largest value is {size:.4g} {si} against {reference:.4g} {si} {where}, a factor of "
+        f"{size / reference:.3g}: is the unit right?"
     )
     return [GateResult(rule="range", where=name, message=message)]
 
@@ -114,3 +122,116 @@ def _largest(cell: Indication) -> float:
     if cell.minimum is None or cell.maximum is None:
         return math.nan
     return max(abs(cell.minimum), abs(cell.maximum)) * unit(cell.unit).factor
+
+
+# `zero = "tared"` is a claim: without load, a tared indication reads nothing.
+
+
+AT_ZERO = 0.1  # of the check loads' tolerance: what a reference may show without load
+_SIGMAS, _ROW_SIGMAS = 3.0, 4.0
+_MAD = 1.4826  # standard deviation of a normal scatter by its median absolute deviation
+
+
+def tare_claim(
+    record: CalibrationRecord, tables: Sequence[Table], *, u_reference: Sequence[float | None] = ()
+) -> tuple[GateResult, ...]:
+    """Return what contradicts a record's ``zero = "tared"``; nothing for other records.
+
+    Parameters
+    ----------
+    tables : the session's reference loads first, then its check loads, in the record's units
+    u_reference : standard uncertainty of each load's reference, in the load's unit, None where not stated
+
+    Notes
+    -----
+    An intercept's own uncertainty is that of the fit, with half the difference of loading and unloading and
+    the misfit of the curve, which move it; a tenth of the check loads' tolerance is what a standard may show
+    of nothing. Single cells at zero load are held against the tolerance itself: zero returns stay inside it.
+    """
+    if record.zero != "tared" or record.kind != "fit" or not tables:
+        return ()
+    failed = [result for load in record.loads for result in _intercept(record, load, tables[0])]
+    noise = [_SIGMAS * (u or 0.0) for u in tuple(u_reference) or (None,) * len(record.loads)]
+    rows = [_zero_rows(record, table, noise) for table in tables]
+    zeros = np.vstack([table.matrix(record.indications)[at] for table, at in zip(tables, rows, strict=True)])
+    if len(zeros):
+        failed += _offsets(record, tables[0], zeros, noise)
+    elif not all(INTERCEPT in load.terms for load in record.loads):
+        message = (
+            'zero = "tared" cannot be seen to hold: no row is at zero load and no intercept is fitted; '
+            "record a row at zero load in each run"
+        )
+        failed.append(GateResult(rule="tared", where=record.instrument, message=message, effect="tells"))
+    return tuple(failed)
+
+
+def _intercept(record: CalibrationRecord, load: LoadFit, loads: Table) -> list[GateResult]:
+    if INTERCEPT not in load.terms or not load.covariance:
+        return []
+    at = load.terms.index(INTERCEPT)
+    scatter = scatter_of(record, loads, load)
+    value, u = load.coefficients[at], math.hypot(load.standard_errors[at], scatter.reversal, scatter.misfit)
+    if abs(value) <= max(AT_ZERO * _limit(load), _SIGMAS * u):
+        return []
+    message = (
+        f'zero = "tared" does not hold: the intercept is {value:+.4g} {load.unit}, its standard uncertainty '
+        f"{u:.2g} {load.unit}; a tared test would read it as a load. Tare before each run, or say "
+        'zero = "included" or zero = "run"'
+    )
+    return [GateResult(rule="tared", where=f"{load.load}, {INTERCEPT}", message=message)]
+
+
+def _zero_rows(record: CalibrationRecord, table: Table, noise: Sequence[float]) -> NDArray[np.bool_]:
+    """Return which rows have every reference load at zero within its own uncertainty (rows,)."""
+    at = np.ones(table.rows, dtype=bool)
+    for load, least in zip(record.loads, noise, strict=True):
+        at &= np.abs(table.column(load.load)) <= max(AT_ZERO * _limit(load), least)
+    return at
+
+
+def _limit(load: LoadFit) -> float:
+    """Return the check loads' tolerance in the load's own unit."""
+    return tolerance(load) / unit(load.unit).factor
+
+
+def _offsets(
+    record: CalibrationRecord, table: Table, zeros: NDArray[np.float64], noise: Sequence[float]
+) -> list[GateResult]:
+    """Return each cell's worst offset at zero load, judged in the load that it moves most.
+
+    ``noise`` is what each reference itself may be off by without load.
+    """
+    failed = []
+    for column, cell in enumerate(record.cells):
+        judged = []
+        for load, least in zip(record.loads, noise, strict=True):
+            sensitivity = response(record, load, cell)
+            slope = sensitivity.value * unit(cell.unit).factor / unit(load.unit).factor
+            limit = max(_limit(load), least)
+            if slope != 0:
+                judged.append((abs(slope) / limit, slope, limit, load))
+        if not judged:
+            continue
+        _, slope, limit, load = max(judged, key=lambda entry: entry[0])
+        scatter = _scatter(load, table, record.indications)
+        moved = slope * zeros[:, column]
+        mean, worst = float(moved.mean()), float(moved[np.abs(moved).argmax()])
+        beyond_mean = abs(mean) > max(limit, _SIGMAS * scatter / len(moved) ** 0.5)
+        beyond_row = abs(worst) > max(limit, _ROW_SIGMAS * scatter)
+        if not (beyond_mean or beyond_row):
+            continue
+        value, what = (mean, "on average") if beyond_mean else (worst, "at most")
+        message = (
+            f'zero = "tared" does not hold: at zero load ({len(moved)} rows) the indication is '
+            f"{value / slope:+.4g} {cell.unit} {what}, worth {value:+.4g} {load.unit} of {load.load} where "
+            f"the rows scatter by {scatter:.2g} {load.unit}; the tolerance is {limit:.4g} {load.unit}"
+        )
+        failed.append(GateResult(rule="tared", where=cell.name, message=message))
+    return failed
+
+
+def _scatter(load: LoadFit, table: Table, indications: Sequence[str]) -> float:
+    """Return the rows' scatter about the equation in the load's unit, robust against rows that are off."""
+    fitted = term_matrix(load.terms, table.columns(indications)) @ np.asarray(load.coefficients)
+    residuals = table.column(load.load) - fitted
+    return _MAD * float(np.median(np.abs(residuals - np.median(residuals))))

@@ -13,6 +13,7 @@ coefficient of a term that hardly matters.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -22,10 +23,10 @@ from toolkit.calibration.fit.run_scatter import is_lowest, stated_scatter
 from toolkit.calibration.fit.session_rows import SessionRows, groups_of
 from toolkit.calibration.records.issue import issued_value, term_reach
 from toolkit.calibration.records.scatter import rows_of
-from toolkit.calibration.registry.whitening import Whitener, errors_of, linearise, whitener
+from toolkit.calibration.session.known_errors import KnownErrors, known_errors
 from toolkit.calibration.session.statements import statements_of
 from toolkit.calibration.session.table import Table
-from toolkit.calibration.terms import INTERCEPT, term_matrix
+from toolkit.calibration.terms import INTERCEPT, term_matrix, term_slopes
 from toolkit.errors import RecordError
 from toolkit.units import unit
 
@@ -33,6 +34,107 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from toolkit.calibration.records.record import CalibrationRecord, LoadFit
+
+# The load-time refit of records with shared errors, or errors in both variables: numpy alone.
+
+
+Whitener = Callable[["NDArray[np.float64]"], "NDArray[np.float64]"]
+_ITERATIONS = 400
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Linearised:
+    """The problem at its solution: ``terms`` (rows, terms) at the adjusted indications, ``weights`` 1/u.
+
+    ``load`` (rows,) is carried to the adjusted indications.
+    """
+
+    terms: NDArray[np.float64]
+    weights: NDArray[np.float64]
+    load: NDArray[np.float64]
+
+
+def errors_of(record: CalibrationRecord, load: str, table: Table) -> KnownErrors:
+    """Return what a record's session states about the errors of one load."""
+    return known_errors(record.load(load).method, statements_of(record), table, load, record.id)
+
+
+def whitener(terms: NDArray[np.float64], load: NDArray[np.float64], errors: KnownErrors) -> Whitener:
+    """Return the map that makes rows (rows, ...) independent and of unit spread."""
+    ordinary = _weighted(terms, load, np.ones(len(load)))
+    fitted = terms @ ordinary
+    residual = load - fitted
+    u = errors.u
+    if u is None:
+        u = np.full(len(load), np.sqrt(residual @ residual / (len(load) - terms.shape[1])))
+    acts = fitted / np.abs(load).max() if errors.proportional else np.ones(len(load))
+    a = errors.u_shared * acts / u
+    order = np.argsort(errors.group, kind="stable")
+    bounds = np.flatnonzero(np.diff(errors.group[order])) + 1
+    blocks = np.split(order, bounds)
+
+    def whiten(values: NDArray[np.float64]) -> NDArray[np.float64]:
+        scaled = (values.T / u).T
+        out = np.empty_like(scaled)
+        for block in blocks:
+            b, x = a[block], scaled[block].reshape(len(block), -1)
+            after = 1 + np.cumsum(b * b)
+            before = np.concatenate([[1.0], after[:-1]])
+            # What the rows before tell of the shared error is taken out of each row.
+            sums = np.cumsum(b[:, None] * x, axis=0)
+            earlier = np.vstack([np.zeros((1, x.shape[1])), sums[:-1]]) / before[:, None]
+            white = (x - b[:, None] * earlier) * np.sqrt(before / after)[:, None]
+            out[block] = white.reshape(scaled[block].shape)
+        return out
+
+    return whiten
+
+
+def linearise(
+    terms: Sequence[str],
+    columns: Mapping[str, NDArray[np.float64]],
+    load: NDArray[np.float64],
+    errors: KnownErrors,
+) -> Linearised:
+    """Return the weighted problem whose solution is that with errors in both variables."""
+    u = np.ones(len(load)) if errors.u is None else errors.u
+    x, u_x = np.array(list(columns.values())), errors.u_cells[:, None]
+    matrix = term_matrix(terms, columns)
+    coefficients = _weighted(matrix, load, 1 / u)
+    delta = np.zeros_like(x)
+    largest = float(np.abs(load).max())
+    best, still = np.inf, 0
+    for _ in range(_ITERATIONS):
+        at = dict(zip(columns, x + delta, strict=True))
+        matrix = term_matrix(terms, at)
+        slopes = term_slopes(terms, coefficients, at)
+        slope = np.array([np.broadcast_to(slopes[name], load.shape) for name in columns])
+        weights = 1 / np.sqrt(u**2 + np.square(slope * u_x).sum(axis=0))
+        carried = load + (slope * delta).sum(axis=0)
+        linear = _weighted(matrix, carried, weights)
+        adjusted = slope * u_x**2 * (carried - matrix @ linear) * weights**2
+        moved = float(np.abs(matrix @ (linear - coefficients)).max())
+        moved = max(moved, float(np.abs((slope * (adjusted - delta)).sum(axis=0)).max())) / largest
+        coefficients, delta = linear, adjusted
+        # At the level of rounding the steps stop shrinking: that is the end, not a failure.
+        still = 0 if moved < best else still + 1
+        best = min(best, moved)
+        if moved <= 1e-15 or still > 3:
+            break
+    return Linearised(terms=matrix, weights=weights, load=carried)
+
+
+def _weighted(
+    matrix: NDArray[np.float64], load: NDArray[np.float64], weights: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    length = np.abs(matrix).max(axis=0)
+    design = matrix / length * weights[:, None]
+    basis, values, right = np.linalg.svd(design, full_matrices=False)
+    solution = right.T @ (basis.T @ (load * weights) / values)
+    residual = (load - matrix @ (solution / length)) * weights
+    solution = solution + right.T @ (basis.T @ residual / values)
+    return np.asarray(solution / length, dtype=np.float64)
+
 
 CRITERION = 1e-6
 GOLDEN = 1e-12
@@ -56,12 +158,12 @@ def check_reproduces(record: CalibrationRecord, table: Table) -> None:
     for cell in record.cells:
         values = columns[cell.name]
         _same_unit(record, cell.name, table.unit(cell.name), cell.unit)
-        found = (float(values.min()), float(values.max()))
-        _demand_equal(record, cell.name, "range", (cell.minimum, cell.maximum), found)
+        extent = (float(values.min()), float(values.max()))
+        _demand_equal(record, cell.name, "range", (cell.minimum, cell.maximum), extent)
     golden = record.golden
     shape = (len(record.cells), len(golden.inputs))
-    whole = len(golden.inputs) > len(record.cells) and len(golden.outputs) == len(record.loads)
-    if not whole or {(len(i), len(o)) for i in golden.inputs for o in golden.outputs} != {shape}:
+    complete = len(golden.inputs) > len(record.cells) and len(golden.outputs) == len(record.loads)
+    if not complete or {(len(i), len(o)) for i in golden.inputs for o in golden.outputs} != {shape}:
         raise _refused(
             record, "golden vectors", f"{len(golden.inputs)} inputs, {len(golden.outputs)} rows of outputs",
             "one output a load for each of the inputs, more inputs than indications", "golden",
@@ -69,36 +171,36 @@ def check_reproduces(record: CalibrationRecord, table: Table) -> None:
     inputs = np.asarray(golden.inputs)
     points = dict(zip(record.indications, inputs.T, strict=True))
     shared: dict[tuple[str, ...], _Solver] = {}
-    for at, one in enumerate(record.loads):
-        _same_unit(record, one.load, table.unit(one.load), one.unit)
-        if one.method in ("gls", "odr"):
-            known = _known_errors_solver(record, one, table, points)
-            _check_load(record, at, one, known, table)
+    for at, load in enumerate(record.loads):
+        _same_unit(record, load.load, table.unit(load.load), load.unit)
+        if load.method in ("gls", "odr"):
+            weighted = _known_errors_solver(record, load, table, points)
+            _check_load(record, at, load, weighted, table)
             continue
-        weights = _weights(one, table)
-        solver = shared.get(one.terms) if weights is None else None
+        weights = _weights(load, table)
+        solver = shared.get(load.terms) if weights is None else None
         if solver is None:
-            terms = term_matrix(one.terms, columns)
-            solver = _solver(terms, weights, one.terms[-1] == INTERCEPT, term_matrix(one.terms, points))
+            terms = term_matrix(load.terms, columns)
+            solver = _solver(terms, weights, load.terms[-1] == INTERCEPT, term_matrix(load.terms, points))
             if weights is None:
-                shared[one.terms] = solver
-        _check_load(record, at, one, solver, table)
+                shared[load.terms] = solver
+        _check_load(record, at, load, solver, table)
 
 
 def _known_errors_solver(
-    record: CalibrationRecord, one: LoadFit, table: Table, points: dict[str, NDArray[np.float64]]
+    record: CalibrationRecord, load: LoadFit, table: Table, points: dict[str, NDArray[np.float64]]
 ) -> _Solver:
-    columns, loads = table.columns(record.indications), table.column(one.load)
-    terms, golden = term_matrix(one.terms, columns), term_matrix(one.terms, points)
-    has_constant = one.terms[-1] == INTERCEPT
-    errors = errors_of(record, one.load, table)
-    if one.method == "gls":
+    columns, loads = table.columns(record.indications), table.column(load.load)
+    terms, golden = term_matrix(load.terms, columns), term_matrix(load.terms, points)
+    has_constant = load.terms[-1] == INTERCEPT
+    errors = errors_of(record, load.load, table)
+    if load.method == "gls":
         return _solver(terms, None, has_constant, golden, whiten=whitener(terms, loads, errors))
-    found = linearise(one.terms, columns, loads, errors)
-    solver = _solver(found.terms, found.weights, has_constant, golden)
-    solution, _ = solver.solve(found.load)
+    linear = linearise(load.terms, columns, loads, errors)
+    solver = _solver(linear.terms, linear.weights, has_constant, golden)
+    solution, _ = solver.solve(linear.load)
     residuals = loads - terms @ (solver.back @ solution)
-    sd = math.sqrt(float(residuals @ residuals) / (len(loads) - len(one.terms)))
+    sd = math.sqrt(float(residuals @ residuals) / (len(loads) - len(load.terms)))
     # Range and extent are those of the indications as observed, whose digits a certificate prints.
     return replace(
         solver,
@@ -121,18 +223,18 @@ def reference_u(table: Table, load: str, load_unit: str, method: str) -> float |
     return float(table.column(name).max()) * (unit(table.unit(name)).factor / unit(load_unit).factor)
 
 
-def _weights(one: LoadFit, table: Table) -> NDArray[np.float64] | None:
-    if one.method != "wls":
+def _weights(load: LoadFit, table: Table) -> NDArray[np.float64] | None:
+    if load.method != "wls":
         return None
-    name = f"u_{one.load}"
-    u = table.column(name) * (unit(table.unit(name)).factor / unit(one.unit).factor)
+    name = f"u_{load.load}"
+    u = table.column(name) * (unit(table.unit(name)).factor / unit(load.unit).factor)
     weights: NDArray[np.float64] = 1.0 / u
     return weights
 
 
-def _check_load(record: CalibrationRecord, at: int, one: LoadFit, solver: _Solver, table: Table) -> None:
-    where, loads = one.load, table.column(one.load)
-    coefficients = np.asarray(one.coefficients)
+def _check_load(record: CalibrationRecord, at: int, load: LoadFit, solver: _Solver, table: Table) -> None:
+    where, loads = load.load, table.column(load.load)
+    coefficients = np.asarray(load.coefficients)
     low, high = float(loads.min()), float(loads.max())
     largest = max(abs(low), abs(high))
     solution, sd = solver.solve(loads)
@@ -140,25 +242,25 @@ def _check_load(record: CalibrationRecord, at: int, one: LoadFit, solver: _Solve
     worst = int(moved.argmax())
     if not moved[worst] <= CRITERION * largest:
         raise _refused(
-            record, f"{where}, term {one.terms[worst]}", f"{one.coefficients[worst]!r}",
+            record, f"{where}, term {load.terms[worst]}", f"{load.coefficients[worst]!r}",
             f"{float((solver.back @ solution)[worst])!r} from its own data", "refit",
         )  # fmt: skip
     n = len(loads)
-    _demand_equal(record, where, "number of rows and dof", (one.n, one.dof), (n, n - len(coefficients)))
-    _demand_equal(record, where, "range", (one.minimum, one.maximum), (low, high))
-    if one.reference_u is not None:  # records made before have none
-        stated = reference_u(table, where, one.unit, one.method)
-        _demand_equal(record, where, "reference_u", one.reference_u, stated)
-    _demand_equal(record, where, "polarity", one.polarity, polarity(one.coefficients))
-    issued = tuple(issued_value(c, e, largest) for c, e in zip(one.coefficients, solver.extent, strict=True))
-    _demand_equal(record, where, "issued coefficients", one.issued, issued)
+    _demand_equal(record, where, "number of rows and dof", (load.n, load.dof), (n, n - len(coefficients)))
+    _demand_equal(record, where, "range", (load.minimum, load.maximum), (low, high))
+    if load.reference_u is not None:  # records made before have none
+        stated = reference_u(table, where, load.unit, load.method)
+        _demand_equal(record, where, "reference_u", load.reference_u, stated)
+    _demand_equal(record, where, "polarity", load.polarity, polarity(load.coefficients))
+    issued = tuple(issued_value(c, e, largest) for c, e in zip(load.coefficients, solver.extent, strict=True))
+    _demand_equal(record, where, "issued coefficients", load.issued, issued)
     _demand(
         record, where, "residual standard deviation",
-        one.residual_sd is not None and abs(one.residual_sd - sd) <= SPREAD * sd + RESIDUAL * largest,
-        repr(one.residual_sd), repr(sd),
+        load.residual_sd is not None and abs(load.residual_sd - sd) <= SPREAD * sd + RESIDUAL * largest,
+        repr(load.residual_sd), repr(sd),
     )  # fmt: skip
-    stored = np.asarray(one.covariance)
-    expected = _covariance(record, one, solver, table)
+    stored = np.asarray(load.covariance)
+    expected = _covariance(record, load, solver, table)
     errors = np.sqrt(expected.diagonal())
     # Its rounding grows with the square of the terms' condition number.
     slack = SPREAD + 10 * np.finfo(float).eps * solver.condition**2
@@ -168,37 +270,37 @@ def _check_load(record: CalibrationRecord, at: int, one: LoadFit, solver: _Solve
         and bool((np.abs(stored - expected) <= slack * np.outer(errors, errors)).all()),
         "another matrix in the record", "that of the refit",
     )  # fmt: skip
-    wanted = np.asarray(record.golden.outputs[at])
+    golden = np.asarray(record.golden.outputs[at])
     # A power series in the raw variable cancels: its own rounding is allowed for, nothing more.
     rounding = 64 * np.finfo(float).eps * (np.abs(solver.golden) @ np.abs(coefficients))
     ours = solver.golden @ coefficients
     theirs = solver.golden_design @ solution
     for values, by, share in ((ours, "the coefficients", GOLDEN), (theirs, "the refit", GOLDEN_REFIT)):
-        off = np.abs(values - wanted) - (share * largest + rounding)
+        off = np.abs(values - golden) - (share * largest + rounding)
         if not (off <= 0).all():
             row = int(off.argmax())
             raise _refused(
                 record, f"{where}, golden vector {row + 1}", f"{float(values[row])!r} from {by}",
-                f"{float(wanted[row])!r}", "golden",
+                f"{float(golden[row])!r}", "golden",
             )  # fmt: skip
 
 
 def _covariance(
-    record: CalibrationRecord, one: LoadFit, solver: _Solver, table: Table
+    record: CalibrationRecord, load: LoadFit, solver: _Solver, table: Table
 ) -> NDArray[np.float64]:
     """Return the covariance by the model that the record names (terms, terms)."""
     if solver.known:
         return solver.inverse
-    if one.scatter is None:
+    if load.scatter is None:
         # By the record's own residual sd, which was just held against the refit's: of noise-free data it is
         # rounding, and the covariance is that rounding squared.
-        return (one.residual_sd or 0.0) ** 2 * solver.inverse
-    found = scatter_covariance(record, one, solver.back @ solver.pseudo @ solver.left.T, table)
-    if found is None:
+        return (load.residual_sd or 0.0) ** 2 * solver.inverse
+    covariance = scatter_covariance(record, load, solver.back @ solver.pseudo @ solver.left.T, table)
+    if covariance is None:
         raise _refused(
-            record, f"{one.load}, scatter", "another scatter in the record", "the likeliest", "refit"
+            record, f"{load.load}, scatter", "another scatter in the record", "the likeliest", "refit"
         )
-    return found
+    return covariance
 
 
 def scatter_covariance(
@@ -217,8 +319,8 @@ def scatter_covariance(
         )
     else:
         stated = statements_of(record).between(one.load)
-        wanted = stated_scatter(factor, stated, residual_sd=one.residual_sd or 0.0, dof=one.dof or 0)
-        sound = one.scatter == wanted
+        expected = stated_scatter(factor, stated, residual_sd=one.residual_sd or 0.0, dof=one.dof or 0)
+        sound = one.scatter == expected
     if one.scatter is None or not sound:
         return None
     return rows_of(design, load, group, operator).covariance(one.scatter)
@@ -284,7 +386,9 @@ def _solver(
     scale[scale == 0] = 1.0
     design[:, :k] /= scale
     weighted = design if weights is None else design * weights[:, None]
-    left, values, right = np.linalg.svd(weighted if whiten is None else whiten(weighted), full_matrices=False)
+    basis, values, right = np.linalg.svd(
+        weighted if whiten is None else whiten(weighted), full_matrices=False
+    )
     # Back to the raw terms: c = slope / scale, intercept = constant - centre . c
     back = np.zeros((p, p))
     back[:k, :k] = np.diag(1 / scale)
@@ -299,7 +403,7 @@ def _solver(
         design=design,
         weights=weights,
         whiten=whiten,
-        left=left,
+        left=basis,
         pseudo=right.T / values,
         back=back,
         inverse=inverse,

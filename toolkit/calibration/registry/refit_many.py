@@ -37,7 +37,7 @@ Pair = tuple["CalibrationRecord", "Table"]
 
 def reproducing(pairs: Sequence[Pair]) -> list[bool]:
     """Return for each record with its reference loads whether it certainly meets all criteria of `refit`."""
-    found = [False] * len(pairs)
+    reproduced = [False] * len(pairs)
     shapes: dict[Hashable, list[int]] = {}
     for at, (record, table) in enumerate(pairs):
         shape = _shape(record, table)
@@ -52,26 +52,27 @@ def reproducing(pairs: Sequence[Pair]) -> list[bool]:
         except (ValueError, TypeError, OverflowError, np.linalg.LinAlgError):
             # One of them is of another shape inside: each is judged alone.
             continue
-        for at, one in zip(places, good.tolist(), strict=True):
-            found[at] = one
-    return found
+        for at, is_good in zip(places, good.tolist(), strict=True):
+            reproduced[at] = is_good
+    return reproduced
 
 
 def _shape(record: CalibrationRecord, table: Table) -> Hashable | None:
     """Return what records must have in common to be stacked; None for one that cannot be."""
     loads = record.loads
-    if not loads or any(one.method != "ols" or one.terms != loads[0].terms for one in loads):
+    if not loads or any(load.method != "ols" or load.terms != loads[0].terms for load in loads):
         return None
     units = dict(zip(table.names, table.units, strict=True))
-    told = {cell.name: cell.unit for cell in record.cells} | {one.load: one.unit for one in loads}
+    told = {cell.name: cell.unit for cell in record.cells} | {load.load: load.unit for load in loads}
     names = tuple(told)
     p, inputs = len(loads[0].terms), record.golden.inputs
     if (
         len(names) != len(record.cells) + len(loads)
         or any(units.get(name) != text for name, text in told.items())
-        or any((one.n, one.dof) != (table.rows, table.rows - p) for one in loads)
+        or any((load.n, load.dof) != (table.rows, table.rows - p) for load in loads)
         or any(
-            one.reference_u not in (None, reference_u(table, one.load, one.unit, one.method)) for one in loads
+            load.reference_u not in (None, reference_u(table, load.load, load.unit, load.method))
+            for load in loads
         )
         or len(inputs) <= len(record.cells)
         or table.rows <= p
@@ -87,15 +88,17 @@ def _accepted(pairs: Sequence[Pair]) -> NDArray[np.bool_]:
     names, terms = tables[0].names, first.loads[0].terms
     values = np.array([table.values.T for table in tables])
     cells = values[:, [names.index(name) for name in first.indications]]
-    loads = values[:, [names.index(one.load) for one in first.loads]]
-    ranges = _numbers([[[c.minimum, c.maximum] for c in one.cells] for one in records])
+    loads = values[:, [names.index(load.load) for load in first.loads]]
+    ranges = _numbers([[[c.minimum, c.maximum] for c in record.cells] for record in records])
     good = _equal(ranges, np.stack([cells.min(axis=2), cells.max(axis=2)], axis=2))
     low, high = loads.min(axis=2), loads.max(axis=2)
-    ranges = _numbers([[[f.minimum, f.maximum] for f in one.loads] for one in records])
+    ranges = _numbers([[[f.minimum, f.maximum] for f in record.loads] for record in records])
     good &= _equal(ranges, np.stack([low, high], axis=2))
     largest = np.maximum(np.abs(low), np.abs(high))
-    coefficients = _numbers([[f.coefficients for f in one.loads] for one in records])
-    good &= _equal(_numbers([[f.polarity for f in one.loads] for one in records]), np.sign(coefficients))
+    coefficients = _numbers([[f.coefficients for f in record.loads] for record in records])
+    good &= _equal(
+        _numbers([[f.polarity for f in record.loads] for record in records]), np.sign(coefficients)
+    )
 
     matrix = _terms(terms, first.indications, cells)
     m, n, p = matrix.shape
@@ -108,9 +111,9 @@ def _accepted(pairs: Sequence[Pair]) -> NDArray[np.bool_]:
     good &= (scale > 0).all(axis=1)
     scale[scale == 0] = 1.0
     design[:, :, :k] /= scale[:, None]
-    left, singular, right = np.linalg.svd(design, full_matrices=False)
+    basis, singular, right = np.linalg.svd(design, full_matrices=False)
     pseudo = right.transpose(0, 2, 1) / singular[:, None]
-    y, across = loads.transpose(0, 2, 1), left.transpose(0, 2, 1)
+    y, across = loads.transpose(0, 2, 1), basis.transpose(0, 2, 1)
     solution = pseudo @ (across @ y)
     solution = solution + pseudo @ (across @ (y - design @ solution))
     residuals = y - design @ solution
@@ -128,27 +131,30 @@ def _accepted(pairs: Sequence[Pair]) -> NDArray[np.bool_]:
     good &= (moved.max(axis=2) <= CRITERION * largest).all(axis=1)
     extent = np.abs(matrix).max(axis=1)
     good &= np.array(
-        [_issued(one, e, f) for one, e, f in zip(records, extent.tolist(), largest.tolist(), strict=True)]
+        [
+            _issued(record, e, f)
+            for record, e, f in zip(records, extent.tolist(), largest.tolist(), strict=True)
+        ]
     )
-    stored_sd = _numbers([[f.residual_sd for f in one.loads] for one in records])
+    stored_sd = _numbers([[f.residual_sd for f in record.loads] for record in records])
     good &= (np.abs(stored_sd - sd) <= SPREAD * sd + RESIDUAL * largest).all(axis=1)
 
     root = back @ pseudo
     expected = (stored_sd**2)[:, :, None, None] * (root @ root.transpose(0, 2, 1))[:, None]
-    operators = root @ left.transpose(0, 2, 1)
+    operators = root @ basis.transpose(0, 2, 1)
     for i, (record, table) in enumerate(pairs):
-        for j, one in enumerate(record.loads):
-            if one.scatter is not None:
-                likeliest = scatter_covariance(record, one, operators[i], table)
+        for j, load in enumerate(record.loads):
+            if load.scatter is not None:
+                likeliest = scatter_covariance(record, load, operators[i], table)
                 expected[i, j] = np.nan if likeliest is None else likeliest
     errors = np.sqrt(np.einsum("mqii->mqi", expected))
-    covariance = _numbers([[f.covariance for f in one.loads] for one in records])
+    covariance = _numbers([[f.covariance for f in record.loads] for record in records])
     slack = SPREAD + 10 * _EPS * (singular[:, 0] / singular[:, -1]) ** 2
     allowed = slack[:, None, None, None] * errors[:, :, :, None] * errors[:, :, None]
     good &= (np.abs(covariance - expected) <= allowed).all(axis=(1, 2, 3))
 
-    inputs = _numbers([one.golden.inputs for one in records])
-    outputs = _numbers([one.golden.outputs for one in records])
+    inputs = _numbers([record.golden.inputs for record in records])
+    outputs = _numbers([record.golden.outputs for record in records])
     golden = _terms(terms, first.indications, inputs.transpose(0, 2, 1))
     golden_design = np.full(golden.shape, n**-0.5)
     golden_design[:, :, :k] = (golden[:, :, :k] - centre[:, None]) / scale[:, None]
@@ -157,8 +163,8 @@ def _accepted(pairs: Sequence[Pair]) -> NDArray[np.bool_]:
     rounding = 64 * _EPS * (np.abs(coefficients) @ np.abs(golden).transpose(0, 2, 1))
     if outputs.shape != ours.shape or inputs.shape[2] != len(first.indications):
         raise ValueError("golden vectors of another shape")
-    for found, share in ((ours, GOLDEN), (theirs, GOLDEN_REFIT)):
-        good &= (np.abs(found - outputs) <= share * largest[:, :, None] + rounding).all(axis=(1, 2))
+    for predicted, share in ((ours, GOLDEN), (theirs, GOLDEN_REFIT)):
+        good &= (np.abs(predicted - outputs) <= share * largest[:, :, None] + rounding).all(axis=(1, 2))
     return good
 
 
@@ -173,20 +179,20 @@ def _terms(terms: Sequence[str], names: Sequence[str], cells: NDArray[np.float64
 
 def _issued(record: CalibrationRecord, extent: list[float], largest: list[float]) -> bool:
     return all(
-        one.issued == tuple(issued_value(c, e, full) for c, e in zip(one.coefficients, extent, strict=True))
-        for one, full in zip(record.loads, largest, strict=True)
+        load.issued == tuple(issued_value(c, e, full) for c, e in zip(load.coefficients, extent, strict=True))
+        for load, full in zip(record.loads, largest, strict=True)
     )
 
 
 def _numbers(values: list[Any]) -> NDArray[np.float64]:
     """Return nested numbers as an array; what is missing, or only looks like a number, is a TypeError."""
-    found = np.array(values)
-    if found.dtype.kind not in "if":
+    numbers = np.array(values)
+    if numbers.dtype.kind not in "if":
         raise TypeError("not numbers")
-    return found.astype(np.float64, copy=False)
+    return numbers.astype(np.float64, copy=False)
 
 
-def _equal(one: NDArray[np.float64], other: NDArray[np.float64]) -> NDArray[np.bool_]:
-    if one.shape != other.shape:
+def _equal(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.bool_]:
+    if a.shape != b.shape:
         raise ValueError("stored numbers of another shape")
-    return np.asarray((one == other).reshape(len(one), -1).all(axis=1))
+    return np.asarray((a == b).reshape(len(a), -1).all(axis=1))

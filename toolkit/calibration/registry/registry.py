@@ -118,11 +118,11 @@ class Registry:
         good: list[CalibrationRecord] = []
         bad: list[Refused] = []
         ledger = self.ledger(instrument)
-        for record_id, found in load_many(self.folder / instrument, self.ids(instrument), ledger).items():
-            if isinstance(found, CalibrationRecord):
-                good.append(found)
+        for record_id, loaded in load_many(self.folder / instrument, self.ids(instrument), ledger).items():
+            if isinstance(loaded, CalibrationRecord):
+                good.append(loaded)
             else:
-                bad.append(Refused(id=record_id, rule=found.rule or "unreadable", reason=reason_of(found)))
+                bad.append(Refused(id=record_id, rule=loaded.rule or "unreadable", reason=reason_of(loaded)))
         return tuple(good), tuple(bad)
 
     def status(self, record_id: str, *, known_at: date | None = None) -> RecordStatus:
@@ -155,15 +155,18 @@ class Registry:
             the record that applies fails a gate
         """
         ledger = self._sound(instrument)
-        known = known_at or today()
-        best = _best(ledger, on, known)
+        known_on = known_at or today()
+        best = _best(ledger, on, known_on)
         if best is None:
-            told = [_told(status_of(one, ledger.of(one), known)) for one in ledger.entered()]
+            standings = [
+                _told(status_of(record_id, ledger.of(record_id), known_on)) for record_id in ledger.entered()
+            ]
             raise RegistryError(
                 f"no calibration of {instrument} is in force on {on.isoformat()}",
                 where=self.folder / instrument,
-                got="; ".join(told) or "no record",
-                expected=f"an approved record in force on {on.isoformat()}, as known on {known.isoformat()}",
+                got="; ".join(standings) or "no record",
+                expected=f"an approved record in force on {on.isoformat()}, "
+                f"as known on {known_on.isoformat()}",
                 next_step="approve one with 'toolkit calibration approve ID --in-force-from DATE', "
                 "or make a draft with --calibration ID --draft",
                 rule="no-record-in-force",
@@ -213,20 +216,20 @@ def load_many(
         except ToolkitError as error:
             started[record_id] = error
     pairs = [
-        (one.record, one.table)
-        for one in started.values()
-        if isinstance(one, Started) and one.table is not None
+        (start.record, start.table)
+        for start in started.values()
+        if isinstance(start, Started) and start.table is not None
     ]
     sound = {record.id for (record, _), good in zip(pairs, reproducing(pairs), strict=True) if good}
-    found: dict[str, CalibrationRecord | ToolkitError] = {}
-    for record_id, one in started.items():
+    loaded: dict[str, CalibrationRecord | ToolkitError] = {}
+    for record_id, begun in started.items():
         try:
-            found[record_id] = (
-                one if isinstance(one, ToolkitError) else finish(one, reproduces=record_id in sound)
+            loaded[record_id] = (
+                begun if isinstance(begun, ToolkitError) else finish(begun, reproduces=record_id in sound)
             )
         except ToolkitError as error:
-            found[record_id] = error
-    return found
+            loaded[record_id] = error
+    return loaded
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -261,7 +264,7 @@ def start(folder: Path, record_id: str, ledger: Ledger) -> Started:
         raise _bad(record_id, path, f"sha256 {record.sha256}", f"{entered.record} as entered", "ledger")
     if entered.file != sha256_bytes(data):
         raise _bad(record_id, path, "a file whose bytes were changed", "the file as entered", "hash")
-    contents = {one.role: _data_file(record_id, folder / one.file, one.sha256) for one in record.data}
+    contents = {part.role: _data_file(record_id, folder / part.file, part.sha256) for part in record.data}
     try:
         if record.kind == "legacy":
             check_transcribed(record, contents["source"])
@@ -290,23 +293,23 @@ def _data_file(record_id: str, path: Path, expected: str) -> bytes:
         raise _bad(
             record_id, path, f"{path.name}: {error.strerror}", "the data that belong to the record", "data"
         ) from error
-    if (found := sha256_bytes(data)) != expected:
-        raise _bad(record_id, path, f"{path.name} with sha256 {found}", f"{expected} as entered", "data")
+    if (digest := sha256_bytes(data)) != expected:
+        raise _bad(record_id, path, f"{path.name} with sha256 {digest}", f"{expected} as entered", "data")
     return data
 
 
-def _best(ledger: Ledger, on: date, known: date) -> str | None:
+def _best(ledger: Ledger, on: date, known_on: date) -> str | None:
     """Return the id of the record in force; see `Registry.in_force` for the order."""
     best: tuple[bool, date, int, str] | None = None
     for record_id in ledger.entered():
         entries = ledger.of(record_id)
-        void_from = status_of(record_id, entries, known).void_from
+        void_from = status_of(record_id, entries, known_on).void_from
         for entry in entries:
             if entry.event != "approved" or entry.since is None or entry.since > on:
                 continue
             if void_from is not None and on >= void_from:
                 continue
-            was_known = entry.known_on is not None and entry.known_on <= known
+            was_known = entry.known_on is not None and entry.known_on <= known_on
             rank = (was_known, entry.since, entry.seq, record_id)
             best = rank if best is None else max(best, rank)
     return None if best is None else best[3]

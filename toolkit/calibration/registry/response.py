@@ -54,53 +54,53 @@ def range_of(cell: Indication) -> tuple[float, float] | None:
 
 
 def response(
-    record: CalibrationRecord, one: LoadFit, cell: Indication, over: tuple[float, float] | None = None
+    record: CalibrationRecord, load: LoadFit, cell: Indication, over: tuple[float, float] | None = None
 ) -> Response:
     """Return the response of a load to an indication, the other indications being zero.
 
     ``over`` is the range in SI; default: the record's own. Without any it is the linear coefficient.
     """
-    x, y = unit(cell.unit), unit(one.unit)
+    x, y = unit(cell.unit), unit(load.unit)
     over = over or range_of(cell)
     if over is None:
-        step = np.array([float(term == cell.name) for term in one.terms])
+        step = np.array([float(term == cell.name) for term in load.terms])
     else:
         points = {name: np.zeros(2) for name in record.indications}
         points[cell.name] = np.array(over) / x.factor
-        low, high = term_matrix(one.terms, points)
+        low, high = term_matrix(load.terms, points)
         step = (high - low) / (points[cell.name][1] - points[cell.name][0])
     scale = y.factor / x.factor
-    variance = step @ np.array(one.covariance) @ step if one.covariance else 0.0
+    variance = step @ np.array(load.covariance) @ step if load.covariance else 0.0
     return Response(
-        value=float(step @ np.array(one.coefficients)) * scale,
+        value=float(step @ np.array(load.coefficients)) * scale,
         u=float(np.sqrt(max(variance, 0.0))) * scale,
         extent=None if over is None else over[1] - over[0],
         per=f"{y.si}/({x.si})",
     )
 
 
-def largest_load(one: LoadFit) -> float:
+def largest_load(load: LoadFit) -> float:
     """Return the largest load of the fitted data in SI; NaN where there is none."""
-    return one.largest * unit(one.unit).factor
+    return load.largest * unit(load.unit).factor
 
 
-def tolerance(one: LoadFit) -> float:
+def tolerance(load: LoadFit) -> float:
     """Return the check loads' tolerance in SI; NaN where the record has neither tolerance nor range."""
-    return (one.tolerance or _TOLERANCE * one.largest) * unit(one.unit).factor
+    return (load.tolerance or _TOLERANCE * load.largest) * unit(load.unit).factor
 
 
-def main_indications(record: CalibrationRecord, one: LoadFit) -> tuple[str, ...]:
+def main_indications(record: CalibrationRecord, load: LoadFit) -> tuple[str, ...]:
     """Return the indications whose response makes a load: those that move over a tenth of the largest one.
 
     A legacy record has no range; there it is a tenth of the largest response.
     """
-    found = {cell.name: response(record, one, cell) for cell in record.cells}
-    effects = {name: one.effect for name, one in found.items()}
+    responses = {cell.name: response(record, load, cell) for cell in record.cells}
+    effects = {name: sensitivity.effect for name, sensitivity in responses.items()}
     if any(effect is None for effect in effects.values()):
-        effects = {name: abs(one.value) for name, one in found.items()}
+        effects = {name: abs(sensitivity.value) for name, sensitivity in responses.items()}
         scale = max((effect or 0.0) for effect in effects.values())
     else:
-        scale = largest_load(one)
+        scale = largest_load(load)
     return tuple(name for name, effect in effects.items() if (effect or 0.0) > MAIN * scale)
 
 

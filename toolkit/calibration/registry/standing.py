@@ -17,8 +17,8 @@ from typing import TYPE_CHECKING
 from toolkit.calibration.records.use import CalibrationUse
 from toolkit.calibration.registry.clock import today
 from toolkit.calibration.registry.gates import GateResult
-from toolkit.calibration.registry.interval import parse_interval
 from toolkit.calibration.registry.judgement import judge_stored, machine_of
+from toolkit.calibration.registry.status import parse_interval
 from toolkit.errors import RecordError, ToolkitError
 
 if TYPE_CHECKING:
@@ -77,7 +77,7 @@ class Standing:
             id=self.record.id,
             sha256=self.record.sha256,
             unverified=not self.record.verified,
-            draft_reasons=tuple(one.text for one in self.reasons),
+            draft_reasons=tuple(reason.text for reason in self.reasons),
             since=self.since,
         )
 
@@ -95,13 +95,13 @@ def not_in_force(
 
     ``draft`` tells whether a draft may be made of it.
     """
-    steps = list(dict.fromkeys(one.next_step for one in reasons))
+    steps = list(dict.fromkeys(reason.next_step for reason in reasons))
     if draft:
         steps.append("or add --draft: every page then says that it is a draft")
     return RecordError(
         f"{record_id} may not be used: it is not approved and in force",
         where=where,
-        got="; ".join(one.text for one in reasons),
+        got="; ".join(reason.text for reason in reasons),
         expected=expected,
         next_step="; ".join(steps),
         rule=rule,
@@ -129,24 +129,24 @@ def standing(
     RegistryError, RecordError
         no record is in force on that day; the named record or the ledger cannot be used
     """
-    known = known_at or today()
+    known_on = known_at or today()
     if named is None:
         if on is None:
             raise TypeError("a record is chosen by its name or by the test's day")
-        record = registry.in_force(instrument, on=on, known_at=known)
+        record = registry.in_force(instrument, on=on, known_at=known_on)
     else:
         record = registry.load(named)
-    reasons = _reasons(registry, record, instrument, on, known)
-    told = {one.text for one in reasons}
-    later = () if known >= today() else _reasons(registry, record, instrument, on, today())
+    reasons = _reasons(registry, record, instrument, on, known_on)
+    texts = {reason.text for reason in reasons}
+    later = () if known_on >= today() else _reasons(registry, record, instrument, on, today())
     return Standing(
         record=record,
         instrument=instrument,
         on=on,
-        known_at=known,
+        known_at=known_on,
         reasons=reasons,
-        since=tuple(one.text for one in later if one.text not in told),
-        discarded=registry.status(record.id, known_at=known).state == "discarded",
+        since=tuple(reason.text for reason in later if reason.text not in texts),
+        discarded=registry.status(record.id, known_at=known_on).state == "discarded",
     )
 
 
@@ -188,52 +188,52 @@ _VERIFY = "see 'toolkit calibration verify'"
 
 
 def _reasons(
-    registry: Registry, record: CalibrationRecord, instrument: str, on: date | None, known: date
+    registry: Registry, record: CalibrationRecord, instrument: str, on: date | None, known_on: date
 ) -> tuple[Reason, ...]:
-    status = registry.status(record.id, known_at=known)
-    found: list[Reason] = []
+    status = registry.status(record.id, known_at=known_on)
+    reasons: list[Reason] = []
     if record.instrument != instrument:
         text = f"it is a record of {record.instrument}, the test is of {instrument}"
-        found.append(Reason(text=text, next_step=f"name a record of {instrument}"))
+        reasons.append(Reason(text=text, next_step=f"name a record of {instrument}"))
     void = withdrawal(status, on)
     if void:
-        found += (replace(one, next_step=_other(registry, instrument, on, known)) for one in void)
+        reasons += (replace(reason, next_step=_other(registry, instrument, on, known_on)) for reason in void)
     else:
-        found += unapproved(registry, record, status)
+        reasons += unapproved(registry, record, status)
     if on is None:
         text = "the test has no date: which record was in force cannot be told"
-        found.append(Reason(text=text, next_step="write 'date = YYYY-MM-DD' into test.toml"))
+        reasons.append(Reason(text=text, next_step="write 'date = YYYY-MM-DD' into test.toml"))
     elif on > today():
         text = (
             f"the test is dated {on.isoformat()}, in the future: what will be in force then cannot be known"
         )
-        found.append(Reason(text=text, next_step="correct the date in test.toml"))
+        reasons.append(Reason(text=text, next_step="correct the date in test.toml"))
     elif not void and status.in_force_from is not None:
-        found += _by_day(registry, record, status, on, known)
-    return tuple(found)
+        reasons += _by_day(registry, record, status, on, known_on)
+    return tuple(reasons)
 
 
 def _by_day(
-    registry: Registry, record: CalibrationRecord, status: RecordStatus, on: date, known: date
+    registry: Registry, record: CalibrationRecord, status: RecordStatus, on: date, known_on: date
 ) -> list[Reason]:
     """Return what the test's day says against an approved record."""
-    found: list[Reason] = []
-    winner = registry.id_in_force(record.instrument, on=on, known_at=known)
+    reasons: list[Reason] = []
+    winner = registry.id_in_force(record.instrument, on=on, known_at=known_on)
     if status.in_force_from is not None and on < status.in_force_from:
         text = f"not in force until {status.in_force_from.isoformat()}"
-        found.append(Reason(text=text, next_step=_other(registry, record.instrument, on, known)))
+        reasons.append(Reason(text=text, next_step=_other(registry, record.instrument, on, known_on)))
     elif winner not in (None, record.id):
-        begin = registry.status(str(winner), known_at=known).in_force_from
+        begin = registry.status(str(winner), known_at=known_on).in_force_from
         text = f"superseded by {winner}" + (f", in force from {begin.isoformat()}" if begin else "")
         if begin is not None and status.in_force_from is not None and begin < status.in_force_from:
-            text = f"approved only after {known.isoformat()}: {winner} was in force then"
-        found.append(Reason(text=text, next_step=_other(registry, record.instrument, on, known)))
+            text = f"approved only after {known_on.isoformat()}: {winner} was in force then"
+        reasons.append(Reason(text=text, next_step=_other(registry, record.instrument, on, known_on)))
     due = due_date(record, status)
     if due is not None and on > due:
         text = f"expired: its recall interval of {status.recall} ended on {due.isoformat()}"
         step = "calibrate the instrument, or approve the record again with a longer --recall and the reason"
-        found.append(Reason(text=text, next_step=step))
-    return found
+        reasons.append(Reason(text=text, next_step=step))
+    return reasons
 
 
 def due_date(record: CalibrationRecord, status: RecordStatus) -> date | None:
@@ -243,8 +243,8 @@ def due_date(record: CalibrationRecord, status: RecordStatus) -> date | None:
     return parse_interval(status.recall).after(date.fromisoformat(record.date))
 
 
-def _other(registry: Registry, instrument: str, on: date | None, known: date) -> str:
-    winner = None if on is None else registry.id_in_force(instrument, on=on, known_at=known)
+def _other(registry: Registry, instrument: str, on: date | None, known_on: date) -> str:
+    winner = None if on is None else registry.id_in_force(instrument, on=on, known_at=known_on)
     if winner is None:
         return "see 'toolkit calibration list' for the records and the days from which they are in force"
     return f"use {winner}, the record in force: leave --calibration away, or process the recordings again"
@@ -252,9 +252,9 @@ def _other(registry: Registry, instrument: str, on: date | None, known: date) ->
 
 def gate_words(failed: Sequence[GateResult]) -> str:
     """Return failed gates in words: each rule with the first of its places."""
-    told = []
-    for rule in dict.fromkeys(one.rule for one in failed):
-        places = [one.where for one in failed if one.rule == rule]
+    phrases = []
+    for rule in dict.fromkeys(result.rule for result in failed):
+        places = [result.where for result in failed if result.rule == rule]
         more = f" and {len(places) - _PLACES} more" if len(places) > _PLACES else ""
-        told.append(f"{rule} ({'; '.join(places[:_PLACES])}{more})")
-    return f"gate{'' if len(told) == 1 else 's'} {', '.join(told)}"
+        phrases.append(f"{rule} ({'; '.join(places[:_PLACES])}{more})")
+    return f"gate{'' if len(phrases) == 1 else 's'} {', '.join(phrases)}"

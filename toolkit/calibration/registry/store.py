@@ -164,11 +164,11 @@ def _roll_forward(folder: Path) -> None:
         journal = json.loads(path.read_bytes())
         files = {name: base64.b64decode(text) for name, text in journal["files"].items()}
         size, line, count = int(journal["bytes"]), str(journal["line"]).encode(), int(journal["count"])
-        whole = sha256_bytes(ledger[:size]) == journal["before"] and ledger[size:] in (b"", line)
+        intact = sha256_bytes(ledger[:size]) == journal["before"] and ledger[size:] in (b"", line)
         head = head_bytes(count, str(journal["sha256"]))
     except (ValueError, KeyError, TypeError, AttributeError) as error:
-        problem, whole = error, False
-    if not whole:
+        problem, intact = error, False
+    if not intact:
         raise RegistryError(
             f"an interrupted write to {folder.name} cannot be finished",
             where=path,

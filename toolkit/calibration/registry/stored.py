@@ -7,12 +7,15 @@ The stored files are those of the session, byte for byte. Where the record says 
 from __future__ import annotations
 
 import json
+import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from toolkit.calibration.session.bridge import Bridge, bridges_of, converted
 from toolkit.calibration.session.known_errors import group_column, row_columns
+from toolkit.calibration.session.read import Session, read_session
 from toolkit.calibration.session.run_zero import without_read_zeros, without_run_zeros
+from toolkit.calibration.session.settings import parse_session
 from toolkit.calibration.session.table import Table, read_table
 from toolkit.errors import RecordError, RegistryError, ToolkitError
 from toolkit.units import unit
@@ -39,7 +42,7 @@ def stored_check(registry: Path, record: CalibrationRecord) -> Table | None:
     if entry is None:
         return None
     path = registry / record.instrument / entry.file
-    loads = [one.load for one in record.loads]
+    loads = [load.load for load in record.loads]
     table = read_table(
         path.read_bytes(),
         where=path,
@@ -48,9 +51,9 @@ def stored_check(registry: Path, record: CalibrationRecord) -> Table | None:
         runs=False,
     )
     units = dict(zip(record.indications, record.indication_units, strict=True))
-    other = [n for n, text in units.items() if unit(table.unit(n)).dimension != unit(text).dimension]
-    table = converted(table, _bridges(record, other), units, where=path)
-    table = table.in_units(units | {one.load: one.unit for one in record.loads})
+    mismatched = [n for n, text in units.items() if unit(table.unit(n)).dimension != unit(text).dimension]
+    table = converted(table, _bridges(record, mismatched), units, where=path)
+    table = table.in_units(units | {load.load: load.unit for load in record.loads})
     return without_read_zeros(table, record.indications, loads, path) if record.zero == "run" else table
 
 
@@ -62,14 +65,14 @@ def parse_loads(record: CalibrationRecord, data: bytes, folder: Path) -> Table:
     RecordError
         ``data``: they cannot be read
     """
-    needed = [*record.indications, *(one.load for one in record.loads)]
-    uncertainties = row_columns([one.load for one in record.loads])
+    needed = [*record.indications, *(load.load for load in record.loads)]
+    uncertainties = row_columns([load.load for load in record.loads])
     file = record.data_file("loads")
     where = folder / ("loads" if file is None else file.file)
     try:
         table = read_table(data, where=where, required=needed, optional=uncertainties, labels=_labels(record))
         table = _as_fitted(record, table, where)
-        loads = [one.load for one in record.loads]
+        loads = [load.load for load in record.loads]
         return without_run_zeros(table, record.indications, loads) if record.zero == "run" else table
     except RegistryError:
         raise
@@ -80,8 +83,8 @@ def parse_loads(record: CalibrationRecord, data: bytes, folder: Path) -> Table:
 
 def _labels(record: CalibrationRecord) -> tuple[str, ...]:
     # Few sessions name a group: the settings of the others are not parsed.
-    named = '"shared_group"' in record.settings
-    return group_column(json.loads(record.settings).get("reference", {})) if named else ()
+    has_group = '"shared_group"' in record.settings
+    return group_column(json.loads(record.settings).get("reference", {})) if has_group else ()
 
 
 def _as_fitted(record: CalibrationRecord, table: Table, where: Path) -> Table:
@@ -119,3 +122,47 @@ def bad_record(record_id: str, where: object, got: object, expected: object, rul
 def reason_of(error: ToolkitError) -> str:
     """Return an error in one line."""
     return f"{error.what}: got {error.got}, expected {error.expected}" if error.got else error.what
+
+
+# A record's session, read again from the files that lie beside it.
+
+
+def stored_session(registry: Path, record: CalibrationRecord) -> Session:
+    """Return the session that a record was fitted from, by the reader that read it then.
+
+    ``registry`` is the registry's folder; the record has been checked (`Registry.load`), and with it the
+    hashes of its files.
+
+    Raises
+    ------
+    RecordError
+        ``data``: a legacy import, which has no session
+    """
+    folder = registry / record.instrument
+    files = {part.role: (folder / part.file).read_bytes() for part in record.data}
+    if "session" not in files or "loads" not in files:
+        raise RecordError(
+            f"record {record.id} has no reference loads to report on",
+            where=folder,
+            got="a legacy import",
+            expected="a record that was fitted from a session",
+            next_step="see 'toolkit calibration show' for its coefficients and their source",
+            rule="data",
+        )
+    raw = parse_session(files["session"], where=folder / f"{record.id}.session.toml")
+    entry = raw.get("check")
+    check = (
+        entry if isinstance(entry, str) else (entry or {}).get("file", (entry or {}).get("data", "check.csv"))
+    )
+    with tempfile.TemporaryDirectory() as place:
+        # The session names its files as they were called when it was recorded.
+        for name, role in ((raw["data"], "loads"), (check, "check")):
+            if role in files:
+                target = Path(place, str(name)).resolve()
+                if not target.is_relative_to(Path(place).resolve()):
+                    continue  # the reader refuses such a name, and says so
+                target.parent.mkdir(parents=True, exist_ok=True)
+                target.write_bytes(files[role])
+        path = Path(place) / "SESSION.toml"
+        path.write_bytes(files["session"])
+        return read_session(path, entered=True)

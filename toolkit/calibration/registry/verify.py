@@ -61,10 +61,11 @@ def verify_registry(registry: Registry, head: str | None = None) -> tuple[Verify
             ledgers[instrument] = registry.ledger(instrument)
         except ToolkitError as error:
             ledgers[instrument] = Ledger(entries=(), damage=f"{error.what}: {error.got}")
-    if head is not None and not any(e.sha256 == head for one in ledgers.values() for e in one.entries):
+    if head is not None and not any(e.sha256 == head for ledger in ledgers.values() for e in ledger.entries):
         damage = f"no line has the given head {head}: the end of a ledger was cut off"
         ledgers = {
-            name: Ledger(entries=one.entries, damage=one.damage or damage) for name, one in ledgers.items()
+            name: Ledger(entries=ledger.entries, damage=ledger.damage or damage)
+            for name, ledger in ledgers.items()
         }
         if not ledgers:
             rows.append(VerifyRow(id=HEAD, ok=False, verified=False, reason=f"ledger: {damage}"))
@@ -79,7 +80,7 @@ def _instrument(folder: Path, ledger: Ledger) -> list[VerifyRow]:
     on_disk = {path.stem for path in folder.glob("*.json") if path.name != HEAD and ID.match(path.stem)}
     owned = {HEAD, LEDGER}
     records = {record_id for record_id in {*on_disk, *entered} if ID.match(record_id)}
-    ids = sorted(records, key=lambda one: (len(one), one))
+    ids = sorted(records, key=lambda record: (len(record), record))
     for row, files in _judged(folder, ids, ledger):
         rows.append(row)
         owned |= {f"{row.id}.json", *files}
@@ -126,20 +127,20 @@ def _judge_shared(folder: Path, ids: Sequence[str]) -> list[_Judged]:
 
 def _judge(folder: Path, ids: Sequence[str], ledger: Ledger) -> list[_Judged]:
     """Return the rows of some records and the names of their files."""
-    found = load_many(folder, ids, ledger)
-    return [_row(folder, record_id, one, ledger) for record_id, one in found.items()]
+    loaded = load_many(folder, ids, ledger)
+    return [_row(folder, record_id, result, ledger) for record_id, result in loaded.items()]
 
 
-def _row(folder: Path, record_id: str, found: CalibrationRecord | ToolkitError, ledger: Ledger) -> _Judged:
-    if isinstance(found, ToolkitError):
-        reason = f"{found.rule or 'unreadable'}: {found.what}"
-        reason += f" (got {found.got}, expected {found.expected})" if found.got else ""
+def _row(folder: Path, record_id: str, loaded: CalibrationRecord | ToolkitError, ledger: Ledger) -> _Judged:
+    if isinstance(loaded, ToolkitError):
+        reason = f"{loaded.rule or 'unreadable'}: {loaded.what}"
+        reason += f" (got {loaded.got}, expected {loaded.expected})" if loaded.got else ""
         row = VerifyRow(id=record_id, ok=False, verified=False, reason=reason)
         return row, tuple(_owned_by_bad(folder, record_id))
-    late = _untimely(found, ledger.of(record_id))
+    late = _untimely(loaded, ledger.of(record_id))
     untimely = None if late is None else f"time: {late}"
-    row = VerifyRow(id=record_id, ok=late is None, verified=found.verified, reason=untimely)
-    return row, tuple(one.file for one in found.data)
+    row = VerifyRow(id=record_id, ok=late is None, verified=loaded.verified, reason=untimely)
+    return row, tuple(part.file for part in loaded.data)
 
 
 def _untimely(record: CalibrationRecord, entries: Sequence[Entry]) -> str | None:
@@ -162,21 +163,21 @@ def _untimely(record: CalibrationRecord, entries: Sequence[Entry]) -> str | None
 
 def _files(folder: Path) -> list[str]:
     """Return every file and link below a folder, as sorted names relative to it."""
-    found: list[str] = []
+    present: list[str] = []
     for top, folders, names in os.walk(folder):
         below = os.path.relpath(top, folder)
         links = [name for name in folders if os.path.islink(os.path.join(top, name))]  # noqa: PTH114, PTH118
-        found += [name if below == "." else f"{below}/{name}" for name in (*names, *links)]
-    return sorted(found)
+        present += [name if below == "." else f"{below}/{name}" for name in (*names, *links)]
+    return sorted(present)
 
 
 def _owned_by_bad(folder: Path, record_id: str) -> set[str]:
     path = folder / f"{record_id}.json"
     try:
-        return {one.file for one in from_bytes(read_regular(path), where=path).data}
+        return {part.file for part in from_bytes(read_regular(path), where=path).data}
     except (ToolkitError, OSError):
         # What belongs to a record that cannot be read is told by the record's own row.
-        return {one.name for one in folder.glob(f"{record_id}.*")}
+        return {path.name for path in folder.glob(f"{record_id}.*")}
 
 
 def _stray(name: str) -> VerifyRow:

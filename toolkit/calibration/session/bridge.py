@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING, Any
 
 from toolkit.calibration.session.settings import wrong
 from toolkit.files import check_keys, is_number
-from toolkit.machine.definition import quantity
+from toolkit.machine.quantity import quantity
 from toolkit.units import si_scale, unit
 
 if TYPE_CHECKING:

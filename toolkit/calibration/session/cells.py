@@ -105,8 +105,7 @@ def _plain(data: bytes, where: object) -> Cells | None:
 
 
 def _text(data: bytes, known: Callable[[str], bool], where: object) -> Cells:
-    from toolkit.recording.csvfile import first_line, split_rows
-    from toolkit.recording.dialect import decode, separator_of
+    from toolkit.recording.csvfile import decode, first_line, separator_of, split_rows
 
     path = Path(str(where))
     text = decode(data, where=path)
@@ -127,7 +126,7 @@ def _sheet(gated: Any, known: Callable[[str], bool]) -> Cells:
             "cell", "correct the cell, or remove the whole row with a reason in the laboratory's notes",
         )  # fmt: skip
     merged = any(b"<mergeCell " in xml for xml in gated.members.values())
-    return _cells(table.whole().rows, where=table.where, separator="", merged=merged)
+    return _cells(table.in_rows().rows, where=table.where, separator="", merged=merged)
 
 
 def _cells(rows: Sequence[Sequence[Any]], *, where: str, separator: str, merged: bool = False) -> Cells:

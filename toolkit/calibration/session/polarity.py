@@ -19,7 +19,7 @@ from typing import Any
 from toolkit.calibration.session.reading_entries import Scope
 from toolkit.calibration.session.settings import wrong
 from toolkit.files import check_keys, is_number
-from toolkit.machine.definition import quantity
+from toolkit.machine.quantity import quantity
 from toolkit.units import unit
 
 AGREEMENT = 0.2
@@ -52,7 +52,7 @@ def polarity_readings(entries: object, scope: Scope) -> tuple[PolarityReading, .
         an unknown key, load or indication, an indication without a reading, a number without a unit or in
         one that does not lead to the fit's
     """
-    if not isinstance(entries, list) or not all(isinstance(one, dict) for one in entries):
+    if not isinstance(entries, list) or not all(isinstance(entry, dict) for entry in entries):
         raise wrong(scope.where, "polarity", entries, "tables [[polarity]] with load, value, indications")
     return tuple(_reading(entry, f"polarity {at}", scope) for at, entry in enumerate(entries, start=1))
 

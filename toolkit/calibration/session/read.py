@@ -11,10 +11,9 @@ from typing import Any
 from toolkit.calibration.records.record import Zero
 from toolkit.calibration.session.bridge import Bridge, bridges_of, converted, fit_units
 from toolkit.calibration.session.cells import FILES
-from toolkit.calibration.session.declaration import refuse
-from toolkit.calibration.session.keys import session_faults
 from toolkit.calibration.session.known_errors import group_column, row_columns
 from toolkit.calibration.session.run_zero import without_read_zeros, without_run_zeros
+from toolkit.calibration.session.session_file import session_faults
 from toolkit.calibration.session.settings import (
     Settings,
     date_of,
@@ -25,6 +24,7 @@ from toolkit.calibration.session.settings import (
 )
 from toolkit.calibration.session.statement_checks import check_columns, check_statements
 from toolkit.calibration.session.table import Table, read_table
+from toolkit.declared import Source, refuse
 from toolkit.errors import SessionError
 from toolkit.files import read_bytes, read_regular, sha256_bytes
 from toolkit.recording.archive import MAX_FILE_BYTES
@@ -112,7 +112,7 @@ def read_session(path: Path, *, entered: bool = False) -> Session:
     session_bytes = read_bytes(path)
     raw = parse_session(session_bytes, where=path)
     if not entered:
-        refuse(session_faults(raw), where=path)
+        refuse(session_faults(raw), Source(where=path, text=session_bytes.decode("utf-8-sig")))
     settings = settings_of(raw, where=path)
     loads, indications = settings.loads, settings.indications
     data_bytes = _file(path, raw.get("data"), "data")

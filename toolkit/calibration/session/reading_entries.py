@@ -26,7 +26,7 @@ from toolkit.calibration.session.bridge import RATIO, RATIO_DIMENSION, Bridge
 from toolkit.calibration.session.settings import wrong
 from toolkit.errors import UnitError
 from toolkit.files import check_keys, is_number
-from toolkit.machine.definition import quantity
+from toolkit.machine.quantity import quantity
 from toolkit.units import unit
 
 SHUNT_TOLERANCE_PERCENT = 0.1
@@ -192,7 +192,7 @@ def shunt_entry(name: str, cell: Mapping[str, Any], scope: Scope) -> ShuntEntry 
 
 
 def _tables(entries: object, key: str, keys: Sequence[str], scope: Scope) -> list[dict[str, Any]]:
-    if not isinstance(entries, list) or not all(isinstance(one, dict) for one in entries):
+    if not isinstance(entries, list) or not all(isinstance(entry, dict) for entry in entries):
         raise wrong(scope.where, key, entries, f"tables [[{key}]] with {', '.join(keys)}")
     return entries
 
@@ -223,7 +223,9 @@ def _shown(value: object, load: object, key: str, scope: Scope) -> tuple[str, fl
     if isinstance(value, dict) and isinstance(value.get("unit"), str):
         # A force that the indication itself is in stays a reading of the indication.
         told = unit(value["unit"], where=f"{scope.where}: {key}").dimension
-        if told != found.dimension or told in {unit(scope.unit(one)).dimension for one in scope.indications}:
+        if told != found.dimension or told in {
+            unit(scope.unit(indication)).dimension for indication in scope.indications
+        }:
             return None
         value = quantity(value, told, f"{scope.where}: {key}") / found.factor
     elif isinstance(value, dict | list) or len(scope.indications) == 1:
@@ -238,7 +240,7 @@ def _load(entry: object, key: str, scope: Scope) -> tuple[str, bool]:
         return entry, False
     value, text = entry, next(iter(scope.loads.values())) if len(scope.loads) == 1 else None
     if isinstance(entry, dict):
-        dimensions = {unit(one).dimension for one in scope.loads.values()}
+        dimensions = {unit(load).dimension for load in scope.loads.values()}
         text = entry.get("unit")
         dimension = unit(text, where=f"{scope.where}: {key}").dimension if isinstance(text, str) else ""
         if dimension not in dimensions:

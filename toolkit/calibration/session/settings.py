@@ -15,11 +15,10 @@ from dataclasses import dataclass
 from typing import Any, cast
 
 from toolkit.calibration.records.record import ZEROS, Zero, canonical
-from toolkit.calibration.session.plain_toml import plain_toml
 from toolkit.calibration.terms import INTERCEPT, MODELS, NAME, model_terms
 from toolkit.errors import ConfigError, ToolkitError
 from toolkit.files import parse_toml, sha256_bytes
-from toolkit.machine.definition import quantity
+from toolkit.machine.quantity import quantity
 from toolkit.units import unit
 
 _ENCODER = json.JSONEncoder(
@@ -87,8 +86,7 @@ def parse_session(data: bytes, *, where: object) -> dict[str, Any]:
         ``not-toml``, with a hint where ``check`` stands as a value and as a table
     """
     try:
-        plain = plain_toml(data)
-        raw = parse_toml(data, where=where) if plain is None else plain
+        return parse_toml(data, where=where)
     except ToolkitError as error:
         text = data.decode("utf-8", "replace")
         if not (_CHECK_VALUE.search(text) and _CHECK_TABLE.search(text)):
@@ -102,7 +100,6 @@ def parse_session(data: bytes, *, where: object) -> dict[str, Any]:
             "nothing was written",
             rule="not-toml",
         ) from error
-    return raw
 
 
 def settings_of(raw: Mapping[str, Any], *, where: object) -> Settings:

@@ -21,7 +21,7 @@ from toolkit.calibration.session.reading_entries import (
 from toolkit.calibration.session.settings import wrong, zero_readings
 from toolkit.errors import SessionError, UnitError
 from toolkit.files import check_keys, is_number
-from toolkit.machine.definition import quantity
+from toolkit.machine.quantity import quantity
 from toolkit.units import Unit, si_scale, unit
 
 if TYPE_CHECKING:
@@ -76,11 +76,11 @@ def check_columns(table: Table, loads: tuple[str, ...], where: object) -> None:
             )  # fmt: skip
 
 
-def _other_unit(where: str, found: Unit, dimension: str, allowed: str) -> UnitError:
+def _other_unit(where: str, unit: Unit, dimension: str, allowed: str) -> UnitError:
     return UnitError(
-        f"unit {found.text!r} is no unit of {dimension}",
+        f"unit {unit.text!r} is no unit of {dimension}",
         where=where,
-        got=f"{found.text} ({found.dimension})",
+        got=f"{unit.text} ({unit.dimension})",
         expected=f"a unit of {dimension}, such as {allowed}",
         next_step="correct the unit; nothing was written",
         rule="unit-dimension",
@@ -146,10 +146,10 @@ def temperature_effect(
     parts = entry if isinstance(entry, dict) and not {"value", "unit"} & set(entry) else {"span": entry}
     check_keys(parts, ("span", "zero"), where=f"{bridge.where}: {key}")
     plain = {
-        name: one | {"unit": per(one["unit"], _PER_KELVIN)}
-        if isinstance(one, dict) and isinstance(one.get("unit"), str)
-        else one
-        for name, one in parts.items()
+        name: part | {"unit": per(part["unit"], _PER_KELVIN)}
+        if isinstance(part, dict) and isinstance(part.get("unit"), str)
+        else part
+        for name, part in parts.items()
     }
     span = zero = None
     if "span" in plain:

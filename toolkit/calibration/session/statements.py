@@ -19,7 +19,7 @@ from toolkit.calibration.session.bridge import bridge_of, bridges_of
 from toolkit.calibration.session.reading_entries import Scope
 from toolkit.calibration.session.settings import preloads_of, zero_readings
 from toolkit.calibration.session.statement_checks import temperature_effect
-from toolkit.machine.definition import quantity
+from toolkit.machine.quantity import quantity
 from toolkit.units import unit
 
 if TYPE_CHECKING:
@@ -90,7 +90,7 @@ class Reference:
 
     def of(self, load: str) -> ReferenceUncertainty | None:
         """Return what was stated of a load; None where nothing was."""
-        return next((one for one in self.uncertainties if one.load == load), None)
+        return next((uncertainty for uncertainty in self.uncertainties if uncertainty.load == load), None)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -134,11 +134,11 @@ class Statements:
 
     def between(self, load: str) -> BetweenRuns | None:
         """Return what is stated of a load's differences between runs; None where nothing is."""
-        return next((one for one in self.between_runs if one.load == load), None)
+        return next((between_run for between_run in self.between_runs if between_run.load == load), None)
 
     def cell(self, name: str) -> CellStatement:
         """Return one indication's statement."""
-        return next(one for one in self.cells if one.name == name)
+        return next(cell for cell in self.cells if cell.name == name)
 
 
 def statements_of(record: CalibrationRecord) -> Statements:
@@ -148,8 +148,8 @@ def statements_of(record: CalibrationRecord) -> Statements:
     return parse_statements(
         json.loads(record.settings),
         indications=units,
-        loads={one.load: one.unit for one in record.loads},
-        largest={one.load: one.largest for one in record.loads},
+        loads={load.load: load.unit for load in record.loads},
+        largest={load.load: load.largest for load in record.loads},
         date=dt.date.fromisoformat(record.date),
         where=record.id,
         columns=columns,
@@ -162,7 +162,7 @@ def scope_of(record: CalibrationRecord) -> Scope:
     return Scope(
         bridges=bridges_of(cells, record.indications, where=record.id),
         columns={cell.name: cell.column_unit or cell.unit for cell in record.cells},
-        loads={one.load: one.unit for one in record.loads},
+        loads={load.load: load.unit for load in record.loads},
         where=record.id,
     )
 
@@ -212,7 +212,8 @@ def parse_statements(
         certificate=settings.get("certificate", {}),
         preloads=preloads_of(settings, where),
         between_runs=tuple(
-            _between(name, one, loads[name]) for name, one in settings.get("between_runs", {}).items()
+            _between(name, between_run, loads[name])
+            for name, between_run in settings.get("between_runs", {}).items()
         ),
     )
 

@@ -90,15 +90,15 @@ def cell_rows(source: CellSource, load: str, indication: str) -> tuple[CellRows,
     SessionError
         ``standard``: no such load or indication, or no row in which the load acts alone
     """
-    for kind, name, known in (("load", load, source.loads), ("indication", indication, source.indications)):
-        if name not in known:
-            raise _refused(source.where, f"there is no {kind} {name}", name, ", ".join(known))
+    for kind, name, names in (("load", load, source.loads), ("indication", indication, source.indications)):
+        if name not in names:
+            raise _refused(source.where, f"there is no {kind} {name}", name, ", ".join(names))
     table = source.table
     force, reading = table.column(load), table.column(indication)
     alone = np.ones(table.rows, dtype=bool)
-    for other in source.loads:
-        if other != load:
-            values = np.abs(table.column(other))
+    for load_name in source.loads:
+        if load_name != load:
+            values = np.abs(table.column(load_name))
             alone &= values <= _OTHER_LOAD * values.max(initial=0.0)
     acting = np.abs(force) > _NO_LOAD * np.abs(force).max()
     if not (acting & alone).any():
@@ -108,7 +108,7 @@ def cell_rows(source: CellSource, load: str, indication: str) -> tuple[CellRows,
     before, after = _stated_zeros(source, indication)
     creep = _creep(source, load, indication)
     run = np.zeros(table.rows) if table.run is None else table.run
-    found = []
+    cells = []
     for sense, sign in (("positive", 1.0), ("negative", -1.0)):
         mine = acting & alone & (np.sign(force) == sign)
         runs = []
@@ -120,7 +120,7 @@ def cell_rows(source: CellSource, load: str, indication: str) -> tuple[CellRows,
             last = float(reading[late[0]]) if late.size else after
             runs.append(_run(table, load, rows, reading, int(number), first, last))
         if runs:
-            found.append(
+            cells.append(
                 CellRows(
                     load=load,
                     load_unit=table.unit(load),
@@ -130,11 +130,11 @@ def cell_rows(source: CellSource, load: str, indication: str) -> tuple[CellRows,
                     runs=tuple(runs),
                     resolution=source.statements.cell(indication).resolution,
                     creep=creep,
-                    zero_read=source.zero != "included" or all(one.zero_before is not None for one in runs),
+                    zero_read=source.zero != "included" or all(run.zero_before is not None for run in runs),
                     left_out=int((acting & ~alone).sum()),
                 )
             )
-    return tuple(found)
+    return tuple(cells)
 
 
 def _run(
@@ -173,22 +173,26 @@ def _scope(source: CellSource) -> Scope:
 
 
 def _stated_zeros(source: CellSource, indication: str) -> tuple[float | None, float | None]:
-    found: dict[str, float] = {}
+    zeros: dict[str, float] = {}
     for entry in zero_entries(list(source.statements.zero), _scope(source)):
-        found |= {entry.when.casefold(): dict(entry.values)[indication]} if indication in dict(
+        zeros |= {entry.when.casefold(): dict(entry.values)[indication]} if indication in dict(
             entry.values
         ) else {}  # fmt: skip
-    return found.get("before"), found.get("after")
+    return zeros.get("before"), zeros.get("after")
 
 
 def _creep(source: CellSource, load: str, indication: str) -> tuple[float, float] | None:
     readings: dict[str, dict[float, float]] = {}
     for entry in creep_entries(list(source.statements.creep), _scope(source)):
-        named = dict(entry.values)
-        if indication in named and (entry.load not in source.loads or entry.load == load):
-            readings.setdefault(entry.load, {})[entry.seconds] = named[indication]
+        indicated = dict(entry.values)
+        if indication in indicated and (entry.load not in source.loads or entry.load == load):
+            readings.setdefault(entry.load, {})[entry.seconds] = indicated[indication]
     early, late = _CREEP_SECONDS
-    pairs = [(one[early], one[late]) for one in readings.values() if early in one and late in one]
+    pairs = [
+        (reading[early], reading[late])
+        for reading in readings.values()
+        if early in reading and late in reading
+    ]
     return max(pairs, key=lambda pair: abs(pair[1] - pair[0])) if pairs else None
 
 

@@ -14,17 +14,73 @@ Reference: ASTM E74, sections on calibration equation and lower limit factor; an
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from toolkit.calibration.fit.regression import TermFit, fit_terms
-from toolkit.calibration.standards.degree import DegreeStep, best_degree
 from toolkit.errors import SessionError
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
+
+# ASTM E74, annex: the degree of the polynomial that fits best.
+
+
+HIGHEST = 5
+_PROBABILITY = 0.025
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DegreeStep:
+    """One comparison: ``ratio`` = s_(degree - 1) / s_degree against ``factor`` = C(n, degree)."""
+
+    degree: int
+    ratio: float
+    factor: float
+
+    @property
+    def better(self) -> bool:
+        """Whether the degree fits better than the next lower one."""
+        return self.ratio > self.factor
+
+
+def degree_factor(n: int, m: int) -> float:
+    """Return C(n, m) of the annex.
+
+    >>> round(degree_factor(10, 2), 3)
+    1.373
+    """
+    from scipy.special import fdtri
+
+    quantile = float(fdtri(1, n - m - 1, 1 - _PROBABILITY))
+    return math.sqrt(1 + (quantile - 1) / (n - m))
+
+
+def best_degree(
+    *, force: NDArray[np.float64], indication: NDArray[np.float64]
+) -> tuple[int, tuple[DegreeStep, ...]]:
+    """Return the degree of best fit of averaged indications (n,) at n forces, and each comparison made."""
+    n = len(force)
+    top = min(HIGHEST, n - 2)
+    # Below this the scatter is rounding, and a ratio of two roundings means nothing.
+    floor = 64 * np.finfo(float).eps * float(np.abs(indication).max())
+    spread = [max(_spread(force, indication, m), floor) for m in range(1, top + 1)]
+    steps: list[DegreeStep] = []
+    for m in range(top, 1, -1):
+        step = DegreeStep(degree=m, ratio=spread[m - 2] / spread[m - 1], factor=degree_factor(n, m))
+        steps.append(step)
+        if step.better:
+            return m, tuple(steps)
+    return 1, tuple(steps)
+
+
+def _spread(force: NDArray[np.float64], indication: NDArray[np.float64], m: int) -> float:
+    terms = ("F", *(f"F^{power}" for power in range(2, m + 1)), "intercept")
+    return fit_terms(terms=terms, columns={"F": force}, load=indication).residual_sd
+
 
 LLF_FACTOR = 2.4
 CLASSES = (("AA", 2000.0), ("A", 400.0))
@@ -101,7 +157,7 @@ class E74Result:
     @property
     def class_name(self) -> str | None:
         """Best class granted, None where there is none."""
-        return next((one.name for one in self.classes if one.granted), None)
+        return next((class_.name for class_ in self.classes if class_.granted), None)
 
 
 def evaluate_e74(
@@ -218,8 +274,8 @@ def _class(
     if len(forces) < MIN_POINTS:
         reasons.append(f"{len(forces)} points, at least {MIN_POINTS} are needed")
     if runs is None or runs < MIN_RUNS:
-        told = "the runs are not stated" if runs is None else f"{runs} runs"
-        reasons.append(f"{told}, at least {MIN_RUNS} are needed")
+        stated = "the runs are not stated" if runs is None else f"{runs} runs"
+        reasons.append(f"{stated}, at least {MIN_RUNS} are needed")
     if resolution is None:
         reasons.append("the resolution is not stated")
     elif smallest < k * resolution:

@@ -11,7 +11,7 @@ import numpy as np
 from toolkit.calibration.standards.cell_rows import CellRows, CellSource, cell_rows
 from toolkit.calibration.standards.e74 import E74Result, evaluate_e74
 from toolkit.calibration.standards.iso376 import Iso376Result, evaluate_iso376
-from toolkit.calibration.standards.iso376_runs import iso376_runs
+from toolkit.calibration.standards.iso376_input import iso376_runs
 from toolkit.errors import SessionError
 
 if TYPE_CHECKING:
@@ -55,18 +55,18 @@ class Evaluation:
     @property
     def all_reasons(self) -> tuple[str, ...]:
         """Why there is no better class: the session's reasons, then the result's."""
-        own: tuple[str, ...] = ()
+        reasons: tuple[str, ...] = ()
         if isinstance(self.result, Iso376Result):
-            own = self.result.reasons
+            reasons = self.result.reasons
         elif isinstance(self.result, E74Result):
-            own = tuple(f"class {c.name}: {r}" for c in self.result.classes for r in c.reasons)
-        return (*self.reasons, *own)
+            reasons = tuple(f"class {c.name}: {r}" for c in self.result.classes for r in c.reasons)
+        return (*self.reasons, *reasons)
 
     def as_dict(self) -> dict[str, Any]:
         """Return the evaluation as JSON values, with ``class`` and every reason against a better one."""
-        found = {f.name: getattr(self, f.name) for f in dataclasses.fields(self) if f.name != "result"}
+        content = {f.name: getattr(self, f.name) for f in dataclasses.fields(self) if f.name != "result"}
         figures = None if self.result is None else dataclasses.asdict(self.result)
-        return {**found, "class": self.class_name, "reasons": list(self.all_reasons), "result": figures}
+        return {**content, "class": self.class_name, "reasons": list(self.all_reasons), "result": figures}
 
 
 def evaluations(fit: SessionFit) -> tuple[Evaluation, ...]:
@@ -75,17 +75,17 @@ def evaluations(fit: SessionFit) -> tuple[Evaluation, ...]:
     source = source_of(fit)
     if len(source.loads) == 1 and len(source.indications) == 1:
         return tuple(
-            one
+            evaluation
             for standard in STANDARDS
-            for one in evaluate_source(
+            for evaluation in evaluate_source(
                 source, standard=standard, load=source.loads[0], indication=source.indications[0]
             )
         )
     return tuple(
         Evaluation(
             standard=standard,
-            load=one.name,
-            load_unit=one.unit,
+            load=load.name,
+            load_unit=load.unit,
             indication=None,
             indication_unit=None,
             sense=None,
@@ -95,7 +95,7 @@ def evaluations(fit: SessionFit) -> tuple[Evaluation, ...]:
             left_out=session.table.rows,
         )
         for standard in STANDARDS
-        for one in session.loads
+        for load in session.loads
     )
 
 
@@ -109,7 +109,7 @@ def source_of(fit: SessionFit) -> CellSource:
         statements=session_statements(session),
         settings=session.settings,
         zero=session.zero,
-        loads=tuple(one.name for one in session.loads),
+        loads=tuple(load.name for load in session.loads),
         indications=session.indications,
         where=str(session.path),
     )
@@ -135,17 +135,17 @@ def evaluate_source(
         ``standard``: no such load or indication, or no row in which the load acts alone
     """
     preloads = source.statements.preloads if preloads is None else preloads
-    found: list[Evaluation] = []
+    evaluations: list[Evaluation] = []
     for rows in cell_rows(source, load, indication):
         if standard == "iso376":
-            found.append(_iso376(source, rows, preloads, degree))
+            evaluations.append(_iso376(source, rows, preloads, degree))
         else:
-            found += [
+            evaluations += [
                 _e74(rows, direction, degree)
                 for direction in ("up", "down")
                 if any((run.up == (direction == "up")).any() for run in rows.runs)
             ]
-    return tuple(found)
+    return tuple(evaluations)
 
 
 def _e74(rows: CellRows, direction: str, degree: int | None) -> Evaluation:
@@ -169,13 +169,13 @@ def _e74(rows: CellRows, direction: str, degree: int | None) -> Evaluation:
 
 def _iso376(source: CellSource, rows: CellRows, preloads: int | None, degree: int | None) -> Evaluation:
     stated = source.statements.reference.of(rows.load)
-    given = iso376_runs(rows.runs, stated=stated)
-    result, reasons = None, (*_zero_reasons(rows), *given.reasons)
+    sequence = iso376_runs(rows.runs, stated=stated)
+    result, reasons = None, (*_zero_reasons(rows), *sequence.reasons)
     try:
         result = evaluate_iso376(
-            force=given.force,
-            runs=given.runs,
-            force_uncertainty=given.force_uncertainty,
+            force=sequence.force,
+            runs=sequence.runs,
+            force_uncertainty=sequence.force_uncertainty,
             resolution=rows.resolution,
             creep=rows.creep,
             preloads=preloads,

@@ -161,15 +161,15 @@ def evaluate_iso376(
     iso376_input.check(force, runs, force_uncertainty, resolution, creep, degree)
     forces = np.asarray(force, dtype=np.float64)
     rotated = iso376_input.rotated(runs)
-    X = np.array([one.up for one in rotated])
+    X = np.array([run.up for run in rotated])
     mean = X.mean(axis=0)
     fit = fit_curve(force=forces, indication=mean, degree=degree)
     curve = mean - fit.residuals
     full = float(abs(mean[-1]))
     zeros = [
-        one.zero_after - one.zero_before
-        for one in runs
-        if one.zero_after is not None and one.zero_before is not None
+        run.zero_after - run.zero_before
+        for run in runs
+        if run.zero_after is not None and run.zero_before is not None
     ]
     f0 = 100 * max(zeros, key=abs) / full if zeros else None
     c = None if creep is None else 100 * abs(creep[1] - creep[0]) / full
@@ -215,10 +215,10 @@ def evaluate_iso376(
     )
     worst = max(_rank(row.class_name) for row in rows)
     limiting = [row for row in rows if _rank(row.class_name) == worst and worst > 0]
-    told = [f"{row.force:g}: {reason}" for row in limiting for reason in row.reasons]
+    limits = [f"{row.force:g}: {reason}" for row in limiting for reason in row.reasons]
     return Iso376Result(
         class_name=LIMITS[worst].name if worst < len(LIMITS) and not procedure else None,
-        reasons=(*procedure, *told),
+        reasons=(*procedure, *limits),
         procedure=procedure,
         forces=tuple(rows),
         ranges=() if procedure else _ranges(rows),
@@ -232,13 +232,13 @@ def evaluate_iso376(
 def _repeatability(runs: Sequence[Iso376Run]) -> NDArray[np.float64] | None:
     if not iso376_input.repeated(runs):
         return None
-    first, second = (np.array(one.up) for one in runs[:2])
+    first, second = (np.array(run.up) for run in runs[:2])
     return np.asarray(100 * np.abs(second - first) / np.abs((first + second) / 2))
 
 
 def _reversibility(rotated: Sequence[Iso376Run]) -> NDArray[np.float64] | None:
     # The standard takes it at the turned mountings; the first one stands in where it is alone.
-    pairs = [(np.array(one.up), np.array(one.down)) for one in rotated[1:] if one.down is not None]
+    pairs = [(np.array(run.up), np.array(run.down)) for run in rotated[1:] if run.down is not None]
     if not pairs and rotated[0].down is not None:
         pairs = [(np.array(rotated[0].up), np.array(rotated[0].down))]
     if not pairs:
@@ -285,7 +285,7 @@ def _rank(name: str | None) -> int:
 
 
 def _ranges(rows: Sequence[Iso376Force]) -> tuple[Iso376Range, ...]:
-    found = []
+    ranges = []
     upper = rows[-1].force
     for rank, limits in enumerate(LIMITS):
         lower = None
@@ -294,8 +294,8 @@ def _ranges(rows: Sequence[Iso376Force]) -> tuple[Iso376Range, ...]:
                 break
             lower = row.force
         if lower is not None and lower <= upper / 2:
-            found.append(Iso376Range(class_name=limits.name, lower=lower, upper=upper))
-    return tuple(found)
+            ranges.append(Iso376Range(class_name=limits.name, lower=lower, upper=upper))
+    return tuple(ranges)
 
 
 def _procedure(
@@ -306,18 +306,18 @@ def _procedure(
     *,
     has_c: bool,
 ) -> tuple[str, ...]:
-    found = []
+    classes = []
     if len(forces) < MIN_FORCES:
-        found.append(f"{len(forces)} forces, at least {MIN_FORCES} are needed")
-    turned = sorted((one.rotation_deg - runs[0].rotation_deg) % 360 for one in rotated)
+        classes.append(f"{len(forces)} forces, at least {MIN_FORCES} are needed")
+    turned = sorted((run.rotation_deg - runs[0].rotation_deg) % 360 for run in rotated)
     if turned != [0, 120, 240]:
-        told = ", ".join(f"{angle:g}" for angle in turned)
-        found.append(f"mounted at {told} deg, 0, 120 and 240 deg are needed")
+        angles = ", ".join(f"{angle:g}" for angle in turned)
+        classes.append(f"mounted at {angles} deg, 0, 120 and 240 deg are needed")
     if preloads is None or preloads < MIN_PRELOADS:
-        told = "the preloads are not stated" if preloads is None else f"{preloads} preloads"
-        found.append(f"{told}, {MIN_PRELOADS} are needed")
-    if not has_c and not any(one.down is not None for one in rotated[1:]):
-        found.append(
+        angles = "the preloads are not stated" if preloads is None else f"{preloads} preloads"
+        classes.append(f"{angles}, {MIN_PRELOADS} are needed")
+    if not has_c and not any(run.down is not None for run in rotated[1:]):
+        classes.append(
             "neither decreasing forces at the turned mountings nor creep were measured, one of them is needed"
         )
-    return tuple(found)
+    return tuple(classes)

@@ -22,8 +22,8 @@ import numpy as np
 from toolkit.calibration.session.statements import statements_of
 from toolkit.calibration.terms import term_matrix
 from toolkit.calibration.uncertainty.components import components_of
-from toolkit.calibration.uncertainty.conditions import Temperature
-from toolkit.calibration.uncertainty.model import Budget
+from toolkit.calibration.uncertainty.model import Budget, Temperature
+from toolkit.calibration.uncertainty.scatter import Scatter, scatter_of
 from toolkit.errors import SessionError
 from toolkit.estimate import coverage_factor, effective_dof
 
@@ -71,16 +71,17 @@ def calibration_budget(
     RecordError
         the record has no such load
     """
-    one = _fitted(record, load)
-    low, high = min(one.minimum or 0.0, 0.0), max(one.maximum or 0.0, 0.0)
+    fitted = _fitted(record, load)
+    low, high = min(fitted.minimum or 0.0, 0.0), max(fitted.maximum or 0.0, 0.0)
     value = (high if high >= -low else low) if at is None else float(at)
     if not low <= value <= high:
         raise _refused(
-            f"{record.id}, {load}", "the load lies outside the calibrated range", f"{value:.6g} {one.unit}",
-            f"{low:.6g} to {high:.6g} {one.unit}", "ask within the range, or calibrate over a larger one",
+            f"{record.id}, {load}", "the load lies outside the calibrated range",
+            f"{value:.6g} {fitted.unit}", f"{low:.6g} to {high:.6g} {fitted.unit}",
+            "ask within the range, or calibrate over a larger one",
         )  # fmt: skip
     point = typical_indications(record, loads, load, value)
-    return _budget(record, loads, check, one, value, point, temperature, probability)
+    return _budget(record, loads, check, fitted, value, point, temperature, probability)
 
 
 def predict(
@@ -100,7 +101,7 @@ def predict(
     SessionError
         ``budget``: a legacy record; an indication is missing, unknown or no finite number
     """
-    one = _fitted(record, load)
+    fitted = _fitted(record, load)
     if set(indications) != set(record.indications) or not all(map(math.isfinite, indications.values())):
         raise _refused(
             record.id, "the indications are not those of the record",
@@ -108,10 +109,10 @@ def predict(
             "a finite number for each of " + ", ".join(record.indications), "give every indication once",
         )  # fmt: skip
     point = np.array([indications[name] for name in record.indications])
-    terms = term_matrix(one.terms, dict(zip(record.indications, point[:, None], strict=True)))
-    value = float((terms @ np.asarray(one.coefficients))[0])
+    terms = term_matrix(fitted.terms, dict(zip(record.indications, point[:, None], strict=True)))
+    value = float((terms @ np.asarray(fitted.coefficients))[0])
     return Prediction(
-        budget=_budget(record, loads, check, one, value, point, temperature, probability),
+        budget=_budget(record, loads, check, fitted, value, point, temperature, probability),
         beyond=tuple(
             cell.name
             for cell, x in zip(record.cells, point.tolist(), strict=True)
@@ -120,17 +121,50 @@ def predict(
     )
 
 
+def budgets_of_rows(
+    record: CalibrationRecord,
+    loads: Table,
+    check: Table | None,
+    load: str,
+    indications: NDArray[np.float64],
+    *,
+    probability: float = PROBABILITY,
+) -> tuple[Budget | None, ...]:
+    """Return the budget of a load at every row of indications (rows, indications) [the record's units].
+
+    Each is that of `predict` at the row; the session's scatter is taken once for all of them. None where a
+    row is not finite.
+
+    Raises
+    ------
+    SessionError
+        ``budget``: a legacy record
+    RecordError
+        the record has no such load
+    """
+    one = _fitted(record, load)
+    terms = term_matrix(one.terms, dict(zip(record.indications, indications.T, strict=True)))
+    values = terms @ np.asarray(one.coefficients)
+    scatter = scatter_of(record, loads, one)
+    return tuple(
+        _budget(record, loads, check, one, float(value), point, None, probability, scatter)
+        if math.isfinite(value)
+        else None
+        for value, point in zip(values.tolist(), indications, strict=True)
+    )
+
+
 def typical_indications(record: CalibrationRecord, loads: Table, load: str, at: float) -> NDArray[np.float64]:
     """Return the indications (indications,) that a load makes by itself: a plane through the session's rows.
 
     The plane is indications on loads; it only sets the point at which sensitivities are taken.
     """
-    names = [one.load for one in record.loads]
+    names = [load.load for load in record.loads]
     design = np.column_stack([loads.matrix(names), np.ones(loads.rows)])
     scale = np.maximum(np.abs(design).max(axis=0), 1e-300)
     plane = np.linalg.lstsq(design / scale, loads.matrix(record.indications), rcond=None)[0]
-    here = np.array([at if name == load else 0.0 for name in names] + [1.0])
-    point: NDArray[np.float64] = (here / scale) @ plane
+    place = np.array([at if name == load else 0.0 for name in names] + [1.0])
+    point: NDArray[np.float64] = (place / scale) @ plane
     return point
 
 
@@ -148,33 +182,35 @@ def _budget(
     record: CalibrationRecord,
     loads: Table,
     check: Table | None,
-    one: LoadFit,
+    load: LoadFit,
     value: float,
     point: NDArray[np.float64],
     temperature: Temperature | None,
     probability: float,
+    scatter: Scatter | None = None,
 ) -> Budget:
     parts, scatter_dof = components_of(
-        record, statements_of(record), loads, check, one, value=value, point=point, temperature=temperature
-    )
+        record, statements_of(record), loads, check, load, value=value, point=point, temperature=temperature,
+        scatter=scatter,
+    )  # fmt: skip
     joint = math.sqrt(math.fsum(part.u**2 for part in parts if part.joint))
     apart = [(part.u, part.dof) for part in parts if not part.joint]
     u, dof, k, U = combine([(joint, scatter_dof), *apart], probability)
     return Budget(
-        record=record.id, load=one.load, unit=one.unit, at=value, indications=tuple(point.tolist()),
+        record=record.id, load=load.load, unit=load.unit, at=value, indications=tuple(point.tolist()),
         components=parts, u=u, dof=dof, k=k, U=U, probability=probability,
         scatter_dof=scatter_dof,
     )  # fmt: skip
 
 
 def _fitted(record: CalibrationRecord, load: str) -> LoadFit:
-    one = record.load(load)
-    if record.kind != "fit" or not one.covariance:
+    fitted = record.load(load)
+    if record.kind != "fit" or not fitted.covariance:
         raise _refused(
             f"{record.id}, {load}", "a record without its data has no budget", "a legacy import",
             "a record that was fitted from reference loads", "calibrate the instrument",
         )  # fmt: skip
-    return one
+    return fitted
 
 
 def _refused(where: str, what: str, got: object, expected: object, next_step: str) -> SessionError:

@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from toolkit.calibration.terms import term_matrix
-from toolkit.calibration.uncertainty.conditions import Temperature
-from toolkit.calibration.uncertainty.model import Component, Distribution, Evaluation
+from toolkit.calibration.uncertainty.model import Component, Distribution, Evaluation, Temperature
 from toolkit.calibration.uncertainty.readings import (
     creep,
     indication_errors,
@@ -36,36 +35,39 @@ def components_of(
     statements: Statements,
     loads: Table,
     check: Table | None,
-    one: LoadFit,
+    load: LoadFit,
     *,
     value: float,
     point: NDArray[np.float64],
     temperature: Temperature | None,
+    scatter: Scatter | None = None,
 ) -> tuple[tuple[Component, ...], float]:
     """Return every component at a point (indications,), whose load is ``value`` [the load's unit].
+
+    ``scatter`` of the session's rows is the same at every point; None: it is taken here.
 
     With them the degrees of freedom of those that the session's rows give together: u^2 of their sum is
     linear in the variances within and between runs, and Satterthwaite's formula holds for it as a whole.
     """
-    scatter = scatter_of(record, loads, one)
-    slope = sensitivities(record, one, point.tolist())
-    share = abs(value) / one.largest
-    curve = _curve(record, one, scatter, point)
+    scatter = scatter or scatter_of(record, loads, load)
+    slope = sensitivities(record, load, point.tolist())
+    share = abs(value) / load.largest
+    curve = _curve(record, load, scatter, point)
     new = _new_run(scatter, share)
-    total = (curve.variance if one.method == "ols" else 0.0) + scatter.runs.within**2
+    total = (curve.variance if load.method == "ols" else 0.0) + scatter.runs.within**2
     total += new.variance if scatter.runs.groups > 1 else 0.0
     dof = scatter.dof(curve.gradient + _READING + new.gradient, total)
     return (
-        _reference(statements, one, value),
-        _fit(record, one, point, curve),
+        _reference(statements, load, value),
+        _fit(record, load, point, curve),
         _repeatability(scatter),
         _reproducibility(scatter, new),
-        _interpolation(record, scatter, check, one),
+        _interpolation(record, scatter, check, load),
         _reversibility(scatter),
         _resolution(record, statements, slope),
         _cells(record, statements, slope),
-        _zero(record, one, slope),
-        _creep(record, one, value),
+        _zero(record, load, slope),
+        _creep(record, load, value),
         _temperature(statements, temperature, slope, point, value),
     ), dof
 
@@ -79,15 +81,15 @@ class _Variance:
     dof: float
 
 
-def _curve(record: CalibrationRecord, one: LoadFit, s: Scatter, point: NDArray[np.float64]) -> _Variance:
+def _curve(record: CalibrationRecord, load: LoadFit, s: Scatter, point: NDArray[np.float64]) -> _Variance:
     """Return the variance of the curve at a point, J C J^T (JCGM 100 eq. 13, H.3.4)."""
-    J = term_matrix(one.terms, dict(zip(record.indications, point[:, None], strict=True)))[0]
-    stored = max(float(J @ np.asarray(one.covariance) @ J), 0.0)
-    if one.method != "ols":  # it follows from stated uncertainties alone
+    J = term_matrix(load.terms, dict(zip(record.indications, point[:, None], strict=True)))[0]
+    stored = max(float(J @ np.asarray(load.covariance) @ J), 0.0)
+    if load.method != "ols":  # it follows from stated uncertainties alone
         return _Variance(variance=stored, gradient=np.zeros(4), dof=math.inf)
-    if one.scatter is None and s.runs.groups < 2:
-        share = stored / (one.residual_sd or 1.0) ** 2
-        dof = math.inf if one.dof is None else float(one.dof)
+    if load.scatter is None and s.runs.groups < 2:
+        share = stored / (load.residual_sd or 1.0) ** 2
+        dof = math.inf if load.dof is None else float(load.dof)
         return _Variance(variance=stored, gradient=np.array([share, 0.0, 0.0, 0.0]), dof=dof)
     variance, gradient = s.rows.variance(s.runs, J)
     return _Variance(variance=variance, gradient=gradient, dof=s.dof(gradient, variance))
@@ -100,33 +102,33 @@ def _new_run(s: Scatter, share: float) -> _Variance:
     return _Variance(variance=variance, gradient=gradient, dof=s.dof(gradient, variance) if variance else 1.0)
 
 
-def _reference(statements: Statements, one: LoadFit, value: float) -> Component:
-    stated = statements.reference.of(one.load)
-    if stated is None and one.reference_u is not None:
-        size = f"{one.reference_u:.4g} {one.unit}"
-        text = f"u_{one.load} of the rows, at most {size}: u at the largest load, in proportion to the load"
-        u = one.reference_u * abs(value) / one.largest
+def _reference(statements: Statements, load: LoadFit, value: float) -> Component:
+    stated = statements.reference.of(load.load)
+    if stated is None and load.reference_u is not None:
+        size = f"{load.reference_u:.4g} {load.unit}"
+        text = f"u_{load.load} of the rows, at most {size}: u at the largest load, in proportion to the load"
+        u = load.reference_u * abs(value) / load.largest
         return _part("reference", text, "B", "normal", u, math.inf, "session")
     if stated is None:
         return _absent("reference", "no uncertainty of the reference standard is stated", "session")
-    if one.method == "gls" and statements.reference.shared_group is not None:
+    if load.method == "gls" and statements.reference.shared_group is not None:
         text = "held by the fit's covariance: its rows share the reference's error (gls)"
         return _part("reference", text, "B", "normal", 0.0, math.inf, "session")
     # The error of a standard is one scale, as in all that the record computes (`propagation`).
     if stated.relative is None:
-        size = f"{stated.U:.4g} {one.unit} at the largest load, in proportion to the load"
+        size = f"{stated.U:.4g} {load.unit} at the largest load, in proportion to the load"
     else:
         size = f"{100 * stated.relative:.4g} % of the load"
     text = f"certificate: U = {size}, with k = {stated.k:g}"
-    return _part("reference", text, "B", "normal", stated.u * abs(value) / one.largest, math.inf, "session")
+    return _part("reference", text, "B", "normal", stated.u * abs(value) / load.largest, math.inf, "session")
 
 
-def _fit(record: CalibrationRecord, one: LoadFit, point: NDArray[np.float64], curve: _Variance) -> Component:
-    known = one.method != "ols"  # the covariance follows from stated uncertainties alone
-    text = f"J V J^T of the {len(one.terms)} coefficients at {_point(record, point)}"
+def _fit(record: CalibrationRecord, load: LoadFit, point: NDArray[np.float64], curve: _Variance) -> Component:
+    from_stated = load.method != "ols"  # the covariance follows from stated uncertainties alone
+    text = f"J V J^T of the {len(load.terms)} coefficients at {_point(record, point)}"
     return _part(
-        "fit", text, "B" if known else "A", "normal" if known else "student", math.sqrt(curve.variance),
-        curve.dof, "data", joint=not known,
+        "fit", text, "B" if from_stated else "A", "normal" if from_stated else "student",
+        math.sqrt(curve.variance), curve.dof, "data", joint=not from_stated,
     )  # fmt: skip
 
 
@@ -157,7 +159,7 @@ def _reproducibility(s: Scatter, new: _Variance) -> Component:
     return _part("reproducibility", text, "A", "student", u, new.dof, "data", joint=True)
 
 
-def _interpolation(record: CalibrationRecord, s: Scatter, check: Table | None, one: LoadFit) -> Component:
+def _interpolation(record: CalibrationRecord, s: Scatter, check: Table | None, load: LoadFit) -> Component:
     """Return the misfit of the level means, else of the check loads (ISO 376 C: interpolation)."""
     if s.misfit_dof:
         text = f"distance of a smooth curve from the equation (rms), free of the scatter; {s.misfit_dof} dof"
@@ -166,9 +168,9 @@ def _interpolation(record: CalibrationRecord, s: Scatter, check: Table | None, o
         return _absent(
             "interpolation", "too few rows to tell it from scatter, and there are no check loads", "data"
         )
-    design = term_matrix(one.terms, check.columns(record.indications))
-    off = design @ np.asarray(one.coefficients) - check.column(one.load)
-    expected = s.runs.within**2 + np.einsum("ij,jk,ik->i", design, np.asarray(one.covariance), design)
+    design = term_matrix(load.terms, check.columns(record.indications))
+    off = design @ np.asarray(load.coefficients) - check.column(load.load)
+    expected = s.runs.within**2 + np.einsum("ij,jk,ik->i", design, np.asarray(load.covariance), design)
     u = math.sqrt(max(float(np.mean(off**2 - expected)), 0.0))
     text = f"distance of {check.rows} check loads from the curve (rms), free of scatter and fit"
     return _part("interpolation", text, "A", "normal", u, check.rows, "check loads")
@@ -203,24 +205,24 @@ def _cells(record: CalibrationRecord, statements: Statements, slope: NDArray[np.
     return _part("indication", text, "B", "normal", u, math.inf, "session")
 
 
-def _zero(record: CalibrationRecord, one: LoadFit, slope: NDArray[np.float64]) -> Component:
-    drift, intercept = zero_drift(record), left_at_zero(record, one)
+def _zero(record: CalibrationRecord, load: LoadFit, slope: NDArray[np.float64]) -> Component:
+    drift, intercept = zero_drift(record), left_at_zero(record, load)
     if isinstance(drift, str) and not intercept:
         return _absent("zero", drift, "session")
     moved = 0.0 if isinstance(drift, str) else abs(float(slope @ np.asarray(drift)))
-    said = (
+    reason = (
         []
         if isinstance(drift, str)
         else [f"zeros after the session minus before move the load by {moved:.3g}"]
     )
     if intercept:
-        said.append(f"tared indications of zero mean {intercept:.3g}")
-    text = f"{'; '.join(said)}: rectangular half-width"
+        reason.append(f"tared indications of zero mean {intercept:.3g}")
+    text = f"{'; '.join(reason)}: rectangular half-width"
     return _part("zero", text, "B", "rectangular", math.hypot(moved, intercept) / ROOT3, math.inf, "session")
 
 
-def _creep(record: CalibrationRecord, one: LoadFit, value: float) -> Component:
-    ratio = creep(record, one)
+def _creep(record: CalibrationRecord, load: LoadFit, value: float) -> Component:
+    ratio = creep(record, load)
     if isinstance(ratio, str):
         return _absent("creep", ratio, "session")
     text = f"{100 * ratio:.3g} % of the load between the readings: rectangular half-width"
@@ -229,7 +231,7 @@ def _creep(record: CalibrationRecord, one: LoadFit, value: float) -> Component:
 
 def _temperature(
     statements: Statements,
-    given: Temperature | None,
+    temperature: Temperature | None,
     slope: NDArray[np.float64],
     point: NDArray[np.float64],
     value: float,
@@ -238,13 +240,13 @@ def _temperature(
     at = statements.temperature_C
     session = "the session's temperature is not stated" if at is None else f"the session was at {at:.1f} degC"
     cells = [cell for cell in statements.cells if (cell.span_per_K, cell.zero_per_K) != (None, None)]
-    if given is None:
-        known = "the range of use is not" if cells else "nor the range of use"
-        why = f"{'a' if cells else 'no'} temperature coefficient is stated, {known}; {session}"
+    if temperature is None:
+        lacking = "the range of use is not" if cells else "nor the range of use"
+        why = f"{'a' if cells else 'no'} temperature coefficient is stated, {lacking}; {session}"
         return _absent("temperature", why, "conditions of use")
-    if given.coefficient_per_K is not None:
-        per_K = given.coefficient_per_K * value
-        what = f"{given.coefficient_per_K:.3g} /K of the load"
+    if temperature.coefficient_per_K is not None:
+        per_K = temperature.coefficient_per_K * value
+        what = f"{temperature.coefficient_per_K:.3g} /K of the load"
     elif cells:
         rates = [
             (c.span_per_K or 0.0) * x + (c.zero_per_K or 0.0)
@@ -254,8 +256,8 @@ def _temperature(
         what = f"coefficients of {', '.join(cell.name for cell in cells)}: {per_K:.3g} a kelvin"
     else:
         return _absent("temperature", f"no temperature coefficient is stated; {session}", "conditions of use")
-    u = abs(per_K) * given.half_range_K / ROOT3
-    text = f"{what}, +-{given.half_range_K:g} K rectangular; {session}"
+    u = abs(per_K) * temperature.half_range_K / ROOT3
+    text = f"{what}, +-{temperature.half_range_K:g} K rectangular; {session}"
     return _part("temperature", text, "B", "rectangular", u, math.inf, "conditions of use")
 
 

@@ -71,7 +71,7 @@ class Budget:
     @property
     def not_stated(self) -> tuple[str, ...]:
         """Names of the components that nothing was stated or measured for."""
-        return tuple(one.name for one in self.components if not one.stated)
+        return tuple(component.name for component in self.components if not component.stated)
 
     @property
     def estimate(self) -> Estimate:
@@ -80,8 +80,23 @@ class Budget:
 
     def component(self, name: str) -> Component:
         """Return one component."""
-        return next(one for one in self.components if one.name == name)
+        return next(component for component in self.components if component.name == name)
 
     def share(self, component: Component) -> float:
         """Return a component's share of the combined variance, 0 to 1."""
         return (component.u / self.u) ** 2 if self.u else 0.0
+
+
+# Conditions of use that no session states: they belong to the one who reads the instrument.
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Temperature:
+    """How far from the session's temperature the instrument is used.
+
+    ``half_range_K`` [K] at most, either way; ``coefficient_per_K`` [1/K] relative change of the load with
+    temperature, None where the cells' own stated coefficients are to be taken.
+    """
+
+    half_range_K: float
+    coefficient_per_K: float | None = None

@@ -112,11 +112,11 @@ def monte_carlo(
         raise _refused("so many trials tell nothing, or take for ever", trials, f"10000 to {MOST_TRIALS}")
     if not (math.isfinite(budget.U) and budget.u > 0):
         raise _refused("the budget has no interval to check", f"u = {budget.u:g}, k = {budget.k:g}", "u > 0")
-    one = record.load(budget.load)
+    fitted = record.load(budget.load)
     names = record.indications
-    coefficients = np.asarray(one.coefficients)
+    coefficients = np.asarray(fitted.coefficients)
     point = dict(zip(names, np.asarray(budget.indications)[:, None], strict=True))
-    value = float((term_matrix(one.terms, point) @ coefficients)[0])
+    value = float((term_matrix(fitted.terms, point) @ coefficients)[0])
     draw = _model(record, loads, budget)
     delta = 0.5 * 10.0 ** last_place(budget.u, digits=digits)
     generator = np.random.default_rng(seed)
@@ -149,14 +149,14 @@ def coverage_interval(values: NDArray[np.float64], probability: float) -> tuple[
 
 def _model(record: CalibrationRecord, loads: Table, budget: Budget) -> Draw:
     """Return the measurement model: a number of trials -> loads (trials,)."""
-    one = record.load(budget.load)
+    fitted = record.load(budget.load)
     refit = _refits(record, loads, budget)
     errors = indication_errors(record, statements_of(record))
     exact = not any(e.u or e.half_width for e in errors)
     joint = [part.u for part in budget.components if part.joint and part.name not in _AT_SOURCE]
     scatter = math.sqrt(math.fsum(u * u for u in joint))
     point = np.asarray(budget.indications)
-    here = term_matrix(one.terms, dict(zip(record.indications, point[:, None], strict=True)))[0]
+    row = term_matrix(fitted.terms, dict(zip(record.indications, point[:, None], strict=True)))[0]
     apart = [part for part in budget.components if not part.joint and part.name not in _AT_SOURCE]
     amounts = [part for part in apart if part.u > 0]
 
@@ -165,13 +165,13 @@ def _model(record: CalibrationRecord, loads: Table, budget: Budget) -> Draw:
         scale = _scale(generator, size, budget.scatter_dof)
         c = refit(generator, size, scale)
         if exact:
-            total: NDArray[np.float64] = c @ here
+            total: NDArray[np.float64] = c @ row
         else:
             cells = {
                 name: x + _misread(generator, size, e)
                 for name, x, e in zip(record.indications, point.tolist(), errors, strict=True)
             }
-            total = np.einsum("ij,ij->i", term_matrix(one.terms, cells), c)
+            total = np.einsum("ij,ij->i", term_matrix(fitted.terms, cells), c)
         total = total + scale * generator.normal(0.0, scatter, size)
         for part in amounts:
             total = total + _amount(generator, size, part)
@@ -186,18 +186,20 @@ def _refits(record: CalibrationRecord, loads: Table, budget: Budget) -> Refit:
     A linear fit of rows whose errors are normal moves its coefficients by normal amounts, exactly: they are
     drawn from their covariance in place of the rows, whose number then costs nothing.
     """
-    one = record.load(budget.load)
-    coefficients = np.asarray(one.coefficients)
+    fitted = record.load(budget.load)
+    coefficients = np.asarray(fitted.coefficients)
     part = budget.component("fit")
-    scatter = scatter_of(record, loads, one)
+    scatter = scatter_of(record, loads, fitted)
     spread = scatter.rows.parts(scatter.runs.correlation)
-    own = np.einsum("k,kij->ij", scatter.runs.variances, spread)
-    root = _root(own if part.joint and one.scatter is not None else np.asarray(one.covariance))
+    covariance = np.einsum("k,kij->ij", scatter.runs.variances, spread)
+    root = _root(covariance if part.joint and fitted.scatter is not None else np.asarray(fitted.covariance))
 
     def refit(generator: np.random.Generator, size: int, scale: NDArray[np.float64]) -> NDArray[np.float64]:
         moved = generator.standard_normal((size, len(coefficients))) @ root.T
-        found: NDArray[np.float64] = coefficients + (moved * scale[:, None] if part.joint else moved)
-        return found
+        coefficients_drawn: NDArray[np.float64] = coefficients + (
+            moved * scale[:, None] if part.joint else moved
+        )
+        return coefficients_drawn
 
     return refit
 

@@ -49,39 +49,39 @@ def record_covariance(record: CalibrationRecord) -> dict[str, NDArray[np.float64
     A legacy record, which has no covariance, gives none; a session that states nothing gives the fit's own.
     """
     statements = statements_of(record)
-    return {one.load: _covariance(record, one, statements) for one in record.loads if one.covariance}
+    return {load.load: _covariance(record, load, statements) for load in record.loads if load.covariance}
 
 
-def scale_u(record: CalibrationRecord, one: LoadFit, statements: Statements) -> float:
+def scale_u(record: CalibrationRecord, load: LoadFit, statements: Statements) -> float:
     """Return the relative standard uncertainty of a load's scale: reference standard and creep."""
     # A generalised fit of one shared reference has its error in the covariance already.
-    counted = one.method == "gls" and statements.reference.shared_group is not None
-    u = 0.0 if counted else statements.reference.u(one.load) or one.reference_u or 0.0
-    crept = creep(record, one)
+    counted = load.method == "gls" and statements.reference.shared_group is not None
+    u = 0.0 if counted else statements.reference.u(load.load) or load.reference_u or 0.0
+    crept = creep(record, load)
     relative = 0.0 if isinstance(crept, str) else crept / math.sqrt(3.0)
-    return math.hypot(u / one.largest if one.largest > 0 else 0.0, relative)
+    return math.hypot(u / load.largest if load.largest > 0 else 0.0, relative)
 
 
-def offset_u(record: CalibrationRecord, one: LoadFit, statements: Statements) -> float:
+def offset_u(record: CalibrationRecord, load: LoadFit, statements: Statements) -> float:
     """Return the standard uncertainty of a shift of all rows [the unit of the load]: cells, zeros."""
     stated = [cell.u or 0.0 for cell in statements.cells]
     drift = zero_drift(record)
-    tared = left_at_zero(record, one) / math.sqrt(3.0)
+    tared = left_at_zero(record, load) / math.sqrt(3.0)
     if not any(stated) and isinstance(drift, str):
         return tared
     middle = [((c.minimum or 0.0) + (c.maximum or 0.0)) / 2 for c in record.cells]
-    slope = sensitivities(record, one, middle)
+    slope = sensitivities(record, load, middle)
     moved = 0.0 if isinstance(drift, str) else float(slope @ np.asarray(drift)) / math.sqrt(3.0)
     return math.hypot(tared, float(np.linalg.norm(slope * np.asarray(stated))), moved)
 
 
-def _covariance(record: CalibrationRecord, one: LoadFit, statements: Statements) -> NDArray[np.float64]:
-    total = np.array(one.covariance)
-    scale = scale_u(record, one, statements)
+def _covariance(record: CalibrationRecord, load: LoadFit, statements: Statements) -> NDArray[np.float64]:
+    total = np.array(load.covariance)
+    scale = scale_u(record, load, statements)
     if scale > 0:
-        c = np.asarray(one.coefficients)
+        c = np.asarray(load.coefficients)
         total += scale**2 * np.outer(c, c)
-    if INTERCEPT in one.terms:
-        at = one.terms.index(INTERCEPT)
-        total[at, at] += offset_u(record, one, statements) ** 2
+    if INTERCEPT in load.terms:
+        at = load.terms.index(INTERCEPT)
+        total[at, at] += offset_u(record, load, statements) ** 2
     return total

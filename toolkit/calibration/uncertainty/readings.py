@@ -51,18 +51,18 @@ def indication_errors(record: CalibrationRecord, statements: Statements) -> tupl
     )
 
 
-def sensitivities(record: CalibrationRecord, one: LoadFit, point: Sequence[float]) -> NDArray[np.float64]:
+def sensitivities(record: CalibrationRecord, load: LoadFit, point: Sequence[float]) -> NDArray[np.float64]:
     """Return d load / d indication (indications,) at a point, by central differences."""
     steps = np.array(
         [_STEP * _extent(cell.minimum, cell.maximum, x) for cell, x in zip(record.cells, point, strict=True)]
     )
     at = np.asarray(point, dtype=np.float64)[:, None]
     moved = np.hstack([at + np.diag(steps), at - np.diag(steps)])
-    values = term_matrix(one.terms, dict(zip(record.indications, moved, strict=True))) @ np.asarray(
-        one.coefficients
+    values = term_matrix(load.terms, dict(zip(record.indications, moved, strict=True))) @ np.asarray(
+        load.coefficients
     )
-    found: NDArray[np.float64] = (values[: len(steps)] - values[len(steps) :]) / (2 * steps)
-    return found
+    slopes: NDArray[np.float64] = (values[: len(steps)] - values[len(steps) :]) / (2 * steps)
+    return slopes
 
 
 def zero_drift(record: CalibrationRecord) -> tuple[float, ...] | str:
@@ -75,9 +75,9 @@ def zero_drift(record: CalibrationRecord) -> tuple[float, ...] | str:
     entries = [e for e in zero_entries(zero_readings(json.loads(record.settings)), scope) if not e.shunt]
     if len(entries) < 2:
         return "no zero before and after the session is stated"
-    said = [entry.when.casefold() for entry in entries]
-    before = next((i for i, text in enumerate(said) if text.startswith("before")), 0)
-    after = max((i for i, text in enumerate(said) if text.startswith("after")), default=len(said) - 1)
+    moments = [entry.when.casefold() for entry in entries]
+    before = next((i for i, text in enumerate(moments) if text.startswith("before")), 0)
+    after = max((i for i, text in enumerate(moments) if text.startswith("after")), default=len(moments) - 1)
     first, last = dict(entries[before].values), dict(entries[after].values)
     missing = [name for name in record.indications if name not in first or name not in last]
     if missing:
@@ -85,20 +85,20 @@ def zero_drift(record: CalibrationRecord) -> tuple[float, ...] | str:
     return tuple(last[name] - first[name] for name in record.indications)
 
 
-def left_at_zero(record: CalibrationRecord, one: LoadFit) -> float:
+def left_at_zero(record: CalibrationRecord, load: LoadFit) -> float:
     """Return the load that tared indications of zero would mean [unit of the load]; 0 where it is none.
 
     An intercept under ``zero = "tared"`` beyond twice its standard uncertainty is no scatter: a gate lets it
     pass inside the check loads' tolerance, and every reading has it.
     """
-    if record.zero != "tared" or INTERCEPT not in one.terms:
+    if record.zero != "tared" or INTERCEPT not in load.terms:
         return 0.0
-    at = one.terms.index(INTERCEPT)
-    size = abs(one.coefficients[at])
-    return size if size > 2 * one.standard_errors[at] else 0.0
+    at = load.terms.index(INTERCEPT)
+    size = abs(load.coefficients[at])
+    return size if size > 2 * load.standard_errors[at] else 0.0
 
 
-def creep(record: CalibrationRecord, one: LoadFit) -> float | str:
+def creep(record: CalibrationRecord, load: LoadFit) -> float | str:
     """Return the creep of a load as a ratio of the load, |last - first reading|; else why it is not known.
 
     ISO 376 relates the change of the deflection between 30 s and 300 s to the deflection at the largest
@@ -107,14 +107,14 @@ def creep(record: CalibrationRecord, one: LoadFit) -> float | str:
     series: dict[str, list[tuple[float, float]]] = {}
     slope = None
     for entry in creep_entries(json.loads(record.settings).get("creep", []), scope_of(record)):
-        if entry.load != one.load and len(record.loads) > 1:
+        if entry.load != load.load and len(record.loads) > 1:
             continue
         if entry.shown is not None:
             value = entry.shown[1]
         else:
             if slope is None:
                 slope = dict(
-                    zip(record.indications, sensitivities(record, one, _middle(record)), strict=True)
+                    zip(record.indications, sensitivities(record, load, _middle(record)), strict=True)
                 )
             value = sum(float(slope[name]) * reading for name, reading in entry.values)
         key = f"{entry.load} {' '.join(name for name, _ in entry.values)}"
@@ -122,7 +122,7 @@ def creep(record: CalibrationRecord, one: LoadFit) -> float | str:
     moved = [
         abs(max(one_series)[1] - min(one_series)[1]) for one_series in series.values() if len(one_series) > 1
     ]
-    return max(moved) / one.largest if moved else "no two creep readings of this load are stated"
+    return max(moved) / load.largest if moved else "no two creep readings of this load are stated"
 
 
 def _middle(record: CalibrationRecord) -> tuple[float, ...]:

@@ -53,18 +53,20 @@ class Scatter:
         return max(2 * variance**2 / uncertain, 1.0) if uncertain > 0 else float("inf")
 
 
-def scatter_of(record: CalibrationRecord, loads: Table, one: LoadFit) -> Scatter:
+def scatter_of(record: CalibrationRecord, loads: Table, fitted: LoadFit) -> Scatter:
     """Return the scatter of a record's load from its reference loads."""
-    design = term_matrix(one.terms, loads.columns(record.indications))
-    load = loads.column(one.load)
+    design = term_matrix(fitted.terms, loads.columns(record.indications))
+    load = loads.column(fitted.load)
     rows = SessionRows.of(design, load, loads, record.zero)
-    runs = one.scatter or estimate(rows) or _one_run(rows)
-    known = spread(rows, runs) if runs.groups > 1 else np.diag([2 * runs.within**4 / runs.dof, 0.0, 0.0, 0.0])
+    runs = fitted.scatter or estimate(rows) or _one_run(rows)
+    covariance = (
+        spread(rows, runs) if runs.groups > 1 else np.diag([2 * runs.within**4 / runs.dof, 0.0, 0.0, 0.0])
+    )
     misfit = _explained(rows, runs, rows.mean.misfit)
     reversal = _explained(rows, runs, rows.mean.direction)
     return Scatter(
         runs=runs,
-        spread=known,
+        spread=covariance,
         rows=rows_of(design, load, groups_of(loads)[1]),
         misfit=misfit[0],
         misfit_dof=misfit[1],
@@ -76,12 +78,12 @@ def scatter_of(record: CalibrationRecord, loads: Table, one: LoadFit) -> Scatter
 def _one_run(rows: SessionRows) -> RunScatter:
     """Return what rows tell whose runs cannot be told apart: scatter about the mean alone."""
     columns = rows.mean.columns
-    rest = rows.load - columns @ (columns.T @ rows.load)
+    residual = rows.load - columns @ (columns.T @ rows.load)
     n, p = columns.shape
     if n - p < 1:  # the smooth curve took up every row: the residuals of the equation's own terms are left
         columns = columns[:, : rows.mean.misfit.start]
-        rest, p = rows.load - columns @ (columns.T @ rows.load), columns.shape[1]
-    within = float(np.sqrt(rest @ rest / (n - p)))
+        residual, p = rows.load - columns @ (columns.T @ rows.load), columns.shape[1]
+    within = float(np.sqrt(residual @ residual / (n - p)))
     return RunScatter(
         factor=rows.factor, groups=1, within=within, zero=0.0, gain=0.0, correlation=0.0, dof=n - p
     )

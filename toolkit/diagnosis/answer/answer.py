@@ -10,6 +10,7 @@ from toolkit.findings import Finding
 
 if TYPE_CHECKING:
     from toolkit.diagnosis.case.case import Run
+    from toolkit.effects.applied import EffectKey
 
 Verdict = Literal["named", "equivalent", "unknown", "nothing", "untestable"]
 
@@ -60,9 +61,8 @@ class FoundParameter:
 class FoundEffect:
     """An effect that explains a mismatch, and the names that explain it as well."""
 
-    name: str
+    key: EffectKey
     stage: str
-    channel: str | None
     statement: str
     equation: str
     reference: str
@@ -71,6 +71,16 @@ class FoundEffect:
     rejected: tuple[tuple[str, float], ...]
     held_out_log_score_gain: float
     p_value: float
+
+    @property
+    def name(self) -> str:
+        """Name of the effect."""
+        return self.key.name
+
+    @property
+    def channel(self) -> str | None:
+        """Channel or state that it acts on."""
+        return self.key.channel
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -148,9 +158,9 @@ class Diagnosis:
 
 def cut_short(skipped: Sequence[str]) -> bool:
     """Tell whether a search ended before every known effect was tried; what comes later leaves names."""
-    return any(one not in ("swaps", "predictions") for one in skipped)
+    return any(step not in ("swaps", "predictions") for step in skipped)
 
 
 def recorded(runs: Iterable[Run]) -> tuple[Recorded, ...]:
     """Return what an answer says of the recordings of a case."""
-    return tuple(Recorded(name=one.name, sha256=one.sha256, own=one.own) for one in runs)
+    return tuple(Recorded(name=run.name, sha256=run.sha256, own=run.own) for run in runs)

@@ -7,10 +7,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from toolkit.calibration.records.use import CalibrationUse
+from toolkit.calibration.registry.registry import Registry
+from toolkit.calibration.registry.standing import unapproved, withdrawal
+from toolkit.diagnosis.simulators.cells import record_of
+from toolkit.errors import RegistryError
 from toolkit.findings import Finding
 
 if TYPE_CHECKING:
-    from toolkit.calibration.records.use import CalibrationUse
     from toolkit.diagnosis.case.case import Case
     from toolkit.diagnosis.fit.problem import Problem
 
@@ -18,9 +22,9 @@ if TYPE_CHECKING:
 def case_findings(problem: Problem) -> tuple[Finding, ...]:
     """Return notes on the recordings, one run only or inputs interpolated, and what the model has to tell."""
     case = problem.case
-    made: list[Finding] = list(getattr(problem.model, "findings", ()))
+    findings: list[Finding] = list(problem.model.capability.findings)
     if len(problem.runs) == 1:
-        made.append(
+        findings.append(
             Finding(
                 rule="case-one-run",
                 where=case.path.name,
@@ -30,19 +34,19 @@ def case_findings(problem: Problem) -> tuple[Finding, ...]:
         )
     for run in (*case.runs, *case.predict):
         if run.filled:
-            told = ", ".join(f"{count} of {name}" for name, count in run.filled)
-            made.append(
+            counts = ", ".join(f"{count} of {name}" for name, count in run.filled)
+            findings.append(
                 Finding(
                     rule="case-filled",
                     where=run.name,
                     level="note",
-                    message=f"missing samples of inputs were interpolated between their neighbours: {told}",
+                    message=f"missing samples of inputs were interpolated between their neighbours: {counts}",
                 )
             )
     for name in ("FZ", "FZ_CMD"):
         loads = [run.columns[name] for run in case.runs if name in run.columns]
         if loads and float(np.nanmedian(np.concatenate(loads))) < 0:
-            made.append(
+            findings.append(
                 Finding(
                     rule="case-load-sign",
                     where=f"{case.path.name}: {name}",
@@ -50,7 +54,7 @@ def case_findings(problem: Problem) -> tuple[Finding, ...]:
                     message="most loads are negative: FZ is the load, positive; below zero there is no force",
                 )
             )
-    return tuple(made)
+    return tuple(findings)
 
 
 def calibration_use(case: Case, calibrations: Path | None) -> CalibrationUse | None:
@@ -59,25 +63,19 @@ def calibration_use(case: Case, calibrations: Path | None) -> CalibrationUse | N
     A case has no date of its own: a record counts as in force where it is approved and not void on every day.
     A candidate is accepted, and what is made with it says that it is a draft.
     """
-    from toolkit.calibration.records.use import CalibrationUse
-    from toolkit.calibration.registry.registry import Registry
-    from toolkit.calibration.registry.standing import unapproved, withdrawal
-    from toolkit.diagnosis.simulators.build_simulator import record_of
-    from toolkit.errors import RegistryError
-
-    named = case.simulation.calibration
-    if not named:
+    name = case.simulation.calibration
+    if not name:
         return None
     record = record_of(case, calibrations)
     reasons: tuple[str, ...] = ()
-    if (case.path.parent / named).is_file():
+    if (case.path.parent / name).is_file():
         reasons = ("a file beside the case: no registry says whether it is approved",)
     elif calibrations is not None:
         registry = Registry(calibrations)
         try:
             status = registry.status(record.id)
-            found = withdrawal(status) or unapproved(registry, record, status)
-            reasons = tuple(one.text for one in found)
+            states = withdrawal(status) or unapproved(registry, record, status)
+            reasons = tuple(state.text for state in states)
         except RegistryError as error:
             reasons = (f"not approved: {error.what}",)
     return CalibrationUse(
@@ -90,10 +88,10 @@ def calibration_findings(case: Case, calibrations: Path | None) -> tuple[Finding
     use = calibration_use(case, calibrations)
     if use is None:
         return ()
-    said = list(use.draft_reasons)
+    reasons = list(use.draft_reasons)
     if use.unverified:
-        said.append("imported, not fitted here: unverified")
+        reasons.append("imported, not fitted here: unverified")
     return tuple(
-        Finding(rule="case-calibration", where=use.id, level="note", message=f"the calibration is {one}")
-        for one in said
+        Finding(rule="case-calibration", where=use.id, level="note", message=f"the calibration is {reason}")
+        for reason in reasons
     )

@@ -2,36 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from toolkit.effects.sense import turned
+from toolkit.effects.applied import AppliedEffect
+from toolkit.effects.catalogue import effects
 from toolkit.errors import ConfigError
 from toolkit.files import sha256_file
 from toolkit.machine import load_machine
-from toolkit.machine.correction import CORRECTABLE, Correction
+from toolkit.machine.correction import Correction, correctable
 from toolkit.machine.definition import machine_file
 
 if TYPE_CHECKING:
-    from toolkit.simulation.model_file import ModelEffect, ModelFile
-
-_WHY_NOT = {
-    "sensitivity_error": "a cell's sensitivity belongs into a new calibration",
-    "zero_offset": "a cell's zero belongs into the tare of each test",
-    "zero_drift": "a drift is another one in each test",
-    "thermal_drift": "a drift is another one in each test",
-    "wrong_calibration": "the right record computes the test: toolkit process --calibration",
-    "channel_sign": "the right record computes the test: toolkit process --calibration",
-}
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Size:
-    value: float
-    u: float
-    unit: str
-    channel: str | None = None
-    source: str | None = None
+    from toolkit.effects.effect import Effect
+    from toolkit.simulation.model_file import FittedEffect, ModelFile
 
 
 def correction_of(model: ModelFile, effect: str, *, reason: str, by: str, date: str) -> Correction:
@@ -55,42 +38,47 @@ def correction_of(model: ModelFile, effect: str, *, reason: str, by: str, date: 
             "an answer that was cut off corrects nothing", model, "complete = false", "a whole search",
             "diagnose the case again with a larger --budget",
         )  # fmt: skip
-    if effect not in CORRECTABLE:
+    listed, catalogued = correctable(), effects().get(effect)
+    if effect not in listed:
+        instead = "" if catalogued is None else catalogued.not_correctable
         raise _wrong(
             "this effect cannot become a correction of the machine", model,
-            f"{effect}: {_WHY_NOT[effect]}" if effect in _WHY_NOT else effect, ", ".join(CORRECTABLE),
+            f"{effect}: {instead}" if instead else effect, ", ".join(listed),
             "put right what it names, or name an effect of those expected",
         )  # fmt: skip
-    for one in model.effects:
-        same = one.equivalent_to
-        if effect != one.effect.name and effect not in same:
+    for fitted in model.effects:
+        same, applied = fitted.equivalent_to, fitted.applied
+        if effect != applied.effect.name and effect not in same:
             continue
-        if one.runs is not None or one.condition is not None:
+        if applied.runs is not None or applied.condition is not None:
             raise _wrong(
                 "the effect was found in some runs only, and a correction holds in every test", model,
-                f"{one.label} in {', '.join(one.runs or ())}", "an effect in all runs",
+                f"{fitted.label} in {', '.join(sorted(applied.runs or ()))}", "an effect in all runs",
                 "find out what was different in those runs",
             )  # fmt: skip
-        size = _size(model, one, effect)
+        sized, u = _sized(model, fitted, listed[effect])
+        parameter = sized.effect.names[0]
         return Correction(
             effect=effect,
-            channel=size.channel,
-            source=size.source,
-            parameter=CORRECTABLE[effect][0],
-            value=size.value,
-            unit=size.unit,
-            u=size.u,
+            channel=sized.channel,
+            source=sized.source,
+            parameter=parameter,
+            value=sized.values[parameter],
+            unit=sized.units[parameter],
+            u=u,
             reason=reason.strip(),
             by=by.strip(),
             date=date,
             answer_sha256=model.sha256,
             case_sha256=model.case_sha256,
             code_version=model.code_version,
-            equivalent_to=tuple(name for name in (one.effect.name, *same) if name != effect),
+            equivalent_to=tuple(name for name in (applied.effect.name, *same) if name != effect),
         )
-    named = ", ".join(name for one in model.effects for name in (one.effect.name, *one.equivalent_to))
+    names = ", ".join(
+        name for effect in model.effects for name in (effect.applied.effect.name, *effect.equivalent_to)
+    )
     raise _wrong(
-        "the answer does not name this effect", model, effect, named or "none", "name an effect of the answer"
+        "the answer does not name this effect", model, effect, names or "none", "name an effect of the answer"
     )
 
 
@@ -105,44 +93,60 @@ def machine_of(model: ModelFile, name: str) -> str | None:
     if model.kind != "machine":
         return None
     file = model.file("machine")
-    told = str(model.simulation.get("machine", "")) if file is None else str(file)
-    fitted = load_machine(told).name
+    machine = str(model.simulation.get("machine", "")) if file is None else str(file)
+    fitted = load_machine(machine).name
     if fitted != name:
         raise _wrong(
             "the answer is one of another machine", model, fitted, name,
             f"correct {fitted}, or diagnose recordings of {name}",
         )  # fmt: skip
-    return sha256_file(machine_file(told))
+    return sha256_file(machine_file(machine))
 
 
-def _size(model: ModelFile, one: ModelEffect, effect: str) -> _Size:
-    (parameter,) = one.parameters[:1]
-    if parameter.standard_error is None:
+def _sized(model: ModelFile, fitted: FittedEffect, effect: Effect) -> tuple[AppliedEffect, float]:
+    """Return the effect as it is corrected, in machine axes, and its standard uncertainty."""
+    fitted_effect, way = fitted.applied.effect, effect.correctable
+    parameter = fitted_effect.parameters[0]
+    u = fitted.standard_errors.get(parameter.name)
+    if u is None:
         raise _wrong(
-            "the effect has no standard error, so its correction would have no uncertainty", model, one.label,
-            "an effect whose size the recordings determine", "record what determines it",
+            "the effect has no standard error, so its correction would have no uncertainty", model,
+            fitted.label, "an effect whose size the recordings determine", "record what determines it",
         )  # fmt: skip
-    value, u = parameter.value, parameter.standard_error
-    sign = turned(one.effect.name, parameter.name, model.axes, "machine")
-    if effect == one.effect.name:
-        if effect == "crosstalk" and model.axes != "machine":
+    value = fitted.applied.values[parameter.name] * parameter.sign_between(model.axes, "machine")
+    if effect.name == fitted_effect.name:
+        if way is not None and way.channels and model.axes != "machine":
             raise _wrong(
-                "crosstalk is a machine's own, and this case does not stand in the machine's axes", model,
-                f'axes = "{model.axes}"', 'axes = "machine"', "give the recordings in the machine's axes",
+                f"{effect.name} is a machine's own, and this case does not stand in the machine's axes",
+                model, f'axes = "{model.axes}"', 'axes = "machine"',
+                "give the recordings in the machine's axes",
             )  # fmt: skip
-        return _Size(value=sign * value, u=u, unit=parameter.unit, channel=one.channel, source=one.source)
-    if (one.effect.name, effect) == ("plysteer", "steer_offset"):
-        # alpha = SA + pseudo_slip_angle is alpha = SA - offset with the other sign.
-        return _Size(value=-sign * value, u=u, unit=parameter.unit)
-    if (one.effect.name, effect) == ("conicity", "crosstalk") and model.nominal_load_N:
-        # FY + force FZ/FZ0 is FY + coefficient FZ, the tire mounted one way.
-        load = model.nominal_load_N
-        return _Size(value=sign * value / load, u=u / load, unit="(N)/(N)", channel="FY", source="FZ")
-    raise _wrong(
-        "the answer has fitted another effect of the class, whose size is not this one's", model,
-        f"{one.label}, not {effect}", "an answer that names the effect itself",
-        "measure what tells them apart: the answer says what",
-    )  # fmt: skip
+        applied = fitted.applied
+        return _applied(effect, applied.channel, applied.source, value, applied.units[parameter.name]), u
+    alike, load = fitted_effect.alike, model.nominal_load_N
+    size = alike.size if alike is not None and _same_class(fitted_effect, effect) else None
+    sizes = None if size is None else (size(value, load), size(u, load))
+    if alike is None or sizes is None or sizes[0] is None or sizes[1] is None:
+        raise _wrong(
+            "the answer has fitted another effect of the class, whose size is not this one's", model,
+            f"{fitted.label}, not {effect.name}", "an answer that names the effect itself",
+            "measure what tells them apart: the answer says what",
+        )  # fmt: skip
+    text = alike.size_unit or fitted.applied.units[parameter.name]
+    return _applied(effect, *alike.place, sizes[0], text), abs(sizes[1])
+
+
+def _same_class(effect: Effect, other: Effect) -> bool:
+    return effect.alike is not None and other.alike is not None and effect.alike.group == other.alike.group
+
+
+def _applied(
+    effect: Effect, channel: str | None, source: str | None, value: float, text: str
+) -> AppliedEffect:
+    name = effect.names[0]
+    return AppliedEffect(
+        effect=effect, channel=channel, source=source, values={name: value}, units={name: text}
+    )
 
 
 def _wrong(what: str, model: ModelFile, got: str, expected: str, next_step: str) -> ConfigError:

@@ -15,10 +15,10 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from toolkit.diagnosis.case.case import Case, Run
-    from toolkit.diagnosis.simulators.simulator import Active
+    from toolkit.effects.applied import AppliedEffect
 
 
-class Refused:
+class FailedRuns:
     """A model's ``simulate`` that counts where the simulation gave nothing: by itself, and with an effect."""
 
     def __init__(self, simulate: Callable[..., dict[str, NDArray[np.float64]]]) -> None:
@@ -29,7 +29,7 @@ class Refused:
         self._with: dict[str, list[int]] = {}  # effect -> simulations with it, and those that gave nothing
 
     def __call__(
-        self, run: Run, p: Mapping[str, float], active: Sequence[Active]
+        self, run: Run, p: Mapping[str, float], active: Sequence[AppliedEffect]
     ) -> dict[str, NDArray[np.float64]]:
         """Return the outputs of a run."""
         values = tuple(p.values())
@@ -49,8 +49,8 @@ class Refused:
 
     def findings(self, case: Case) -> tuple[Finding, ...]:
         """Return what is to be told; nothing where every simulation gave numbers."""
-        never = sorted(name for name, (tried, failed) in self._with.items() if tried == failed)
-        made = [
+        never = sorted(name for name, (attempts, failed) in self._with.items() if attempts == failed)
+        lines = [
             Finding(
                 rule="effect-not-simulated",
                 where=f"{case.path.name}: simulation",
@@ -60,7 +60,7 @@ class Refused:
             for name in never
         ]
         if self._failed:
-            made.append(
+            lines.append(
                 Finding(
                     rule="simulator-refuses",
                     where=f"{case.path.name}: simulation",
@@ -68,8 +68,8 @@ class Refused:
                     f"simulation gave no usable output, first {self._first}",
                 )
             )
-        return tuple(made)
+        return tuple(lines)
 
 
-def _told(one: Active) -> str:
-    return one.effect.name if one.channel is None else f"{one.effect.name} on {one.channel}"
+def _told(effect: AppliedEffect) -> str:
+    return effect.key._replace(source=None).label

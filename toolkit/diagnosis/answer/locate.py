@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from toolkit.diagnosis.answer.answer import Place
+from toolkit.diagnosis.policy import LOCATION
 from toolkit.units import unit
 
 if TYPE_CHECKING:
@@ -15,11 +16,6 @@ if TYPE_CHECKING:
 
     from toolkit.diagnosis.case.case import Case
     from toolkit.diagnosis.fit.problem import Problem
-
-_BINS = 10
-_HELD = 0.8  # of the mismatch's energy that a range must hold
-_NARROW = 0.7  # of the rows: a range that is wider says nothing
-_WHOLE = 0.95  # of the rows: no range is narrower
 
 
 def places(
@@ -39,18 +35,18 @@ def places(
     depends_on : variables on which the mismatch was found to depend
     """
     energy = np.where(problem.kept[name], np.nan_to_num(signal) ** 2, 0.0)
-    whole = float(energy.sum())
-    if whole <= 0:
+    energy_sum = float(energy.sum())
+    if energy_sum <= 0:
         return ()
     rows = problem.kept[name]
-    found: list[tuple[float, Place]] = []
-    unit_of = {one.name: one.unit for one in problem.model.outputs}
+    ranges: list[tuple[float, Place]] = []
+    unit_of = {output.name: output.unit for output in problem.model.outputs}
     for variable, measure, x in [*_variables(problem), (name, unit_of[name], simulated)]:
-        made = _range(x, energy, rows)
-        if made is not None:
-            share, low, high = made
+        span = _range(x, energy, rows)
+        if span is not None:
+            share, low, high = span
             inside = (x >= low) & (x <= high)
-            found.append(
+            ranges.append(
                 (
                     share,
                     Place(
@@ -59,32 +55,32 @@ def places(
                         end=high,
                         unit=measure,
                         runs=_runs(problem, energy * inside),
-                        whole=share > _WHOLE,
+                        whole=share > LOCATION.whole,
                     ),
                 )
             )
-    found += _conditions(problem, energy, rows)
-    found.sort(key=lambda one: (one[1].variable not in depends_on, one[0]))
-    chosen = [place for share, place in found if share <= _NARROW][:3]
-    return tuple(chosen) if chosen else tuple(place for _, place in found[:1])
+    ranges += _conditions(problem, energy, rows)
+    ranges.sort(key=lambda pair: (pair[1].variable not in depends_on, pair[0]))
+    chosen = [place for share, place in ranges if share <= LOCATION.narrow][: LOCATION.ranges]
+    return tuple(chosen) if chosen else tuple(place for _, place in ranges[:1])
 
 
 def _variables(problem: Problem) -> list[tuple[str, str, NDArray[np.float64]]]:
-    made = []
-    for one in problem.case.drivers:
-        if all(one.name in run.columns for run in problem.runs):
-            x = np.concatenate([run.columns[one.name] for run in problem.runs])
+    variables = []
+    for channel in problem.case.drivers:
+        if all(channel.name in run.columns for run in problem.runs):
+            x = np.concatenate([run.columns[channel.name] for run in problem.runs])
             if np.ptp(x) > 0:
-                made.append((one.name, one.unit, x))
+                variables.append((channel.name, channel.unit, x))
     if problem.case.has_time:
         text, seconds = time_unit(problem.case)
-        made.append(("time", text, np.concatenate([run.t for run in problem.runs]) / seconds))
-    return made
+        variables.append(("time", text, np.concatenate([run.t for run in problem.runs]) / seconds))
+    return variables
 
 
 def time_unit(case: Case) -> tuple[str, float]:
     """Return the unit in which a case's people count its time, and its seconds."""
-    text = next((one.unit for one in case.channels if one.role == "time"), "s")
+    text = next((channel.unit for channel in case.channels if channel.role == "time"), "s")
     return text, unit(text).factor
 
 
@@ -93,17 +89,17 @@ def _range(
 ) -> tuple[float, float, float] | None:
     """Return the share of rows, and the ends, of the narrowest range of bins that holds most energy."""
     values = x[rows]
-    edges = np.unique(np.quantile(values, np.linspace(0, 1, _BINS + 1)))
+    edges = np.unique(np.quantile(values, np.linspace(0, 1, LOCATION.bins + 1)))
     if len(edges) < 3:
         return None
     at = np.clip(np.searchsorted(edges, x, side="right") - 1, 0, len(edges) - 2)
     per_bin = np.bincount(at, weights=energy, minlength=len(edges) - 1)
     count = np.bincount(at, weights=rows.astype(float), minlength=len(edges) - 1)
-    whole, n = per_bin.sum(), count.sum()
+    energy_sum, n = per_bin.sum(), count.sum()
     best: tuple[float, float, float] | None = None
     for i in range(len(per_bin)):
         for j in range(i, len(per_bin)):
-            if per_bin[i : j + 1].sum() >= _HELD * whole:
+            if per_bin[i : j + 1].sum() >= LOCATION.held * energy_sum:
                 share = float(count[i : j + 1].sum() / n)
                 if best is None or share < best[0]:
                     best = (share, float(edges[i]), float(edges[j + 1]))
@@ -114,8 +110,8 @@ def _range(
 def _conditions(
     problem: Problem, energy: NDArray[np.float64], rows: NDArray[np.bool_]
 ) -> list[tuple[float, Place]]:
-    found = []
-    whole, n = float(energy.sum()), float(rows.sum())
+    ranges = []
+    energy_sum, n = float(energy.sum()), float(rows.sum())
     keys = dict.fromkeys(key for run in problem.runs for key in run.conditions)
     for key in keys:
         levels: dict[str, list[int]] = {}
@@ -125,18 +121,20 @@ def _conditions(
         if len(levels) < 2 or len(levels) == len(problem.runs):
             continue
         for level, which in levels.items():
-            held = sum(float(energy[problem.slices[i]].sum()) for i in which)
-            if held >= _HELD * whole:
+            energy_there = sum(float(energy[problem.slices[i]].sum()) for i in which)
+            if energy_there >= LOCATION.held * energy_sum:
                 share = sum(float(rows[problem.slices[i]].sum()) for i in which) / n
                 runs = tuple(problem.runs[i].name for i in which)
-                found.append((share, Place(variable=key, start=level, end=level, unit="", runs=runs)))
-    return found
+                ranges.append((share, Place(variable=key, start=level, end=level, unit="", runs=runs)))
+    return ranges
 
 
 def _runs(problem: Problem, energy: NDArray[np.float64]) -> tuple[str, ...]:
-    sums = np.array([float(energy[one].sum()) for one in problem.slices])
+    sums = np.array([float(energy[rows].sum()) for rows in problem.slices])
     if sums.sum() <= 0:
         return ()
     return tuple(
-        run.name for run, held in zip(problem.runs, sums, strict=True) if held > 0.2 * sums.sum() / len(sums)
+        run.name
+        for run, energy_of_run in zip(problem.runs, sums, strict=True)
+        if energy_of_run > LOCATION.run * sums.sum() / len(sums)
     )

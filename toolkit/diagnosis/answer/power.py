@@ -9,49 +9,47 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from toolkit.diagnosis.answer.answer import NotFound
+from toolkit.diagnosis.policy import VERDICT
 from toolkit.effects.catalogue import effects
 
 if TYPE_CHECKING:
-    from toolkit.diagnosis.search.screen import Scored, Screen
-
-_POWER = 0.8
-_VISIBLE = 1e-3  # of a response that the nominal parameters must leave, for the effect to be observable
+    from toolkit.diagnosis.search.screen import LinearisedFit, Scored
 
 
 def not_found(
-    screen: Screen, scored: Sequence[Scored], named: set[str], *, alpha: float, units: dict[int, str]
+    screen: LinearisedFit, scored: Sequence[Scored], names: set[str], *, alpha: float, units: dict[int, str]
 ) -> tuple[NotFound, ...]:
     """Return every effect that is not named, with its minimum detectable size.
 
     Parameters
     ----------
     scored : every candidate and start about the last fit
-    named : effects that were found
+    names : of the effects that were found
     alpha : of one test, so that the whole search keeps its own
     units : of the first parameter, by the identity of each scored
     """
     best: dict[str, tuple[float | None, str, bool]] = {}
-    for one in scored:
-        name = one.candidate.name
-        if name in named:
+    for trial in scored:
+        name = trial.candidate.name
+        if name in names:
             continue
-        length, share, amplitude = _distance(screen, one)
-        visible = share > _VISIBLE and length > 0
-        needed = _noncentrality(alpha, one.dof)
+        length, share, amplitude = _distance(screen, trial)
+        visible = share > VERDICT.observable and length > 0
+        needed = _noncentrality(alpha, trial.dof)
         size = abs(amplitude) * needed / length if visible and amplitude else None
-        known = best.get(name)
+        smallest = best.get(name)
         if (
-            known is None
-            or (visible and not known[2])
-            or (visible and size is not None and (known[0] is None or size < known[0]))
+            smallest is None
+            or (visible and not smallest[2])
+            or (visible and size is not None and (smallest[0] is None or size < smallest[0]))
         ):
-            best[name] = (size if visible else None, units.get(id(one), "1"), visible)
-    made = []
+            best[name] = (size if visible else None, units.get(id(trial), "1"), visible)
+    entries = []
     for name in effects():
-        if name in named:
+        if name in names:
             continue
         if name not in best:
-            made.append(
+            entries.append(
                 NotFound(
                     name=name,
                     minimum_detectable=None,
@@ -63,24 +61,28 @@ def not_found(
             continue
         size, unit, visible = best[name]
         why = "" if visible else "its response vanishes here, or the free parameters take it all"
-        made.append(NotFound(name=name, minimum_detectable=size, unit=unit, observable=visible, why=why))
-    return tuple(made)
+        entries.append(NotFound(name=name, minimum_detectable=size, unit=unit, observable=visible, why=why))
+    return tuple(entries)
 
 
-def _distance(screen: Screen, one: Scored) -> tuple[float, float, float]:
+def _distance(screen: LinearisedFit, trial: Scored) -> tuple[float, float, float]:
     """Return the whitened response off the nominal parameters, its share of the whole, and the amplitude."""
-    raw = screen.rows(one.directions)[:, 0]
-    whole = float(np.linalg.norm(raw))
-    left = raw - screen.coloured.span @ (screen.coloured.span.T @ raw)
-    names = one.candidate.active.searched
+    raw = screen.rows(trial.directions)[:, 0]
+    length = float(np.linalg.norm(raw))
+    off_nominal = raw - screen.coloured.span @ (screen.coloured.span.T @ raw)
+    parameters = trial.candidate.active.searched
     amplitude = 0.0
-    if names:
+    if parameters:
         # The size of the first direction: what was switched on, off its own neutral value.
-        first = next((each for each in names if each.off is not None), None)
+        first = next((parameter for parameter in parameters if parameter.off is not None), None)
         if first is not None:
             off = first.off if first.off is not None and math.isfinite(first.off) else 0.0
-            amplitude = one.start.directions[0][first.name] - off
-    return float(np.linalg.norm(left)), float(np.linalg.norm(left)) / max(whole, 1e-300), amplitude
+            amplitude = trial.start.directions[0][first.name] - off
+    return (
+        float(np.linalg.norm(off_nominal)),
+        float(np.linalg.norm(off_nominal)) / max(length, 1e-300),
+        amplitude,
+    )
 
 
 def _noncentrality(alpha: float, dof: int) -> float:
@@ -92,6 +94,8 @@ def _noncentrality(alpha: float, dof: int) -> float:
     for _ in range(60):
         middle = 0.5 * (low + high)
         low, high = (
-            (middle, high) if float(ncx2.sf(critical, dof, max(middle, 1e-12))) < _POWER else (low, middle)
+            (middle, high)
+            if float(ncx2.sf(critical, dof, max(middle, 1e-12))) < VERDICT.power
+            else (low, middle)
         )
     return math.sqrt(high)

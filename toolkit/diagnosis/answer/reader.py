@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 from toolkit.diagnosis.answer.answer import (
     Diagnosis,
@@ -18,6 +18,8 @@ from toolkit.diagnosis.answer.answer import (
     Place,
     Recorded,
 )
+from toolkit.effects.applied import EffectKey
+from toolkit.effects.facts import Second
 from toolkit.errors import ConfigError
 from toolkit.files import read_bytes
 from toolkit.findings import Finding
@@ -48,115 +50,136 @@ def read_answer(path: Path) -> tuple[Diagnosis, Path]:
         OverflowError,
         RecursionError,
     ) as error:
-        got = f"no key {error}" if isinstance(error, KeyError) else str(error)
+        reason = f"no key {error}" if isinstance(error, KeyError) else str(error)
         raise ConfigError(
             "this is no answer of a diagnosis",
             where=file,
-            got=got[:200],
+            got=reason[:200],
             expected=f"the {ANSWER} that 'toolkit diagnose' writes",
             next_step="name that file, or the folder that it is in",
             rule="not-a-diagnosis",
         ) from error
 
 
-def _answer(told: dict[str, Any]) -> Diagnosis:
-    if told["schema"] != 1:
-        raise ValueError(f"schema {told['schema']!r}")
-    fit = told["fit"]
+def _answer(entries: dict[str, Any]) -> Diagnosis:
+    if entries["schema"] != 1:
+        raise ValueError(f"schema {entries['schema']!r}")
+    fit = entries["fit"]
     return Diagnosis(
-        title=_text(told["title"]),
-        case_sha256=_text(told["case_sha256"]),
-        verdict=_one_of(told["verdict"], _VERDICTS),
-        remaining=_one_of(told["remaining"], _REMAINING),
-        mismatch=tuple(map(_mismatch, told["mismatch"])),
-        effects=tuple(map(_effect, told["effects"])),
+        title=_text(entries["title"]),
+        case_sha256=_text(entries["case_sha256"]),
+        verdict=_one_of(entries["verdict"], _VERDICTS),
+        remaining=_one_of(entries["remaining"], _REMAINING),
+        mismatch=tuple(map(_mismatch, entries["mismatch"])),
+        effects=tuple(map(_effect, entries["effects"])),
         nominal_parameters=tuple(
             NominalParameter(
-                name=_text(one["name"]), before=_number(one["before"]), after=_number(one["after"]),
-                unit=_text(one["unit"]), prior_sd=_or_none(one["prior_sd"]),
+                name=_text(parameter["name"]),
+                before=_number(parameter["before"]), after=_number(parameter["after"]),
+                unit=_text(parameter["unit"]), prior_sd=_or_none(parameter["prior_sd"]),
             )
-            for one in told["nominal_parameters"]
+            for parameter in entries["nominal_parameters"]
         ),
         held_out=tuple(
             HeldOutFit(
-                channel=_text(one["channel"]),
-                unit=_text(one["unit"]),
-                nominal_rmse=_number(one["nominal_rmse"]),
-                refitted_rmse=_number(one["refitted_rmse"]),
-                augmented_rmse=_number(one["augmented_rmse"]),
-                noise_floor=_number(one["noise_floor"]),
+                channel=_text(output["channel"]),
+                unit=_text(output["unit"]),
+                nominal_rmse=_number(output["nominal_rmse"]),
+                refitted_rmse=_number(output["refitted_rmse"]),
+                augmented_rmse=_number(output["augmented_rmse"]),
+                noise_floor=_number(output["noise_floor"]),
             )
-            for one in fit["held_out"]
+            for output in fit["held_out"]
         ),
         held_out_by=_text(fit["held_out_by"]),
-        depends_on=tuple((_text(one["channel"]), _texts(one["variables"])) for one in told["depends_on"]),
+        depends_on=tuple(
+            (_text(structure["channel"]), _texts(structure["variables"]))
+            for structure in entries["depends_on"]
+        ),
         not_found=tuple(
             NotFound(
-                name=_text(one["name"]), minimum_detectable=_or_none(one["minimum_detectable"]),
-                unit=_text(one["unit"]), observable=bool(one["observable"]), why=_text(one["why"]),
+                name=_text(effect["name"]), minimum_detectable=_or_none(effect["minimum_detectable"]),
+                unit=_text(effect["unit"]), observable=bool(effect["observable"]), why=_text(effect["why"]),
             )
-            for one in told["not_found"]
+            for effect in entries["not_found"]
         ),
-        next_measurements=_texts(told["next_measurements"]),
+        next_measurements=_texts(entries["next_measurements"]),
         findings=tuple(
             Finding(
-                rule=_text(one["rule"]), where=_text(one["where"]), message=_text(one["message"]),
-                level=_one_of(one["level"], ("error", "warning", "note")),
+                rule=_text(finding["rule"]), where=_text(finding["where"]), message=_text(finding["message"]),
+                level=_one_of(finding["level"], ("error", "warning", "note")),
             )
-            for one in told["findings"]
+            for finding in entries["findings"]
         ),
-        complete=bool(told["complete"]),
-        skipped=_texts(told["skipped"]),
-        recordings=_recordings(told.get("recordings")),
+        complete=bool(entries["complete"]),
+        skipped=_texts(entries["skipped"]),
+        recordings=_recordings(entries.get("recordings")),
     )  # fmt: skip
 
 
-def _recordings(told: Any) -> tuple[Recorded, ...] | None:
+def _recordings(entries: Any) -> tuple[Recorded, ...] | None:
     """Return the recordings of an answer; None where it is older than the key."""
-    if told is None:
+    if entries is None:
         return None
     return tuple(
-        Recorded(name=_text(one["name"]), sha256=_text(one["sha256"]), own=bool(one["own"])) for one in told
+        Recorded(name=_text(entry["name"]), sha256=_text(entry["sha256"]), own=bool(entry["own"]))
+        for entry in entries
     )
 
 
-def _mismatch(one: dict[str, Any]) -> Mismatch:
+def _mismatch(mismatch: dict[str, Any]) -> Mismatch:
     return Mismatch(
-        channel=_text(one["channel"]),
-        p_value=_number(one["p_value"]),
-        share_of_variance=_number(one["share_of_variance"]),
+        channel=_text(mismatch["channel"]),
+        p_value=_number(mismatch["p_value"]),
+        share_of_variance=_number(mismatch["share_of_variance"]),
         where=tuple(
             Place(
                 variable=_text(at["variable"]), start=_end(at["from"]), end=_end(at["to"]),
                 unit=_text(at["unit"]), runs=_texts(at["runs"]),
             )
-            for at in one["where"]
+            for at in mismatch["where"]
         ),
     )  # fmt: skip
 
 
-def _effect(one: dict[str, Any]) -> FoundEffect:
+def _effect(effect: dict[str, Any]) -> FoundEffect:
     return FoundEffect(
-        name=_text(one["name"]),
-        stage=_text(one["stage"]),
-        channel=None if one["channel"] is None else _text(one["channel"]),
-        statement=_text(one["statement"]),
-        equation=_text(one["equation"]),
-        reference=_text(one["reference"]),
+        key=_key(effect),
+        stage=_text(effect["stage"]),
+        statement=_text(effect["statement"]),
+        equation=_text(effect["equation"]),
+        reference=_text(effect["reference"]),
         parameters=tuple(
             FoundParameter(
-                name=_text(each["name"]),
-                value=each["value"] if isinstance(each["value"], str) else _number(each["value"]),
-                unit=_text(each["unit"]),
-                ci95=None if each["ci95"] is None else (_number(each["ci95"][0]), _number(each["ci95"][1])),
-                runs=None if each["runs"] is None else _texts(each["runs"]),
+                name=_text(parameter["name"]),
+                value=parameter["value"]
+                if isinstance(parameter["value"], str)
+                else _number(parameter["value"]),
+                unit=_text(parameter["unit"]),
+                ci95=None
+                if parameter["ci95"] is None
+                else (_number(parameter["ci95"][0]), _number(parameter["ci95"][1])),
+                runs=None if parameter["runs"] is None else _texts(parameter["runs"]),
             )
-            for each in one["parameters"]
+            for parameter in effect["parameters"]
         ),
-        equivalent_to=_texts(one["equivalent_to"]),
-        rejected=tuple((_text(o["name"]), -_number(o["log_likelihood_less"])) for o in one["rejected"]),
-        held_out_log_score_gain=_number(one["evidence"]["held_out_log_score_gain"]),
-        p_value=_number(one["evidence"]["p_value"]),
+        equivalent_to=_texts(effect["equivalent_to"]),
+        rejected=tuple((_text(o["name"]), -_number(o["log_likelihood_less"])) for o in effect["rejected"]),
+        held_out_log_score_gain=_number(effect["evidence"]["held_out_log_score_gain"]),
+        p_value=_number(effect["evidence"]["p_value"]),
+    )
+
+
+def _key(effect: dict[str, Any]) -> EffectKey:
+    """Return an effect's identity; its source and its runs stand among its parameters."""
+    parameters = effect["parameters"]
+    words = {entry["name"]: entry["value"] for entry in parameters if isinstance(entry["value"], str)}
+    runs = next((entry["runs"] for entry in parameters), None)
+    return EffectKey(
+        name=_text(effect["name"]),
+        channel=None if effect["channel"] is None else _text(effect["channel"]),
+        source=next((words[word] for word in get_args(Second) if word in words), None),
+        runs=None if runs is None else frozenset(_texts(runs)),
     )
 
 
@@ -187,7 +210,7 @@ def _end(value: Any) -> float | str | None:
     return value if value is None or isinstance(value, str) else _number(value)
 
 
-def _one_of(value: Any, known: tuple[str, ...]) -> Any:
-    if value not in known:
-        raise ValueError(f"{value!r} is none of {', '.join(known)}")
+def _one_of(value: Any, choices: tuple[str, ...]) -> Any:
+    if value not in choices:
+        raise ValueError(f"{value!r} is none of {', '.join(choices)}")
     return value

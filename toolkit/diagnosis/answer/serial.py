@@ -9,92 +9,101 @@ if TYPE_CHECKING:
     from toolkit.diagnosis.answer.answer import Diagnosis, FoundEffect, Mismatch
 
 
-def as_json(made: Diagnosis) -> dict[str, Any]:
+def as_json(diagnosis: Diagnosis) -> dict[str, Any]:
     """Return the answer as the contract has it, without ``schema`` and ``timing``."""
     answer: dict[str, Any] = _finite({
-        "title": made.title,
-        "case_sha256": made.case_sha256,
-        "recordings": None if made.recordings is None else [
-            {"name": one.name, "sha256": one.sha256, "own": one.own} for one in made.recordings
+        "title": diagnosis.title,
+        "case_sha256": diagnosis.case_sha256,
+        "recordings": None if diagnosis.recordings is None else [
+            {"name": recording.name, "sha256": recording.sha256, "own": recording.own}
+            for recording in diagnosis.recordings
         ],
-        "verdict": made.verdict,
-        "remaining": made.remaining,
-        "complete": made.complete,
-        "skipped": list(made.skipped),
-        "mismatch": [_mismatch(one) for one in made.mismatch],
-        "effects": [_effect(one) for one in made.effects],
+        "verdict": diagnosis.verdict,
+        "remaining": diagnosis.remaining,
+        "complete": diagnosis.complete,
+        "skipped": list(diagnosis.skipped),
+        "mismatch": [_mismatch(mismatch) for mismatch in diagnosis.mismatch],
+        "effects": [_effect(effect) for effect in diagnosis.effects],
         "nominal_parameters": [
             {
-                "name": one.name, "before": one.before, "after": one.after, "unit": one.unit,
-                "prior_sd": one.prior_sd, "shift_in_sd": one.shift_in_sd,
+                "name": parameter.name, "before": parameter.before, "after": parameter.after,
+                "unit": parameter.unit, "prior_sd": parameter.prior_sd, "shift_in_sd": parameter.shift_in_sd,
             }
-            for one in made.nominal_parameters
+            for parameter in diagnosis.nominal_parameters
         ],
         "fit": {
-            "held_out_by": made.held_out_by,
+            "held_out_by": diagnosis.held_out_by,
             "held_out": [
                 {
-                    "channel": one.channel, "unit": one.unit, "nominal_rmse": one.nominal_rmse,
-                    "refitted_rmse": one.refitted_rmse, "augmented_rmse": one.augmented_rmse,
-                    "noise_floor": one.noise_floor,
+                    "channel": output.channel, "unit": output.unit, "nominal_rmse": output.nominal_rmse,
+                    "refitted_rmse": output.refitted_rmse, "augmented_rmse": output.augmented_rmse,
+                    "noise_floor": output.noise_floor,
                 }
-                for one in made.held_out
+                for output in diagnosis.held_out
             ],
         },
-        "depends_on": [{"channel": channel, "variables": list(names)} for channel, names in made.depends_on],
+        "depends_on": [
+            {"channel": channel, "variables": list(names)} for channel, names in diagnosis.depends_on
+        ],
         "not_found": [
             {
-                "name": one.name, "minimum_detectable": one.minimum_detectable, "unit": one.unit,
-                "observable": one.observable, "why": one.why,
+                "name": effect.name, "minimum_detectable": effect.minimum_detectable, "unit": effect.unit,
+                "observable": effect.observable, "why": effect.why,
             }
-            for one in made.not_found
+            for effect in diagnosis.not_found
         ],
-        "next_measurements": list(made.next_measurements),
-        "findings": [one.as_dict() for one in made.findings],
+        "next_measurements": list(diagnosis.next_measurements),
+        "findings": [finding.as_dict() for finding in diagnosis.findings],
     })  # fmt: skip
     return answer
 
 
-def _mismatch(one: Mismatch) -> dict[str, Any]:
+def _mismatch(mismatch: Mismatch) -> dict[str, Any]:
     return {
-        "channel": one.channel,
-        "p_value": one.p_value,
-        "share_of_variance": one.share_of_variance,
+        "channel": mismatch.channel,
+        "p_value": mismatch.p_value,
+        "share_of_variance": mismatch.share_of_variance,
         "where": [
-            {"variable": at.variable, "from": at.start, "to": at.end, "unit": at.unit, "runs": list(at.runs)}
-            for at in one.where
+            {
+                "variable": place.variable,
+                "from": place.start,
+                "to": place.end,
+                "unit": place.unit,
+                "runs": list(place.runs),
+            }
+            for place in mismatch.where
         ],
     }
 
 
-def _effect(one: FoundEffect) -> dict[str, Any]:
+def _effect(effect: FoundEffect) -> dict[str, Any]:
     return {
-        "name": one.name,
-        "stage": one.stage,
-        "channel": one.channel,
-        "statement": one.statement,
-        "equation": one.equation,
-        "reference": one.reference,
+        "name": effect.name,
+        "stage": effect.stage,
+        "channel": effect.channel,
+        "statement": effect.statement,
+        "equation": effect.equation,
+        "reference": effect.reference,
         "parameters": [
             {
-                "name": each.name,
-                "value": each.value,
-                "unit": each.unit,
-                "ci95": None if each.ci95 is None else list(each.ci95),
-                "runs": None if each.runs is None else list(each.runs),
+                "name": parameter.name,
+                "value": parameter.value,
+                "unit": parameter.unit,
+                "ci95": None if parameter.ci95 is None else list(parameter.ci95),
+                "runs": None if parameter.runs is None else list(parameter.runs),
             }
-            for each in one.parameters
+            for parameter in effect.parameters
         ],
-        "equivalent_to": list(one.equivalent_to),
-        "rejected": [{"name": name, "log_likelihood_less": -value} for name, value in one.rejected],
-        "evidence": {"held_out_log_score_gain": one.held_out_log_score_gain, "p_value": one.p_value},
+        "equivalent_to": list(effect.equivalent_to),
+        "rejected": [{"name": name, "log_likelihood_less": -value} for name, value in effect.rejected],
+        "evidence": {"held_out_log_score_gain": effect.held_out_log_score_gain, "p_value": effect.p_value},
     }
 
 
 def _finite(value: Any) -> Any:
     """Return a JSON value with null in the place of every number that is none."""
     if isinstance(value, dict):
-        return {key: _finite(one) for key, one in value.items()}
+        return {key: _finite(entry) for key, entry in value.items()}
     if isinstance(value, list | tuple):
-        return [_finite(one) for one in value]
+        return [_finite(entry) for entry in value]
     return None if isinstance(value, float) and not math.isfinite(value) else value

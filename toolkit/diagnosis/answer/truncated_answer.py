@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from toolkit.diagnosis.answer.answer import Diagnosis, HeldOutFit, NominalParameter, NotFound, recorded
+from toolkit.diagnosis.policy import ROWS
 from toolkit.effects.catalogue import effects
 
 if TYPE_CHECKING:
@@ -27,12 +28,11 @@ STEPS = (
     "joint fits",
     "power of what was not found",
 )
-_FEW = 3  # rows with which nothing can be told apart from anything
 
 
 def is_flat(values: NDArray[np.float64]) -> bool:
     """Tell whether recorded values are too few, or all the same."""
-    return len(values) < _FEW or float(np.ptp(values)) == 0.0
+    return len(values) < ROWS.fewest or float(np.ptp(values)) == 0.0
 
 
 def does_not_vary(problem: Problem) -> bool:
@@ -67,8 +67,14 @@ def without_search(
         mismatch=(),
         effects=(),
         nominal_parameters=tuple(
-            NominalParameter(name=one.name, before=one.value, after=one.value, unit=one.unit, prior_sd=one.sd)
-            for one in case.parameters
+            NominalParameter(
+                name=parameter.name,
+                before=parameter.value,
+                after=parameter.value,
+                unit=parameter.unit,
+                prior_sd=parameter.sd,
+            )
+            for parameter in case.parameters
         ),
         held_out=() if problem is None or simulated is None else _as_declared(problem, simulated),
         held_out_by="none: no fit was made",
@@ -87,17 +93,17 @@ def without_search(
 
 def _as_declared(problem: Problem, simulated: Stacked) -> tuple[HeldOutFit, ...]:
     """Return the error of the simulation as declared, three times; noise that nobody stated is unknown."""
-    made = []
-    for one in problem.model.outputs:
-        kept = problem.kept[one.name]
-        if not kept.any():
+    errors = []
+    for output in problem.model.outputs:
+        counted = problem.kept[output.name]
+        if not counted.any():
             continue
-        away = problem.observed[one.name][kept] - simulated[one.name][kept]
+        away = problem.observed[output.name][counted] - simulated[output.name][counted]
         error = math.sqrt(float(np.mean(away**2)))
-        made.append(
+        errors.append(
             HeldOutFit(
-                channel=one.name, unit=one.unit, nominal_rmse=error, refitted_rmse=error,
-                augmented_rmse=error, noise_floor=one.sd or math.nan,
+                channel=output.name, unit=output.unit, nominal_rmse=error, refitted_rmse=error,
+                augmented_rmse=error, noise_floor=output.sd or math.nan,
             )
         )  # fmt: skip
-    return tuple(made)
+    return tuple(errors)

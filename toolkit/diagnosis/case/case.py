@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from toolkit.simulation.model_file import ModelEffect
+    from toolkit.simulation.model_file import FittedEffect
 
 Role = Literal["time", "input", "output", "covariate"]
 Kind = Literal["machine", "python", "ode", "columns"]
@@ -102,19 +102,19 @@ class Case:
     runs: tuple[Run, ...]
     predict: tuple[Run, ...]
     sha256: str
-    effects: tuple[ModelEffect, ...] = ()
+    effects: tuple[FittedEffect, ...] = ()
     nominal_load_N: float | None = None
     model: Path | None = None
 
     @property
     def outputs(self) -> tuple[CaseChannel, ...]:
         """Channels that the simulation is judged on."""
-        return tuple(one for one in self.channels if one.role == "output")
+        return tuple(channel for channel in self.channels if channel.role == "output")
 
     @property
     def drivers(self) -> tuple[CaseChannel, ...]:
         """Inputs and covariates."""
-        return tuple(one for one in self.channels if one.role in ("input", "covariate"))
+        return tuple(channel for channel in self.channels if channel.role in ("input", "covariate"))
 
     def file(self) -> Path:
         """Return the simulator's file; kinds ``python`` and ``ode`` always have one."""
@@ -122,7 +122,7 @@ class Case:
 
     def channel(self, name: str) -> CaseChannel:
         """Return a channel by name; KeyError where the case has none."""
-        return {one.name: one for one in self.channels}[name]
+        return {channel.name: channel for channel in self.channels}[name]
 
     def unit(self, name: str) -> str:
         """Return the unit of a channel, or that of the output which a simulated column stands for."""

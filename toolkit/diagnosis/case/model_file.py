@@ -7,10 +7,9 @@ from pathlib import Path
 from typing import Any
 
 from toolkit.diagnosis.case.case import KINDS, CaseParameter, Simulation
-from toolkit.effects.catalogue import effect
 from toolkit.errors import ConfigError
 from toolkit.machine import load_machine
-from toolkit.simulation.model_file import ModelEffect, ModelFile, ModelParameter, read_model
+from toolkit.simulation.model_file import FittedEffect, ModelFile, read_model
 
 
 def simulation_of(model: ModelFile) -> Simulation:
@@ -21,10 +20,10 @@ def simulation_of(model: ModelFile) -> Simulation:
             got=model.kind, expected=", ".join(KINDS),
             next_step="name a file that toolkit diagnose has written", rule="model-file",
         )  # fmt: skip
-    told: Mapping[str, Any] = model.simulation
+    entries: Mapping[str, Any] = model.simulation
     # A file by path is a path, whatever folder the case lies in.
     machine, calibration = (
-        str(file.absolute()) if (file := model.file(key)) is not None else str(told.get(key, ""))
+        str(file.absolute()) if (file := model.file(key)) is not None else str(entries.get(key, ""))
         for key in ("machine", "calibration")
     )
     return Simulation(
@@ -33,21 +32,27 @@ def simulation_of(model: ModelFile) -> Simulation:
         calibration=calibration,
         tire=model.file("tire"),
         path=model.file("path"),
-        function=str(told.get("function", "simulate")),
-        states=tuple(told.get("states", ())),
-        force_terms=tuple(dict(told.get("force_terms", {})).items()),
-        simulated=tuple(dict(told.get("simulated", {})).items()),
+        function=str(entries.get("function", "simulate")),
+        states=tuple(entries.get("states", ())),
+        force_terms=tuple(dict(entries.get("force_terms", {})).items()),
+        simulated=tuple(dict(entries.get("simulated", {})).items()),
     )
 
 
-def parameters_of(model: ModelFile, given: tuple[CaseParameter, ...] = ()) -> tuple[CaseParameter, ...]:
+def parameters_of(model: ModelFile, first: tuple[CaseParameter, ...] = ()) -> tuple[CaseParameter, ...]:
     """Return the model's parameters, free within their standard errors; those ``given`` go before them."""
-    own = tuple(
-        CaseParameter(name=one.name, value=one.value, unit=one.unit, sd=one.standard_error, bounds=one.bounds)
-        for one in model.parameters
-        if one.name not in {each.name for each in given}
+    further = tuple(
+        CaseParameter(
+            name=parameter.name,
+            value=parameter.value,
+            unit=parameter.unit,
+            sd=parameter.standard_error,
+            bounds=parameter.bounds,
+        )
+        for parameter in model.parameters
+        if parameter.name not in {each.name for each in first}
     )
-    return (*given, *own)
+    return (*first, *further)
 
 
 def tire_model(path: Path, where: str) -> ModelFile:
@@ -68,7 +73,7 @@ def tire_model(path: Path, where: str) -> ModelFile:
     return model
 
 
-def corrections_of(simulation: Simulation) -> tuple[ModelEffect, ...]:
+def corrections_of(simulation: Simulation) -> tuple[FittedEffect, ...]:
     """Return the corrections of a case's machine as effects: the recordings still have them.
 
     None where no tire is simulated: an acquisition program's arithmetic is not the machine's.
@@ -77,18 +82,12 @@ def corrections_of(simulation: Simulation) -> tuple[ModelEffect, ...]:
         return ()
     machine = load_machine(simulation.machine)
     return tuple(
-        ModelEffect(
-            effect=effect(one.effect, where=machine.name),
-            channel=one.channel,
-            source=one.source,
-            parameters=(
-                ModelParameter(
-                    name=one.parameter, value=one.value, unit=one.unit, standard_error=one.u or None
-                ),
-            ),
+        FittedEffect(
+            applied=correction.applied,
+            standard_errors={correction.parameter: correction.u} if correction.u else {},
             axes="machine",
             of_machine=True,
-            origin=f"{machine.name}, version {machine.version}: answer {one.answer_sha256[:16]}",
+            origin=f"{machine.name}, version {machine.version}: answer {correction.answer_sha256[:16]}",
         )
-        for one in machine.corrections
+        for correction in machine.corrections
     )

@@ -38,7 +38,7 @@ def read_csv(data: bytes, wanted: Collection[str], *, where: Path) -> dict[str, 
     try:
         rows = csv.reader(io.StringIO(text, newline=""), skipinitialspace=True)
         header = [cell.strip() for cell in next(rows, [])]
-        doubled = sorted({one for one in header if one in wanted and header.count(one) > 1})
+        doubled = sorted({name for name in header if name in wanted and header.count(name) > 1})
         if doubled:
             raise ColumnError(
                 "a column stands twice", where=where, got=", ".join(doubled), expected="different names",
@@ -90,19 +90,19 @@ def _quick(text: str, header: list[str]) -> NDArray[np.float64] | None:
     if start < 0 or '"' in text or "\r" in text[:start].rstrip("\r") or not text[start + 1 :].strip():
         return None
     try:
-        made = np.loadtxt(
+        table = np.loadtxt(
             io.StringIO(text[start + 1 :]), delimiter=",", dtype=np.float64, ndmin=2, comments=None
         )
     except ValueError:
         return None
-    fits = made.shape[1] == len(header) and bool((np.abs(made) < _LARGEST).all())
-    return made if fits else None
+    fits = table.shape[1] == len(header) and bool((np.abs(table) < _LARGEST).all())
+    return table if fits else None
 
 
 def _careful(
     rows: Iterable[list[str]], header: list[str], wanted: Collection[str], where: Path
 ) -> NDArray[np.float64]:
-    made: list[list[float]] = []
+    table: list[list[float]] = []
     used = [name in wanted for name in header]
     for number, row in enumerate(rows, start=2):
         if not any(cell.strip() for cell in row):
@@ -113,13 +113,13 @@ def _careful(
                 got=f"{len(row)} cells", expected=f"{len(header)}",
                 next_step=_COMMAS if _otherwise_separated(header) else "correct the row", rule="case-run",
             )  # fmt: skip
-        made.append(
+        table.append(
             [
                 _number(cell, f"{where}, line {number}, column {name}") if use else math.nan
                 for cell, name, use in zip(row, header, used, strict=True)
             ]
         )
-    return np.array(made, dtype=np.float64).reshape(len(made), len(header))
+    return np.array(table, dtype=np.float64).reshape(len(table), len(header))
 
 
 def _number(cell: str, where: str) -> float:

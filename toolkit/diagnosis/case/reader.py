@@ -69,12 +69,12 @@ def read_case(path: Path, *, model: Path | None = None) -> Case:
         )
         for i, entry in enumerate(_list(recording, "run", path), start=1)
     ]
-    _different_content(runs, [one.name for one in channels if one.role == "output"], path)
+    _different_content(runs, [channel.name for channel in channels if channel.role == "output"], path)
     if not runs:
         raise wrong(
             "a case has no recording", f"{path}: recording", "no [[recording.run]]", "one run or more"
         )
-    if all(one.conditions.get("phase") == "tare" for one in runs):
+    if all(run.conditions.get("phase") == "tare" for run in runs):
         raise wrong(
             "every recording is a tare", f"{path}: recording.run", 'phase = "tare"', 'a run of phase = "test"'
         )
@@ -96,7 +96,7 @@ def read_case(path: Path, *, model: Path | None = None) -> Case:
     for one in (simulation.path, simulation.tire, _record_beside(simulation, path), definition, source):
         if one is not None:
             digest.update(_content(one))
-    if not any(one.role == "output" for one in channels):
+    if not any(channel.role == "output" for channel in channels):
         raise wrong(
             "a case has nothing to be judged on",
             f"{path}: recording.channels",
@@ -141,9 +141,9 @@ def _channels(entry: object, where: str) -> tuple[CaseChannel, ...]:
 
 def _time(recording: dict[str, Any], channels: tuple[CaseChannel, ...], path: Path) -> CaseChannel | None:
     named = recording.get("time")
-    timed = [one for one in channels if one.role == "time"]
+    timed = [channel for channel in channels if channel.role == "time"]
     if named is not None:
-        timed = [one for one in channels if one.name == named]
+        timed = [channel for channel in channels if channel.name == named]
         if not timed or timed[0].role != "time":
             raise wrong(
                 "the time channel is not declared",
@@ -254,7 +254,7 @@ def _different_content(runs: list[Run], outputs: list[str], path: Path) -> None:
     first: dict[str, str] = {}
     for i, run in enumerate(runs, start=1):
         # An output that stands still may well repeat itself.
-        if run.sha256 in first and any(len(set(run.columns.get(one, ()))) > 1 for one in outputs):
+        if run.sha256 in first and any(len(set(run.columns.get(output, ()))) > 1 for output in outputs):
             raise wrong(
                 "a recording stands twice",
                 f"{path}: recording.run[{i}].file",

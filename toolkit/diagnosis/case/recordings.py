@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -10,8 +10,10 @@ import numpy as np
 
 from toolkit.diagnosis.case.case import CaseChannel, Run
 from toolkit.diagnosis.case.plain_csv import header_of, missing_column, read_csv
-from toolkit.errors import CellError, ColumnError, UnreadableError
+from toolkit.errors import CellError, ColumnError, UnitError, UnreadableError
 from toolkit.files import sha256_bytes
+from toolkit.machine import load_machine
+from toolkit.recording.read import read_recording
 from toolkit.units import unit
 
 if TYPE_CHECKING:
@@ -44,8 +46,8 @@ def read_run(
     ColumnError
         a column is missing or doubled; CellError: a cell is no number; UnreadableError: no rows, no text
     """
-    names = {one.name for one in channels} | set(simulated.values())
-    units = {one.name: one.unit for one in channels}
+    names = {channel.name for channel in channels} | set(simulated.values())
+    units = {channel.name: channel.unit for channel in channels}
     table, present, own = _read(path, data, machine=machine, units=units, wanted=names)
     columns: dict[str, NDArray[np.float64]] = {}
     for channel in channels:
@@ -80,13 +82,13 @@ def read_run(
 
 def conditions(declared: Mapping[str, Any]) -> dict[str, str]:
     """Return the conditions of a run's table as texts, a quantity as number and unit."""
-    made = {}
+    texts = {}
     for key, value in declared.items():
         if isinstance(value, dict) and set(value) == {"value", "unit"}:
-            made[key] = f"{value['value']} {value['unit']}"
+            texts[key] = f"{value['value']} {value['unit']}"
         elif key != "file":
-            made[key] = str(value)
-    return made
+            texts[key] = str(value)
+    return texts
 
 
 def _read(
@@ -95,13 +97,10 @@ def _read(
     """Return the wanted columns that a file has, the names of all, and whether it is the machine's own."""
     is_book = data[:4] == b"PK\x03\x04"
     header = [] if is_book else header_of(data)
-    if machine:
-        from toolkit.diagnosis.case.workbook import is_of_machine, read_workbook
-
-        # The acquisition program's own headers, in a workbook or as text.
-        if is_book or (not wanted & set(header) and is_of_machine(header, machine)):
-            made = read_workbook(path, data, machine, units)
-            return made, list(made), True
+    # The acquisition program's own headers, in a workbook or as text.
+    if machine and (is_book or (not wanted & set(header) and _is_of_machine(header, machine))):
+        columns = _read_workbook(path, data, machine, units)
+        return columns, list(columns), True
     if not is_book:
         return read_csv(data, wanted, where=path), header, False
     raise UnreadableError(
@@ -112,6 +111,39 @@ def _read(
         next_step="save the run as CSV",
         rule="case-run",
     )
+
+
+def _is_of_machine(header: Collection[str], machine: str) -> bool:
+    """Tell whether a header row is that of a machine's acquisition program."""
+    return any(column.header in header for column in load_machine(machine).columns)
+
+
+def _read_workbook(
+    path: Path, data: bytes, machine: str, units: Mapping[str, str]
+) -> dict[str, NDArray[np.float64]]:
+    """Return a file's columns by symbol, each in the unit that the case states for it.
+
+    Raises
+    ------
+    UnreadableError
+        it is no recording of the machine; UnitError: a stated unit is of another dimension
+    """
+    columns = {}
+    for series in read_recording(path, load_machine(machine), data=data).series:
+        if series.symbol not in units:
+            continue
+        stated = unit(units[series.symbol])
+        if stated.dimension != unit(series.unit).dimension:
+            raise UnitError(
+                "a channel's unit does not fit the recording's",
+                where=f"{path}: {series.symbol}",
+                got=stated.text,
+                expected=series.unit,
+                next_step="correct the unit in the case",
+                rule="case",
+            )
+        columns[series.symbol] = (series.si - stated.offset) / stated.factor
+    return columns
 
 
 def _check_time(path: Path, name: str, t: NDArray[np.float64]) -> None:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolkit.diagnosis.fit.noise import Layout, Noise, whiten
+from toolkit.diagnosis.fit.noise import Autoregression, Layout, whiten
 from toolkit.diagnosis.fit.space import Space
 from toolkit.errors import FitError
 
@@ -53,16 +53,16 @@ class Derivatives:
         step = x - before
         if not step.any():
             return slopes
-        here = self._space.simulated(x)
-        moved = {name: one - there[name] for name, one in here.items()}
-        off = {name: one - slopes[name] @ step for name, one in moved.items()}
+        simulated = self._space.simulated(x)
+        moved = {name: column - there[name] for name, column in simulated.items()}
+        off = {name: change - slopes[name] @ step for name, change in moved.items()}
         if weighing.size(off) > max(_BENT * weighing.size(moved), _NOTHING):
             return self.anew(x)
         along = step / float(step @ step)
         self._last = (
             x.copy(),
-            here,
-            {name: one + np.outer(off[name], along) for name, one in slopes.items()},
+            simulated,
+            {name: slope + np.outer(off[name], along) for name, slope in slopes.items()},
         )
         return self._last[2]
 
@@ -71,9 +71,9 @@ class Derivatives:
         if self._fresh is None:
             return False
         begun, there, slopes = self._fresh
-        here = self._space.simulated(x)
-        moved = {name: one - there[name] for name, one in here.items()}
-        off = {name: one - slopes[name] @ (x - begun) for name, one in moved.items()}
+        simulated = self._space.simulated(x)
+        moved = {name: column - there[name] for name, column in simulated.items()}
+        off = {name: change - slopes[name] @ (x - begun) for name, change in moved.items()}
         way = weighing.size(moved)
         return way < _NOTHING or weighing.size(off) < _STRAIGHT * way
 
@@ -81,18 +81,16 @@ class Derivatives:
 class Weighing:
     """What rows are worth: their layouts and noise, and the priors beside them."""
 
-    def __init__(self, space: Space, layouts: dict[str, Layout], noise: dict[str, Noise]) -> None:
+    def __init__(self, space: Space, layouts: dict[str, Layout], noise: dict[str, Autoregression]) -> None:
         self._space, self._layouts, self._noise = space, layouts, noise
-        self._prior_sd = np.array([one.sd or 1.0 for one in space.problem.free])
-        self._declared = np.array([one.value for one in space.problem.free])
 
     def _whitened(self, values: Stacked) -> Array:
         parts = [
             whiten(values[name][where.index], where, self._noise[name])
             for name, where in self._layouts.items()
         ]
-        made = np.concatenate(parts)
-        return np.where(np.isfinite(made), made, 1e6)
+        white = np.concatenate(parts)
+        return np.where(np.isfinite(white), white, 1e6)
 
     def size(self, values: Stacked) -> float:
         """Return the size of a difference of simulations in standard deviations of the noise."""
@@ -103,20 +101,24 @@ class Weighing:
         try:
             residual = self._space.residual(self._space.simulated(x))
         except FitError:
-            return np.full(sum(one.n for one in self._layouts.values()) + len(self._declared), 1e6)
+            return np.full(
+                sum(layout.n for layout in self._layouts.values()) + len(self._space.problem.free), 1e6
+            )
         p, _ = self._space.split(x)
-        return np.concatenate([self._whitened(residual), (np.array(p) - self._declared) / self._prior_sd])
+        return np.concatenate([self._whitened(residual), self._space.problem.off_priors(p)])
 
     def slope(self, slopes: Stacked) -> Array:
         """Return d(cost)/dx from d(simulated)/dx."""
-        n = len(self._declared)
-        prior = np.zeros((n, len(self._space.sizes)))
-        prior[range(n), range(n)] = self._space.sizes[:n] / self._prior_sd
-        return np.concatenate([self._whitened({name: -one for name, one in slopes.items()}), prior])
+        prior = self._space.problem.prior_rows(self._space.sizes, len(self._space.sizes))
+        return np.concatenate([self._whitened({name: -slope for name, slope in slopes.items()}), prior])
 
 
 def descend(
-    space: Space, layouts: dict[str, Layout], x: Array, noise: dict[str, Noise], known: Derivatives
+    space: Space,
+    layouts: dict[str, Layout],
+    x: Array,
+    noise: dict[str, Autoregression],
+    derivatives: Derivatives,
 ) -> Array:
     """Return the vector of least squares, searched from ``x``.
 
@@ -132,7 +134,7 @@ def descend(
     weighing = Weighing(space, layouts, noise)
 
     def slope(v: NDArray[np.float64]) -> NDArray[np.float64]:
-        return weighing.slope(known.at(v, weighing))
+        return weighing.slope(derivatives.at(v, weighing))
 
     for _ in range(_AGAIN):
         x = least_squares(
@@ -146,7 +148,7 @@ def descend(
             xtol=1e-5,  # of a parameter's size: the step after it would be smaller by orders
             gtol=1e-9,
         ).x
-        if known.trusted(x, weighing):
+        if derivatives.trusted(x, weighing):
             break
-        known.anew(x)
+        derivatives.anew(x)
     return x

@@ -9,11 +9,18 @@ from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
-from toolkit.diagnosis.fit.covariance import covariance
 from toolkit.diagnosis.fit.descent import Derivatives, descend
-from toolkit.diagnosis.fit.noise import Layout, Noise, fit_noise, log_likelihood
+from toolkit.diagnosis.fit.noise import (
+    Autoregression,
+    Layout,
+    autocovariance,
+    fit_noise,
+    log_likelihood,
+    whiten,
+)
 from toolkit.diagnosis.fit.space import Space
-from toolkit.diagnosis.simulators.simulator import Active
+from toolkit.diagnosis.policy import NOISE
+from toolkit.effects.applied import AppliedEffect
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -22,10 +29,70 @@ if TYPE_CHECKING:
 
     Stacked = dict[str, NDArray[np.float64]]
 
+# The covariance of a joint fit: of generalised least squares, or the sandwich of ordinary ones.
+
+
+_OPEN = 1e12  # variance, in searched units, of what the data leave open altogether
+
+
+def covariance(
+    J: Stacked,
+    prior: NDArray[np.float64],
+    sizes: NDArray[np.float64],
+    layouts: dict[str, Layout],
+    noise: dict[str, Autoregression],
+    *,
+    plain: bool,
+) -> NDArray[np.float64]:
+    """Return the covariance of (p, effects' parameters) in their units.
+
+    Of ordinary least squares it is the sandwich with the residual's autocovariance in it.
+
+    Parameters
+    ----------
+    J : of every output over all rows, d(simulated)/d(x), (rows, k); x are the parameters over ``sizes``
+    prior : rows of the priors, (free, k)
+    """
+    if not len(sizes):
+        return np.zeros((0, 0))
+    parts, spread = [], prior.T @ prior
+    for name, where in layouts.items():
+        columns = J[name][where.index]
+        if plain:
+            weight = 1 / (noise[name].marginal_sd ** 2 * noise[name].correlation_rows)
+            parts.append(columns * math.sqrt(weight))
+            spread = spread + weight**2 * columns.T @ _correlated(columns, where, noise[name])
+        else:
+            parts.append(whiten(columns, where, noise[name]))
+    rows = np.vstack([*parts, prior])
+    size = np.sqrt((rows**2).sum(axis=0))
+    size[size == 0] = 1.0
+    _, s, vt = np.linalg.svd(rows / size, full_matrices=False)
+    keep = s > 1e-10 * s.max()
+    inverse = (vt[keep].T / s[keep] ** 2) @ vt[keep]
+    if plain:
+        inverse = inverse @ (spread / np.outer(size, size)) @ inverse
+    if not keep.all():
+        inverse[np.diag_indices_from(inverse)] += np.where(np.abs(vt[~keep]).max(axis=0) > 0.1, _OPEN, 0.0)
+    scale = sizes / size
+    return np.asarray(inverse * np.outer(scale, scale))
+
+
+def _correlated(columns: NDArray[np.float64], where: Layout, noise: Autoregression) -> NDArray[np.float64]:
+    """Return the noise's covariance matrix times columns, segment by segment."""
+    from scipy.signal import fftconvolve
+
+    products = np.empty_like(columns)
+    for segment in where.segments:
+        n = segment.stop - segment.start
+        gamma = autocovariance(noise, n)
+        kernel = np.concatenate([gamma[:0:-1], gamma])[:, None]
+        products[segment] = fftconvolve(columns[segment], kernel, mode="full", axes=0)[n - 1 : 2 * n - 1]
+    return products
+
+
 _OUTER = 4  # times that the noise is estimated anew
 _BETTER = 0.02  # of the log-likelihood: less is no step worth another round
-_APART = 2.0  # of its own standard deviation: a larger difference of two solutions is none of chance
-_SAME = 0.05  # by which the coloured fit's residual variance may exceed the plain one's
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -37,10 +104,10 @@ class Fit:
     """
 
     p: tuple[float, ...]
-    active: tuple[Active, ...]
+    active: tuple[AppliedEffect, ...]
     residual: Stacked
     simulated: Stacked
-    noise: dict[str, Noise]
+    noise: dict[str, Autoregression]
     log_posterior: float
     covariance: NDArray[np.float64]
     rows: NDArray[np.bool_] | None
@@ -54,17 +121,17 @@ class _Solved:
     x: NDArray[np.float64]
     simulated: Stacked
     residual: Stacked
-    noise: dict[str, Noise]
+    noise: dict[str, Autoregression]
     score: float
 
 
 def fit(
     problem: Problem,
-    active: Sequence[Active] = (),
+    active: Sequence[AppliedEffect] = (),
     *,
     start: Sequence[float] | None = None,
     rows: NDArray[np.bool_] | None = None,
-    noise: dict[str, Noise] | None = None,
+    noise: dict[str, Autoregression] | None = None,
     rounds: int = _OUTER,
     plain: bool | None = None,
 ) -> Fit:
@@ -79,26 +146,26 @@ def fit(
     plain : ordinary least squares, or not; None lets a specification test decide
     """
     space = Space.of(problem, tuple(active))
-    known = Derivatives(space)
+    derivatives = Derivatives(space)
     layouts = {name: problem.layout(name, rows) for name in problem.names}
-    x = space.begin([one.value for one in problem.free] if start is None else start)
-    made = _coloured(space, layouts, x, noise, 2 if plain else rounds, known)
-    other = None
+    x = space.begin([parameter.value for parameter in problem.free] if start is None else start)
+    solved = _coloured(space, layouts, x, noise, 2 if plain else rounds, derivatives)
+    alternative = None
     if plain is None:
-        other = _plain(space, layouts, made, known)
-        plain = other is not None and _absorbs(made, other, layouts)
-        chosen = other if plain and other is not None else made
+        alternative = _plain(space, layouts, solved, derivatives)
+        plain = alternative is not None and _absorbs(solved, alternative, layouts)
+        chosen = alternative if plain and alternative is not None else solved
     else:
-        chosen = _plain(space, layouts, made, known) or made if plain else made
-    p, found = space.split(chosen.x)
+        chosen = _plain(space, layouts, solved, derivatives) or solved if plain else solved
+    p, values = space.split(chosen.x)
     return Fit(
         p=tuple(p),
-        active=found,
+        active=values,
         residual=chosen.residual,
         simulated=chosen.simulated,
         noise=chosen.noise,
         log_posterior=chosen.score,
-        covariance=_covariance(space, chosen, None if plain else other, layouts, plain=plain),
+        covariance=_covariance(space, chosen, None if plain else alternative, layouts, plain=plain),
         rows=rows,
         plain=plain,
     )
@@ -108,34 +175,38 @@ def _coloured(
     space: Space,
     layouts: dict[str, Layout],
     x: NDArray[np.float64],
-    noise: dict[str, Noise] | None,
+    noise: dict[str, Autoregression] | None,
     rounds: int,
     derivatives: Derivatives,
 ) -> _Solved:
     """Return generalised least squares, the noise estimated anew in every round."""
     best: _Solved | None = None
-    known = noise
+    noise_now = noise
     for turn in range(max(rounds, 1)):
-        if known is None:
-            known = _white(space.problem, space.residual(space.simulated(x)), layouts)
-        here = _solve(space, layouts, x, known, derivatives)
-        if best is not None and here.score < best.score + _BETTER:
-            return here if here.score > best.score else best
-        best, x, known = here, here.x, here.noise
+        if noise_now is None:
+            noise_now = _white(space.problem, space.residual(space.simulated(x)), layouts)
+        solved = _solve(space, layouts, x, noise_now, derivatives)
+        if best is not None and solved.score < best.score + _BETTER:
+            return solved if solved.score > best.score else best
+        best, x, noise_now = solved, solved.x, solved.noise
         if not len(x) and turn:
             break
     return cast("_Solved", best)
 
 
-def _plain(space: Space, layouts: dict[str, Layout], from_: _Solved, known: Derivatives) -> _Solved | None:
+def _plain(
+    space: Space, layouts: dict[str, Layout], from_: _Solved, derivatives: Derivatives
+) -> _Solved | None:
     """Return ordinary least squares, each output weighed by what its rows are worth; None for white noise."""
-    if not len(from_.x) or not any(one.reflection for one in from_.noise.values()):
+    if not len(from_.x) or not any(autoregression.reflection for autoregression in from_.noise.values()):
         return None
     weights = {
-        name: Noise(reflection=(), sd=one.marginal_sd * math.sqrt(one.correlation_rows))
-        for name, one in from_.noise.items()
+        name: Autoregression(
+            reflection=(), sd=autoregression.marginal_sd * math.sqrt(autoregression.correlation_rows)
+        )
+        for name, autoregression in from_.noise.items()
     }
-    return _solve(space, layouts, from_.x, weights, known)
+    return _solve(space, layouts, from_.x, weights, derivatives)
 
 
 def _absorbs(coloured: _Solved, plain: _Solved, layouts: dict[str, Layout]) -> bool:
@@ -146,10 +217,12 @@ def _absorbs(coloured: _Solved, plain: _Solved, layouts: dict[str, Layout]) -> b
     manner of Hausman), and the plain one is to be trusted.
     """
     for name, where in layouts.items():
-        one = float(np.mean(coloured.residual[name][where.index] ** 2)) if where.n else 0.0
-        other = float(np.mean(plain.residual[name][where.index] ** 2)) if where.n else 0.0
+        coloured_square = float(np.mean(coloured.residual[name][where.index] ** 2)) if where.n else 0.0
+        plain_square = float(np.mean(plain.residual[name][where.index] ** 2)) if where.n else 0.0
         worth = plain.noise[name].correlation_rows / max(where.n, 1)
-        if one > other * (1 + _SAME + 3 * len(plain.x) * worth):
+        if coloured_square > plain_square * (
+            1 + NOISE.absorbed + NOISE.absorbed_by_chance * len(plain.x) * worth
+        ):
             return True
     return False
 
@@ -158,40 +231,40 @@ def _solve(
     space: Space,
     layouts: dict[str, Layout],
     x: NDArray[np.float64],
-    weights: dict[str, Noise],
-    known: Derivatives,
+    weights: dict[str, Autoregression],
+    derivatives: Derivatives,
 ) -> _Solved:
-    x = descend(space, layouts, x, weights, known)
+    x = descend(space, layouts, x, weights, derivatives)
     simulated = space.simulated(x)
     residual = space.residual(simulated)
     noise = noise_of(space.problem, residual, layouts, used=len(x))
     return _Solved(x, simulated, residual, noise, _score(space, x, residual, layouts, noise))
 
 
-def replace_effects(problem: Problem, made: Fit, active: tuple[Active, ...]) -> Fit:
+def replace_effects(problem: Problem, fit: Fit, active: tuple[AppliedEffect, ...]) -> Fit:
     """Return a fit with other effects in it that nothing is fitted of: its covariance has them as known."""
-    simulated = problem.simulate(made.p, active)
-    before, after = _columns(problem, made.active), _columns(problem, active)
+    simulated = problem.simulate(fit.p, active)
+    before, after = _columns(problem, fit.active), _columns(problem, active)
     covariance = np.zeros((len(after), len(after)))
-    there = [i for i, one in enumerate(after) if one in before]
-    known = [before.index(after[i]) for i in there]
-    covariance[np.ix_(there, there)] = made.covariance[np.ix_(known, known)]
-    residual = {name: problem.observed[name] - one for name, one in simulated.items()}
-    return replace(made, active=active, simulated=simulated, residual=residual, covariance=covariance)
+    there = [i for i, applied in enumerate(after) if applied in before]
+    places = [before.index(after[i]) for i in there]
+    covariance[np.ix_(there, there)] = fit.covariance[np.ix_(places, places)]
+    residual = {name: problem.observed[name] - column for name, column in simulated.items()}
+    return replace(fit, active=active, simulated=simulated, residual=residual, covariance=covariance)
 
 
-def _columns(problem: Problem, active: Sequence[Active]) -> list[tuple[object, ...]]:
+def _columns(problem: Problem, active: Sequence[AppliedEffect]) -> list[tuple[object, ...]]:
     """Return what tells the parameters of a fit apart, in the order of its covariance."""
-    made: list[tuple[object, ...]] = [(one.name,) for one in problem.free]
-    for one in active:
-        at = (one.effect.name, one.channel, one.source, one.runs)
-        made += [(*at, each.name) for each in one.searched]
-    return made
+    columns: list[tuple[object, ...]] = [(parameter.name,) for parameter in problem.free]
+    for applied in active:
+        at = applied.key
+        columns += [(*at, parameter.name) for parameter in applied.searched]
+    return columns
 
 
 def noise_of(
     problem: Problem, residual: Stacked, layouts: dict[str, Layout], *, used: int = 0
-) -> dict[str, Noise]:
+) -> dict[str, Autoregression]:
     """Return the noise of every output's residual."""
     return {
         name: fit_noise(
@@ -208,33 +281,34 @@ def noise_of(
 def log_prior(problem: Problem, p: Sequence[float]) -> float:
     """Return the logarithm of the priors' density, without its constant."""
     return -0.5 * sum(
-        ((value - one.value) / (one.sd or 1.0)) ** 2 for value, one in zip(p, problem.free, strict=True)
+        ((value - parameter.value) / (parameter.sd or 1.0)) ** 2
+        for value, parameter in zip(p, problem.free, strict=True)
     )
 
 
-def held_out_score(problem: Problem, made: Fit, rows: NDArray[np.bool_]) -> float:
+def held_out_score(problem: Problem, fit: Fit, rows: NDArray[np.bool_]) -> float:
     """Return the log-likelihood of rows that a fit has not seen, under the noise of its training rows."""
     total = 0.0
     for name in problem.names:
         where = problem.layout(name, rows)
         if where.n:
-            total += log_likelihood(made.residual[name][where.index], where, made.noise[name])
+            total += log_likelihood(fit.residual[name][where.index], where, fit.noise[name])
     return total
 
 
-def jacobian(problem: Problem, made: Fit) -> tuple[dict[str, NDArray[np.float64]], NDArray[np.float64]]:
+def jacobian(problem: Problem, fit: Fit) -> tuple[dict[str, NDArray[np.float64]], NDArray[np.float64]]:
     """Return d(simulated)/d(x) over all rows of each output, and the sizes of x; x = (p, effects) / sizes."""
-    space = Space.of(problem, made.active)
-    return space.around(space.at(made.p))[1], space.sizes
+    space = Space.of(problem, fit.active)
+    return space.around(space.at(fit.p))[1], space.sizes
 
 
-def _white(problem: Problem, residual: Stacked, layouts: dict[str, Layout]) -> dict[str, Noise]:
-    made = {}
+def _white(problem: Problem, residual: Stacked, layouts: dict[str, Layout]) -> dict[str, Autoregression]:
+    noise = {}
     for name, where in layouts.items():
         values = residual[name][where.index]
         size = math.sqrt(float(np.mean(values**2))) if len(values) else 0.0
-        made[name] = Noise(reflection=(), sd=max(size, problem.floor[name]))
-    return made
+        noise[name] = Autoregression(reflection=(), sd=max(size, problem.floor[name]))
+    return noise
 
 
 def _score(
@@ -242,7 +316,7 @@ def _score(
     x: NDArray[np.float64],
     residual: Stacked,
     layouts: dict[str, Layout],
-    noise: dict[str, Noise],
+    noise: dict[str, Autoregression],
 ) -> float:
     p, _ = space.split(x)
     total = log_prior(space.problem, p)
@@ -253,7 +327,7 @@ def _score(
 
 
 def _covariance(
-    space: Space, solved: _Solved, other: _Solved | None, layouts: dict[str, Layout], *, plain: bool
+    space: Space, solved: _Solved, alternative: _Solved | None, layouts: dict[str, Layout], *, plain: bool
 ) -> NDArray[np.float64]:
     """Return the covariance of a solution, with what the plain ``other`` disagrees with it beside.
 
@@ -263,13 +337,11 @@ def _covariance(
     if not len(solved.x):
         return np.zeros((0, 0))
     J = space.around(solved.x)[1]
-    prior = np.zeros((len(space.problem.free), len(solved.x)))
-    for i, one in enumerate(space.problem.free):
-        prior[i, i] = space.sizes[i] / (one.sd or 1.0)
-    made = covariance(J, prior, space.sizes, layouts, solved.noise, plain=plain)
-    if other is not None:
-        unsure = np.diag(covariance(J, prior, space.sizes, layouts, other.noise, plain=True))
-        apart = ((other.x - solved.x) * space.sizes) ** 2
-        expected = np.maximum(unsure - np.diag(made), 0.0)
-        made = made + np.diag(np.where(apart > _APART**2 * expected, apart, 0.0))
-    return made
+    prior = space.problem.prior_rows(space.sizes, len(solved.x))
+    matrix = covariance(J, prior, space.sizes, layouts, solved.noise, plain=plain)
+    if alternative is not None:
+        unsure = np.diag(covariance(J, prior, space.sizes, layouts, alternative.noise, plain=True))
+        apart = ((alternative.x - solved.x) * space.sizes) ** 2
+        expected = np.maximum(unsure - np.diag(matrix), 0.0)
+        matrix = matrix + np.diag(np.where(apart > NOISE.apart**2 * expected, apart, 0.0))
+    return matrix

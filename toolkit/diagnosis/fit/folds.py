@@ -9,14 +9,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from toolkit.diagnosis.fit.fit import Fit, fit, held_out_score, jacobian
-from toolkit.diagnosis.simulators.simulator import Active
+from toolkit.diagnosis.policy import ROWS
+from toolkit.effects.applied import AppliedEffect
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from toolkit.diagnosis.fit.problem import Problem
-
-_FOLDS = 5
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -33,39 +32,39 @@ class Folds:
         return "contiguous blocks of one run" if runs == 1 else "contiguous blocks of the runs"
 
 
-def folds_of(problem: Problem, made: Fit) -> Folds:
+def folds_of(problem: Problem, fit: Fit) -> Folds:
     """Return the folds of a problem, at most five, runs dealt out in turn.
 
     Where a free parameter belongs to one run alone (its own initial state), a run that is held out whole
     would leave it at its prior: then blocks of every run are held out in its place.
     """
-    runs = [one for one in problem.slices if one.stop > one.start]
-    if len(runs) >= 2 and not _own_parameters(problem, made):
-        count = min(_FOLDS, len(runs))
-        held = []
+    runs = [rows for rows in problem.slices if rows.stop > rows.start]
+    if len(runs) >= 2 and not _own_parameters(problem, fit):
+        count = min(ROWS.folds, len(runs))
+        masks = []
         for k in range(count):
             mask = np.zeros(problem.rows, dtype=bool)
             for one in runs[k::count]:
                 mask[one] = True
-            held.append(mask)
-        return Folds(held=tuple(held), by_run=True)
-    held = []
-    for k in range(_FOLDS):
+            masks.append(mask)
+        return Folds(held=tuple(masks), by_run=True)
+    masks = []
+    for k in range(ROWS.folds):
         mask = np.zeros(problem.rows, dtype=bool)
-        for one in runs:
-            mask[np.array_split(np.arange(one.start, one.stop), _FOLDS)[k]] = True
+        for run in runs:
+            mask[np.array_split(np.arange(run.start, run.stop), ROWS.folds)[k]] = True
         if mask.any():
-            held.append(mask)
-    return Folds(held=tuple(held), by_run=False)
+            masks.append(mask)
+    return Folds(held=tuple(masks), by_run=False)
 
 
-def _own_parameters(problem: Problem, made: Fit) -> bool:
-    columns, _ = jacobian(problem, made)
+def _own_parameters(problem: Problem, fit: Fit) -> bool:
+    columns, _ = jacobian(problem, fit)
     for i in range(len(problem.free)):
         moved = [
-            any(float(np.abs(columns[name][one, i]).max()) > 0 for name in problem.names)
-            for one in problem.slices
-            if one.stop > one.start
+            any(float(np.abs(columns[name][rows, i]).max()) > 0 for name in problem.names)
+            for rows in problem.slices
+            if rows.stop > rows.start
         ]
         if sum(moved) == 1:
             return True
@@ -86,16 +85,18 @@ class HeldOut:
         return sum(self.scores)
 
 
-def hold_out(problem: Problem, folds: Folds, active: Sequence[Active], start: Fit) -> HeldOut:
+def hold_out(problem: Problem, folds: Folds, active: Sequence[AppliedEffect], start: Fit) -> HeldOut:
     """Fit a hypothesis without each fold and score it there; the simulation is free over whole runs."""
     scores, fits = [], []
     simulated = {name: np.full(problem.rows, np.nan) for name in problem.names}
-    for held in folds.held:
-        made = fit(problem, active, start=start.p, rows=~held, noise=start.noise, rounds=2, plain=start.plain)
-        scores.append(held_out_score(problem, made, held))
-        fits.append(made)
+    for mask in folds.held:
+        trained = fit(
+            problem, active, start=start.p, rows=~mask, noise=start.noise, rounds=2, plain=start.plain
+        )
+        scores.append(held_out_score(problem, trained, mask))
+        fits.append(trained)
         for name in problem.names:
-            simulated[name][held] = made.simulated[name][held]
+            simulated[name][mask] = trained.simulated[name][mask]
     return HeldOut(scores=tuple(scores), simulated=simulated, fits=tuple(fits))
 
 
@@ -104,10 +105,14 @@ def matters(problem: Problem, before: HeldOut, after: HeldOut, least: float) -> 
 
     By its mean square or by its variance: where a drift starts is found in a later step.
     """
-    for name, kept in problem.kept.items():
-        observed = problem.observed[name][kept]
-        one, other = (observed - each.simulated[name][kept] for each in (before, after))
-        if np.mean(other**2) < np.mean(one**2) * (1 - least) or np.var(other) < np.var(one) * (1 - least):
+    for name, counted in problem.kept.items():
+        observed = problem.observed[name][counted]
+        error_before, error_after = (
+            observed - held_out.simulated[name][counted] for held_out in (before, after)
+        )
+        if np.mean(error_after**2) < np.mean(error_before**2) * (1 - least) or np.var(error_after) < np.var(
+            error_before
+        ) * (1 - least):
             return True
     return False
 
@@ -120,11 +125,12 @@ def beyond_form(problem: Problem, refitted: HeldOut, before: HeldOut, after: Hel
     refitted, before : without any effect, and with those that were found
     form : how far an effect's form is off, as a share of what the effect is
     """
-    for name, kept in problem.kept.items():
-        observed = problem.observed[name][kept]
-        none, one, other = (
-            float(np.mean((observed - each.simulated[name][kept]) ** 2)) for each in (refitted, before, after)
+    for name, counted in problem.kept.items():
+        observed = problem.observed[name][counted]
+        square_refitted, square_before, square_after = (
+            float(np.mean((observed - held_out.simulated[name][counted]) ** 2))
+            for held_out in (refitted, before, after)
         )
-        if one - other > form**2 * max(none - one, 0.0):
+        if square_before - square_after > form**2 * max(square_refitted - square_before, 0.0):
             return True
     return False

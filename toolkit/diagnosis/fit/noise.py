@@ -13,17 +13,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from toolkit.diagnosis.policy import NOISE
+
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-_GAP = 3.0  # median steps of time, beyond which a series begins anew
-_FEWEST = 24  # values of a segment below which nothing can be told of its colour
-_ORDERS = 8
-_MISMATCH = 3.0  # times a stated noise: a larger residual is mostly no noise
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Noise:
+class Autoregression:
     """An autoregression: reflection coefficients, and the innovations' standard deviation.
 
     ``reflection`` has one entry an order; white noise has none. ``sd`` is in the output's unit.
@@ -48,24 +45,24 @@ class Noise:
 
 def predictor(reflection: Sequence[float]) -> list[NDArray[np.float64]]:
     """Return the predictor of every order 0..p: value = sum a_j * value[-j] (Levinson's recursion)."""
-    made: list[NDArray[np.float64]] = [np.zeros(0)]
+    orders: list[NDArray[np.float64]] = [np.zeros(0)]
     for k in reflection:
-        last = made[-1]
-        made.append(np.concatenate([last - k * last[::-1], [k]]))
-    return made
+        last = orders[-1]
+        orders.append(np.concatenate([last - k * last[::-1], [k]]))
+    return orders
 
 
-def autocovariance(noise: Noise, count: int) -> NDArray[np.float64]:
+def autocovariance(noise: Autoregression, count: int) -> NDArray[np.float64]:
     """Return the noise's autocovariance at lags 0 to ``count`` - 1, shape (count,)."""
     orders = predictor(noise.reflection)
     gamma = np.zeros(count)
     gamma[0] = noise.marginal_sd**2
-    left, p = gamma[0], len(noise.reflection)
+    innovation, p = gamma[0], len(noise.reflection)
     for k in range(1, min(p + 1, count)):
         # Levinson's recursion read backwards: the reflection coefficient gives the next lag.
-        known = float(orders[k - 1] @ gamma[k - 1 : 0 : -1]) if k > 1 else 0.0
-        gamma[k] = known + noise.reflection[k - 1] * left
-        left *= 1 - noise.reflection[k - 1] ** 2
+        predicted = float(orders[k - 1] @ gamma[k - 1 : 0 : -1]) if k > 1 else 0.0
+        gamma[k] = predicted + noise.reflection[k - 1] * innovation
+        innovation *= 1 - noise.reflection[k - 1] ** 2
     for k in range(p + 1, count):
         gamma[k] = float(orders[p] @ gamma[k - 1 : k - p - 1 : -1]) if p and k > p else 0.0
     return gamma
@@ -87,33 +84,33 @@ class Layout:
         return len(self.index)
 
 
-def layout(times: Sequence[NDArray[np.float64]], kept: Sequence[NDArray[np.bool_]]) -> Layout:
+def layout(times: Sequence[NDArray[np.float64]], counted: Sequence[NDArray[np.bool_]]) -> Layout:
     """Return the layout of one output.
 
     Parameters
     ----------
     times : of each run [s], shape (n_run,)
-    kept : of each run, which values count
+    counted : of each run, which values count
     """
     index, segments, offset, start = [], [], 0, 0
-    for t, good in zip(times, kept, strict=True):
+    for t, good in zip(times, counted, strict=True):
         at = np.flatnonzero(good)
         if len(at):
             steps = np.diff(t[at])
             usual = np.median(np.diff(t)) if len(t) > 1 else 1.0
-            breaks = np.flatnonzero(steps > _GAP * usual) + 1
+            breaks = np.flatnonzero(steps > NOISE.gap * usual) + 1
             for piece in np.split(at, breaks):
                 segments.append(slice(start, start + len(piece)))
                 start += len(piece)
             index.append(at + offset)
         offset += len(t)
-    whole = np.concatenate(index) if index else np.zeros(0, dtype=np.int64)
-    return Layout(whole.astype(np.int64), tuple(segments))
+    places = np.concatenate(index) if index else np.zeros(0, dtype=np.int64)
+    return Layout(places.astype(np.int64), tuple(segments))
 
 
 def fit_noise(
     residual: NDArray[np.float64], where: Layout, *, floor: float, sd: float | None = None, used: int = 0
-) -> Noise:
+) -> Autoregression:
     """Return the noise of a residual: Burg's method over all segments, the order by BIC.
 
     Parameters
@@ -126,20 +123,20 @@ def fit_noise(
     """
     n = where.n
     if n == 0:
-        return Noise(reflection=(), sd=floor)
+        return Autoregression(reflection=(), sd=floor)
     variance = float(np.mean(residual**2))
-    if sd is not None and variance > (_MISMATCH * sd) ** 2:
+    if sd is not None and variance > (NOISE.mismatch * sd) ** 2:
         # Most of it is none of the sensor's. Taken as coloured noise, a smooth mismatch foretells itself, and
         # what mends all but a jagged rest of it would look worse than nothing.
-        return Noise(reflection=(), sd=math.sqrt(variance * n / max(n - used, 1)))
+        return Autoregression(reflection=(), sd=math.sqrt(variance * n / max(n - used, 1)))
     reflection: list[float] = []
     best, best_score = 0, math.log(max(variance, 1e-300))
-    usable = [one for one in where.segments if one.stop - one.start >= _FEWEST]
+    usable = [segment for segment in where.segments if segment.stop - segment.start >= NOISE.fewest]
     if usable:
-        forward = [residual[one].copy() for one in usable]
-        backward = [residual[one].copy() for one in usable]
-        left = variance
-        for order in range(1, _ORDERS + 1):
+        forward = [residual[segment].copy() for segment in usable]
+        backward = [residual[segment].copy() for segment in usable]
+        innovation = variance
+        for order in range(1, NOISE.orders + 1):
             top = bottom = 0.0
             for i, (f, b) in enumerate(zip(forward, backward, strict=True)):
                 forward[i], backward[i] = f[1:], b[:-1]
@@ -151,20 +148,23 @@ def fit_noise(
             for i, (f, b) in enumerate(zip(forward, backward, strict=True)):
                 forward[i], backward[i] = f - k * b, b - k * f
             reflection.append(k)
-            left *= 1 - k * k
-            score = math.log(max(left, 1e-300)) + order * math.log(n) / n
+            innovation *= 1 - k * k
+            score = math.log(max(innovation, 1e-300)) + order * math.log(n) / n
             if score < best_score - 1e-12:
                 best, best_score = order, score
     chosen = tuple(reflection[:best])
-    white = whiten(residual, where, Noise(reflection=chosen, sd=1.0))
+    white = whiten(residual, where, Autoregression(reflection=chosen, sd=1.0))
     dof = max(n - used, 1)
-    made = math.sqrt(float(np.sum(white**2)) / dof)
+    sd_of_innovations = math.sqrt(float(np.sum(white**2)) / dof)
     if sd is not None:
-        made = max(made, sd * math.sqrt(math.prod(1 - k * k for k in chosen)) if not chosen else made)
-    return Noise(reflection=chosen, sd=max(made, floor))
+        sd_of_innovations = max(
+            sd_of_innovations,
+            sd * math.sqrt(math.prod(1 - k * k for k in chosen)) if not chosen else sd_of_innovations,
+        )
+    return Autoregression(reflection=chosen, sd=max(sd_of_innovations, floor))
 
 
-def whiten(values: NDArray[np.float64], where: Layout, noise: Noise) -> NDArray[np.float64]:
+def whiten(values: NDArray[np.float64], where: Layout, noise: Autoregression) -> NDArray[np.float64]:
     """Return innovations over their standard deviation; ``values`` (n,) or (n, columns).
 
     Exact for a stationary autoregression: the first values of a segment are predicted by lower orders.
@@ -173,27 +173,27 @@ def whiten(values: NDArray[np.float64], where: Layout, noise: Noise) -> NDArray[
     p = len(noise.reflection)
     if p == 0:
         return values / noise.sd
-    made = values.copy()
+    innovations = values.copy()
     for j, weight in enumerate(orders[p], start=1):
-        made[j:] -= weight * values[:-j]
+        innovations[j:] -= weight * values[:-j]
     early = [
         math.sqrt(math.prod(1 - noise.reflection[j] ** 2 for j in range(k, p))) for k in range(p)
     ]  # innovation sd of order p over that of order k
-    for one in where.segments:
-        x = values[one.start : min(one.start + p, one.stop)]
+    for segment in where.segments:
+        x = values[segment.start : min(segment.start + p, segment.stop)]
         for k in range(len(x)):
             past = orders[k] @ x[:k][::-1] if k else 0.0
-            made[one.start + k] = (x[k] - past) * early[k]
-    return made / noise.sd
+            innovations[segment.start + k] = (x[k] - past) * early[k]
+    return innovations / noise.sd
 
 
-def log_likelihood(residual: NDArray[np.float64], where: Layout, noise: Noise) -> float:
+def log_likelihood(residual: NDArray[np.float64], where: Layout, noise: Autoregression) -> float:
     """Return the Gaussian log-likelihood of a residual under a noise (natural logarithm)."""
     white = whiten(residual, where, noise)
     p = len(noise.reflection)
     shorter = 0.0
     if p:
         tails = [math.log(math.prod(1 - noise.reflection[j] ** 2 for j in range(k, p))) / 2 for k in range(p)]
-        shorter = sum(sum(tails[: min(p, one.stop - one.start)]) for one in where.segments)
+        shorter = sum(sum(tails[: min(p, segment.stop - segment.start)]) for segment in where.segments)
     n = where.n
     return float(-0.5 * np.sum(white**2) - n * math.log(noise.sd) - 0.5 * n * math.log(2 * math.pi) + shorter)

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from toolkit.diagnosis.case.case import Run
     from toolkit.diagnosis.fit.fit import Fit
     from toolkit.diagnosis.fit.problem import Problem
-    from toolkit.diagnosis.simulators.simulator import Active
+    from toolkit.effects.applied import AppliedEffect
 
 VARIANTS = ("nominal", "refitted", "augmented")
 
@@ -29,17 +29,17 @@ def prediction_names(runs: Sequence[Run]) -> tuple[str, ...]:
     The path of the case is kept without what would lead out of the folder, a workbook becomes a CSV; where
     two would then be one, a number tells them apart.
     """
-    made: list[str] = []
+    names: list[str] = []
     for run in runs:
-        parts = [one for one in run.name.replace("\\", "/").split("/") if one not in ("", ".", "..")]
+        parts = [part for part in run.name.replace("\\", "/").split("/") if part not in ("", ".", "..")]
         path = PurePosixPath(*parts) if parts else PurePosixPath("prediction.csv")
         if path.suffix.lower() in (".xlsx", ".xlsm"):
             path = path.with_suffix(".csv")
         at, name = 2, str(path)
-        while name in made:
+        while name in names:
             name, at = str(path.with_stem(f"{path.stem}-{at}")), at + 1
-        made.append(name)
-    return tuple(made)
+        names.append(name)
+    return tuple(names)
 
 
 def prediction_csv(problem: Problem, run: Run, fits: Sequence[Fit | None]) -> str:
@@ -51,12 +51,12 @@ def prediction_csv(problem: Problem, run: Run, fits: Sequence[Fit | None]) -> st
     """
     case = problem.case
     columns: dict[str, NDArray[np.float64]] = {}
-    for one in case.channels:
-        if one.role == "time":
-            columns[one.name] = run.columns[one.name]
-    made = [_simulated(problem, run, one) for one in fits]
+    for channel in case.channels:
+        if channel.role == "time":
+            columns[channel.name] = run.columns[channel.name]
+    variants = [_simulated(problem, run, fit) for fit in fits]
     for output in problem.model.outputs:
-        for variant, values in zip(VARIANTS, made, strict=True):
+        for variant, values in zip(VARIANTS, variants, strict=True):
             columns[f"{output.name}_{variant}"] = values[output.name]
     return csv_of(columns)
 
@@ -68,27 +68,29 @@ def csv_of(columns: Mapping[str, NDArray[np.float64]]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _simulated(problem: Problem, run: Run, made: Fit | None) -> Mapping[str, NDArray[np.float64]]:
+def _simulated(problem: Problem, run: Run, fit: Fit | None) -> Mapping[str, NDArray[np.float64]]:
     values = dict(problem.known)
-    if made is None:
+    if fit is None:
         return problem.model.simulate(run, values, ())
-    values.update(zip((one.name for one in problem.free), made.p, strict=True))
-    return problem.model.simulate(run, values, tuple(_spread_to(problem, run, one) for one in made.active))
+    values.update(zip((parameter.name for parameter in problem.free), fit.p, strict=True))
+    return problem.model.simulate(
+        run, values, tuple(_spread_to(problem, run, applied) for applied in fit.active)
+    )
 
 
-def _spread_to(problem: Problem, run: Run, one: Active) -> Active:
+def _spread_to(problem: Problem, run: Run, applied: AppliedEffect) -> AppliedEffect:
     """Return an effect that is confined to some runs with the new run in it, where a condition says so.
 
     The condition is the one whose values part the effect's runs from all the others.
     """
-    if one.runs is None:
-        return one
-    for key in one.effect.confining(run.conditions):
-        inside = {each.conditions.get(key) for each in problem.runs if each.name in one.runs}
-        outside = {each.conditions.get(key) for each in problem.runs if each.name not in one.runs}
+    if applied.runs is None:
+        return applied
+    for key in applied.effect.confining(run.conditions):
+        inside = {run.conditions.get(key) for run in problem.runs if run.name in applied.runs}
+        outside = {run.conditions.get(key) for run in problem.runs if run.name not in applied.runs}
         if not inside & outside and run.conditions[key] in inside:
-            return replace(one, runs=one.runs | {run.name})
-    return replace(one, runs=one.runs - {run.name})
+            return replace(applied, runs=applied.runs | {run.name})
+    return replace(applied, runs=applied.runs - {run.name})
 
 
 def _cell(name: str) -> str:

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from toolkit.diagnosis.fit.noise import Layout, layout
-from toolkit.diagnosis.simulators.simulator import Active, Model, Moving
+from toolkit.diagnosis.policy import ROWS
+from toolkit.diagnosis.simulators.simulator import Model
+from toolkit.effects.applied import AppliedEffect
+from toolkit.errors import FitError
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -19,8 +22,8 @@ if TYPE_CHECKING:
 
     Stacked = dict[str, NDArray[np.float64]]
 
-_ISOLATED = 8.0  # robust standard deviations from the neighbours' median: no physics does that in one row
-_SHARE = 0.03  # of the rows; more than that is no outlier but a pattern
+
+_QUARTERS = 2  # of a cycle, by which the columns of a pattern are apart: sine and cosine make every phase
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -45,7 +48,7 @@ class Problem:
     @property
     def names(self) -> tuple[str, ...]:
         """Names of the outputs."""
-        return tuple(one.name for one in self.model.outputs)
+        return tuple(output.name for output in self.model.outputs)
 
     @property
     def rows(self) -> int:
@@ -55,27 +58,32 @@ class Problem:
     def layout(self, name: str, rows: NDArray[np.bool_] | None = None) -> Layout:
         """Return the layout of an output's kept values, confined to some rows."""
         good = self.kept[name] if rows is None else self.kept[name] & rows
-        return layout([run.t for run in self.runs], [good[one] for one in self.slices])
+        return layout([run.t for run in self.runs], [good[rows] for rows in self.slices])
 
-    def simulate(self, p: Sequence[float], active: Sequence[Active]) -> Stacked:
+    def simulate(self, p: Sequence[float], active: Sequence[AppliedEffect]) -> Stacked:
         """Return every output over all runs in their order; ``p`` are the free parameters."""
         values = dict(self.known)
-        values.update(zip((one.name for one in self.free), map(float, p), strict=True))
-        made = [self.model.simulate(run, values, active) for run in self.runs]
-        return {name: np.concatenate([one[name] for one in made]) for name in self.names}
+        values.update(zip((parameter.name for parameter in self.free), map(float, p), strict=True))
+        outputs = [self.model.simulate(run, values, active) for run in self.runs]
+        return {name: np.concatenate([output[name] for output in outputs]) for name in self.names}
 
-    def prepare(self, wanted: Sequence[tuple[Sequence[float], Sequence[Active]]]) -> None:
+    def prepare(self, points: Sequence[tuple[Sequence[float], Sequence[AppliedEffect]]]) -> None:
         """Have several simulations made at once where the model can; `simulate` then finds them."""
-        prepare = getattr(self.model, "prepare", None)
-        if prepare is None:
+        together = self.model.capability.together
+        if together is None:
             return
-        names = [one.name for one in self.free]
-        sets = [(self.known | dict(zip(names, map(float, p), strict=True)), active) for p, active in wanted]
+        names = [parameter.name for parameter in self.free]
+        sets = [(self.known | dict(zip(names, map(float, p), strict=True)), active) for p, active in points]
         for run in self.runs:
-            prepare(run, sets)
+            together(run, sets)
 
     def pushed(
-        self, p: Sequence[float], active: Sequence[Active], one: Active, pattern: Pattern, forces: int
+        self,
+        p: Sequence[float],
+        active: Sequence[AppliedEffect],
+        applied: AppliedEffect,
+        pattern: Pattern,
+        forces: int,
     ) -> Stacked:
         """Return linear responses of every output over all runs to small forces, (rows, forces).
 
@@ -83,44 +91,103 @@ class Problem:
 
         Parameters
         ----------
-        one : where and in which runs they act
+        applied : where and in which runs they act
         pattern : positions (n,) to forces (n, forces)
         """
         values = dict(self.known)
-        values.update(zip((each.name for each in self.free), map(float, p), strict=True))
+        values.update(zip((parameter.name for parameter in self.free), map(float, p), strict=True))
         parts: dict[str, list[NDArray[np.float64]]] = {name: [] for name in self.names}
-        moving = self.model if isinstance(self.model, Moving) else None
+        moving = self.model.capability.motion
         for run in self.runs:
-            made: Stacked = {}
-            if moving is not None and one.acts_in(run):
-                made = moving.pushed(run, values, active, one.channel, pattern)
+            responses: Stacked = {}
+            if moving is not None and applied.acts_in(run):
+                responses = moving.pushed(run, values, active, applied.channel, pattern)
             for name, column in parts.items():
-                column.append(made.get(name, np.zeros((run.rows, forces))))
+                column.append(responses.get(name, np.zeros((run.rows, forces))))
         return {name: np.concatenate(column) for name, column in parts.items()}
+
+    def prior_rows(self, sizes: NDArray[np.float64], columns: int) -> NDArray[np.float64]:
+        """Return d(parameter over its prior's sd)/dx below the rows of the data, (free, columns).
+
+        Parameters
+        ----------
+        sizes : of the searched vector x, the free parameters first
+        columns : of the whole matrix; what stands behind the free parameters has no prior
+        """
+        rows = np.zeros((len(self.free), columns))
+        for i, parameter in enumerate(self.free):
+            rows[i, i] = sizes[i] / (parameter.sd or 1.0)
+        return rows
+
+    def off_priors(self, p: Sequence[float]) -> NDArray[np.float64]:
+        """Return how far free parameters are off their declared values, in prior sd, (free,)."""
+        pairs = zip(p, self.free, strict=True)
+        return np.array([(value - parameter.value) / (parameter.sd or 1.0) for value, parameter in pairs])
+
+    def patterned(
+        self,
+        p: Sequence[float],
+        active: Sequence[AppliedEffect],
+        applied: AppliedEffect,
+        starts: Sequence[Mapping[str, float]],
+    ) -> list[Stacked]:
+        """Return the responses of an output to a term with a pattern, (rows, 2) for each start.
+
+        Hundreds of starts would be too many simulations; their linear responses along one are not.
+
+        Parameters
+        ----------
+        applied : where and in which runs the term acts
+        starts : its parameters; the columns are a quarter of a cycle apart
+
+        Raises
+        ------
+        FitError
+            the simulation cannot be run, or has no linear response
+        """
+        pattern = None if applied.effect.term is None else applied.effect.term.pattern
+        if pattern is None:
+            return []
+        hook = pattern
+        responses = self.pushed(p, active, applied, lambda x: hook(x, starts), _QUARTERS * len(starts))
+        for column in responses.values():
+            if not np.isfinite(column).all():
+                raise FitError(
+                    "an equation cannot be linearised along its motion",
+                    where=str(applied.channel),
+                    got="responses without bound",
+                    expected="an equation that is smooth where it moves",
+                    next_step="look at the equation where it has corners",
+                    rule="simulator",
+                )
+        return [
+            {name: column[:, [k, k + len(starts)]] for name, column in responses.items()}
+            for k in range(len(starts))
+        ]
 
     def sd_of(self, name: str) -> float | None:
         """Return the stated noise of an output."""
-        return next(one.sd for one in self.model.outputs if one.name == name)
+        return next(output.sd for output in self.model.outputs if output.name == name)
 
 
 def problem_of(case: Case, model: Model) -> Problem:
     """Return the problem of a case: runs of the phase ``tare`` are no part of it."""
     runs = tuple(run for run in case.runs if run.conditions.get("phase") != "tare")
-    observed: dict[str, list[NDArray[np.float64]]] = {one.name: [] for one in model.outputs}
+    observed: dict[str, list[NDArray[np.float64]]] = {output.name: [] for output in model.outputs}
     for run in runs:
-        made = model.observed(run)
+        recorded = model.observed(run)
         for name, column in observed.items():
-            column.append(made.get(name, np.full(run.rows, np.nan)))
+            column.append(recorded.get(name, np.full(run.rows, np.nan)))
     stacked = {name: np.concatenate(columns) for name, columns in observed.items()}
-    unsure: dict[str, float] = getattr(model, "unsure", {})
+    unsure = model.capability.unsure
     ends = np.cumsum([run.rows for run in runs])
     slices = tuple(slice(int(end - run.rows), int(end)) for end, run in zip(ends, runs, strict=True))
     return Problem(
         case=case,
         model=model,
         runs=runs,
-        free=tuple(one for one in model.parameters if one.sd is not None),
-        known={one.name: one.value for one in model.parameters},
+        free=tuple(parameter for parameter in model.parameters if parameter.sd is not None),
+        known={parameter.name: parameter.value for parameter in model.parameters},
         observed=stacked,
         kept={name: np.isfinite(column) for name, column in stacked.items()},
         floor={name: max(_resolution(column), unsure.get(name, 0.0)) for name, column in stacked.items()},
@@ -136,22 +203,22 @@ def without_outliers(problem: Problem, residual: Stacked) -> Problem:
     """
     from dataclasses import replace
 
-    kept = {}
+    counted = {}
     for name, r in residual.items():
         good = problem.kept[name].copy()
-        for one in problem.slices:
-            here = np.flatnonzero(good[one]) + one.start
-            if len(here) < 12:
+        for rows in problem.slices:
+            places = np.flatnonzero(good[rows]) + rows.start
+            if len(places) < ROWS.fewest_for_outliers:
                 continue
-            values = r[here]
+            values = r[places]
             away = values - _running_median(values)
             scale = 1.4826 * float(np.median(np.abs(away))) or float(np.std(away))
             steps = 1.4826 * float(np.median(np.abs(np.diff(values)))) / np.sqrt(2)
-            far = np.abs(away) > _ISOLATED * max(scale, steps, 1e-300)
-            if 0 < far.sum() <= max(1, _SHARE * len(here)):
-                good[here[far]] = False
-        kept[name] = good
-    return replace(problem, kept=kept)
+            far = np.abs(away) > ROWS.isolated * max(scale, steps, 1e-300)
+            if 0 < far.sum() <= max(1, ROWS.outliers * len(places)):
+                good[places[far]] = False
+        counted[name] = good
+    return replace(problem, kept=counted)
 
 
 def _running_median(x: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolkit.diagnosis.simulators.simulator import Active
+from toolkit.diagnosis.policy import PRIORS
+from toolkit.effects.applied import AppliedEffect
 from toolkit.errors import FitError
 
 if TYPE_CHECKING:
@@ -21,7 +22,6 @@ if TYPE_CHECKING:
     Stacked = dict[str, Array]
 
 _STEP = 1e-4  # of a parameter's size, for differences
-_WITHIN = 4.0  # prior standard deviations; further off a parameter is not uncertain but imitates an effect
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -29,25 +29,25 @@ class Space:
     """One hypothesis as a vector with bounds."""
 
     problem: Problem
-    active: tuple[Active, ...]
+    active: tuple[AppliedEffect, ...]
     sizes: Array
     low: Array
     high: Array
 
     @staticmethod
-    def of(problem: Problem, active: tuple[Active, ...]) -> Space:
+    def of(problem: Problem, active: tuple[AppliedEffect, ...]) -> Space:
         """Return the space of a problem's free parameters and of the values that effects search."""
         sizes, low, high = [], [], []
         for one in problem.free:
             size = one.sd or abs(one.value) or 1.0
             sizes.append(size)
             bounds = one.bounds or (-math.inf, math.inf)
-            reach = _WITHIN * one.sd if one.sd else math.inf
+            reach = PRIORS.within * one.sd if one.sd else math.inf
             low.append(max(bounds[0], one.value - reach) / size)
             high.append(min(bounds[1], one.value + reach) / size)
-        for each in active:
-            for parameter in each.searched:
-                size = _size(each, parameter.name)
+        for applied in active:
+            for parameter in applied.searched:
+                size = _size(applied, parameter.name)
                 sizes.append(size)
                 low.append(parameter.bounds[0] / size)
                 high.append(parameter.bounds[1] / size)
@@ -55,24 +55,32 @@ class Space:
 
     def begin(self, p: Sequence[float]) -> Array:
         """Return the vector of free parameters and of the effects' values as they are, within the bounds."""
-        begin = [*p, *(_clipped(one, each.name) for one in self.active for each in one.searched)]
+        begin = [
+            *p,
+            *(_clipped(applied, parameter.name) for applied in self.active for parameter in applied.searched),
+        ]
         return np.clip(np.asarray(begin, dtype=np.float64) / self.sizes, self.low, self.high)
 
     def at(self, p: Sequence[float]) -> Array:
         """Return the same with the values as they are."""
-        values = [*p, *(one.values[each.name] for one in self.active for each in one.searched)]
+        values = [
+            *p,
+            *(applied.values[parameter.name] for applied in self.active for parameter in applied.searched),
+        ]
         return np.asarray(values, dtype=np.float64) / self.sizes
 
-    def split(self, x: Array) -> tuple[list[float], tuple[Active, ...]]:
+    def split(self, x: Array) -> tuple[list[float], tuple[AppliedEffect, ...]]:
         """Return free parameters and effects with their values."""
         values = (x * self.sizes).tolist()
         n = len(self.problem.free)
-        made, at = [], n
-        for one in self.active:
-            names = [each.name for each in one.searched]
-            made.append(replace(one, values={**one.values, **dict(zip(names, values[at:], strict=False))}))
+        effects, at = [], n
+        for applied in self.active:
+            names = [parameter.name for parameter in applied.searched]
+            effects.append(
+                replace(applied, values={**applied.values, **dict(zip(names, values[at:], strict=False))})
+            )
             at += len(names)
-        return values[:n], tuple(made)
+        return values[:n], tuple(effects)
 
     def simulated(self, x: Array) -> Stacked:
         """Return every output over all runs.
@@ -101,17 +109,17 @@ class Space:
         """
         points = self._moved(x)
         # Together they have the same steps: what these leave is then no part of a difference.
-        self.problem.prepare([self.split(one) for one in (x, *points)])
-        here = self.simulated(x)
-        made = {name: np.empty((len(column), len(x))) for name, column in here.items()}
+        self.problem.prepare([self.split(point) for point in (x, *points)])
+        simulated = self.simulated(x)
+        slopes = {name: np.empty((len(column), len(x))) for name, column in simulated.items()}
         for i, moved in enumerate(points):
             try:
-                simulated = self.simulated(moved)
+                trial = self.simulated(moved)
             except FitError:
-                simulated = here
-            for name, column in simulated.items():
-                made[name][:, i] = (column - here[name]) / (moved[i] - x[i])
-        return here, made
+                trial = simulated
+            for name, column in trial.items():
+                slopes[name][:, i] = (column - simulated[name]) / (moved[i] - x[i])
+        return simulated, slopes
 
     def _moved(self, x: Array) -> list[Array]:
         points = []
@@ -124,18 +132,18 @@ class Space:
         return points
 
 
-def _size(one: Active, name: str) -> float:
+def _size(applied: AppliedEffect, name: str) -> float:
     """Return the size on which a parameter is searched: its value, or its typical one where that is off."""
-    parameter = next(each for each in one.effect.parameters if each.name == name)
-    value = abs(one.values.get(name, 0.0))
-    scale = one.values.get(f"_size_{name}", 0.0)
+    parameter = next(parameter for parameter in applied.effect.parameters if parameter.name == name)
+    value = abs(applied.values.get(name, 0.0))
+    scale = applied.values.get(f"_size_{name}", 0.0)
     if value and math.isfinite(value):
         return max(value, 0.2 * scale)
     return scale or abs(parameter.typical[0]) or 1.0
 
 
-def _clipped(one: Active, name: str) -> float:
-    parameter = next(each for each in one.effect.parameters if each.name == name)
+def _clipped(applied: AppliedEffect, name: str) -> float:
+    parameter = next(parameter for parameter in applied.effect.parameters if parameter.name == name)
     low, high = parameter.bounds
     inside = 1e-9 * max(abs(low) if math.isfinite(low) else 0.0, 1e-9)
-    return min(max(one.values[name], low + inside), high)
+    return min(max(applied.values[name], low + inside), high)

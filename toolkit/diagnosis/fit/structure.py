@@ -12,19 +12,19 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from toolkit.diagnosis.policy import STRUCTURE
+
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from toolkit.diagnosis.fit.fit import Fit
     from toolkit.diagnosis.fit.problem import Problem
 
-_KNOTS = 7
 _ANGLES = ("TIRE_ANGLE", "DRUM_ANGLE")
-_FEWEST = 4.0  # rows for each column
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Group:
+class SmoothDependence:
     """Columns of a smooth dependence: the output it is in, the variables it depends on."""
 
     output: str
@@ -37,43 +37,43 @@ class Group:
         return {name: self.columns if name == self.output else none for name in problem.names}
 
 
-def groups(problem: Problem, base: Fit) -> list[Group]:
+def groups(problem: Problem, base: Fit) -> list[SmoothDependence]:
     """Return the groups of a case."""
     variables = _variables(problem)
-    made: list[Group] = []
+    dependences: list[SmoothDependence] = []
     for output in problem.names:
         n = int(problem.kept[output].sum())
-        found: list[tuple[tuple[str, ...], NDArray[np.float64]]] = []
-        own = _spline(base.simulated[output])
+        listed: list[tuple[tuple[str, ...], NDArray[np.float64]]] = []
+        own_spline = _spline(base.simulated[output])
         for name, x in [*variables, (output, base.simulated[output])]:
-            columns = own if name == output else _spline(x)
+            columns = own_spline if name == output else _spline(x)
             if columns is not None:
-                found.append(((name,), columns))
+                listed.append(((name,), columns))
             if name in _ANGLES or name.lower() in ("tire_angle", "drum_angle"):
-                found.append(((name,), _harmonics(x)))
+                listed.append(((name,), _harmonics(x)))
         for i, (a, x) in enumerate(variables):
             for b, y in variables[i + 1 :]:
                 product = _product(x, y)
                 if product is not None and "time" not in (a, b):
-                    found.append(((a, b), product))
+                    listed.append(((a, b), product))
         if len(problem.runs) > 1:
-            found.append((("run",), _run_offsets(problem)))
-        for names, columns in found:
-            if columns.shape[1] * _FEWEST <= n:
-                made.append(Group(output=output, variables=names, columns=columns))
-    return made
+            listed.append((("run",), _run_offsets(problem)))
+        for names, columns in listed:
+            if columns.shape[1] * STRUCTURE.rows_per_column <= n:
+                dependences.append(SmoothDependence(output=output, variables=names, columns=columns))
+    return dependences
 
 
 def _variables(problem: Problem) -> list[tuple[str, NDArray[np.float64]]]:
-    found = [
-        (one.name, np.concatenate([run.columns[one.name] for run in problem.runs]))
-        for one in problem.case.drivers
-        if all(one.name in run.columns for run in problem.runs)
+    variables = [
+        (channel.name, np.concatenate([run.columns[channel.name] for run in problem.runs]))
+        for channel in problem.case.drivers
+        if all(channel.name in run.columns for run in problem.runs)
     ]
     rates = []
     if problem.case.has_time:
         elapsed = np.concatenate([run.t - run.t[0] for run in problem.runs])
-        for name, x in found:
+        for name, x in variables:
             steps = []
             for run, place in zip(problem.runs, problem.slices, strict=True):
                 column = x[place]
@@ -82,8 +82,8 @@ def _variables(problem: Problem) -> list[tuple[str, NDArray[np.float64]]]:
             if np.ptp(rate) > 0:
                 low, high = np.quantile(rate, (0.005, 0.995))
                 rates.append((f"d{name}/dt", np.clip(rate, low, high)))
-        found.append(("time", elapsed))
-    return [*found, *rates]
+        variables.append(("time", elapsed))
+    return [*variables, *rates]
 
 
 def _spline(x: NDArray[np.float64]) -> NDArray[np.float64] | None:
@@ -92,10 +92,10 @@ def _spline(x: NDArray[np.float64]) -> NDArray[np.float64] | None:
     if len(values) < 2 or np.ptp(values) <= 1e-9 * np.abs(values).max():
         return None
     scaled = (x - values[0]) / np.ptp(values)
-    if len(values) <= _KNOTS + 1:
+    if len(values) <= STRUCTURE.knots + 1:
         columns = np.stack([scaled**k for k in range(1, min(len(values), 4))], axis=1)
     else:
-        knots = np.unique(np.quantile(scaled, np.linspace(0, 1, _KNOTS)))
+        knots = np.unique(np.quantile(scaled, np.linspace(0, 1, STRUCTURE.knots)))
         columns = np.stack([scaled, *[np.abs(scaled - knot) ** 3 for knot in knots[1:-1]]], axis=1)
     return np.asarray(columns - columns.mean(axis=0))
 
@@ -115,6 +115,6 @@ def _harmonics(angle: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def _run_offsets(problem: Problem) -> NDArray[np.float64]:
     columns = np.zeros((problem.rows, len(problem.slices)))
-    for i, one in enumerate(problem.slices):
-        columns[one, i] = 1.0
+    for i, rows in enumerate(problem.slices):
+        columns[rows, i] = 1.0
     return columns[:, 1:] if len(problem.slices) > 1 else columns

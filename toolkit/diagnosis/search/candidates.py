@@ -2,45 +2,60 @@
 
 from __future__ import annotations
 
+import dataclasses
 import itertools
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-import numpy as np
-
-from toolkit.diagnosis.fit.nuisance import INPUT_NOISE
-from toolkit.diagnosis.search import ripple
-from toolkit.diagnosis.simulators.channel_units import channel_unit
-from toolkit.diagnosis.simulators.forces import LEAST_REACH
-from toolkit.diagnosis.simulators.simulator import DISCRETE, Active
+from toolkit.diagnosis.policy import STARTS
+from toolkit.diagnosis.search.case_view import CaseView
+from toolkit.effects.applied import AppliedEffect, EffectKey
 from toolkit.effects.catalogue import effects
-from toolkit.effects.creep import FROM_REST
-from toolkit.effects.drum_curvature import EXPONENT
 from toolkit.effects.effect import Effect, EffectParameter
-from toolkit.effects.relaxation import WITH_LOAD
-from toolkit.effects.thermal_friction import TEMPERATURES
-from toolkit.effects.unit_error import factors_for
-from toolkit.errors import UnitError
-from toolkit.units import unit
+from toolkit.effects.facts import Values
+from toolkit.effects.filters import lag
+from toolkit.effects.signals import Drive, Setting, Tire
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from toolkit.diagnosis.fit.problem import Problem
+    from toolkit.effects.surroundings import Surroundings
 
-# Effects in which time passes: nothing can be said of them where rows have no time.
-_IN_TIME = frozenset(
-    (
-        "channel_delay filter_lag zero_drift creep relaxation thermal_friction wear viscoelastic_settling "
-        "turn_slip load_lag input_noise"
-    ).split()
+# What imitates physics without being any: noise in the recorded slip angle, which every lag smooths away.
+
+
+def _smoothed(drive: Drive, values: Values, setting: Setting, tire: Tire) -> Drive:
+    del setting, tire
+    tau = max(values["time_constant"], 0.0)
+    forward = lag(drive.t, drive.SA, tau)
+    there_and_back = lag(-drive.t[::-1], forward[::-1], tau)[::-1]
+    return dataclasses.replace(drive, SA=there_and_back)
+
+
+INPUT_NOISE = Effect(
+    name="input_noise",
+    stage="carriage",
+    rank=0,
+    in_time=True,
+    nuisance=True,
+    statement="The recorded slip angle is noisy; the wheel's own is smoother.",
+    equation="SA smoothed forward and backward by one time constant",
+    reference="Rauch, Tung and Striebel, AIAA J. 3 (1965)",
+    signature="a gain from smoothing alone, without delay",
+    separates="",
+    parameters=(
+        EffectParameter(
+            name="time_constant",
+            unit="s",
+            text="of the smoothing, each way",
+            typical=(0.005, 0.2),
+            bounds=(0.0, 10.0),
+            starts=(0.01, 0.05, 0.2),
+        ),
+    ),
+    drive=_smoothed,
 )
-_SUBSETS = 8
-_LOADS = 0.2  # of the largest load: less tells nothing of what goes with it
-_LATE = (1, 4, 12)  # rows
-_SHORT = 0.05  # of the position's spread: the longest distance over which dry friction builds up
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -64,32 +79,45 @@ class Start:
         coefficients : one for each direction
         off : of every amplitude the value at which the effect is not there, those without one left out
         """
-        made = dict(self.values)
+        values = dict(self.values)
         for name in dict.fromkeys(self.amplitudes):
             if name not in off:
                 continue
-            own = [c for one, c in zip(self.amplitudes, coefficients, strict=True) if one == name]
+            weights = [
+                weight
+                for amplitude, weight in zip(self.amplitudes, coefficients, strict=True)
+                if amplitude == name
+            ]
             size = self.values[name] - off[name]
             if name in self.phases:
-                made[name] = off[name] + math.hypot(*own) * size
-                made[self.phases[name]] = math.degrees(math.atan2(own[1], own[0]))
+                values[name] = off[name] + math.hypot(*weights) * size
+                values[self.phases[name]] = math.degrees(math.atan2(weights[1], weights[0]))
             else:
-                made[name] = off[name] + own[0] * size
-        return made
+                values[name] = off[name] + weights[0] * size
+        return values
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Candidate:
-    """An effect at a place, and how a search may start; ``discrete`` ones are there or not."""
+class CandidateEffect:
+    """An effect at a place, and how a search may start."""
 
-    active: Active
+    active: AppliedEffect
     starts: tuple[Start, ...]
-    discrete: bool
 
     @property
-    def key(self) -> tuple[str, str | None, str | None, frozenset[str] | None]:
+    def discrete(self) -> bool:
+        """It is there or not."""
+        return self.active.effect.discrete
+
+    @property
+    def has_pattern(self) -> bool:
+        """Its starts differ by their pattern over the position, and have linear responses."""
+        return self.active.effect.term is not None and self.active.effect.term.pattern is not None
+
+    @property
+    def key(self) -> EffectKey:
         """What tells candidates apart."""
-        return (self.active.effect.name, self.active.channel, self.active.source, self.active.runs)
+        return self.active.key
 
     @property
     def name(self) -> str:
@@ -97,276 +125,107 @@ class Candidate:
         return self.active.effect.name
 
 
-def candidates(problem: Problem) -> tuple[Candidate, ...]:
+def candidates(problem: Problem) -> tuple[CandidateEffect, ...]:
     """Return every candidate of a case."""
-    made = []
+    listed = []
     for effect in (*effects().values(), INPUT_NOISE):
-        if effect.name in _IN_TIME and not problem.case.has_time:
+        if effect.in_time and not problem.case.has_time:
             continue
+        subsets = (None, *_subsets(problem, effect))
         for channel, source in problem.model.places(effect):
-            whole = Active(effect=_as_known(problem, effect), channel=channel, source=source)
-            whole = _within_reach(problem, whole)
-            for runs in (None, *_subsets(problem, effect)):
-                active = replace(whole, runs=runs)
-                starts = _starts(problem, active)
-                if starts:
-                    made.append(Candidate(active=active, starts=starts, discrete=effect.name in DISCRETE))
-    return tuple(made)
+            case = CaseView(problem, channel, source)
+            confined = effect.in_case(case)
+            starts = _starts(case, confined)
+            for runs in subsets if starts else ():
+                active = AppliedEffect(effect=confined, channel=channel, source=source, runs=runs)
+                listed.append(CandidateEffect(active=active, starts=starts))
+    return tuple(listed)
 
 
-def _as_known(problem: Problem, effect: Effect) -> Effect:
-    """Return an effect without the parameters that mean nothing in a case: nobody should search for them."""
-    needless: set[str] = set()
-    if effect.name == "load_friction" and getattr(problem.model, "nominal_load_N", None) is not None:
-        needless = {"reference"}  # the tire's own file states the load
-        effect = replace(effect, equation="friction = 1 + sensitivity * (FZ - FZ0)/FZ0, FZ0 the nominal load")
-    if effect.name == "drum_curvature" and all(one.name != "MZ" for one in problem.model.outputs):
-        needless = {EXPONENT}
-    if effect.name == "relaxation" and not _several_loads(problem):
-        needless = {WITH_LOAD}
-    if effect.name == "thermal_friction":
-        recorded = {one.name for one in problem.case.drivers} & set(TEMPERATURES)
-        needless = {"time_constant" if recorded else "reference"}
-    return replace(effect, parameters=tuple(one for one in effect.parameters if one.name not in needless))
-
-
-def _several_loads(problem: Problem) -> bool:
-    loads = _values(problem, "FZ")
-    return len(loads) > 0 and float(np.ptp(loads)) > _LOADS * float(np.abs(loads).max())
-
-
-def _within_reach(problem: Problem, active: Active) -> Active:
-    """Return an effect with the bounds that its motion sets.
-
-    A bristle as long as the way itself is a spring: over a fall from rest it grows as drag does. A ripple of
-    which the way sees less than two periods does not repeat: it is a stiffness, linear and cubic.
-    """
-    from toolkit.diagnosis.simulators.ode import OdeModel
-
-    if active.effect.name == ripple.NAME:
-        return _bounded(active, "period", ripple.longest(problem, active.channel))
-    if active.effect.name != "coulomb_friction" or not isinstance(problem.model, OdeModel):
-        return active
-    _, speed, way = _motion_scales(problem, active)
-    if problem.model.position_of(str(active.channel)) is None:
-        way = speed * max((float(run.t[-1] - run.t[0]) for run in problem.runs if run.rows), default=0.0)
-    most = max(_SHORT * way, speed * _row_time(problem))
-    return _bounded(active, "presliding", most)
-
-
-def _bounded(active: Active, name: str, most: float) -> Active:
-    parameters = tuple(
-        replace(one, bounds=(one.bounds[0], most)) if one.name == name else one
-        for one in active.effect.parameters
-    )
-    return replace(active, effect=replace(active.effect, parameters=parameters))
-
-
-def _starts(problem: Problem, active: Active) -> tuple[Start, ...]:
-    effect = active.effect
+def _starts(case: Surroundings, effect: Effect) -> tuple[Start, ...]:
     if not effect.parameters:
         return (Start(values={}, directions=({},), amplitudes=()),)
-    scales = {one.name: _scale(problem, active, one) for one in effect.parameters}
-    extra = {f"_size_{one.name}": scales[one.name] * _middle(one) for one in effect.parameters}
-    extra |= _smoothing(problem, active) | _span(problem, active)
-    phases = {one.phase_of: one.name for one in effect.parameters if one.phase_of is not None}
+    scales = {
+        parameter.name: 1.0 if parameter.scale is None else parameter.scale(case)
+        for parameter in effect.parameters
+    }
+    extra = {
+        f"_size_{parameter.name}": scales[parameter.name] * _middle(parameter)
+        for parameter in effect.parameters
+    }
+    extra |= {} if effect.numerics is None else dict(effect.numerics(case))
+    phases = {
+        parameter.phase_of: parameter.name
+        for parameter in effect.parameters
+        if parameter.phase_of is not None
+    }
     still = dict.fromkeys(phases.values(), 0.0)
-    shapes = [one for one in effect.parameters if one.off is None and one.phase_of is None]
-    amplitudes = [one for one in effect.parameters if one.off is not None]
-    made = []
-    grids = [_tried(problem, active, one, scales[one.name]) for one in shapes]
-    for before, shape in itertools.product(_histories(effect), itertools.product(*grids)):
-        fixed = dict(zip((one.name for one in shapes), shape, strict=True)) | extra | before | still
-        off = {one.name: float(one.off or 0.0) for one in amplitudes}
+    shapes = [
+        parameter for parameter in effect.parameters if parameter.off is None and parameter.phase_of is None
+    ]
+    amplitudes = [parameter for parameter in effect.parameters if parameter.off is not None]
+    off = {amplitude.name: float(amplitude.off or 0.0) for amplitude in amplitudes}
+    starts = []
+    grids = [_shape_values(case, shape, scales[shape.name]) for shape in shapes]
+    pasts = ({}, *(dict(past.values) for past in effect.histories))
+    for past, point in itertools.product(pasts, itertools.product(*grids)):
+        fixed = dict(zip((shape.name for shape in shapes), point, strict=True)) | extra | past | still
         if len(amplitudes) == 1 and amplitudes[0].starts:
-            one = amplitudes[0]
-            for value in _steps(problem, active, one):
-                values = fixed | {one.name: value * scales[one.name]}
-                made.append(Start(values=values, directions=(values,), amplitudes=(one.name,)))
+            (amplitude,) = amplitudes
+            for size in _amplitudes(case, amplitude, scales[amplitude.name]):
+                values = fixed | {amplitude.name: size}
+                starts.append(Start(values=values, directions=(values,), amplitudes=(amplitude.name,)))
             continue
-        for share in _shares(problem, effect):
-            sizes = {one.name: share * _middle(one) * scales[one.name] for one in amplitudes}
+        shares = effect.term.shares if effect.term is not None and case.integrates else (1.0,)
+        for share in shares:
+            sizes = {
+                parameter.name: share * _middle(parameter) * scales[parameter.name]
+                for parameter in amplitudes
+            }
             directions, names = [], []
-            for one in amplitudes:
-                alone = fixed | off | {one.name: sizes[one.name]}
-                for turned in (0.0, 90.0) if one.name in phases else (None,):
-                    directions.append(alone if turned is None else alone | {phases[one.name]: turned})
-                    names.append(one.name)
-            made.append(
+            for amplitude in amplitudes:
+                alone = fixed | off | {amplitude.name: sizes[amplitude.name]}
+                for phase in (0.0, 90.0) if amplitude.name in phases else (None,):
+                    directions.append(alone if phase is None else alone | {phases[amplitude.name]: phase})
+                    names.append(amplitude.name)
+            starts.append(
                 Start(
                     values=fixed | sizes, directions=tuple(directions), amplitudes=tuple(names), phases=phases
                 )
             )
-    return tuple(made)
+    return tuple(starts)
 
 
-def _shares(problem: Problem, effect: Effect) -> tuple[float, ...]:
-    """Return the shares of an effect's usual size at which its response is taken.
-
-    A motion answers a small force in proportion; one that is as large as it may ever be has another phase, or
-    comes to rest.
-    """
-    from toolkit.diagnosis.simulators.ode import OdeModel
-
-    moves = isinstance(problem.model, OdeModel) and effect.stage == "dynamics"
-    return (1.0, 0.1) if moves and effect.name not in (ripple.NAME, "overflow") else (1.0,)
-
-
-def _tried(problem: Problem, active: Active, one: EffectParameter, scale: float) -> list[float]:
+def _shape_values(case: Surroundings, shape: EffectParameter, scale: float) -> list[float]:
     """Return the values of a shape from which a search starts."""
-    if active.effect.name == ripple.NAME and one.name == "period":
-        return list(ripple.periods(problem, active.channel))
-    return [value * scale for value in _grid(problem, one)]
+    if shape.start_values is not None:
+        return list(shape.start_values(case))
+    return [value * scale for value in shape.starts or (_middle(shape),)]
 
 
-def _grid(problem: Problem, one: EffectParameter) -> tuple[float, ...]:
-    from toolkit.diagnosis.simulators.ode import OdeModel
-
-    starts = one.starts or (_middle(one),)
-    # The longest bristle of an equation that turns at every row is a spring.
-    return starts[:2] if one.name == "presliding" and isinstance(problem.model, OdeModel) else starts
-
-
-def _histories(effect: Effect) -> tuple[dict[str, float], ...]:
-    """Return what may have been before the first row, where that shapes an effect."""
-    return ({}, {FROM_REST: 1.0}) if effect.name == "creep" else ({},)
-
-
-def _steps(problem: Problem, active: Active, one: EffectParameter) -> tuple[float, ...]:
-    """Return where the only amplitude of an effect starts: a unit is taken for one of its own dimension."""
-    if one.unit == "s":
+def _amplitudes(case: Surroundings, amplitude: EffectParameter, scale: float) -> list[float]:
+    """Return where the only amplitude of an effect starts."""
+    if amplitude.start_values is not None:
+        return list(amplitude.start_values(case))
+    starts = amplitude.starts
+    if amplitude.unit == "s":
         # Of a plant whose rows are far apart, some rows: so far off the response is no straight line.
-        far = [rows * _row_time(problem) for rows in _LATE]
-        far = [time for time in far if time > max(map(abs, one.starts))]
-        return (*one.starts, *far, *(-time for time in far if min(one.starts) < 0))
-    if active.effect.name != "unit_error":
-        return one.starts
-    try:
-        return factors_for(unit(channel_unit(problem.case, problem.model, active.channel)).dimension)
-    except UnitError:
-        return factors_for(None)
+        far = [rows * case.row_time for rows in STARTS.late]
+        far = [time for time in far if time > max(map(abs, starts))]
+        starts = (*starts, *far, *(-time for time in far if min(starts) < 0))
+    return [value * scale for value in starts]
 
 
-def _middle(one: EffectParameter) -> float:
-    low, high = one.typical
+def _middle(parameter: EffectParameter) -> float:
+    low, high = parameter.typical
     if low * high > 0:
         return math.copysign(math.sqrt(low * high), low)
     return high or low
 
 
-def _scale(problem: Problem, active: Active, one: EffectParameter) -> float:
-    if not one.relative:
-        return 1.0
-    if active.effect.stage == "dynamics":
-        return _dynamic_scale(problem, active, one)
-    own = _spread(problem, active.channel)
-    name = active.effect.name
-    if name == "nonlinearity":
-        return 1 / own if one.name == "quadratic" else 1 / own**2
-    if name == "zero_drift":
-        minutes = sum(float(run.t[-1] - run.t[0]) for run in problem.runs if run.rows > 1) / 60
-        return 20 * own / max(minutes, 1e-9)
-    if name == "thermal_drift":
-        return 100 * own / max(_temperature_range(problem), 0.1)
-    if name == "crosstalk":
-        return own / _spread(problem, active.source)
-    return own
-
-
-def _dynamic_scale(problem: Problem, active: Active, one: EffectParameter) -> float:
-    force, speed, place = _motion_scales(problem, active)
-    known: dict[str, tuple[float, float]] = getattr(problem.model, "reach", {})
-    reach = known.get(str(active.channel), (speed, place))
-    return {
-        "force": force,
-        "coulomb": force,
-        "amplitude": force,
-        # Where it is largest, not at its spread: a cube of three of them would be another motion.
-        "viscous": force / reach[0],
-        "drag": force / reach[0] ** 2,
-        "k3": force / reach[1] ** 3,
-        "period": place,
-        "level": place,
-        "presliding": speed * _row_time(problem),
-    }[one.name]
-
-
-def _row_time(problem: Problem) -> float:
-    steps = np.concatenate([np.diff(run.t) for run in problem.runs if run.rows > 1] or [np.ones(1)])
-    return float(np.median(steps))
-
-
-def _motion_scales(problem: Problem, active: Active) -> tuple[float, float, float]:
-    """Return the sizes of force, velocity and position of the equation that an effect enters."""
-    from toolkit.diagnosis.simulators.ode import OdeModel
-
-    model = problem.model
-    if isinstance(model, OdeModel):
-        name = str(active.channel)
-        rate, own = model.scale[name]
-        position = model.position_of(name)
-        place = own if position is None else model.scale[position][1]
-        if active.effect.name == "overflow":
-            # A state that starts at zero and only falls has no level to run over.
-            place = model.largest[name] or place
-        return rate, own, place
-    motion = getattr(model, "motion", None)
-    force = _spread(problem, active.channel)
-    speed = place = 1.0
-    if motion is not None:
-        if motion.kind == "force":
-            speed = _spread(problem, motion.velocity) if motion.velocity else 1.0
-            place = _spread(problem, motion.position) if motion.position else 1.0
-        else:
-            force, speed, place = motion.scales()
-    return force, speed, place
-
-
-def _smoothing(problem: Problem, active: Active) -> dict[str, float]:
-    if active.effect.name != "coulomb_friction":
-        return {}
-    speed = _motion_scales(problem, active)[1]
-    return {"smooth": 1e-3 * speed, LEAST_REACH: 1e-3 * speed * _row_time(problem)}
-
-
-def _span(problem: Problem, active: Active) -> dict[str, float]:
-    """Return half the range of a channel and its middle, over all runs: its loops have one shape."""
-    if active.effect.name != "hysteresis":
-        return {}
-    values = _values(problem, active.channel)
-    if not len(values):
-        return {}
-    low, high = float(values.min()), float(values.max())
-    return {"_span": 0.5 * (high - low), "_middle": 0.5 * (high + low)}
-
-
-def _spread(problem: Problem, name: str | None) -> float:
-    if name is None:
-        return 1.0
-    values = np.abs(_values(problem, name))
-    return float(values.max()) if len(values) and values.max() > 0 else 1.0
-
-
-def _values(problem: Problem, name: str | None) -> NDArray[np.float64]:
-    """Return what was recorded of a channel over all runs, nothing where it was not."""
-    if name is not None and name in problem.observed:
-        values = problem.observed[name]
-    else:
-        columns = [run.columns[str(name)] for run in problem.runs if name in run.columns]
-        values = np.concatenate(columns) if columns else np.zeros(0)
-    return values[np.isfinite(values)]
-
-
-def _temperature_range(problem: Problem) -> float:
-    for name in ("T_CELL", "T_AMBIENT", "T", "T_TREAD"):
-        columns = [run.columns[name] for run in problem.runs if name in run.columns]
-        if columns:
-            return float(np.ptp(np.concatenate(columns)))
-    return 1.0
-
-
 def _subsets(problem: Problem, effect: Effect) -> list[frozenset[str]]:
-    made: list[frozenset[str]] = []
+    """Return the sets of runs to which the conditions may confine an effect."""
+    subsets: list[frozenset[str]] = []
     names = {run.name for run in problem.runs}
     for key in effect.confining(key for run in problem.runs for key in run.conditions):
         levels: dict[str, list[str]] = {}
@@ -376,13 +235,13 @@ def _subsets(problem: Problem, effect: Effect) -> list[frozenset[str]]:
         if len(levels) < 2:
             continue
         ordered = _in_order(list(levels))
-        groups: list[Sequence[str]] = [[one] for one in ordered]
+        groups: list[Sequence[str]] = [[level] for level in ordered]
         groups += [ordered[:k] for k in range(2, len(ordered))]
-        for group in groups[:_SUBSETS]:
-            chosen = frozenset(itertools.chain.from_iterable(levels[one] for one in group))
-            if chosen not in made and chosen != names:
-                made.append(chosen)
-    return made
+        for group in groups[: STARTS.subsets]:
+            runs = frozenset(itertools.chain.from_iterable(levels[level] for level in group))
+            if runs not in subsets and runs != names:
+                subsets.append(runs)
+    return subsets
 
 
 def _in_order(levels: list[str]) -> list[str]:

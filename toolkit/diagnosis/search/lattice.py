@@ -13,14 +13,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from toolkit.diagnosis.policy import LATTICE
+
 if TYPE_CHECKING:
     from numpy.typing import NDArray
-
-_FEWEST = 20
-_COARSE = 0.1  # of the residual's variance that rounding to the step must make
-_EXACT = 1e-3  # of a step, by which values may miss the lattice
-_FINER = 1.5  # a step of one last place is only how the file was printed
-_COARSER, _MANY = 10.0, 8  # a few values have a step of two or five places by chance
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -43,27 +39,28 @@ def lattice_of(values: NDArray[np.float64], residual_sd: float) -> Lattice | Non
     values : as recorded, (n,), without missing ones
     residual_sd : of what a simulation leaves of them
     """
-    if len(values) < _FEWEST:
+    if len(values) < LATTICE.fewest:
         return None
     steps = np.diff(np.unique(values))
     size = float(np.abs(values).max())
     steps = steps[steps > 1e-9 * max(size, 1e-300)]
-    if len(steps) < 3:
+    if len(steps) < LATTICE.fewest_steps:
         return None
     least = float(steps.min())
     counts = np.round(steps / least)
-    if np.abs(steps / least - counts).max() > _EXACT * max(float(counts.max()), 1.0):
+    if np.abs(steps / least - counts).max() > LATTICE.exact * max(float(counts.max()), 1.0):
         return None
-    whole = float(np.sum(counts))
-    step = float(np.sum(steps)) / whole
+    total = float(np.sum(counts))
+    step = float(np.sum(steps)) / total
     printed = _last_place(values)
+    rounded = step**2 / 12  # variance of what rounding to a step takes away
     if (
-        step < (_FINER if len(steps) >= _MANY else _COARSER) * printed
-        or step**2 / 12 < _COARSE * residual_sd**2
+        step < (LATTICE.finer if len(steps) >= LATTICE.many else LATTICE.coarser) * printed
+        or rounded < LATTICE.coarse * residual_sd**2
     ):
         return None
     ends = _rounding(values, printed)
-    return Lattice(step=step, half_width=ends / whole, log_score_gain=len(values) * math.log(step / printed))
+    return Lattice(step=step, half_width=ends / total, log_score_gain=len(values) * math.log(step / printed))
 
 
 def _rounding(values: NDArray[np.float64], printed: float) -> float:
@@ -71,10 +68,10 @@ def _rounding(values: NDArray[np.float64], printed: float) -> float:
 
     A file prints either to a fixed place or to so many significant digits, then its ends are the coarsest.
     """
-    shown = (f"{abs(one):.12g}".partition("e")[0].replace(".", "").lstrip("0") for one in values.tolist())
+    shown = (f"{abs(value):.12g}".partition("e")[0].replace(".", "").lstrip("0") for value in values.tolist())
     digits = max(map(len, shown))
     ends = (abs(float(values.min())), abs(float(values.max())))
-    places = (10.0 ** (math.floor(math.log10(one)) + 1 - digits) if one > 0 else printed for one in ends)
+    places = (10.0 ** (math.floor(math.log10(end)) + 1 - digits) if end > 0 else printed for end in ends)
     return sum(0.5 * max(printed, place) for place in places)
 
 

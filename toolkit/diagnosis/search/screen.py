@@ -16,10 +16,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from toolkit.diagnosis.fit.fit import Fit, jacobian, log_prior
-from toolkit.diagnosis.fit.noise import Layout, Noise, fit_noise, log_likelihood, whiten
-from toolkit.diagnosis.search import ripple
-from toolkit.diagnosis.search.candidates import Candidate, Start
-from toolkit.diagnosis.simulators.simulator import Active
+from toolkit.diagnosis.fit.noise import Autoregression, Layout, fit_noise, log_likelihood, whiten
+from toolkit.diagnosis.policy import SCREENING
+from toolkit.diagnosis.search.candidates import CandidateEffect, Start
+from toolkit.effects.applied import AppliedEffect
 from toolkit.errors import FitError
 
 if TYPE_CHECKING:
@@ -29,11 +29,6 @@ if TYPE_CHECKING:
 
     Stacked = dict[str, NDArray[np.float64]]
 
-_TURNS = 2
-_OF_ONE = 6  # starts of one candidate whose gain is made exact
-_SHORT, _LEAST_TRUST = 10.0, 0.3
-_COLLINEAR = 1e-11  # of the largest eigenvalue: what lies below adds nothing that could be told apart
-
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Scored:
@@ -41,12 +36,12 @@ class Scored:
 
     ``directions`` are its responses over all rows of each output, one column for each amplitude; ``block``
     the same whitened, off the nominal parameters, orthonormal. A gain is first a quick one, at the noise of
-    the fit or at white noise, whichever is larger; `Screen.sharpened` makes the best ones exact.
+    the fit or at white noise, whichever is larger; `LinearisedFit.sharpened` makes the best ones exact.
     """
 
-    candidate: Candidate
+    candidate: CandidateEffect
     start: Start
-    active: Active
+    active: AppliedEffect
     gain: float
     directions: Stacked
     block: NDArray[np.float64]
@@ -62,7 +57,7 @@ class Scored:
 class Weighed:
     """Rows of all outputs under one noise, with the priors beneath; what the nominal parameters span."""
 
-    noise: dict[str, Noise]
+    noise: dict[str, Autoregression]
     span: NDArray[np.float64]
     left: NDArray[np.float64]
 
@@ -73,7 +68,7 @@ class Weighed:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Screen:
+class LinearisedFit:
     """What every candidate is held against: a fit, its Jacobian, and its residual under two noises."""
 
     problem: Problem
@@ -86,15 +81,18 @@ class Screen:
     white: Weighed
 
     @staticmethod
-    def of(problem: Problem, base: Fit) -> Screen:
+    def of(problem: Problem, base: Fit) -> LinearisedFit:
         """Return the screen about a fit."""
         columns, sizes = jacobian(problem, base)
         layouts = {name: problem.layout(name) for name in problem.names}
-        plain = {name: Noise(reflection=(), sd=one.marginal_sd) for name, one in base.noise.items()}
+        plain = {
+            name: Autoregression(reflection=(), sd=autoregression.marginal_sd)
+            for name, autoregression in base.noise.items()
+        }
         coloured, white = (
             _weighed(problem, base, columns, sizes, layouts, noise) for noise in (base.noise, plain)
         )
-        bare = Screen(problem, base, columns, sizes, layouts, 0.0, coloured, white)
+        bare = LinearisedFit(problem, base, columns, sizes, layouts, 0.0, coloured, white)
         # What the nominal parameters reach by the same steps without a response: gains count from there.
         none = {name: np.zeros((problem.rows, 0)) for name in problem.names}
         reached = max(0.5 * bare.gain(none)[0], base.log_posterior)
@@ -105,30 +103,34 @@ class Screen:
         """Number of values that count."""
         return sum(where.n for where in self.layouts.values())
 
-    def prepare(self, candidates: Sequence[Candidate]) -> None:
+    def prepare(self, candidates: Sequence[CandidateEffect]) -> None:
         """Have the simulations made at once that scoring the candidates asks for."""
         base = self.base
         listed = [
-            replace(one.active, values=values)
-            for one in candidates
-            if one.name != ripple.NAME
-            for start in one.starts
+            replace(candidate.active, values=values)
+            for candidate in candidates
+            if not candidate.has_pattern
+            for start in candidate.starts
             for values in start.directions
         ]
-        self.problem.prepare([(base.p, base.active), *((base.p, (*base.active, one)) for one in listed)])
+        self.problem.prepare(
+            [(base.p, base.active), *((base.p, (*base.active, applied)) for applied in listed)]
+        )
 
-    def score(self, candidate: Candidate) -> list[Scored]:
+    def score(self, candidate: CandidateEffect) -> list[Scored]:
         """Return a candidate with its quick gains, one for each start that the simulation can run."""
-        made = []
+        trials = []
         for start, directions in zip(candidate.starts, self._directions(candidate), strict=True):
             # Rows that do not count (a cell was lost there) may be without a response.
-            counted = [one[self.layouts[name].index] for name, one in directions.items()]
-            if not any(np.isfinite(one).all() and np.abs(one).max(initial=0.0) > 0 for one in counted):
+            counted = [columns[self.layouts[name].index] for name, columns in directions.items()]
+            if not any(
+                np.isfinite(response).all() and np.abs(response).max(initial=0.0) > 0 for response in counted
+            ):
                 continue
-            directions = {name: np.nan_to_num(one) for name, one in directions.items()}
+            directions = {name: np.nan_to_num(columns) for name, columns in directions.items()}
             gain, block = self.quick(directions, fixed=candidate.discrete)
             active = replace(candidate.active, values=start.values)
-            made.append(
+            trials.append(
                 Scored(
                     candidate=candidate,
                     start=start,
@@ -139,14 +141,14 @@ class Screen:
                     trust=self.trust(self.base.noise),
                 )
             )
-        return made
+        return trials
 
-    def _directions(self, candidate: Candidate) -> Iterator[Stacked]:
+    def _directions(self, candidate: CandidateEffect) -> Iterator[Stacked]:
         """Give the responses of every start, nothing for one that the simulation cannot run."""
-        if candidate.name == ripple.NAME:
+        if candidate.has_pattern:
             try:
-                starts = [one.values for one in candidate.starts]
-                yield from ripple.responses(self.problem, self.base, candidate.active, starts)
+                starts = [start.values for start in candidate.starts]
+                yield from self.problem.patterned(self.base.p, self.base.active, candidate.active, starts)
             except FitError:
                 yield from ({} for _ in candidate.starts)
             return
@@ -154,13 +156,16 @@ class Screen:
             responses = []
             try:
                 for values in start.directions:
-                    one = replace(candidate.active, values=values)
-                    moved = self.problem.simulate(self.base.p, (*self.base.active, one))
+                    applied = replace(candidate.active, values=values)
+                    moved = self.problem.simulate(self.base.p, (*self.base.active, applied))
                     responses.append({name: moved[name] - self.base.simulated[name] for name in moved})
             except FitError:
                 yield {}
                 continue
-            yield {name: np.stack([one[name] for one in responses], axis=1) for name in self.problem.names}
+            yield {
+                name: np.stack([response[name] for response in responses], axis=1)
+                for name in self.problem.names
+            }
 
     def quick(self, directions: Stacked, *, fixed: bool = False) -> tuple[float, NDArray[np.float64]]:
         """Return twice the gain at a fixed noise, the better of two, and the responses' orthonormal block."""
@@ -170,32 +175,32 @@ class Screen:
             raw = raw - under.span @ (under.span.T @ raw)
             block = _orthonormal(raw)
             if fixed:
-                left = float(np.sum((under.left - raw.sum(axis=1)) ** 2))
+                remaining = float(np.sum((under.left - raw.sum(axis=1)) ** 2))
             else:
-                left = under.rest - float(np.sum((block.T @ under.left) ** 2))
-            gains.append(self.n * math.log(under.rest / max(left, 1e-12 * under.rest)))
+                remaining = under.rest - float(np.sum((block.T @ under.left) ** 2))
+            gains.append(self.n * math.log(under.rest / max(remaining, 1e-12 * under.rest)))
             blocks.append(block)
         # White noise overrates what is smooth; as a first look that is what is wanted.
         return (max(gains) if self._is_coloured else gains[0]), blocks[0]
 
-    def trust(self, noise: dict[str, Noise]) -> float:
+    def trust(self, noise: dict[str, Autoregression]) -> float:
         """Return the share of a gain that short coloured series leave: their noise is known from few rows.
 
         In the manner of Bartlett's correction, with rows counted by what they are worth; found on clean
         series of AR(1) noise.
         """
         worth = sum(where.n / noise[name].correlation_rows for name, where in self.layouts.items())
-        return max(_LEAST_TRUST, 1 - _SHORT / max(worth, 1.0))
+        return max(SCREENING.least_trust, 1 - SCREENING.short / max(worth, 1.0))
 
     @property
     def _is_coloured(self) -> bool:
-        return any(one.reflection for one in self.base.noise.values())
+        return any(autoregression.reflection for autoregression in self.base.noise.values())
 
     def rows(self, directions: Stacked) -> NDArray[np.float64]:
         """Return responses whitened by the fit's noise, (values and priors, columns)."""
         return self._rows(directions, self.coloured.noise)
 
-    def _rows(self, directions: Stacked, noise: dict[str, Noise]) -> NDArray[np.float64]:
+    def _rows(self, directions: Stacked, noise: dict[str, Autoregression]) -> NDArray[np.float64]:
         parts = [
             whiten(directions[name][where.index], where, noise[name]) for name, where in self.layouts.items()
         ]
@@ -206,28 +211,32 @@ class Screen:
         """Return all of them, the ``most`` best with their exact gain and the values that reach it."""
         first: list[Scored] = []
         later: list[Scored] = []
-        seen = Counter[object]()
-        for one in sorted(scored, key=lambda one: -one.gain):
-            seen[one.candidate.key] += 1
-            chosen = len(first) < most and seen[one.candidate.key] <= _OF_ONE
-            (first if chosen else later).append(one)
-        made = [self._exact(one) for one in first]
-        least = min((one.gain for one in made), default=0.0)
+        starts_of = Counter[object]()
+        for trial in sorted(scored, key=lambda trial: -trial.gain):
+            starts_of[trial.candidate.key] += 1
+            chosen = len(first) < most and starts_of[trial.candidate.key] <= SCREENING.starts
+            (first if chosen else later).append(trial)
+        sharp = [self._exact(scored) for scored in first]
+        least = min((scored.gain for scored in sharp), default=0.0)
         # What was not sharpened keeps its quick gain, but never ranks before what was.
-        return [*made, *(replace(one, gain=min(one.gain, least)) for one in later)]
+        return [*sharp, *(replace(scored, gain=min(scored.gain, least)) for scored in later)]
 
-    def _exact(self, one: Scored) -> Scored:
-        gain, coefficients, trust = self.gain(one.directions, fixed=one.candidate.discrete)
-        if one.candidate.discrete:
-            return replace(one, gain=gain, trust=trust)
-        known = {each.name: each for each in one.active.effect.parameters}
-        amplitudes = {name: known[name] for name in one.start.amplitudes}
-        off = {name: each.off or 0.0 for name, each in amplitudes.items() if math.isfinite(each.off or 0.0)}
-        values = one.start.reached(coefficients, off) if coefficients else dict(one.start.values)
-        if len(off) == 1 and any(values[name] < known[name].bounds[0] for name in off):
+    def _exact(self, trial: Scored) -> Scored:
+        gain, coefficients, trust = self.gain(trial.directions, fixed=trial.candidate.discrete)
+        if trial.candidate.discrete:
+            return replace(trial, gain=gain, trust=trust)
+        parameters = {parameter.name: parameter for parameter in trial.active.effect.parameters}
+        amplitudes = {name: parameters[name] for name in trial.start.amplitudes}
+        off = {
+            name: amplitude.off or 0.0
+            for name, amplitude in amplitudes.items()
+            if math.isfinite(amplitude.off or 0.0)
+        }
+        values = trial.start.reached(coefficients, off) if coefficients else dict(trial.start.values)
+        if len(off) == 1 and any(values[name] < parameters[name].bounds[0] for name in off):
             # The other sign would fit, and the effect has one only.
             gain = 0.0
-        return replace(one, gain=gain, trust=trust, active=replace(one.active, values=values))
+        return replace(trial, gain=gain, trust=trust, active=replace(trial.active, values=values))
 
     def gain(self, directions: Stacked, *, fixed: bool = False) -> tuple[float, tuple[float, ...], float]:
         """Return twice the gain of the log-likelihood, the responses' coefficients, and its trust.
@@ -235,21 +244,21 @@ class Screen:
         ``fixed`` takes the responses as they are (coefficients one) and fits the nominal parameters alone.
         """
         width = next(iter(directions.values())).shape[1]
-        best, chosen, left = -math.inf, tuple([1.0] * width), self.base.noise
+        best, chosen, noise_there = -math.inf, tuple([1.0] * width), self.base.noise
         for first in (self.base.noise, None) if self._is_coloured else (self.base.noise,):
-            known = first
-            for _ in range(_TURNS):
-                made = self._once(directions, known, fixed=fixed)
-                if made is None:
+            noise = first
+            for _ in range(SCREENING.turns):
+                linear_fit = self._once(directions, noise, fixed=fixed)
+                if linear_fit is None:
                     break
-                value, coefficients, known = made
+                value, coefficients, noise = linear_fit
                 if value > best:
-                    best, chosen, left = value, coefficients, known
-        return 2 * (best - self.log_likelihood), chosen, self.trust(left)
+                    best, chosen, noise_there = value, coefficients, noise
+        return 2 * (best - self.log_likelihood), chosen, self.trust(noise_there)
 
     def _once(
-        self, directions: Stacked, noise: dict[str, Noise] | None, *, fixed: bool
-    ) -> tuple[float, tuple[float, ...], dict[str, Noise]] | None:
+        self, directions: Stacked, noise: dict[str, Autoregression] | None, *, fixed: bool
+    ) -> tuple[float, tuple[float, ...], dict[str, Autoregression]] | None:
         problem, base = self.problem, self.base
         n_p = len(self.sizes)
         width = 0 if fixed else next(iter(directions.values())).shape[1]
@@ -262,37 +271,38 @@ class Screen:
             matrix = self.columns[name][at]
             if not fixed:
                 matrix = np.hstack([matrix, directions[name][at]])
-            used = noise[name] if noise is not None else Noise(reflection=(), sd=_rms(r) or 1.0)
-            white = whiten(np.hstack([matrix, r[:, None]]), where, used)
+            spectrum = noise[name] if noise is not None else Autoregression(reflection=(), sd=_rms(r) or 1.0)
+            white = whiten(np.hstack([matrix, r[:, None]]), where, spectrum)
             blocks.append(white[:, :-1])
             targets.append(white[:, -1])
         free = problem.free
-        prior = np.zeros((len(free), n_p + width))
-        for i, one in enumerate(free):
-            prior[i, i] = self.sizes[i] / (one.sd or 1.0)
-        at_prior = [-(v - one.value) / (one.sd or 1.0) for v, one in zip(base.p, free, strict=True)]
-        found = _solved([*blocks, prior], [*targets, np.array(at_prior)])
-        if not np.isfinite(found).all():
+        prior = problem.prior_rows(self.sizes, n_p + width)
+        solution = _solved([*blocks, prior], [*targets, -problem.off_priors(base.p)])
+        if not np.isfinite(solution).all():
             return None
-        total, made = 0.0, {}
-        p = np.array(base.p) + found[: len(free)] * self.sizes[: len(free)]
+        total, noise_there = 0.0, {}
+        p = np.array(base.p) + solution[: len(free)] * self.sizes[: len(free)]
         total += log_prior(problem, p.tolist())
         for name, where in self.layouts.items():
             at = where.index
-            left = base.residual[name][at] - self.columns[name][at] @ found[:n_p]
-            left = left - (directions[name][at].sum(axis=1) if fixed else directions[name][at] @ found[n_p:])
-            made[name] = fit_noise(
-                left,
+            remaining = base.residual[name][at] - self.columns[name][at] @ solution[:n_p]
+            remaining = remaining - (
+                directions[name][at].sum(axis=1) if fixed else directions[name][at] @ solution[n_p:]
+            )
+            noise_there[name] = fit_noise(
+                remaining,
                 where,
                 floor=problem.floor[name],
                 sd=problem.sd_of(name),
-                used=len(found) // len(self.layouts),
+                used=len(solution) // len(self.layouts),
             )
-            total += log_likelihood(left, where, made[name])
+            total += log_likelihood(remaining, where, noise_there[name])
         coefficients = (
-            tuple([1.0] * next(iter(directions.values())).shape[1]) if fixed else tuple(found[n_p:].tolist())
+            tuple([1.0] * next(iter(directions.values())).shape[1])
+            if fixed
+            else tuple(solution[n_p:].tolist())
         )
-        return total, coefficients, made
+        return total, coefficients, noise_there
 
 
 def _weighed(
@@ -301,18 +311,14 @@ def _weighed(
     columns: Stacked,
     sizes: NDArray[np.float64],
     layouts: dict[str, Layout],
-    noise: dict[str, Noise],
+    noise: dict[str, Autoregression],
 ) -> Weighed:
     blocks, targets = [], []
     for name, where in layouts.items():
         blocks.append(whiten(columns[name][where.index], where, noise[name]))
         targets.append(whiten(base.residual[name][where.index], where, noise[name]))
-    prior = np.zeros((len(problem.free), len(sizes)))
-    for i, one in enumerate(problem.free):
-        prior[i, i] = sizes[i] / (one.sd or 1.0)
-    at_prior = [-(v - one.value) / (one.sd or 1.0) for v, one in zip(base.p, problem.free, strict=True)]
-    span = _orthonormal(np.vstack([*blocks, prior]))
-    target = np.concatenate([*targets, np.array(at_prior)])
+    span = _orthonormal(np.vstack([*blocks, problem.prior_rows(sizes, len(sizes))]))
+    target = np.concatenate([*targets, -problem.off_priors(base.p)])
     return Weighed(noise, span, target - span @ (span.T @ target))
 
 
@@ -324,33 +330,33 @@ def _orthonormal(columns: NDArray[np.float64]) -> NDArray[np.float64]:
     scaled = columns / np.where(size > 0, size, 1.0)
     values, vectors = np.linalg.eigh(scaled.T @ scaled)
     keep = values > 1e-10 * max(float(values.max()), 1e-300)
-    made = (scaled @ vectors[:, keep]) / np.sqrt(values[keep])
+    basis = (scaled @ vectors[:, keep]) / np.sqrt(values[keep])
     # Once more, against what rounding left.
-    q, _ = np.linalg.qr(made)
+    q, _ = np.linalg.qr(basis)
     return np.asarray(q)
 
 
 def best_of(scored: Sequence[Scored]) -> list[Scored]:
     """Return the best start of every candidate, best first."""
     best: dict[object, Scored] = {}
-    for one in scored:
-        key = one.candidate.key
-        if key not in best or one.gain > best[key].gain:
-            best[key] = one
-    return sorted(best.values(), key=lambda one: -one.gain)
+    for trial in scored:
+        key = trial.candidate.key
+        if key not in best or trial.gain > best[key].gain:
+            best[key] = trial
+    return sorted(best.values(), key=lambda scored: -scored.gain)
 
 
 def _solved(blocks: list[NDArray[np.float64]], targets: list[NDArray[np.float64]]) -> NDArray[np.float64]:
     """Return least squares by normal equations on scaled columns: quick, and enough to rank."""
-    gram = sum(one.T @ one for one in blocks)
-    right = sum(one.T @ target for one, target in zip(blocks, targets, strict=True))
+    gram = sum(block.T @ block for block in blocks)
+    right = sum(block.T @ target for block, target in zip(blocks, targets, strict=True))
     gram, right = np.asarray(gram), np.asarray(right)
     if not gram.size:
         return np.zeros(0)
     size = np.sqrt(np.diag(gram))
     size[size == 0] = 1.0
     values, vectors = np.linalg.eigh(gram / np.outer(size, size))
-    keep = values > _COLLINEAR * values.max()
+    keep = values > SCREENING.collinear * values.max()
     return np.asarray(((vectors[:, keep] / values[keep]) @ (vectors[:, keep].T @ (right / size))) / size)
 
 

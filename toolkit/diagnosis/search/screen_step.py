@@ -1,37 +1,100 @@
-"""A look from one hypothesis at all that may be added to it: gains, and p-values of the whole search."""
+"""A look from one hypothesis at all that may be added to it: gains, p-values, and what a refit has masked."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
 
 from toolkit.diagnosis.fit.fit import Fit
 from toolkit.diagnosis.fit.problem import Problem
-from toolkit.diagnosis.search.candidates import Candidate
-from toolkit.diagnosis.search.forward_step import place
-from toolkit.diagnosis.search.null import search_p_values
-from toolkit.diagnosis.search.screen import Scored, Screen, best_of
+from toolkit.diagnosis.policy import PRIORS, SCREENING
+from toolkit.diagnosis.search.candidates import CandidateEffect
+from toolkit.diagnosis.search.screen import LinearisedFit, Scored, best_of
+from toolkit.effects.applied import EffectKey
+from toolkit.errors import FitError
 
-ALPHA = 0.003  # of the whole search, a step
-_SHARPENED = 30  # starts whose gain is computed with the noise estimated anew
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+# What the best of a whole search is worth: the null distribution of its largest statistic.
+
+
+def search_p_values(
+    screen: LinearisedFit, blocks: Sequence[NDArray[np.float64]], gains: Sequence[float], seed: int
+) -> list[float]:
+    """Return for every statistic the chance that a search without an effect finds one as improbable.
+
+    Parameters
+    ----------
+    blocks : orthonormal whitened responses of every candidate and start, (values, k)
+    gains : their gains of twice the log-likelihood, each times its trust
+    """
+    if not blocks:
+        return []
+    widths = [block.shape[1] for block in blocks]
+    stacked = np.hstack(blocks)
+    gram = stacked.T @ stacked
+    values, vectors = np.linalg.eigh(gram)
+    keep = values > 1e-9 * max(float(values.max()), 1e-300)
+    root = vectors[:, keep] * np.sqrt(values[keep])
+    n = screen.n
+    dof = max(n - screen.sizes.size - int(keep.sum()), 1)
+    rng = np.random.default_rng(seed)
+    normal = rng.standard_normal((SCREENING.draws, root.shape[1]))
+    z = normal @ root.T
+    total = (normal**2).sum(axis=1) + rng.chisquare(dof, SCREENING.draws)
+    smallest = np.full(SCREENING.draws, math.inf)
+    starts = np.cumsum([0, *widths[:-1]])
+    for width in sorted(set(widths) - {0}):
+        chosen = starts[[i for i, start_width in enumerate(widths) if start_width == width]]
+        part = sum(z[:, chosen + k] ** 2 for k in range(width))
+        share = np.asarray(part) / total[:, None]
+        statistic = -n * np.log1p(-np.minimum(share, 1 - 1e-9))
+        smallest = np.minimum(smallest, _log_p(statistic.max(axis=1), width))
+    smallest.sort()
+    p_values = []
+    for gain, width in zip(gains, widths, strict=True):
+        p = float(_log_p(np.array([max(gain, 0.0)]), max(width, 1))[0])
+        below = int(np.searchsorted(smallest, p, side="right"))
+        if below >= SCREENING.fewest_draws:
+            p_values.append((below + 1) / (SCREENING.draws + 1))
+        else:
+            # Beyond what was drawn: Bonferroni on as many independent tests as the drawn tail shows.
+            tail = float(smallest[int(SCREENING.tail * SCREENING.draws)])
+            p_values.append(min(1.0, math.exp(min(0.0, p - tail)) * SCREENING.tail))
+    return p_values
+
+
+def _log_p(statistic: NDArray[np.float64], dof: int) -> NDArray[np.float64]:
+    """Return the logarithm of chi-squared's upper tail; far out by its leading term."""
+    from scipy.special import gammaincc, gammaln
+
+    half = 0.5 * statistic
+    tail = gammaincc(0.5 * dof, half)
+    far = (0.5 * dof - 1) * np.log(np.maximum(half, 1e-300)) - half - gammaln(0.5 * dof)
+    return np.where(tail > 1e-290, np.log(np.maximum(tail, 1e-300)), far)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Look:
     """What was seen: ``significant`` are candidates by their best start, the best first.
 
-    ``p_of`` has the p-value of every entry of ``scored``, by its identity; ``left`` are the candidates that
+    ``p_of`` has the p-value of every entry of ``scored``, by its identity; ``candidates`` are those that
     were looked at.
     """
 
-    screen: Screen
-    left: tuple[Candidate, ...]
+    screen: LinearisedFit
+    candidates: tuple[CandidateEffect, ...]
     scored: tuple[Scored, ...]
     significant: tuple[Scored, ...]
     p_of: dict[int, float]
 
 
-def look(problem: Problem, base: Fit, listed: Sequence[Candidate], *, turn: int, seed: int) -> Look:
+def look(problem: Problem, base: Fit, listed: Sequence[CandidateEffect], *, turn: int, seed: int) -> Look:
     """Look from a fit at the candidates that are not in it.
 
     Parameters
@@ -39,23 +102,58 @@ def look(problem: Problem, base: Fit, listed: Sequence[Candidate], *, turn: int,
     turn : how many steps were made before
     seed : of the null's draws
     """
-    screen = Screen.of(problem, base)
-    taken = {place(one) for one in base.active}
-    left = [each for each in listed if place(each.active) not in taken and _is_sought(each, turn)]
-    screen.prepare(left)
-    scored = screen.sharpened([one for each in left for one in screen.score(each)], _SHARPENED)
-    p_values = search_p_values(
-        screen, [one.block for one in scored], [one.gain * one.trust for one in scored], seed
+    screen = LinearisedFit.of(problem, base)
+    present = {applied.key for applied in base.active}
+    candidates = [
+        candidate for candidate in listed if candidate.key not in present and _is_sought(candidate, turn)
+    ]
+    screen.prepare(candidates)
+    scored = screen.sharpened(
+        [score for candidate in candidates for score in screen.score(candidate)], SCREENING.sharpened
     )
-    p_of = {id(one): p for one, p in zip(scored, p_values, strict=True)}
-    significant = tuple(one for one in best_of(scored) if p_of[id(one)] < ALPHA)
-    return Look(screen, tuple(left), tuple(scored), significant, p_of)
+    p_values = search_p_values(
+        screen, [trial.block for trial in scored], [trial.gain * trial.trust for trial in scored], seed
+    )
+    p_of = {id(trial): p for trial, p in zip(scored, p_values, strict=True)}
+    significant = tuple(score for score in best_of(scored) if p_of[id(score)] < SCREENING.alpha)
+    return Look(screen, tuple(candidates), tuple(scored), significant, p_of)
 
 
-def _is_sought(one: Candidate, turn: int) -> bool:
+def _is_sought(candidate: CandidateEffect, turn: int) -> bool:
     """Tell whether a candidate is searched for.
 
-    Coarse steps have a test of their own; what is there or not (a sign, a swap, a unit) is so gross that it
-    comes first or second.
+    What is read off the digits has a test of its own; what is there or not (a sign, a swap, a unit) is so
+    gross that it comes first or second.
     """
-    return one.name != "quantisation" and not (one.discrete and turn > 1)
+    return not candidate.active.effect.from_digits and not (candidate.discrete and turn > 1)
+
+
+def masked(problem: Problem, base: Fit, candidates: Sequence[CandidateEffect]) -> frozenset[EffectKey]:
+    """Return the candidates that explain most from the declared parameters; none where they hold.
+
+    Where a parameter left its prior far behind, it stands in for something that was left out. Seen from there
+    the true effect looks small, because what it explains is explained already, and another that only mends
+    what the parameter could not do looks large. From the declared values the true effect is large; joint
+    fits, with the priors in their score, decide between the two.
+
+    Parameters
+    ----------
+    base : the fit so far, its effects with their values
+    candidates : those that may be added to it
+    """
+    moved = [
+        abs(value - parameter.value) / parameter.sd
+        for value, parameter in zip(base.p, problem.free, strict=True)
+        if parameter.sd is not None
+    ]
+    if not moved or max(moved) < PRIORS.far:
+        return frozenset()
+    declared = tuple(parameter.value for parameter in problem.free)
+    try:
+        simulated = problem.simulate(declared, base.active)
+    except FitError:  # from there, an effect that was found already is beyond what can be simulated
+        return frozenset()
+    residual = {name: problem.observed[name] - values for name, values in simulated.items()}
+    screen = LinearisedFit.of(problem, replace(base, p=declared, simulated=simulated, residual=residual))
+    ranked = best_of([score for candidate in candidates for score in screen.score(candidate)])
+    return frozenset(trial.candidate.key for trial in ranked[: PRIORS.masked])

@@ -2,33 +2,107 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
-from collections.abc import Callable, Sequence
+import sys
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolkit.diagnosis.fit.fit import Fit, fit, replace_effects
+from toolkit.diagnosis.fit.fit import Fit, fit, noise_of, replace_effects
 from toolkit.diagnosis.fit.folds import Folds, HeldOut, folds_of, hold_out, matters
-from toolkit.diagnosis.fit.nuisance import INPUT_NOISE
 from toolkit.diagnosis.fit.problem import Problem, without_outliers
+from toolkit.diagnosis.policy import STEP
 from toolkit.diagnosis.search.candidates import candidates
-from toolkit.diagnosis.search.forward_step import LEAST_GAIN, Step, best_step, joint_fits, place, step_groups
+from toolkit.diagnosis.search.forward_step import Step, best_step, joint_fits, step_groups
 from toolkit.diagnosis.search.lattice import lattice_of
-from toolkit.diagnosis.search.nuisance_refit import refined, without
-from toolkit.diagnosis.search.refit_masking import absorbed
-from toolkit.diagnosis.search.screen import Scored, Screen
-from toolkit.diagnosis.search.screen_step import look
-from toolkit.diagnosis.search.unexplained import NOTICED, StructureFound, remainder
+from toolkit.diagnosis.search.screen import LinearisedFit, Scored
+from toolkit.diagnosis.search.screen_step import look, masked
+from toolkit.diagnosis.search.time_budget import BudgetSpentError, TimeBudget
+from toolkit.diagnosis.search.unexplained import StructureFound, remainder
 from toolkit.errors import FitError
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-MOST_EFFECTS = 4
-_SEEN = 0.01  # of the noise: an effect that never moves an output by more is not there
-_LATER = 0.05  # of the held-out mean square: what an effect beside others must take away
+    from toolkit.diagnosis.search.candidates import CandidateEffect
+    from toolkit.effects.applied import AppliedEffect
+
+# What of a found effect matters for its size alone: the zero beneath it, the noise that went through it.
+
+
+def refined(
+    problem: Problem, folds: Folds, base: Fit, held_out: HeldOut, listed: Sequence[CandidateEffect]
+) -> tuple[Fit, HeldOut]:
+    """Return the hypothesis that a search found with what its effects' sizes depend on.
+
+    Under every drift with the temperature a free zero, as a nuisance: the effect counts from the first
+    row's temperature, and nobody recorded at which one the channel was zeroed. A dead band whose noise
+    comes before it, where the recording is more likely so.
+
+    Parameters
+    ----------
+    base, held : the hypothesis found, fitted to all rows and by folds
+    listed : every candidate of the case
+    """
+    with_zeros = _better(problem, base, _with_zeros(base, listed), -sys.float_info.max)
+    if with_zeros is not base:
+        with contextlib.suppress(FitError):
+            held_out = hold_out(problem, folds, with_zeros.active, with_zeros)
+            base = with_zeros
+    # Rows inside a band have no noise, so that a fold's noise, and its score, hang on which rows it has: the
+    # noise before a band is for the band's width alone, and the score stays that of the sharp one.
+    for applied in base.active:
+        base = _better(problem, base, _with_noise(base, applied), STEP.band_noise)
+    return base, held_out
+
+
+def without(active: Sequence[AppliedEffect], effect: AppliedEffect) -> tuple[AppliedEffect, ...]:
+    """Return effects without one of them; a drift with the temperature goes with its zero."""
+    zero = (effect.channel, None, None)
+
+    def belongs(effect: AppliedEffect) -> bool:
+        return effect.effect.frees_zero and effect.effect.is_zero and effect.key[1:] == zero
+
+    return tuple(applied for applied in active if applied.key != effect.key and not belongs(applied))
+
+
+def _better(problem: Problem, base: Fit, active: tuple[AppliedEffect, ...] | None, least: float) -> Fit:
+    """Return the fit with other effects where it can be made, and gains so much."""
+    if active is None:
+        return base
+    try:
+        refitted = fit(problem, active, start=base.p)
+    except FitError:
+        return base
+    return refitted if refitted.log_posterior >= base.log_posterior + least else base
+
+
+def _with_zeros(base: Fit, listed: Sequence[CandidateEffect]) -> tuple[AppliedEffect, ...] | None:
+    there = {applied.channel for applied in base.active if applied.effect.is_zero}
+    free_zeros = {applied.channel for applied in base.active if applied.effect.frees_zero} - there
+    zeros = tuple(
+        replace(channel.active, values=channel.starts[0].values | {channel.active.effect.names[0]: 0.0})
+        for channel in listed
+        if channel.active.effect.is_zero
+        and channel.active.channel in free_zeros
+        and channel.active.runs is None
+    )
+    return (*base.active, *zeros) if zeros else None
+
+
+def _with_noise(base: Fit, effect: AppliedEffect) -> tuple[AppliedEffect, ...] | None:
+    noise, key = base.noise.get(str(effect.channel)), effect.effect.noise_key
+    if key is None or noise is None:
+        return None
+    return tuple(
+        replace(applied, values={**applied.values, key: noise.marginal_sd})
+        if applied.key == effect.key
+        else applied
+        for applied in base.active
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -45,7 +119,7 @@ class Search:
     structure_before: tuple[StructureFound, ...]
     held_refitted: HeldOut
     held_augmented: HeldOut
-    screen: Screen
+    screen: LinearisedFit
     scored: tuple[Scored, ...]
     skipped: tuple[str, ...]
 
@@ -54,37 +128,18 @@ class Search:
 
         What a short series leaves open of its noise's colour widens it as it shortens a gain.
         """
-        made = self.augmented
-        return float(made.covariance[at, at]) / self.screen.trust(made.noise)
+        fit = self.augmented
+        return float(fit.covariance[at, at]) / self.screen.trust(fit.noise)
 
 
-class BudgetSpentError(Exception):
-    """The budget is spent."""
-
-
-@dataclass(slots=True)
-class Budget:
-    """How long a search may take; ``check`` raises where the time is over."""
-
-    now: Callable[[], float]
-    until: float
-    tell: Callable[[str], None]
-
-    def check(self, what: str) -> None:
-        """Tell what comes next, or raise."""
-        if self.now() > self.until:
-            raise BudgetSpentError(what)
-        self.tell(what)
-
-
-def search(problem: Problem, *, seed: int, budget: Budget) -> Search:
+def search(problem: Problem, *, seed: int, budget: TimeBudget) -> Search:
     """Search for what a simulation leaves out.
 
     Parameters
     ----------
     problem : runs, outputs, nominal parameters
     seed : of the null's draws; from the case's hash, so that an answer repeats
-    budget : of time; a spent one ends the search with what it has
+    budget : a spent one ends the search with what it has
     """
     nominal = _as_declared(problem)
     budget.check("refit of the nominal parameters")
@@ -97,33 +152,33 @@ def search(problem: Problem, *, seed: int, budget: Budget) -> Search:
     steps: list[Step] = []
     base = refitted
     held_base = held_refitted = hold_out(problem, folds, (), refitted)
-    screen = Screen.of(problem, base)
+    screen = LinearisedFit.of(problem, base)
     scored: tuple[Scored, ...] = ()
     before: tuple[StructureFound, ...] = ()
     structure: tuple[StructureFound, ...] = ()
     try:
-        for turn in range(MOST_EFFECTS + 1):
+        for turn in range(STEP.most_effects + 1):
             budget.check(f"step {turn + 1}: screening {len(listed)} candidates")
-            seen = look(problem, base, listed, turn=turn, seed=seed + turn)
-            screen, scored = seen.screen, seen.scored
+            view = look(problem, base, listed, turn=turn, seed=seed + turn)
+            screen, scored = view.screen, view.scored
             budget.check(f"step {turn + 1}: structure of the residual")
             structure = remainder(problem, screen, base, seed + 100 + turn)
             if turn == 0:
                 before = structure
-            if turn == MOST_EFFECTS:
+            if turn == STEP.most_effects:
                 break
-            found = None
-            hidden = absorbed(problem, base, seen.left) if seen.significant else frozenset()
-            for promising, least in step_groups(seen.significant, hidden, _LATER if turn else 2 * NOTICED):
-                told = ", ".join(dict.fromkeys(one.candidate.name for one in promising))
-                budget.check(f"step {turn + 1}: joint fits of {told}")
+            outcome = None
+            hidden = masked(problem, base, view.candidates) if view.significant else frozenset()
+            for promising, least in step_groups(view.significant, hidden, STEP.later if turn else STEP.first):
+                names = ", ".join(dict.fromkeys(trial.candidate.name for trial in promising))
+                budget.check(f"step {turn + 1}: joint fits of {names}")
                 joint = joint_fits(problem, base, promising)
-                found = best_step(problem, folds, base, held_base, joint, seen.p_of, least, held_refitted)
-                if found is not None:
+                outcome = best_step(problem, folds, base, held_base, joint, view.p_of, least, held_refitted)
+                if outcome is not None:
                     break
-            if found is None:
+            if outcome is None:
                 break
-            base, held_base, step = found
+            base, held_base, step = outcome
             if not _is_nuisance(step, steps):
                 steps.append(step)
         base, held_base = refined(problem, folds, base, held_base, listed)
@@ -135,8 +190,8 @@ def search(problem: Problem, *, seed: int, budget: Budget) -> Search:
         skipped.append(str(error))
     base, steps = _with_a_size(problem, base, steps)
     # Every effect with its values of the last joint fit, not of the step that found it.
-    values = {place(one): one for one in base.active}
-    steps = [replace(one, active=values[place(one.active)]) for one in steps]
+    values = {applied.key: applied for applied in base.active}
+    steps = [replace(step, active=values[step.active.key]) for step in steps]
     return Search(
         problem=problem,
         folds=folds,
@@ -156,17 +211,18 @@ def search(problem: Problem, *, seed: int, budget: Budget) -> Search:
 
 def _is_nuisance(step: Step, steps: Sequence[Step]) -> bool:
     """Tell whether a step is no physics: input noise, or the point from which a drift or a loop starts."""
-    if step.active.effect.name == INPUT_NOISE.name:
+    effect = step.active.effect
+    if effect.nuisance:
         return True
-    if step.active.effect.name != "zero_offset":
+    if not effect.is_zero:
         return False
-    beside = [one.active for one in steps if one.active.channel == step.active.channel]
-    offset = abs(step.active.values["offset"])
+    beside = [
+        step_before.active for step_before in steps if step_before.active.channel == step.active.channel
+    ]
+    offset = abs(step.active.values[effect.names[0]])
     return any(
-        one.effect.name in ("thermal_drift", "zero_drift")
-        # Where in its loop a channel stands at first depends on what came before the recording.
-        or (one.effect.name == "hysteresis" and offset <= 0.5 * one.values["width"])
-        for one in beside
+        active.effect.zero_beside is not None and offset <= active.effect.zero_beside(active.values)
+        for active in beside
     )
 
 
@@ -176,27 +232,28 @@ def _stepped(
     """Add the outputs whose recorded values stand on a coarse lattice."""
     for candidate in candidates(problem):
         name = str(candidate.active.channel)
-        if candidate.name != "quantisation" or name not in problem.observed:
+        if not candidate.active.effect.from_digits or name not in problem.observed:
             continue
-        kept = problem.kept[name]
-        sd = float(np.std(base.residual[name][kept]))
-        found = lattice_of(problem.observed[name][np.isfinite(problem.observed[name])], sd)
-        if found is None:
+        counted = problem.kept[name]
+        sd = float(np.std(base.residual[name][counted]))
+        lattice = lattice_of(problem.observed[name][np.isfinite(problem.observed[name])], sd)
+        if lattice is None:
             continue
-        active = replace(candidate.active, values={"step": found.step, "_half_step": found.half_width})
-        gain = found.log_score_gain
-        made = Step(
+        width = candidate.active.effect.names[0]
+        active = replace(candidate.active, values={width: lattice.step, f"_half_{width}": lattice.half_width})
+        gain = lattice.log_score_gain
+        step = Step(
             active=active, p_value=math.exp(-min(gain, 700.0)), held_out_gain=gain, gain=gain, rivals=()
         )
-        steps = [*steps, made]
+        steps = [*steps, step]
         with_steps = replace_effects(problem, base, (*base.active, active))
-        held = HeldOut(
+        held_out = HeldOut(
             scores=held_base.scores,
-            simulated={**held_base.simulated, name: _rounded(held_base.simulated[name], found.step)},
+            simulated={**held_base.simulated, name: _rounded(held_base.simulated[name], lattice.step)},
             fits=held_base.fits,
         )
-        if matters(problem, held_base, held, 2 * NOTICED):
-            held_base = held
+        if matters(problem, held_base, held_out, STEP.first):
+            held_base = held_out
         base = with_steps
     return base, held_base, steps
 
@@ -212,16 +269,16 @@ def _pruned(
     for i in range(len(steps) - 1):
         if len(base.active) < 2:
             break
-        rest = without(base.active, steps[i].active)
+        remaining = without(base.active, steps[i].active)
         try:
-            made = fit(problem, rest, start=base.p)
-            held = hold_out(problem, folds, made.active, made)
+            pruned = fit(problem, remaining, start=base.p)
+            scores = hold_out(problem, folds, pruned.active, pruned)
         except FitError:  # what is left cannot be simulated: the effect is needed
             continue
-        if held_base.total - held.total < LEAST_GAIN:
-            base, held_base = made, held
-            kept = {place(one) for one in rest}
-            steps = [one for one in steps if place(one.active) in kept]
+        if held_base.total - scores.total < STEP.least_gain:
+            base, held_base = pruned, scores
+            keys = {applied.key for applied in remaining}
+            steps = [step for step in steps if step.active.key in keys]
             return _pruned(problem, folds, base, held_base, steps)
     return base, held_base, steps
 
@@ -229,27 +286,26 @@ def _pruned(
 def _with_a_size(problem: Problem, base: Fit, steps: list[Step]) -> tuple[Fit, list[Step]]:
     """Return a hypothesis without effects that a later one left nothing to do."""
     for step in steps:
-        rest = without(base.active, step.active)
+        remaining = without(base.active, step.active)
         try:
-            bare = problem.simulate(base.p, rest)
+            bare = problem.simulate(base.p, remaining)
         except (FitError, BudgetSpentError):  # the simulation needs it, or there is no time to look
             continue
-        moved = {name: one - bare[name] for name, one in base.simulated.items()}
+        moved = {name: column - bare[name] for name, column in base.simulated.items()}
         if all(
-            float(np.abs(one[problem.kept[name]]).max(initial=0.0)) < _SEEN * base.noise[name].marginal_sd
-            for name, one in moved.items()
+            float(np.abs(change[problem.kept[name]]).max(initial=0.0))
+            < STEP.visible * base.noise[name].marginal_sd
+            for name, change in moved.items()
         ):
-            kept = {place(one) for one in rest}
-            left = [one for one in steps if place(one.active) in kept]
-            return _with_a_size(problem, replace_effects(problem, base, rest), left)
+            keys = {applied.key for applied in remaining}
+            remaining_steps = [step for step in steps if step.active.key in keys]
+            return _with_a_size(problem, replace_effects(problem, base, remaining), remaining_steps)
     return base, steps
 
 
 def _as_declared(problem: Problem) -> Fit:
     """Return the simulation as declared, its residual and noise, nothing fitted."""
-    from toolkit.diagnosis.fit.fit import noise_of
-
-    p = tuple(one.value for one in problem.free)
+    p = tuple(parameter.value for parameter in problem.free)
     simulated = problem.simulate(p, ())
     residual = {name: problem.observed[name] - simulated[name] for name in simulated}
     layouts = {name: problem.layout(name) for name in problem.names}

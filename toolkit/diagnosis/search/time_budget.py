@@ -1,4 +1,4 @@
-"""A simulator's calls under a time limit: a budget ends also a call that would take ten minutes."""
+"""How long a search may take: a spent budget ends it between two steps, and a call where it stands."""
 
 from __future__ import annotations
 
@@ -9,8 +9,6 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any, TypeVar
 
-from toolkit.diagnosis.search.search import BudgetSpentError
-
 T = TypeVar("T")
 
 
@@ -18,7 +16,11 @@ class _AlarmError(BaseException):
     """The time is over; no simulator's own ``except Exception`` holds it up."""
 
 
-class Watch:
+class BudgetSpentError(Exception):
+    """The budget is spent."""
+
+
+class TimeBudget:
     """How long a search may take, what it is at, and how long the last simulation took [s]."""
 
     def __init__(self, budget_s: float, tell: Callable[[str], None]) -> None:
@@ -32,6 +34,12 @@ class Watch:
         self.step = step
         self._tell(step)
 
+    def check(self, step: str) -> None:
+        """Tell the step that comes next; BudgetSpentError where the time is over."""
+        if time.monotonic() > self.until:
+            raise BudgetSpentError(step)
+        self.tell(step)
+
     def guarded(self, function: Callable[..., T]) -> Callable[..., T]:
         """Return a function whose calls end with the budget.
 
@@ -39,14 +47,14 @@ class Watch:
         computes in Python never outlives the budget; elsewhere the call that is running is the last.
         """
 
-        def call(*arguments: Any, **named: Any) -> T:
+        def call(*arguments: Any, **keywords: Any) -> T:
             started = time.monotonic()
-            left = self.until - started
-            if left <= 0:
+            seconds = self.until - started
+            if seconds <= 0:
                 raise BudgetSpentError(self.step)
             try:
-                with _alarm(left):
-                    return function(*arguments, **named)
+                with _alarm(seconds):
+                    return function(*arguments, **keywords)
             except _AlarmError:
                 raise BudgetSpentError(self.step) from None
             finally:

@@ -4,21 +4,81 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from toolkit.diagnosis.fit.fit import Fit
-from toolkit.diagnosis.fit.lines import strongest_line
 from toolkit.diagnosis.fit.problem import Problem
-from toolkit.diagnosis.fit.structure import Group, groups
-from toolkit.diagnosis.search.null import search_p_values
-from toolkit.diagnosis.search.screen import Screen
+from toolkit.diagnosis.fit.structure import SmoothDependence, groups
+from toolkit.diagnosis.policy import STEP, STRUCTURE
+from toolkit.diagnosis.search.screen import LinearisedFit
+from toolkit.diagnosis.search.screen_step import search_p_values
 
-ALPHA_STRUCTURE = 0.0005
-NOTICED = 0.01  # of an error: a smaller gain is real perhaps, and matters to nobody
-_EXACT = 15  # groups whose gain is computed with the noise estimated anew
-_STATED = 1.1  # times a stated noise that a residual may have: certificates are round numbers
-_LINE, _LINE_SHARE = 1e-8, 0.05  # p-value and share of variance of a spectral line
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+# Lines in the spectrum of a residual: a disturbance that repeats in time, of a period that nobody named.
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Line:
+    """A line: its frequency [1/s], its p-value among all of them, its share of the residual's variance."""
+
+    frequency: float
+    p_value: float
+    share: float
+
+
+def strongest_line(problem: Problem, name: str, residual: NDArray[np.float64]) -> Line | None:
+    """Return the strongest line of an output's residual, None where no run is long and even enough."""
+    if not problem.case.has_time:
+        return None
+    runs = []
+    for run, place in zip(problem.runs, problem.slices, strict=True):
+        steps = np.diff(run.t)
+        if run.rows < STRUCTURE.line_rows or np.ptp(steps) > STRUCTURE.line_jitter * np.median(steps):
+            continue
+        good = problem.kept[name][place]
+        if good.mean() < STRUCTURE.line_kept:
+            continue
+        values = residual[place]
+        even = np.linspace(run.t[0], run.t[-1], run.rows)
+        runs.append((float(even[1] - even[0]), np.interp(even, run.t[good], values[good])))
+    if not runs:
+        return None
+    n = min(len(values) for _, values in runs)
+    step = runs[0][0]
+    if any(abs(run_step - step) > STRUCTURE.line_even * step for run_step, _ in runs):
+        return None
+    window = np.hanning(n + 2)[1:-1]
+    power = np.zeros(n // 2 + 1)
+    for _, values in runs:
+        x = values[:n] - values[:n].mean()
+        power += np.abs(np.fft.rfft(x * window)) ** 2
+    level = np.array([_level(power, k) for k in range(len(power))])
+    ratio = np.where(level > 0, power / np.maximum(level, 1e-300), 0.0)
+    ratio[: STRUCTURE.line_cycles] = 0.0
+    k = int(np.argmax(ratio))
+    # A sum of R independent periodograms is chi-squared with 2R degrees, its median the level.
+    p = min(1.0, len(power) * _tail(ratio[k], len(runs)))
+    line_power = power[max(k - 1, 1) : k + 2].sum() - 3 * level[k]
+    share = max(0.0, float(line_power / max(power[1:].sum(), 1e-300)))
+    return Line(frequency=k / (n * step), p_value=p, share=share)
+
+
+def _level(power: NDArray[np.float64], k: int) -> float:
+    low, high = max(1, k - STRUCTURE.line_around), min(len(power), k + STRUCTURE.line_around + 1)
+    around = np.concatenate([power[low : max(low, k - 2)], power[min(high, k + 3) : high]])
+    return float(np.median(around)) if len(around) else 0.0
+
+
+def _tail(ratio: float, runs: int) -> float:
+    from scipy.stats import chi2
+
+    median = float(chi2.median(2 * runs))
+    # The level is itself a median of some twenty values: its own scatter is allowed for.
+    return float(chi2.sf(ratio * median / (1 + 2 / math.sqrt(2 * STRUCTURE.line_around)), 2 * runs))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -31,59 +91,63 @@ class StructureFound:
     p_value: float
 
 
-def remainder(problem: Problem, screen: Screen, base: Fit, seed: int) -> tuple[StructureFound, ...]:
+def remainder(problem: Problem, screen: LinearisedFit, base: Fit, seed: int) -> tuple[StructureFound, ...]:
     """Return what stays unexplained about a fit, the largest first; nothing that matters to nobody."""
-    listed: list[Group] = groups(problem, base)
-    directions = [one.directions(problem) for one in listed]
-    quick = [screen.quick(one) for one in directions]
+    listed: list[SmoothDependence] = groups(problem, base)
+    directions = [dependence.directions(problem) for dependence in listed]
+    quick = [screen.quick(dependence) for dependence in directions]
     order = sorted(range(len(listed)), key=lambda i: -quick[i][0])
     gains = [gain for gain, _ in quick]
     trusts = [screen.trust(base.noise)] * len(listed)
     for place, i in enumerate(order):
-        if place < _EXACT:
+        if place < STRUCTURE.sharpened:
             gains[i], _, trusts[i] = screen.gain(directions[i])
-    least = min((gains[i] for i in order[:_EXACT]), default=0.0)
-    for i in order[_EXACT:]:
+    least = min((gains[i] for i in order[: STRUCTURE.sharpened]), default=0.0)
+    for i in order[STRUCTURE.sharpened :]:
         gains[i] = min(gains[i], least)
     weighed = [gain * trust for gain, trust in zip(gains, trusts, strict=True)]
     p_values = search_p_values(screen, [block for _, block in quick], weighed, seed)
-    found = [
-        StructureFound(output=one.output, variables=one.variables, gain=gain, p_value=p)
-        for one, gain, p in zip(listed, gains, p_values, strict=True)
-        if p < ALPHA_STRUCTURE and _share(problem, base, one) > 2 * NOTICED
+    findings = [
+        StructureFound(output=dependence.output, variables=dependence.variables, gain=gain, p_value=p)
+        for dependence, gain, p in zip(listed, gains, p_values, strict=True)
+        if p < STRUCTURE.alpha and _share(problem, base, dependence) > STEP.first
     ]
     for name in problem.names:
         line = strongest_line(problem, name, base.residual[name])
-        if line is not None and line.p_value < _LINE and line.share > _LINE_SHARE:
+        if line is not None and line.p_value < STRUCTURE.line and line.share > STRUCTURE.line_share:
             gain = -2 * math.log(max(line.p_value, 1e-300))
-            told = f"time (a line at {line.frequency:.4g} Hz)"
-            found.append(StructureFound(output=name, variables=(told,), gain=gain, p_value=line.p_value))
+            line_text = f"time (a line at {line.frequency:.4g} Hz)"
+            findings.append(
+                StructureFound(output=name, variables=(line_text,), gain=gain, p_value=line.p_value)
+            )
         beyond = _beyond_noise(problem, base, name)
         if beyond is not None:
-            found.append(beyond)
-    return tuple(sorted(found, key=lambda one: -one.gain))
+            findings.append(beyond)
+    return tuple(sorted(findings, key=lambda dependence: -dependence.gain))
 
 
 def _beyond_noise(problem: Problem, base: Fit, name: str) -> StructureFound | None:
     """Return the finding that a residual is larger than the sensor noise which a certificate states."""
     from scipy.stats import chi2
 
-    sd, kept = problem.sd_of(name), problem.kept[name]
-    if sd is None or kept.sum() < 10:
+    sd, counted = problem.sd_of(name), problem.kept[name]
+    if sd is None or counted.sum() < STRUCTURE.stated_rows:
         return None
     # Coarse steps add their own to what the sensor is stated to have.
-    ratio = float(np.mean(base.residual[name][kept] ** 2)) / (sd**2 + problem.floor[name] ** 2)
-    worth = max(kept.sum() / base.noise[name].correlation_rows, 3.0)
-    p = float(chi2.sf(ratio / _STATED**2 * worth, worth))
-    if p >= ALPHA_STRUCTURE:
+    ratio = float(np.mean(base.residual[name][counted] ** 2)) / (sd**2 + problem.floor[name] ** 2)
+    worth = max(counted.sum() / base.noise[name].correlation_rows, STRUCTURE.stated_worth)
+    p = float(chi2.sf(ratio / STRUCTURE.stated**2 * worth, worth))
+    if p >= STRUCTURE.alpha:
         return None
     gain = float(worth * (ratio - 1 - math.log(ratio)))
     return StructureFound(output=name, variables=("more than its stated noise",), gain=gain, p_value=p)
 
 
-def _share(problem: Problem, base: Fit, group: Group) -> float:
+def _share(problem: Problem, base: Fit, group: SmoothDependence) -> float:
     """Return the share of a residual's variance that a group's columns explain."""
-    kept = problem.kept[group.output]
-    residual, columns = base.residual[group.output][kept], group.columns[kept]
-    found = np.linalg.lstsq(columns, residual, rcond=None)[0]
-    return 1 - float(np.sum((residual - columns @ found) ** 2)) / max(float(np.sum(residual**2)), 1e-300)
+    counted = problem.kept[group.output]
+    residual, columns = base.residual[group.output][counted], group.columns[counted]
+    coefficients = np.linalg.lstsq(columns, residual, rcond=None)[0]
+    return 1 - float(np.sum((residual - columns @ coefficients) ** 2)) / max(
+        float(np.sum(residual**2)), 1e-300
+    )

@@ -12,9 +12,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from toolkit.diagnosis.case.case import CaseParameter
-from toolkit.diagnosis.simulators.channel_units import unit_of
-from toolkit.diagnosis.simulators.simulator import Active, Model, Moving
-from toolkit.effects.sense import computed_in
+from toolkit.diagnosis.simulators.parameter_units import unit_of
+from toolkit.diagnosis.simulators.simulator import Capability, Model
+from toolkit.effects.applied import AppliedEffect
 from toolkit.errors import ConfigError
 from toolkit.findings import Finding
 from toolkit.units import unit
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
     from toolkit.diagnosis.case.case import Case, Run
     from toolkit.effects.effect import Effect
-    from toolkit.simulation.model_file import ModelEffect, ModelParameter
+    from toolkit.simulation.model_file import FittedEffect
 
     Arrays = dict[str, NDArray[np.float64]]
 
@@ -43,153 +43,166 @@ class _Told:
 class _BuiltIn:
     """One effect with the names under which its parameters stand among those of the simulation."""
 
-    active: Active
+    active: AppliedEffect
     told: tuple[_Told, ...]
 
-    def at(self, p: Mapping[str, float]) -> Active:
+    def at(self, p: Mapping[str, float]) -> AppliedEffect:
         """Return the effect with its values of these parameters."""
-        values = {one.parameter: p[one.name] * one.factor for one in self.told}
+        values = {parameter.parameter: p[parameter.name] * parameter.factor for parameter in self.told}
         return dataclasses.replace(self.active, values={**self.active.values, **values})
 
 
-def build_in(case: Case, model: Model) -> None:
-    """Put the effects of a case's own simulation into its model, for good.
+class WithEffects:
+    """A simulation with the effects of its own case in it, in every question that is asked of it.
 
     Raises
     ------
     ConfigError
         ``model-place``: an effect acts on what this case does not have, or in another dimension
     """
-    if not case.effects:
-        return
-    own = {one.name for one in model.parameters}
-    built: list[_BuiltIn] = []
-    free: list[CaseParameter] = []
-    for one, names in zip(case.effects, parameter_names(case.effects), strict=True):
-        made, parameters = _built(case, model, one, names)
-        built.append(made)
-        free += parameters
-    model.parameters = (*model.parameters, *free)
-    plain, places = model.simulate, model.places
-    repeats, prepare = getattr(model, "repeats", None), getattr(model, "prepare", None)
 
-    def only_own(p: Mapping[str, float]) -> dict[str, float]:
-        return {name: value for name, value in p.items() if name in own}
+    def __init__(self, case: Case, plain: Model) -> None:
+        self._plain = plain
+        self._own = {parameter.name for parameter in plain.parameters}
+        pairs = [
+            _built(case, plain, effect, names)
+            for effect, names in zip(case.effects, parameter_names(case.effects), strict=True)
+        ]
+        self._effects = [effect for effect, _ in pairs]
+        self.outputs = plain.outputs
+        self.parameters = (*plain.parameters, *(parameter for _, free in pairs for parameter in free))
+        self.capability = self._wrapped(plain.capability)
 
-    def with_them(p: Mapping[str, float], active: Sequence[Active]) -> tuple[Active, ...]:
-        return (*(one.at(p) for one in built), *active)
+    def _wrapped(self, plain: Capability) -> Capability:
+        repeats, together, motion = plain.repeats, plain.together, plain.motion
+        if repeats is not None:
+            plain = dataclasses.replace(plain, repeats=lambda run, p: repeats(run, self._parameters(p)))
+        if together is not None:
+            plain = dataclasses.replace(
+                plain,
+                together=lambda run, sets: together(
+                    run, [(self._parameters(p), self._all(p, active)) for p, active in sets]
+                ),
+            )
+        if motion is not None:
+            pushed = motion.pushed
+            motion = dataclasses.replace(
+                motion,
+                pushed=lambda run, p, active, channel, pattern: pushed(
+                    run, self._parameters(p), self._all(p, active), channel, pattern
+                ),
+            )
+        return dataclasses.replace(plain, motion=motion)
 
-    def simulate(run: Run, p: Mapping[str, float], active: Sequence[Active]) -> Arrays:
-        return plain(run, only_own(p), with_them(p, active))
+    def _parameters(self, p: Mapping[str, float]) -> dict[str, float]:
+        return {name: value for name, value in p.items() if name in self._own}
 
-    def not_yet(effect: Effect) -> list[tuple[str | None, str | None]]:
+    def _all(self, p: Mapping[str, float], active: Sequence[AppliedEffect]) -> tuple[AppliedEffect, ...]:
+        return (*(effect.at(p) for effect in self._effects), *active)
+
+    def observed(self, run: Run) -> Arrays:
+        """Return what was recorded of every output."""
+        return self._plain.observed(run)
+
+    def simulate(self, run: Run, p: Mapping[str, float], active: Sequence[AppliedEffect]) -> Arrays:
+        """Return every output of a run, the simulation's own effects before those that are added."""
+        return self._plain.simulate(run, self._parameters(p), self._all(p, active))
+
+    def places(self, effect: Effect) -> list[tuple[str | None, str | None]]:
+        """Return where a further effect could act."""
         # Steps on steps of the same size are no second effect, and the recording would name them again.
-        taken = {
-            one.active.channel for one in built if one.active.effect.name == effect.name == "quantisation"
+        stepped = {
+            one.active.channel
+            for one in self._effects
+            if effect.from_digits and one.active.effect.name == effect.name
         }
-        return [place for place in places(effect) if place[0] not in taken]
-
-    model.simulate = simulate  # type: ignore[method-assign]
-    model.places = not_yet  # type: ignore[method-assign]
-    if repeats is not None:
-        model.repeats = lambda run, p: repeats(run, only_own(p))  # type: ignore[attr-defined]
-    if prepare is not None:
-        model.prepare = lambda run, sets: prepare(  # type: ignore[attr-defined]
-            run, [(only_own(p), with_them(p, active)) for p, active in sets]
-        )
-    if isinstance(model, Moving):
-        pushed = model.pushed
-        model.pushed = lambda run, p, active, *more: pushed(  # type: ignore[method-assign]
-            run, only_own(p), with_them(p, active), *more
-        )
+        return [place for place in self._plain.places(effect) if place[0] not in stepped]
 
 
-def parameter_names(effects: Sequence[ModelEffect]) -> tuple[tuple[str, ...], ...]:
+def parameter_names(effects: Sequence[FittedEffect]) -> tuple[tuple[str, ...], ...]:
     """Return the names of each effect's parameters among those of the simulation, all different.
 
-    >>> from toolkit.effects.catalogue import effects
-    >>> from toolkit.simulation.model_file import ModelEffect
-    >>> parameter_names([ModelEffect(effect=effects()["zero_offset"], channel="D51")] * 2)
-    (('zero_offset.D51.offset',), ('zero_offset.D51#2.offset',))
+    Those of a second effect at one place are counted: ``NAME.CHANNEL#2.PARAMETER``.
     """
-    seen: dict[str, int] = {}
-    made = []
-    for one in effects:
-        label = ".".join(part for part in (one.effect.name, one.source, one.channel) if part)
-        seen[label] = seen.get(label, 0) + 1
-        label += f"#{seen[label]}" if seen[label] > 1 else ""
-        made.append(tuple(f"{label}.{name}" for name in one.effect.names))
-    return tuple(made)
+    counts: dict[str, int] = {}
+    names = []
+    for effect in effects:
+        label = effect.applied.key.dotted
+        counts[label] = counts.get(label, 0) + 1
+        label += f"#{counts[label]}" if counts[label] > 1 else ""
+        names.append(tuple(f"{label}.{name}" for name in effect.applied.effect.names))
+    return tuple(names)
 
 
 def _built(
-    case: Case, model: Model, one: ModelEffect, names: Sequence[str]
+    case: Case, model: Model, one: FittedEffect, names: Sequence[str]
 ) -> tuple[_BuiltIn, list[CaseParameter]]:
-    effect = one.effect
-    if (one.channel, one.source) not in [tuple(place) for place in model.places(effect)]:
+    applied, effect = one.applied, one.applied.effect
+    if (applied.channel, applied.source) not in [tuple(place) for place in model.places(effect)]:
         raise ConfigError(
             "the simulation has no place for an effect of its model", where=case.path, got=one.label,
             expected="a case with the channels on which the model's effects act",
             next_step="use the model with recordings of the same channels and roles", rule="model-place",
         )  # fmt: skip
     runs = {run.name for run in (*case.runs, *case.predict)}
-    acting = frozenset(
-        run.name for run in (*case.runs, *case.predict) if one.acts_in(run.name, run.conditions)
-    )
-    active = Active(
-        effect=effect,
-        channel=one.channel,
-        source=one.source,
+    acting = frozenset(run.name for run in (*case.runs, *case.predict) if applied.acts_in(run))
+    active = dataclasses.replace(
+        applied,
         runs=None if acting == runs else acting,
-        values=dict(one.numerics),
+        condition=None,
+        values=applied.numerics,
+        units={},
     )
-    told, free = [], []
-    for name, parameter, own in zip(names, one.parameters, effect.parameters, strict=True):
-        sense = computed_in(effect.name, parameter.name, one.axes or case.axes)
-        low, high = (sense * bound for bound in own.bounds)
-        scale = _scale(case, model, active, parameter)
-        sd = parameter.standard_error if active.searched and effect.name != "quantisation" else None
+    stated, free = [], []
+    for name, parameter in zip(names, effect.parameters, strict=True):
+        sense = parameter.sign_in(one.axes or case.axes)
+        low, high = (sense * bound for bound in parameter.bounds)
+        text = applied.units[parameter.name]
+        scale = _scale(case, model, active, parameter.name, text)
+        fitted = active.searched and not effect.from_digits
+        sd = one.standard_errors.get(parameter.name) if fitted else None
         free.append(
             CaseParameter(
                 name=name,
-                value=parameter.value,
-                unit=parameter.unit,
+                value=applied.values[parameter.name],
+                unit=text,
                 sd=sd,
                 bounds=(min(low, high) / scale, max(low, high) / scale),
             )
         )
-        told.append(_Told(name=name, parameter=parameter.name, factor=sense * scale))
-    return _BuiltIn(active=active, told=tuple(told)), free
+        stated.append(_Told(name=name, parameter=parameter.name, factor=sense * scale))
+    return _BuiltIn(active=active, told=tuple(stated)), free
 
 
-def _scale(case: Case, model: Model, active: Active, parameter: ModelParameter) -> float:
+def _scale(case: Case, model: Model, active: AppliedEffect, name: str, text: str) -> float:
     """Return the factor from a parameter's unit to that of the same parameter in this case."""
-    here = unit_of(case, model, active, parameter.name)
-    if here == parameter.unit:
+    case_unit = unit_of(case, model, active, name)
+    if case_unit == text:
         return 1.0
-    given, own = unit(parameter.unit), unit(here)
-    if given.dimension != own.dimension:
+    file_unit, expected = unit(text), unit(case_unit)
+    if file_unit.dimension != expected.dimension:
         raise ConfigError(
             "a parameter of the model does not fit the case's units",
-            where=f"{case.path}: {active.effect.name}.{parameter.name}", got=parameter.unit, expected=here,
+            where=f"{case.path}: {active.effect.name}.{name}", got=text, expected=case_unit,
             next_step="give the channel the dimension that it had when the model was fitted",
             rule="model-place",
         )  # fmt: skip
-    return given.factor / own.factor
+    return file_unit.factor / expected.factor
 
 
 def built_in_findings(case: Case) -> tuple[Finding, ...]:
     """Return notes on the effects that the simulation has from the start."""
-    made = []
-    for one in case.effects:
-        runs = [run.name for run in case.runs if one.acts_in(run.name, run.conditions)]
+    findings = []
+    for effect in case.effects:
+        runs = [run.name for run in case.runs if effect.applied.acts_in(run)]
         where = "all runs" if len(runs) == len(case.runs) else ", ".join(runs) or "none of the case's runs"
-        made.append(
+        findings.append(
             Finding(
                 rule="case-model",
-                where=one.origin or case.path.name,
+                where=effect.origin or case.path.name,
                 level="note",
-                message=f"the simulation has an effect of an earlier answer in it: {one.label}, in {where}",
+                message="the simulation has an effect of an earlier answer in it: "
+                f"{effect.label}, in {where}",
             )
         )
-    return tuple(made)
+    return tuple(findings)

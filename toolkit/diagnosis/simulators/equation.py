@@ -9,15 +9,44 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from toolkit.diagnosis.simulators.forces import Forces
-from toolkit.diagnosis.simulators.inputs import Inputs
 from toolkit.diagnosis.simulators.integrate import OFF
-from toolkit.diagnosis.simulators.python import silenced
+from toolkit.diagnosis.simulators.user_code import silenced
 from toolkit.errors import FitError
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from toolkit.diagnosis.case.case import Case, Run
+
+
+class Inputs:
+    """Inputs between rows: linear, as a dict of floats."""
+
+    def __init__(self, run: Run, names: Sequence[str]) -> None:
+        self._t = run.t.tolist()
+        self._columns = [(name, run.columns[name].tolist()) for name in names]
+        self._at = 0
+        self._last = len(self._t) - 1
+
+    def __call__(self, t: float) -> dict[str, float]:
+        """Return the inputs at a time."""
+        if not self._columns:
+            return {}
+        times, i = self._t, self._at
+        while i > 0 and t < times[i]:
+            i -= 1
+        while i < self._last - 1 and t >= times[i + 1]:
+            i += 1
+        self._at = i
+        if self._last == 0:
+            return self.row(0)
+        w = (t - times[i]) / (times[i + 1] - times[i])
+        w = 0.0 if w < 0 else (1.0 if w > 1 else w)
+        return {name: (1 - w) * column[i] + w * column[i + 1] for name, column in self._columns}
+
+    def row(self, k: int) -> dict[str, float]:
+        """Return the inputs of a row."""
+        return {name: column[k] for name, column in self._columns}
 
 
 class Equation:
@@ -27,8 +56,8 @@ class Equation:
         self, case: Case, rhs: Callable[..., Any], outputs: Callable[..., Any], initial: Callable[..., Any]
     ) -> None:
         self.case, self.rhs, self._outputs, self._initial = case, rhs, outputs, initial
-        self._drivers = tuple(one.name for one in case.drivers)
-        self._shown = tuple(one.name for one in case.outputs)
+        self._drivers = tuple(channel.name for channel in case.drivers)
+        self._shown = tuple(output.name for output in case.outputs)
 
     def inputs(self, run: Run) -> Inputs:
         """Return a run's inputs between its rows."""
@@ -88,7 +117,7 @@ class Equation:
     ) -> Callable[..., Any]:
         """Return the same for several sets at once, a column each."""
         plain, u = self.rhs, self.inputs(run)
-        there = [(k, one) for k, one in enumerate(forces) if one.listed]
+        there = [(k, force) for k, force in enumerate(forces) if force.listed]
 
         def rhs(t: float, x: NDArray[np.float64]) -> NDArray[np.float64]:
             rate = np.zeros_like(x)

@@ -14,14 +14,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from toolkit.diagnosis.simulators.simulator import Active
 from toolkit.diagnosis.simulators.sliding_friction import Slide
+from toolkit.effects.applied import AppliedEffect
 
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
-
-LEAST_REACH = "least_presliding"  # among an effect's values: a shorter bristle shows in no row
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -38,7 +36,7 @@ class Force:
     bristle: int | None
     way: int | None
     scale: float
-    active: Active
+    active: AppliedEffect
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,7 +48,7 @@ class Forces:
 
     @staticmethod
     def of(
-        active: Sequence[Active],
+        active: Sequence[AppliedEffect],
         states: Sequence[str],
         derivative_of: Mapping[int, int],
         scale: Mapping[str, tuple[float, float]],
@@ -102,23 +100,24 @@ class Forces:
         """Add the forces to the rates of ``own`` states, and set those of the added ones, in place."""
         for one in self.listed:
             i, values = one.velocity, one.active.values
-            if one.active.effect.name == "overflow":
-                width = 1e-3 * one.scale
+            term = one.active.effect.term
+            if term is None:
+                continue
+            if term.limit is not None:
                 if rate[i] > 0:
-                    rate[i] *= min(max((values["level"] - x[i]) / width, 0.0), 1.0)
-            elif one.bristle is not None:
-                reach, v, bend = _reach(one.active), float(x[i]), float(x[own + one.bristle])
+                    rate[i] *= term.limit(x[i], one.scale, values)
+            elif one.bristle is not None and term.bristle is not None:
+                size, reach = term.bristle(values)
+                v, bend = float(x[i]), float(x[own + one.bristle])
                 turning = v - abs(v) * bend
-                coulomb = values["coulomb"]
-                rate[i] -= coulomb * bend
+                rate[i] -= size * bend
                 rate[own + one.bristle] = turning / reach
                 if one.way is not None:
                     rate[own + one.way] = v
-            elif one.active.effect.force is not None:
-                rate[i] -= one.active.effect.force(float(x[one.position]), float(x[i]), values)
+            elif term.force is not None:
+                rate[i] -= term.force(float(x[one.position]), float(x[i]), values)
 
 
-def _reach(one: Active) -> float:
-    if one.effect.name != "coulomb_friction":
-        return 0.0
-    return max(one.values.get("presliding", 0.0), one.values.get(LEAST_REACH, 0.0))
+def _reach(effect: AppliedEffect) -> float:
+    term = effect.effect.term
+    return 0.0 if term is None or term.bristle is None else term.bristle(effect.values)[1]

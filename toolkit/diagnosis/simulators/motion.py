@@ -19,15 +19,18 @@ import numpy as np
 from toolkit.diagnosis.simulators.channels import slopes
 from toolkit.diagnosis.simulators.linear_response import integrated
 from toolkit.diagnosis.simulators.setting import dimension
-from toolkit.diagnosis.simulators.simulator import Active
+from toolkit.diagnosis.simulators.simulator import Moving
+from toolkit.effects.applied import AppliedEffect
 from toolkit.effects.effect import Effect
+from toolkit.effects.forward import resisting
+from toolkit.effects.surroundings import MotionSizes
 from toolkit.units import unit
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from toolkit.diagnosis.case.case import Case, Run
-    from toolkit.diagnosis.simulators.simulator import Pattern
+    from toolkit.diagnosis.simulators.simulator import Largest, Pattern
     from toolkit.effects.signals import Setting
 
 _LENGTHS, _SPEEDS = ("length", "angle"), ("speed", "rad/s", "angular_speed")
@@ -46,20 +49,39 @@ class Motion:
 
     def places(self, effect: Effect) -> list[tuple[str | None, str | None]]:
         """Return the output that a dynamic effect could enter."""
-        if effect.stage != "dynamics":
+        term = effect.term
+        if term is None or term.of == "state":
             return []
-        if effect.name in ("cubic_stiffness", "periodic_ripple") and self.position is None:
+        if term.of == "position" and self.position is None:
             return []
-        if effect.name == "overflow":
-            return []
-        needs_v = effect.name in ("coulomb_friction", "viscous_damping", "quadratic_drag")
-        if needs_v and self.velocity is None and self.kind == "force":
+        if term.of == "velocity" and self.velocity is None and self.kind == "force":
             return []
         return [(self.output, None)]
 
-    def scales(self) -> tuple[float, float, float]:
+    def sizes(self, force: float, largest: Largest) -> MotionSizes:
+        """Return sizes of the motion; those of the recorded channels where the output is a force."""
+        if self.kind == "force":
+            speed = largest(self.velocity) if self.velocity else 1.0
+            place = largest(self.position) if self.position else 1.0
+        else:
+            force, speed, place = self._scales()
+        return MotionSizes(
+            force=force, speed=speed, place=place, fastest=speed, farthest=place, level=place,
+            has_position=self.position is not None,
+        )  # fmt: skip
+
+    def units(self) -> tuple[str, str, str]:
+        """Return units of a force-like term, of its velocity and of its position."""
+        output = self.case.unit(self.output)
+        if self.kind == "force":
+            speed = "1" if self.velocity is None else self.case.unit(self.velocity)
+            return output, speed, f"{speed}*s" if self.position is None else self.case.unit(self.position)
+        length = output if self.kind == "position" else f"{output}*s"
+        return f"{length}/s^2", f"{length}/s", length
+
+    def _scales(self) -> tuple[float, float, float]:
         """Return sizes of acceleration, velocity and position of an output that moves."""
-        run = max(self.case.runs, key=lambda one: one.rows)
+        run = max(self.case.runs, key=lambda run: run.rows)
         y = run.columns[self.output]
         good = np.isfinite(y)
         span = float(np.ptp(run.t)) or 1.0
@@ -75,20 +97,20 @@ class Motion:
         """
         name = self.position or ""
         columns = [run.columns[name] for run in self.case.runs if name in run.columns]
-        columns = [one[np.isfinite(one)] for one in columns]
-        spans = [float(np.ptp(one)) for one in columns if len(one)]
-        steps = [np.abs(np.diff(one)) for one in columns if len(one) > 1]
+        columns = [column[np.isfinite(column)] for column in columns]
+        spans = [float(np.ptp(column)) for column in columns if len(column)]
+        steps = [np.abs(np.diff(column)) for column in columns if len(column) > 1]
         unseen = bool(steps) and self.kind != "force"
         return max(spans, default=0.0), float(np.median(np.concatenate(steps))) if unseen else 0.0
 
     def pushed(
         self,
-        made: Mapping[str, NDArray[np.float64]],
+        simulated: Mapping[str, NDArray[np.float64]],
         run: Run,
         pattern: Callable[[NDArray[np.float64]], NDArray[np.float64]],
     ) -> dict[str, NDArray[np.float64]]:
         """Return what small forces of a pattern over the position add to every output, (rows, forces)."""
-        x = made.get(str(self.position), run.columns.get(str(self.position)))
+        x = simulated.get(str(self.position), run.columns.get(str(self.position)))
         if x is None:
             return {}
         pushes = pattern(x)
@@ -97,36 +119,36 @@ class Motion:
             if self.kind == "position":
                 pushes = integrated(run.t, pushes)
         none = np.zeros_like(pushes)
-        return {name: pushes if name == self.output else none for name in made}
+        return {name: pushes if name == self.output else none for name in simulated}
 
     def disturbed(
-        self, made: Mapping[str, NDArray[np.float64]], forces: Sequence[Active], run: Run
+        self, simulated: Mapping[str, NDArray[np.float64]], forces: Sequence[AppliedEffect], run: Run
     ) -> dict[str, NDArray[np.float64]]:
         """Return the outputs with force-like terms in the equation of motion."""
-        result = dict(made)
+        result = dict(simulated)
         if self.kind == "force":
             zero = np.zeros(run.rows)
             x = zero if self.position is None else run.columns[self.position]
             v = zero if self.velocity is None else run.columns[self.velocity]
-            result[self.output] = made[self.output] + _resisting(forces, run.t, x, v)
+            result[self.output] = simulated[self.output] + resisting(forces, run.t, x, v)
             return result
         return self._moved(result, forces, run)
 
     def _moved(
-        self, made: dict[str, NDArray[np.float64]], forces: Sequence[Active], run: Run
+        self, simulated: dict[str, NDArray[np.float64]], forces: Sequence[AppliedEffect], run: Run
     ) -> dict[str, NDArray[np.float64]]:
         from scipy.interpolate import CubicSpline
 
         if run.rows < 4:
-            return made
+            return simulated
         t = run.t
         is_position = self.kind == "position"
         if is_position:
-            spline = CubicSpline(t, made[self.output])
+            spline = CubicSpline(t, simulated[self.output])
             x0, v0 = float(spline(t[0])), float(spline(t[0], 1))
             acceleration = spline.derivative(2)
         else:
-            spline = CubicSpline(t, made[self.output])
+            spline = CubicSpline(t, simulated[self.output])
             x0, v0 = 0.0, float(spline(t[0]))
             acceleration = spline.derivative(1)
         x, v = np.empty(run.rows), np.empty(run.rows)
@@ -138,7 +160,7 @@ class Motion:
                 a, b = _step(acceleration, forces, at, h, a, b)
                 at += h
             x[i + 1], v[i + 1] = a, b
-        result = dict(made)
+        result = dict(simulated)
         result[self.output] = x if is_position else v
         if is_position and self.velocity in result:
             result[str(self.velocity)] = v
@@ -156,38 +178,49 @@ class AlongMotion(ABC):
 
     @abstractmethod
     def simulate(
-        self, run: Run, p: Mapping[str, float], active: Sequence[Active]
+        self, run: Run, p: Mapping[str, float], active: Sequence[AppliedEffect]
     ) -> dict[str, NDArray[np.float64]]:
         """Return every output of a run with effects in it."""
 
-    def way(self, _channel: str | None) -> tuple[float, float]:
-        """Return the longest way of a run and the usual one between rows, nothing where nothing moves."""
-        return (0.0, 0.0) if self.motion is None else self.motion.way()
+    def moving(self) -> Moving | None:
+        """Return what moves along the recordings, None where their units show no motion."""
+        motion = self.motion
+        if motion is None:
+            return None
 
-    def pushed(
-        self,
-        run: Run,
-        p: Mapping[str, float],
-        active: Sequence[Active],
-        _channel: str | None,
-        pattern: Pattern,
-    ) -> dict[str, NDArray[np.float64]]:
-        """Return what small forces of a pattern over the position add to every output, (rows, forces)."""
-        if self.motion is None:
-            return {}
-        # The class's own: a model file's effects, which wrap that of the instance, are in `active` already.
-        made = type(self).simulate(self, run, p, [one for one in active if one.effect.channel is None])
-        shown = slopes(made, active, run, self.setting(run), run.columns)
-        return {
-            name: shown[name][:, None] * one for name, one in self.motion.pushed(made, run, pattern).items()
-        }
+        def sizes(channel: str | None, largest: Largest) -> MotionSizes:
+            return motion.sizes(largest(channel), largest)
+
+        def pushed(
+            run: Run, p: Mapping[str, float], active: Sequence[AppliedEffect], _: str | None, pattern: Pattern
+        ) -> dict[str, NDArray[np.float64]]:
+            simulated = self.simulate(
+                run, p, [applied for applied in active if applied.effect.channel is None]
+            )
+            shown = slopes(simulated, active, run, self.setting(run), run.columns)
+            responses = motion.pushed(simulated, run, pattern)
+            return {name: shown[name][:, None] * column for name, column in responses.items()}
+
+        return Moving(
+            integrates=False, sizes=sizes, units=lambda _: motion.units(), way=lambda _: motion.way(),
+            pushed=pushed,
+        )  # fmt: skip
 
 
 def _step(
-    acceleration: Callable[[float], object], forces: Sequence[Active], t: float, h: float, x: float, v: float
+    acceleration: Callable[[float], object],
+    forces: Sequence[AppliedEffect],
+    t: float,
+    h: float,
+    x: float,
+    v: float,
 ) -> tuple[float, float]:
     """Return position and velocity after a step of Runge and Kutta's fourth order."""
-    terms = [(one.effect.force, one.values) for one in forces if one.effect.force is not None]
+    terms = [
+        (force.effect.term.force, force.values)
+        for force in forces
+        if force.effect.term is not None and force.effect.term.force is not None
+    ]
 
     def rate(at: float, position: float, speed: float) -> tuple[float, float]:
         pull = sum(force(position, speed, values) for force, values in terms)
@@ -203,30 +236,10 @@ def _step(
     )
 
 
-def _resisting(
-    forces: Sequence[Active], t: NDArray[np.float64], x: NDArray[np.float64], v: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    total = np.zeros(len(x))
-    for one in forces:
-        if one.effect.recorded is not None:
-            total += one.effect.recorded(t, v, one.values)
-            continue
-        force = one.effect.force
-        if force is None:
-            continue
-        # A constant is reported as the term that stands in the output's own equation.
-        sign = -1.0 if one.effect.name in ("constant_force", "periodic_ripple") else 1.0
-        values = one.values
-        total += sign * np.fromiter(
-            (force(a, b, values) for a, b in zip(x.tolist(), v.tolist(), strict=True)), np.float64, len(x)
-        )
-    return total
-
-
 def motion_of(case: Case) -> Motion | None:
     """Return how dynamic terms could enter a case, None where its units show no motion."""
-    inputs = {one.name: dimension(one.unit) for one in case.drivers}
-    outputs = {one.name: dimension(one.unit) for one in case.outputs}
+    inputs = {driver.name: dimension(driver.unit) for driver in case.drivers}
+    outputs = {output.name: dimension(output.unit) for output in case.outputs}
     velocity = next((name for name, kind in inputs.items() if _is_speed(case, name, kind)), None)
     position = next((name for name, kind in inputs.items() if kind in _LENGTHS), None)
     force = next((name for name, kind in outputs.items() if kind in ("force", "moment")), None)

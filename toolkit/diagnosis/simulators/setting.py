@@ -23,8 +23,8 @@ _NOMINAL_LOADS = frozenset({"FZ0", "FZNOM", "FZNOMINAL", "FNOMIN", "FNOM", "NOMI
 
 def si(case: Case, name: str, values: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return a channel's values in SI."""
-    known = unit(case.unit(name))
-    return values * known.factor + known.offset
+    stated = unit(case.unit(name))
+    return values * stated.factor + stated.offset
 
 
 def setting(
@@ -32,12 +32,16 @@ def setting(
 ) -> Setting:
     """Return the setting of a run; its channels are all drivers, in SI."""
     channels = {
-        one.name: si(case, one.name, run.columns[one.name]) for one in case.drivers if one.name in run.columns
+        channel.name: si(case, channel.name, run.columns[channel.name])
+        for channel in case.drivers
+        if channel.name in run.columns
     }
     first = {}
-    for one in case.drivers:
-        source = next((r for r in case.runs if one.name in r.columns), run)
-        first[one.name] = float(si(case, one.name, source.columns[one.name])[0]) if source.rows else 0.0
+    for channel in case.drivers:
+        source = next((r for r in case.runs if channel.name in r.columns), run)
+        first[channel.name] = (
+            float(si(case, channel.name, source.columns[channel.name])[0]) if source.rows else 0.0
+        )
     return Setting(
         t=run.t,
         elapsed_s=elapsed(case, run),
@@ -59,8 +63,8 @@ def elapsed(case: Case, run: Run) -> NDArray[np.float64]:
     Where the runs' clocks go on from one to the next, they are one clock; where each run begins anew, the
     time is that within the run: what passed between runs is not known.
     """
-    starts = [one.t[0] for one in case.runs if one.rows]
-    ends = [one.t[-1] for one in case.runs if one.rows]
+    starts = [run.t[0] for run in case.runs if run.rows]
+    ends = [run.t[-1] for run in case.runs if run.rows]
     onward = all(starts[i] >= ends[i - 1] for i in range(1, len(starts)))
     return run.t - (starts[0] if onward and starts else (run.t[0] if run.rows else 0.0))
 
@@ -81,15 +85,15 @@ def nominal_load(case: Case) -> float:
     """
     if case.nominal_load_N is not None:
         return case.nominal_load_N
-    for one in case.parameters:
-        named = one.name.replace("_", "").upper() in _NOMINAL_LOADS
-        if named and dimension(one.unit) == dimension("N") and one.value > 0:
-            return one.value * unit(one.unit).factor
+    for parameter in case.parameters:
+        is_nominal = parameter.name.replace("_", "").upper() in _NOMINAL_LOADS
+        if is_nominal and dimension(parameter.unit) == dimension("N") and parameter.value > 0:
+            return parameter.value * unit(parameter.unit).factor
     loads = [
         si(case, name, run.columns[name])
         for run in case.runs
         for name in ("FZ", "FZ_CMD")
-        if name in run.columns and any(one.name == name for one in case.channels)
+        if name in run.columns and any(channel.name == name for channel in case.channels)
     ]
     if not loads:
         return 4000.0

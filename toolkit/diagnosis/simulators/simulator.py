@@ -1,26 +1,32 @@
-"""What every kind of simulation offers to the search, and an effect that is switched on."""
+"""What every kind of simulation offers to the search, and what it declares of itself.
+
+The search and the answer ask a simulation's `Capability`, never its class: a new kind of simulation is one
+file that gives its outputs and states every fact.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Protocol, runtime_checkable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Protocol
 
-from toolkit.effects.effect import Effect, EffectParameter
+from toolkit.findings import Finding
 
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
     from toolkit.diagnosis.case.case import CaseParameter, Run
+    from toolkit.effects.applied import AppliedEffect
+    from toolkit.effects.effect import Effect
+    from toolkit.effects.surroundings import MotionSizes
 
     Arrays = dict[str, NDArray[np.float64]]
     # Positions of shape (n,) to force-like terms of shape (n, forces)
     Pattern = Callable[[NDArray[np.float64]], NDArray[np.float64]]
-
-
-# Effects that are there or not: nothing of them is fitted.
-DISCRETE = frozenset(("channel_sign", "channel_swap", "unit_error", "rectification", "wrong_calibration"))
+    Parameters = Mapping[str, float]
+    # A channel's name to its largest recorded magnitude over the runs that are judged
+    Largest = Callable[[str | None], float]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -33,68 +39,101 @@ class Output:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Active:
-    """An effect that is switched on: where it acts, with which values, in which runs.
+class Moving:
+    """What moves in a simulation, and what forces do to it; channels are those that a force may act on.
 
-    ``channel`` is the channel or state that it acts on, ``source`` the other channel that it takes,
-    ``runs`` the names of the runs in which it acts, None for all.
+    integrates : whether the simulation integrates its own equation, so that it answers a force with another
+        motion; else the motion is the recorded one
+    sizes : (channel, largest magnitude of a recorded channel) -> sizes of the motion
+    units : channel -> units of a force-like term, of its velocity and of its position
+    way : channel -> the longest way of a run [position's unit] and the usual one from row to row, zero where
+        it stands in the rows themselves
+    pushed : (run, parameters, effects, channel, pattern) -> linear responses of every output to small forces
+        of a pattern over the position, (rows, forces); none where none move
     """
 
-    effect: Effect
-    channel: str | None = None
-    source: str | None = None
-    runs: frozenset[str] | None = None
-    values: Mapping[str, float] = field(default_factory=dict)
+    integrates: bool
+    sizes: Callable[[str | None, Largest], MotionSizes]
+    units: Callable[[str | None], tuple[str, str, str]]
+    way: Callable[[str | None], tuple[float, float]]
+    pushed: Callable[[Run, Parameters, Sequence[AppliedEffect], str | None, Pattern], Arrays]
 
-    @property
-    def searched(self) -> tuple[EffectParameter, ...]:
-        """Parameters that a fit moves: none of an effect that is there or not."""
-        return () if self.effect.name in DISCRETE else self.effect.parameters
 
-    def acts_in(self, run: Run) -> bool:
-        """Tell whether the effect acts in a run."""
-        return self.runs is None or run.name in self.runs
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Capability:
+    """What a kind of simulation knows and can do beside giving its outputs; every kind states every fact.
+
+    nominal_load_N : load [N] that the simulation's own files state, None where they state none
+    cells : names of the load cells that a calibration turns into outputs
+    unsure : output -> what the simulation itself is unsure by, in the output's unit
+    findings : what a reader of the answer must know of the simulation
+    repeats : (run, parameters) -> nothing; FitError where a second call gives another answer. None where the
+        simulation is our own
+    together : makes several simulations of a run at once, for `simulate` to find; None where it cannot
+    motion : what moves in it, None where nothing does
+    """
+
+    nominal_load_N: float | None
+    cells: tuple[str, ...]
+    unsure: Mapping[str, float]
+    findings: tuple[Finding, ...]
+    repeats: Callable[[Run, Parameters], None] | None
+    together: Callable[[Run, Sequence[tuple[Parameters, Sequence[AppliedEffect]]]], None] | None
+    motion: Moving | None
 
 
 class Model(Protocol):
-    """A simulation that can be run with effects in it.
+    """A simulation that can be run with effects in it."""
 
-    ``places`` says for an effect where it could act: pairs of channel and source. An effect without a
-    place is not applicable to this case, and ``why_not`` says why.
-    """
+    @property
+    def outputs(self) -> tuple[Output, ...]:
+        """Channels that are judged."""
+        ...
 
-    outputs: tuple[Output, ...]
-    parameters: tuple[CaseParameter, ...]
+    @property
+    def parameters(self) -> tuple[CaseParameter, ...]:
+        """Nominal parameters, the free ones with their priors."""
+        ...
+
+    @property
+    def capability(self) -> Capability:
+        """What this kind of simulation knows and can do."""
+        ...
 
     def observed(self, run: Run) -> Arrays:
         """Return what was recorded of every output, (n,), NaN where a sample is missing."""
         ...
 
-    def simulate(self, run: Run, p: Mapping[str, float], active: Sequence[Active]) -> Arrays:
+    def simulate(self, run: Run, p: Parameters, active: Sequence[AppliedEffect]) -> Arrays:
         """Return what the simulation says of every output, (n,), free over the whole run."""
         ...
 
     def places(self, effect: Effect) -> Sequence[tuple[str | None, str | None]]:
-        """Return where an effect could act in this case."""
+        """Return where an effect could act in this case, as pairs of channel and source; nothing: nowhere."""
         ...
 
 
-@runtime_checkable
-class Moving(Protocol):
-    """A simulation in which something moves: what forces over a position would each do to its outputs."""
+class Supervised:
+    """A simulation whose runs go through a supervisor, which counts or ends them, until it is released."""
 
-    def way(self, channel: str | None, /) -> tuple[float, float]:
-        """Return the longest way of a run [position's unit] and the usual one from row to row."""
-        ...
+    def __init__(
+        self, plain: Model, simulate: Callable[[Run, Parameters, Sequence[AppliedEffect]], Arrays]
+    ) -> None:
+        self._plain, self._simulate = plain, simulate
+        self.outputs, self.parameters, self.capability = plain.outputs, plain.parameters, plain.capability
 
-    def pushed(
-        self,
-        run: Run,
-        p: Mapping[str, float],
-        active: Sequence[Active],
-        channel: str | None,
-        pattern: Pattern,
-        /,
-    ) -> Arrays:
-        """Return linear responses of every output to small forces, (rows, forces); none where none move."""
-        ...
+    def observed(self, run: Run) -> Arrays:
+        """Return what was recorded of every output."""
+        return self._plain.observed(run)
+
+    def simulate(self, run: Run, p: Parameters, active: Sequence[AppliedEffect]) -> Arrays:
+        """Return every output of a run, as the supervisor lets it through."""
+        return self._simulate(run, p, active)
+
+    def places(self, effect: Effect) -> Sequence[tuple[str | None, str | None]]:
+        """Return where an effect could act."""
+        return self._plain.places(effect)
+
+    def release(self) -> None:
+        """Let every further run through as it is."""
+        self._simulate = self._plain.simulate

@@ -43,12 +43,20 @@ def held(slides: Sequence[Slide], before: list[float]) -> Callable[[list[float]]
     It raises TurnedError for a state in which a body has turned.
     """
     known = []
-    for one in slides:
-        if before[one.velocity] == 0:
+    for slide in slides:
+        if before[slide.velocity] == 0:
             return None
-        way = math.copysign(1.0, before[one.velocity])
+        way = math.copysign(1.0, before[slide.velocity])
         known.append(
-            (one.bend, one.velocity, one.way, way, before[one.bend] - way, before[one.way], one.reach)
+            (
+                slide.bend,
+                slide.velocity,
+                slide.way,
+                way,
+                before[slide.bend] - way,
+                before[slide.way],
+                slide.reach,
+            )
         )
 
     def hold(y: list[float]) -> None:
@@ -65,13 +73,13 @@ class HeldColumns:
 
     def __init__(self, slides: Sequence[tuple[int, Slide]]) -> None:
         """Take pairs of column and slide."""
-        listed = [one for _, one in slides]
+        listed = [slide for _, slide in slides]
         self._column = np.array([column for column, _ in slides], dtype=np.intp)
         self._bend, self._velocity, self._place = (
-            np.array([getattr(one, name) for one in listed], dtype=np.intp)
+            np.array([getattr(slide, name) for slide in listed], dtype=np.intp)
             for name in ("bend", "velocity", "way")
         )
-        self._reach = np.array([one.reach for one in listed])
+        self._reach = np.array([slide.reach for slide in listed])
         self._on = np.zeros(len(listed), dtype=bool)
 
     @property

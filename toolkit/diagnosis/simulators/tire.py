@@ -9,10 +9,10 @@ import numpy as np
 
 from toolkit.channels import Axes, Rotation, signs
 from toolkit.diagnosis.simulators.setting import NOMINAL_SPEED, si
-from toolkit.diagnosis.simulators.simulator import Active
-from toolkit.effects.effect import STAGES, Effect
+from toolkit.effects.applied import AppliedEffect
+from toolkit.effects.effect import Effect
+from toolkit.effects.forward import Steady, driven, tire_forces
 from toolkit.effects.signals import Drive, Setting, Tire, TireForces, drive
-from toolkit.effects.similarity import Steady, similar
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -32,7 +32,7 @@ def tire_signs(source: Axes, target: Axes, run: Run) -> dict[str, int]:
 
 def first_of(case: Case, run: Run, *names: str, outputs: bool = True) -> NDArray[np.float64] | None:
     """Return the first of these drivers, or of these outputs, in SI; None where the run has none."""
-    among = {one.name for one in (case.channels if outputs else case.drivers)}
+    among = {channel.name for channel in (case.channels if outputs else case.drivers)}
     for name in names:
         if name in run.columns and name in among:
             values = si(case, name, run.columns[name])
@@ -90,27 +90,23 @@ def slip_work_before(
 
 
 def through_tire(
-    start: Drive, steady: Steady, active: Sequence[Active], run: Run, setting: Setting
+    start: Drive, steady: Steady, active: Sequence[AppliedEffect], run: Run, setting: Setting
 ) -> TireForces:
     """Return the forces in the machine's axes with every effect on road, carriage and tire."""
-
-    def tire(one: Drive) -> TireForces:
-        return similar(steady, one)
-
-    here = [one for one in active if one.acts_in(run)]
-    for one in sorted(here, key=lambda each: STAGES.index(each.effect.stage)):
-        if one.effect.drive is not None:
-            start = one.effect.drive(start, one.values, setting, tire)
-    return tire(start)
+    return tire_forces(start, steady, [applied for applied in active if applied.acts_in(run)], setting)
 
 
-def late(start: Drive, active: Sequence[Active], run: Run, setting: Setting, tire: Tire) -> Drive | None:
+def late(
+    start: Drive, active: Sequence[AppliedEffect], run: Run, setting: Setting, tire: Tire
+) -> Drive | None:
     """Return the drive with the load as late as the carriage makes it, None where nothing does."""
-    lags = [one for one in active if one.effect.name == "load_lag" and one.acts_in(run)]
-    for one in lags:
-        if one.effect.drive is not None:
-            start = one.effect.drive(start, one.values, setting, tire)
-    return start if lags else None
+    lags = [applied for applied in active if delays_load(applied) and applied.acts_in(run)]
+    return driven(start, lags, setting, tire) if lags else None
+
+
+def delays_load(applied: AppliedEffect) -> bool:
+    """Tell whether an effect stands between the load's command and the load."""
+    return applied.effect.follows_command == "FZ"
 
 
 def tire_places(
@@ -119,10 +115,8 @@ def tire_places(
     """Return where an effect on road, carriage or tire could act: nowhere, or in the one machine."""
     if effect.drive is None:
         return []
-    if effect.name == "camber_offset" and not has_IA:
+    if not {"camber": has_IA, "pressure": has_P, None: True}[effect.needs_tire]:
         return []
-    if effect.name == "pressure_change" and not has_P:
-        return []
-    if effect.name == "load_lag" and not varies.get("load_commanded", False):
+    if effect.follows_command is not None and not varies.get("load_commanded", False):
         return []
     return [(None, None)]

@@ -82,7 +82,7 @@ class Bench:
 
         def act() -> Refusals:
             decision = approve(self.registry, record_id, in_force_from=day, **{"checked_by": CHECKER, **more})
-            return [(one.rule, f"{one.where}: {one.message}") for one in decision.failed]
+            return [(result.rule, f"{result.where}: {result.message}") for result in decision.failed]
 
         return act
 

@@ -7,17 +7,50 @@ is made of can tell.
 from __future__ import annotations
 
 import dataclasses
+import json
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
-from toolkit.calibration.records.record import CalibrationRecord, LoadFit
-from toolkit.calibration.registry.ledger import LEDGER
+from toolkit.calibration.records.record import CalibrationRecord, LoadFit, sealed, to_bytes
+from toolkit.calibration.registry.ledger import HEAD, LEDGER, START, head_bytes, next_line
 from toolkit.calibration.registry.refit import polarity
 from toolkit.calibration.registry.registry import Registry
 from toolkit.files import sha256_bytes
 from toolkit.qualification.gates.bench import Act, Bench, Demonstration, Refusals
-from toolkit.qualification.gates.forgery import forge
 from toolkit.qualification.gates.virtual_hub import RIG
+
+# A registry changed by one who can compute every hash: records, ledger and head agree with each other.
+
+
+_OF_THE_CHAIN = ("seq", "prev", "sha256")
+
+
+def rewrite_ledger(folder: Path, change: Callable[[dict[str, Any]], dict[str, Any]]) -> None:
+    """Write an instrument's ledger anew, each event changed and the chain intact."""
+    bodies = [json.loads(line) for line in (folder / LEDGER).read_bytes().splitlines()]
+    lines, previous = b"", START
+    for number, body in enumerate(bodies, start=1):
+        event = change({key: value for key, value in body.items() if key not in _OF_THE_CHAIN})
+        line, previous = next_line(number, previous, event)
+        lines += line
+    (folder / LEDGER).write_bytes(lines)
+    (folder / HEAD).write_bytes(head_bytes(len(bodies), previous))
+
+
+def forge(folder: Path, record: CalibrationRecord) -> None:
+    """Write a changed record in place of the entered one, with its hashes in the ledger."""
+    record = sealed(record)
+    data = to_bytes(record)
+    (folder / f"{record.id}.json").write_bytes(data)
+    hashes = {"record": record.sha256, "file": sha256_bytes(data), "inputs": record.inputs_sha256}
+    rewrite_ledger(
+        folder,
+        lambda event: (
+            {**event, **hashes} if event["event"] == "entered" and event["id"] == record.id else event
+        ),
+    )
+
 
 _RECORD = f"{RIG}-r1"
 _FILE, _DATA = f"{_RECORD}.json", f"{_RECORD}.loads.csv"
@@ -60,26 +93,28 @@ def _replaced(file: str, old: bytes, new: bytes) -> Callable[[Path], object]:
 
 def _first_load(change: Callable[[LoadFit], LoadFit]) -> Change:
     def alter(record: CalibrationRecord) -> CalibrationRecord:
-        first, *rest = record.loads
-        return dataclasses.replace(record, loads=(change(first), *rest))
+        first, *others = record.loads
+        return dataclasses.replace(record, loads=(change(first), *others))
 
     return alter
 
 
-def _negated(one: LoadFit) -> LoadFit:
-    coefficients = (-one.coefficients[0], *one.coefficients[1:])
-    return dataclasses.replace(one, coefficients=coefficients, polarity=polarity(coefficients))
+def _negated(load: LoadFit) -> LoadFit:
+    coefficients = (-load.coefficients[0], *load.coefficients[1:])
+    return dataclasses.replace(load, coefficients=coefficients, polarity=polarity(coefficients))
 
 
-def _smaller(one: LoadFit) -> LoadFit:
-    covariance = tuple(tuple(value / 4 for value in row) for row in one.covariance)
-    return dataclasses.replace(one, covariance=covariance)
+def _smaller(load: LoadFit) -> LoadFit:
+    covariance = tuple(tuple(value / 4 for value in row) for row in load.covariance)
+    return dataclasses.replace(load, covariance=covariance)
 
 
-def _less_scatter(one: LoadFit) -> LoadFit:
-    if one.scatter is None:
+def _less_scatter(load: LoadFit) -> LoadFit:
+    if load.scatter is None:
         raise ValueError("the record has no scatter components")
-    return dataclasses.replace(one, scatter=dataclasses.replace(one.scatter, within=one.scatter.within / 2))
+    return dataclasses.replace(
+        load, scatter=dataclasses.replace(load.scatter, within=load.scatter.within / 2)
+    )
 
 
 def _shifted_golden(record: CalibrationRecord) -> CalibrationRecord:
@@ -94,8 +129,8 @@ def _exchange_loads(folder: Path) -> None:
     data = path.read_bytes().replace(b",3000.0,", b",3100.0,")
     path.write_bytes(data)
     files = tuple(
-        dataclasses.replace(one, sha256=sha256_bytes(data)) if one.role == "loads" else one
-        for one in record.data
+        dataclasses.replace(part, sha256=sha256_bytes(data)) if part.role == "loads" else part
+        for part in record.data
     )
     forge(folder, dataclasses.replace(record, data=files))
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import tempfile
 from pathlib import Path
 
-from toolkit.qualification.gates import approvals, records, times, uses, values
+from toolkit.qualification.gates import records, times, uses, values
 from toolkit.qualification.gates.bench import FAULTS, GROUP, Bench, Demonstration
 from toolkit.qualification.model import Check, not_run
 
@@ -13,7 +13,7 @@ from toolkit.qualification.model import Check, not_run
 def demonstrations(folder: Path) -> tuple[Demonstration, ...]:
     """Return every demonstration; ``folder`` has the packaged numbers."""
     return (
-        *approvals.DEMONSTRATIONS,
+        *uses.APPROVALS,
         *times.DEMONSTRATIONS,
         *uses.DEMONSTRATIONS,
         *records.DEMONSTRATIONS,
@@ -27,8 +27,8 @@ def check_gates(folder: Path) -> list[Check]:
         with tempfile.TemporaryDirectory(prefix="toolkit-qualify-") as place:
             stock = Bench(Path(place) / "stock").fill()
             return [
-                one.check(stock.copy(Path(place) / str(number)))
-                for number, one in enumerate(demonstrations(folder))
+                demonstration.check(stock.copy(Path(place) / str(number)))
+                for number, demonstration in enumerate(demonstrations(folder))
             ]
     except FAULTS as error:
         # Without a folder or a record in force nothing can be shown.

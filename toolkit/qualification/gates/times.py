@@ -6,13 +6,12 @@ import datetime as dt
 from collections.abc import Callable
 from typing import Any
 
-from toolkit.calibration.registry.approval import withdraw
+from toolkit.calibration.registry.approval import discard, withdraw
 from toolkit.calibration.registry.candidate import calibrate
 from toolkit.calibration.registry.clock import today
-from toolkit.calibration.registry.discard import discard
 from toolkit.calibration.session.read import read_session
 from toolkit.qualification.gates.bench import Act, Bench, Demonstration, Refusals
-from toolkit.qualification.gates.forgery import rewrite_ledger
+from toolkit.qualification.gates.records import rewrite_ledger
 from toolkit.qualification.gates.virtual_hub import FIRST, RIG, SECOND, Session
 
 _DAY = dt.timedelta(days=1)

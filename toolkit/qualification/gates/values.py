@@ -57,7 +57,7 @@ def demonstrations(folder: Path) -> tuple[Demonstration, ...]:
 def _shown(name: str, rules: str, values: Callable[[], tuple[Departure, ...]]) -> Demonstration:
     def prepare(bench: Bench) -> Act:
         del bench  # values are judged without a registry
-        return lambda: [(one.rule, f"{one.where}: {one.message}") for one in values()]
+        return lambda: [(value.rule, f"{value.where}: {value.message}") for value in values()]
 
     return Demonstration(name=name, stage="values of a test", rules=tuple(rules.split()), prepare=prepare)
 
@@ -82,7 +82,7 @@ def _figure(folder: Path, *, stored: bool) -> tuple[Departure, ...]:
     rows = np.arange(len(readings.FZ))
     # Each row by itself: one possible row among ten must not hide behind the others.
     by_row = [departures(readings.part(rows == row)) for row in rows]
-    rules = [frozenset(one.rule for one in row) for row in by_row]
+    rules = [frozenset(finding.rule for finding in row) for row in by_row]
     if len(set(rules)) != 1:
         raise ValueError(f"the rows do not agree: {rules}")
     return departures(readings)
@@ -91,7 +91,7 @@ def _figure(folder: Path, *, stored: bool) -> tuple[Departure, ...]:
 def _sweep(FZ: float = 1.0, FY: float = 1.0, MZ: float = 1.0, reverse: float = 1.0) -> Readings:
     """Return a virtual tire at each angle and load, forward and reverse, its values times the factors."""
     SA, load, direction = (
-        one.ravel() for one in np.meshgrid(_ANGLES, np.array(_LOADS), [0.0, 1.0], indexing="ij")
+        grid.ravel() for grid in np.meshgrid(_ANGLES, np.array(_LOADS), [0.0, 1.0], indexing="ij")
     )
     side, moment = _tire(SA, load)
     turn = np.where(direction > 0, reverse, 1.0)

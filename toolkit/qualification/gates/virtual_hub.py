@@ -102,7 +102,7 @@ class Session:
         entries = []
         for load, row in zip(LOADS, 0.45 * np.diag(LARGEST), strict=True):
             values = zip(CELLS, self.reading * _cells(row[np.newaxis], start=2000)[0], strict=True)
-            inner = ", ".join(f'{name} = {{ value = {one:.6f}, unit = "mV/V" }}' for name, one in values)
+            inner = ", ".join(f'{name} = {{ value = {value:.6f}, unit = "mV/V" }}' for name, value in values)
             applied = f'{{ value = {float(row.max())!r}, unit = "{UNITS[load]}" }}'
             entries.append(f'{{ load = "{load}", value = {applied}, indications = {{ {inner} }} }}')
         return f"polarity = [{', '.join(entries)}]\n"

@@ -18,7 +18,7 @@ import numpy as np
 
 from toolkit.errors import ColumnError, RecordingError, UnreadableError
 from toolkit.machine import Machine
-from toolkit.recording.dialect import number_or_text
+from toolkit.recording.csvfile import number_or_text
 from toolkit.recording.formats.vectors import Vector, Vectors, one_table
 from toolkit.recording.integrity.refuse import damaged, truncated
 from toolkit.recording.table import judge, refuse_cell
@@ -65,7 +65,7 @@ def read_lvm(gated: Gated, machine: Machine) -> Vectors:
     head, start, separator = _header(lines, gated)
     decimal = head.get("Decimal_Separator", ".")[:1] or "."
     segments = _segments(lines, start, separator, head.get("Multi_Headings", "No"), gated)
-    filled = [one for one in segments if one.rows]
+    filled = [segment for segment in segments if segment.rows]
     if not filled:
         raise UnreadableError(
             "the LVM file has no data", where=gated.path, got=f"{len(segments)} segments without rows",
@@ -73,17 +73,17 @@ def read_lvm(gated: Gated, machine: Machine) -> Vectors:
             next_step="repeat the recording, or leave the file out of the test", rule="no-data",
         )  # fmt: skip
     columns = _columns(filled[0], head.get("X_Columns", "One"), gated)
-    for other in filled[1:]:
-        if _columns(other, head.get("X_Columns", "One"), gated) != columns:
+    for table in filled[1:]:
+        if _columns(table, head.get("X_Columns", "One"), gated) != columns:
             raise RecordingError(
                 "the segments of the LVM file have different channels",
-                where=f"{gated.path}, line {other.rows[0][0] - 1}",
-                got=", ".join(other.names)[:300],
+                where=f"{gated.path}, line {table.rows[0][0] - 1}",
+                got=", ".join(table.names)[:300],
                 expected=", ".join(filled[0].names)[:300],
                 next_step="save each segment as a file of its own",
                 rule="several-sheets",
             )
-    rows = [row for one in filled for row in one.rows]
+    rows = [row for filled_table in filled for row in filled_table.rows]
     vectors = [
         Vector(name=name, unit=unit, values=_values(rows, place, name, decimal, gated))
         for place, name, unit in columns
@@ -108,12 +108,12 @@ def _header(lines: list[str], gated: Gated) -> tuple[dict[str, str], int, str]:
     separator = "\t"
     for line in lines[:end]:
         if line.startswith("Separator"):
-            said = line.removeprefix("Separator")
-            separator = said[:1] or "\t"
-            word = said[1:].strip(said[:1] + " ").casefold()
+            mark = line.removeprefix("Separator")
+            separator = mark[:1] or "\t"
+            word = mark[1:].strip(mark[:1] + " ").casefold()
             if _SEPARATORS.get(word, separator) != separator or separator not in _SEPARATORS.values():
                 raise UnreadableError(
-                    "the LVM file has a separator that is not read", where=gated.path, got=repr(said),
+                    "the LVM file has a separator that is not read", where=gated.path, got=repr(mark),
                     expected="a tab, comma or semicolon",
                     next_step="save it again with tabs", rule="unreadable",
                 )  # fmt: skip
@@ -126,10 +126,10 @@ def _header(lines: list[str], gated: Gated) -> tuple[dict[str, str], int, str]:
 
 
 def _segments(lines: list[str], place: int, separator: str, multi: str, gated: Gated) -> list[_Segment]:
-    found: list[_Segment] = []
+    segments: list[_Segment] = []
     while (place := _skip(lines, place, separator, gated)) < len(lines):
         fields = _split(lines[place], separator)
-        if fields[0] == "Channels" or (not found and _ahead(lines, place)):
+        if fields[0] == "Channels" or (not segments and _ahead(lines, place)):
             segment = _Segment({})
             while not lines[place].startswith(_END):
                 fields = _split(lines[place], separator)
@@ -143,17 +143,19 @@ def _segments(lines: list[str], place: int, separator: str, multi: str, gated: G
             if place == len(lines):
                 truncated(gated.path, "the LVM file ends before a segment's names", f"line {place}", _X)
             segment.names = [name.strip() for name in _split(lines[place], separator)]
-            found.append(segment)
+            segments.append(segment)
             place += 1
-        elif not found:
-            found.append(_Segment({}, [name.strip() for name in fields]))  # names without a segment's header
+        elif not segments:
+            segments.append(
+                _Segment({}, [name.strip() for name in fields])
+            )  # names without a segment's header
             place += 1
         else:
-            found[-1].rows.append((place + 1, fields))
+            segments[-1].rows.append((place + 1, fields))
             place += 1
-    for one in found:
-        _check_rows(one, exact=multi.casefold() == "yes", gated=gated)
-    return found
+    for member in segments:
+        _check_rows(member, exact=multi.casefold() == "yes", gated=gated)
+    return segments
 
 
 def _ahead(lines: Sequence[str], place: int) -> bool:
@@ -175,36 +177,38 @@ def _skip(lines: list[str], place: int, separator: str, gated: Gated) -> int:
     return place
 
 
-def _check_rows(one: _Segment, *, exact: bool, gated: Gated) -> None:
-    claims = [text.strip() for text in one.tags.get("Samples", [])]
+def _check_rows(segment: _Segment, *, exact: bool, gated: Gated) -> None:
+    claims = [text.strip() for text in segment.tags.get("Samples", [])]
     most = max((int(text) for text in claims if re.fullmatch("[0-9]{1,9}", text)), default=None)
     if most is None:
         return
-    if len(one.rows) < most:
-        truncated(gated.path, "the LVM file has fewer rows than it says", len(one.rows), f"{most} samples")
-    if exact and len(one.rows) > most:
-        damaged(gated.path, "the LVM file has more rows than it says", len(one.rows), f"{most} samples")
+    if len(segment.rows) < most:
+        truncated(
+            gated.path, "the LVM file has fewer rows than it says", len(segment.rows), f"{most} samples"
+        )
+    if exact and len(segment.rows) > most:
+        damaged(gated.path, "the LVM file has more rows than it says", len(segment.rows), f"{most} samples")
 
 
-def _columns(one: _Segment, saved: str, gated: Gated) -> list[tuple[int, str, str | None]]:
+def _columns(segment: _Segment, saved: str, gated: Gated) -> list[tuple[int, str, str | None]]:
     """Return (place in the row, name, unit) of the channels of a segment."""
-    found: list[tuple[int, str, str | None]] = []
+    columns: list[tuple[int, str, str | None]] = []
     channels = 0
-    for place, name in enumerate(one.names):
+    for place, name in enumerate(segment.names):
         # The tags of a channel stand in its column; one field, the tag's own name, was taken off.
         if name == _X:
             if saved.casefold() != "no":
-                dimension = one.tag("X_Dimension", place) or "Time"
-                label = _label(one.tag("X_Unit_Label", place))
+                dimension = segment.tag("X_Dimension", place) or "Time"
+                label = _label(segment.tag("X_Unit_Label", place))
                 is_time = dimension.casefold() == "time"
-                found.append((place, "t" if is_time else dimension, label or ("s" if is_time else None)))
+                columns.append((place, "t" if is_time else dimension, label or ("s" if is_time else None)))
         elif name and name != _COMMENT:
             channels += 1
-            found.append((place, name, _label(one.tag("Y_Unit_Label", place - 1))))
-    said = one.tag("Channels", 0)
-    if said and said != str(channels):
-        damaged(gated.path, "the LVM file names more or fewer channels than it says", channels, said)
-    return found
+            columns.append((place, name, _label(segment.tag("Y_Unit_Label", place - 1))))
+    count = segment.tag("Channels", 0)
+    if count and count != str(channels):
+        damaged(gated.path, "the LVM file names more or fewer channels than it says", channels, count)
+    return columns
 
 
 def _label(text: str) -> str | None:
@@ -227,9 +231,9 @@ def _values(
 
 def _one_time(vectors: list[Vector], gated: Gated) -> list[Vector]:
     # With `X_Columns Multi` every channel brings its own; they must be the same to be one recording's rows.
-    times = [one for one in vectors if one.name == "t"]
-    for one in times[1:]:
-        if one.unit != times[0].unit or not np.array_equal(one.values, times[0].values):
+    times = [vector for vector in vectors if vector.name == "t"]
+    for time in times[1:]:
+        if time.unit != times[0].unit or not np.array_equal(time.values, times[0].values):
             raise ColumnError(
                 "the channels of the LVM file were not sampled together",
                 where=gated.path,
@@ -238,7 +242,7 @@ def _one_time(vectors: list[Vector], gated: Gated) -> list[Vector]:
                 next_step="resample the channels to one time when they are saved",
                 rule="doubled-column",
             )
-    return [one for one in vectors if one.name != "t" or one is times[0]]
+    return [vector for vector in vectors if vector.name != "t" or vector is times[0]]
 
 
 def _split(line: str, separator: str) -> list[str]:

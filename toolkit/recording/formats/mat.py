@@ -43,7 +43,7 @@ def read_mat(gated: Gated, machine: Machine) -> Vectors:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("error")  # such as two variables of one name
-            found = loadmat(stream, chars_as_strings=True)
+            contents = loadmat(stream, chars_as_strings=True)
     except Exception as error:
         raise UnreadableError(
             "the MAT-file cannot be read",
@@ -53,7 +53,7 @@ def read_mat(gated: Gated, machine: Machine) -> Vectors:
             next_step="save it again with save(name, '-v7')",
             rule="unreadable",
         ) from error
-    variables = {name: value for name, value in found.items() if not name.startswith("__")}
+    variables = {name: value for name, value in contents.items() if not name.startswith("__")}
     if DATA in variables and HEADERS in variables:
         vectors = _columns(variables, gated.path)
     else:
@@ -89,13 +89,21 @@ def _vector(name: str, unit: str | None, values: NDArray[Any]) -> Vector:
 def _texts(value: NDArray[Any], where: object) -> list[str]:
     # A cell of texts, or a matrix of characters that has one text a row.
     texts = [item if isinstance(item, str) else np.asarray(item).reshape(-1) for item in value.reshape(-1)]
-    found = []
-    for one in texts:
-        text = one if isinstance(one, str) else one[0] if len(one) == 1 else "" if len(one) == 0 else None
+    texts_of = []
+    for cell_text in texts:
+        text = (
+            cell_text
+            if isinstance(cell_text, str)
+            else cell_text[0]
+            if len(cell_text) == 1
+            else ""
+            if len(cell_text) == 0
+            else None
+        )
         if not isinstance(text, str):
             no_numbers(where, "the variable 'headers' is no list of texts", f"{value.dtype}")
-        found.append(text.strip())
-    return found
+        texts_of.append(text.strip())
+    return texts_of
 
 
 def _units(value: NDArray[Any] | None, where: object) -> dict[str, str]:
@@ -105,5 +113,7 @@ def _units(value: NDArray[Any] | None, where: object) -> dict[str, str]:
         no_numbers(
             where, "the variable 'units' is no structure of texts", f"{value.dtype.kind}, {value.size}"
         )
-    one = value.reshape(-1)[0]
-    return {name: _texts(np.asarray(one[name]), where)[0] for name in value.dtype.names if one[name].size}
+    content = value.reshape(-1)[0]
+    return {
+        name: _texts(np.asarray(content[name]), where)[0] for name in value.dtype.names if content[name].size
+    }

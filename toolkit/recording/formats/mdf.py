@@ -43,7 +43,8 @@ def read_mdf(gated: Gated, machine: Machine) -> Vectors:
                 Vectors(
                     where=f"{gated.path}, channel group {index + 1}",
                     vectors=[
-                        _vector(file, index, place, one, gated) for place, one in enumerate(group.channels)
+                        _vector(file, index, place, channel, gated)
+                        for place, channel in enumerate(group.channels)
                     ],
                 )
                 for index, group in enumerate(file.groups)

@@ -41,13 +41,13 @@ def read_tdms(gated: Gated, machine: Machine) -> Vectors:
     counts = walk_tdms(gated.data, gated.path)
     try:
         with nptdms.TdmsFile.open(io.BytesIO(gated.data), raw_timestamps=True) as file:
-            channels = [(group.name, one) for group in file.groups() for one in group.channels()]
+            channels = [(group.name, channel) for group in file.groups() for channel in group.channels()]
             _check_counts(channels, counts, gated)
             names = dict.fromkeys(name for name, _ in channels)
             tables = [
                 Vectors(
                     where=f"{gated.path}, group {name!r}",
-                    vectors=[_vector(one) for group, one in channels if group == name],
+                    vectors=[_vector(channel) for group, channel in channels if group == name],
                 )
                 for name in names
             ]
@@ -66,19 +66,19 @@ def read_tdms(gated: Gated, machine: Machine) -> Vectors:
 
 
 def _check_counts(channels: list[tuple[str, Any]], counts: dict[str, int], gated: Gated) -> None:
-    for name, one in channels:
-        if len(one) != counts.get(one.path, 0):
-            damaged(gated.path, f"channel {one.name!r} of group {name!r} has another length than it says",
-                    len(one), counts.get(one.path, 0))  # fmt: skip
+    for name, channel in channels:
+        if len(channel) != counts.get(channel.path, 0):
+            damaged(gated.path, f"channel {channel.name!r} of group {name!r} has another length than it says",
+                    len(channel), counts.get(channel.path, 0))  # fmt: skip
 
 
-def _vector(one: Any) -> Vector:
-    values = np.asarray(one.read_data(scaled=True))
-    stored = np.asarray(one.read_data(scaled=False))
+def _vector(channel: Any) -> Vector:
+    values = np.asarray(channel.read_data(scaled=True))
+    stored = np.asarray(channel.read_data(scaled=False))
     plain = stored.ndim == 1 and len(stored) == len(values) and len(values) and values.dtype.kind in "fiu"
-    stated = one.properties.get("unit_string")
+    stated = channel.properties.get("unit_string")
     return Vector(
-        name=str(one.name),
+        name=str(channel.name),
         unit=None if stated is None else str(stated),
         values=values,
         half=quantum(stored, values) if plain else None,

@@ -50,18 +50,20 @@ def one_table(tables: Sequence[Vectors], machine: Machine, *, where: object) -> 
     UnreadableError
         rule ``no-data``: there is no group with channels
     """
-    filled = [one for one in tables if one.vectors]
+    filled = [table for table in tables if table.vectors]
     if not filled:
         raise UnreadableError(
             "the file has no channels", where=where, got="no channel", expected="channels with values",
             next_step="repeat the recording, or leave the file out of the test", rule="no-data",
         )  # fmt: skip
-    fitting = [one for one in filled if any(map(header_of(machine), (v.name for v in one.vectors)))]
+    fitting = [
+        candidate for candidate in filled if any(map(header_of(machine), (v.name for v in candidate.vectors)))
+    ]
     if len(fitting) > 1:
         raise RecordingError(
             "more than one group of channels looks like a recording",
             where=where,
-            got="; ".join(one.where for one in fitting)[:300],
+            got="; ".join(candidate.where for candidate in fitting)[:300],
             expected="one",
             next_step="save each group as a file of its own",
             rule="several-sheets",
@@ -81,9 +83,9 @@ def series_of(table: Vectors, machine: Machine) -> tuple[Series, ...]:
     UnreadableError
         rule ``no-data not-numbers``
     """
-    headers = [_header(one, table.where) for one in table.vectors]
+    headers = [_header(vector, table.where) for vector in table.vectors]
     assigned = assign_columns(headers, machine, where=table.where)
-    rows = max(len(one.values) for one in table.vectors)
+    rows = max(len(vector.values) for vector in table.vectors)
     if rows == 0:
         raise UnreadableError(
             "the recording has no data", where=table.where, got="channels without values",
@@ -92,14 +94,14 @@ def series_of(table: Vectors, machine: Machine) -> tuple[Series, ...]:
         )  # fmt: skip
     return tuple(
         Series(
-            symbol=one.symbol,
-            header=one.header,
-            unit=one.unit,
-            role=one.role,
-            values=_numbers(table.vectors[one.index], one.header, rows, table.where),
-            half=table.vectors[one.index].half,
+            symbol=column.symbol,
+            header=column.header,
+            unit=column.unit,
+            role=column.role,
+            values=_numbers(table.vectors[column.index], column.header, rows, table.where),
+            half=table.vectors[column.index].half,
         )
-        for one in assigned
+        for column in assigned
     )
 
 
@@ -132,11 +134,11 @@ def quantum(raw: NDArray[Any], values: NDArray[Any]) -> NDArray[np.float64] | No
     return np.full(len(counts), abs(slope) / 2)
 
 
-def _header(one: Vector, where: str) -> str:
-    name, printed = split_header(one.name)
-    stated = (one.unit or "").strip()
+def _header(vector: Vector, where: str) -> str:
+    name, printed = split_header(vector.name)
+    stated = (vector.unit or "").strip()
     if not stated:
-        return one.name
+        return vector.name
     if printed is None:
         return f"{name} [{stated}]"
     try:
@@ -145,18 +147,18 @@ def _header(one: Vector, where: str) -> str:
         same = printed.strip() == stated
     if not same:
         raise ColumnError(
-            f"channel {one.name!r} has two units",
+            f"channel {vector.name!r} has two units",
             where=where,
             got=f"{printed!r} in its name, {stated!r} beside it",
             expected="one unit",
             next_step="correct the channel's unit in a copy of the file",
             rule="doubled-unit",
         )
-    return one.name
+    return vector.name
 
 
-def _numbers(one: Vector, header: str, rows: int, where: str) -> NDArray[np.float64]:
-    values = one.values
+def _numbers(vector: Vector, header: str, rows: int, where: str) -> NDArray[np.float64]:
+    values = vector.values
     if values.ndim != 1 or values.dtype.kind not in "fiubSUM":
         raise UnreadableError(
             f"channel {header!r} holds no column of numbers", where=where,

@@ -36,9 +36,9 @@ class Written:
 
 def lvm_bytes(columns: Sequence[Written], title: str) -> bytes:
     """Return an LVM file of one segment; a time channel is its column of x values."""
-    time = next((one for one in columns if one.symbol == "t"), None)
-    rest = [one for one in columns if one is not time]
-    rows, many = len(columns[0].values), len(rest)
+    time = next((column for column in columns if column.symbol == "t"), None)
+    others_than_time = [column for column in columns if column is not time]
+    rows, many = len(columns[0].values), len(others_than_time)
 
     def line(*texts: str) -> str:
         return "\t".join(texts)
@@ -56,14 +56,17 @@ def lvm_bytes(columns: Sequence[Written], title: str) -> bytes:
         "",
         line("Channels", str(many), *[""] * many),
         line("Samples", *[str(rows)] * many, ""),
-        line("Y_Unit_Label", *[one.unit for one in rest], ""),
+        line("Y_Unit_Label", *[column.unit for column in others_than_time], ""),
         line("X_Dimension", *["Time"] * many, ""),
         line("X_Unit_Label", *["s" if time is None else time.unit] * many, ""),
         line("***End_of_Header***", *[""] * (many + 1)),
-        line("X_Value", *[one.name for one in rest], "Comment"),
+        line("X_Value", *[column.name for column in others_than_time], "Comment"),
     ]
     x = [""] * rows if time is None else [repr(float(v)) for v in time.values]
-    body = [line(x[row], *[repr(float(one.values[row])) for one in rest], "") for row in range(rows)]
+    body = [
+        line(x[row], *[repr(float(column.values[row])) for column in others_than_time], "")
+        for row in range(rows)
+    ]
     return ("\r\n".join([*head, *body]) + "\r\n").encode()
 
 
@@ -73,8 +76,8 @@ def mat_bytes(columns: Sequence[Written], title: str) -> bytes:
 
     stream: Any = io.BytesIO()
     table = {
-        "data": np.column_stack([one.values for one in columns]),
-        "headers": np.array([one.header for one in columns], dtype=object),
+        "data": np.column_stack([column.values for column in columns]),
+        "headers": np.array([column.header for column in columns], dtype=object),
         "title": title,
     }
     savemat(stream, table)
@@ -84,14 +87,14 @@ def mat_bytes(columns: Sequence[Written], title: str) -> bytes:
 def mdf_bytes(columns: Sequence[Written], title: str) -> bytes:
     """Return an MDF 4.1 file of one channel group, whose master is the time."""
     asammdf: Any = needed("asammdf", extra="mdf", to="write an MDF file", where=title)
-    time = next((one for one in columns if one.symbol == "t"), None)
+    time = next((column for column in columns if column.symbol == "t"), None)
     stamps = np.arange(len(columns[0].values), dtype=np.float64) if time is None else time.values
     stream = io.BytesIO()
     with asammdf.MDF(version="4.10") as file:
         signals = [
-            asammdf.Signal(one.values, stamps, name=one.name, unit=one.unit)
-            for one in columns
-            if one is not time
+            asammdf.Signal(column.values, stamps, name=column.name, unit=column.unit)
+            for column in columns
+            if column is not time
         ]
         file.append(signals, comment=title)
         file.save(stream)
@@ -108,9 +111,9 @@ def tdms_bytes(columns: Sequence[Written], title: str) -> bytes:
                 nptdms.RootObject(properties={"description": title}),
                 *(
                     nptdms.ChannelObject(
-                        "recording", one.name, one.values, properties={"unit_string": one.unit}
+                        "recording", column.name, column.values, properties={"unit_string": column.unit}
                     )
-                    for one in columns
+                    for column in columns
                 ),
             ]
         )

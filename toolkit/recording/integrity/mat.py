@@ -40,31 +40,31 @@ def unpack_mat(data: bytes, where: object) -> bytes:
         version(where, "the MAT-file is of a version that is not read", data[124:128].hex(), "version 5 to 7",
                 "save it with save(name, '-v7')")  # fmt: skip
     parts = [data[:116] + bytes(8) + data[124:_HEADER]]  # no link to MATLAB's own objects
-    place, left = _HEADER, MAX_TOTAL_BYTES
+    place, budget = _HEADER, MAX_TOTAL_BYTES
     while place < len(data):
         kind, begin, end, following = _tag(data, place, len(data), order, where)
         if kind == _COMPRESSED:
-            element, following = _inflated(data[begin:end], left, where), end
+            element, following = _inflated(data[begin:end], budget, where), end
         else:
             element = data[place:following]
         kind, begin, end, after = _tag(element, 0, len(element), order, where)
         if kind != _MATRIX or after != len(element):
             damaged(where, "an element of the MAT-file is no array", f"type {kind}", f"type {_MATRIX}")
         _walk(element, begin, end, order, 0, where)
-        left -= len(element)
+        budget -= len(element)
         parts.append(element)
         place = following
     return b"".join(parts)
 
 
-def _inflated(packed: bytes, left: int, where: object) -> bytes:
+def _inflated(packed: bytes, budget: int, where: object) -> bytes:
     engine = zlib.decompressobj()
     try:
-        content = engine.decompress(packed, left + 1)
+        content = engine.decompress(packed, budget + 1)
     except zlib.error as error:
         damaged(where, "an array of the MAT-file is damaged", error, "intact packed data")
-    if len(content) > left:
-        too_large(where, f"more than {left} bytes from {len(packed)}", MAX_TOTAL_BYTES)
+    if len(content) > budget:
+        too_large(where, f"more than {budget} bytes from {len(packed)}", MAX_TOTAL_BYTES)
     if not engine.eof:
         truncated(
             where, "an array of the MAT-file ends early", f"{len(packed)} bytes", "all of its packed data"
@@ -134,7 +134,7 @@ def _walk(data: bytes, place: int, end: int, order: str, depth: int, where: obje
     kind, begin, stop, place = _tag(data, place, end, order, where)
     if kind not in _SIZES:
         damaged(where, f"{name} has values of no known type", f"type {kind}", "numbers or text")
-    held = (stop - begin) // _SIZES[kind]
+    present = (stop - begin) // _SIZES[kind]
     # UTF-8 has up to four bytes a character: only a claim of more than there are is a lie.
-    if held != count if group != _CHAR else count > held:
-        damaged(where, f"{name} claims more or fewer values than it holds", count, held)
+    if present != count if group != _CHAR else count > present:
+        damaged(where, f"{name} claims more or fewer values than it holds", count, present)

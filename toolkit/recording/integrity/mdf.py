@@ -45,10 +45,10 @@ class _Block:
 
     def down(self) -> tuple[tuple[int, bytes], ...]:
         """Return (place, what should stand there) of the blocks that this one leads to."""
-        wanted = _LINKS.get(self.id, ())
+        expected = _LINKS.get(self.id, ())
         if self.id in _ALL:
-            wanted += (b"",) * (len(self.links) - len(wanted))
-        return tuple((link, kind) for link, kind in zip(self.links, wanted, strict=False) if link)
+            expected += (b"",) * (len(self.links) - len(expected))
+        return tuple((link, kind) for link, kind in zip(self.links, expected, strict=False) if link)
 
 
 def walk_mdf(data: bytes, where: object) -> None:
@@ -90,7 +90,7 @@ def walk_mdf(data: bytes, where: object) -> None:
 
 def _blocks(data: bytes, where: object) -> dict[int, _Block]:
     # Depth first, with a colour for what is on the way down: a link back to it would never end.
-    found: dict[int, _Block] = {}
+    blocks: dict[int, _Block] = {}
     open_: set[int] = set()
     stack: list[tuple[int, bytes, bool]] = [(_FIRST, b"HD", True)]
     while stack:
@@ -101,8 +101,8 @@ def _blocks(data: bytes, where: object) -> dict[int, _Block]:
         if place in open_:
             damaged(where, "a chain of blocks in the MDF file leads back to itself", f"byte {place}",
                     "chains that end")  # fmt: skip
-        new = place not in found
-        block = found[place] = _block(data, place, where) if new else found[place]
+        new = place not in blocks
+        block = blocks[place] = _block(data, place, where) if new else blocks[place]
         if kind and block.id not in kind.split():
             damaged(where, "a link in the MDF file leads to another kind of block", repr(block.id),
                     kind.decode())  # fmt: skip
@@ -110,7 +110,7 @@ def _blocks(data: bytes, where: object) -> dict[int, _Block]:
             open_.add(place)
             stack.append((place, b"", False))
             stack += [(*link, True) for link in block.down()]
-    return found
+    return blocks
 
 
 def _block(data: bytes, place: int, where: object) -> _Block:
@@ -130,7 +130,7 @@ def _block(data: bytes, place: int, where: object) -> _Block:
     return _Block(data[place + 2 : place + 4], links, body, place + length)
 
 
-def _inflated(data: bytes, block: _Block, left: int, where: object) -> int:
+def _inflated(data: bytes, block: _Block, budget: int, where: object) -> int:
     if block.body + 24 > block.end:
         damaged(where, "a packed block of the MDF file is too short", block.end - block.body, "24 bytes")
     kind, claimed, size = struct.unpack_from("<2xBx4xQQ", data, block.body)
@@ -140,7 +140,7 @@ def _inflated(data: bytes, block: _Block, left: int, where: object) -> int:
                 "save it without compression, or with deflate")  # fmt: skip
     if begin + size > block.end:
         truncated(where, "a packed block of the MDF file ends early", f"{block.end - begin} bytes", size)
-    if claimed > left:
+    if claimed > budget:
         too_large(where, f"{claimed} bytes", MAX_TOTAL_BYTES)
     engine = zlib.decompressobj()
     try:
@@ -169,11 +169,11 @@ def _check_group(
         claimed += cycles * (prefix + size + invalid)
         _check_channels(data, block.links[1], blocks, size, where)
         place = block.links[0]
-    held = _length(group.links[2], blocks, inflated, where)
-    if held < claimed:
-        truncated(where, "the MDF file has less data than it claims", f"{held} bytes", claimed)
-    if held > claimed:
-        damaged(where, "the MDF file has more data than it claims", f"{held} bytes", claimed)
+    present = _length(group.links[2], blocks, inflated, where)
+    if present < claimed:
+        truncated(where, "the MDF file has less data than it claims", f"{present} bytes", claimed)
+    if present > claimed:
+        damaged(where, "the MDF file has more data than it claims", f"{present} bytes", claimed)
 
 
 def _check_channels(data: bytes, place: int, blocks: dict[int, _Block], size: int, where: object) -> None:

@@ -40,8 +40,8 @@ class _Reader:
         return self.data[begin : self.place]
 
     def number(self, kind: str = "L") -> int:
-        found: int = struct.unpack(f"{self.order}{kind}", self.take(struct.calcsize(f"={kind}")))[0]
-        return found
+        value: int = struct.unpack(f"{self.order}{kind}", self.take(struct.calcsize(f"={kind}")))[0]
+        return value
 
     def text(self) -> bytes:
         return self.take(self.number())
@@ -59,7 +59,7 @@ def walk_tdms(data: bytes, where: object) -> dict[str, int]:
     """
     place = 0
     counts: dict[str, int] = {}
-    known: dict[str, tuple[int, int]] = {}  # path -> (bytes of a value, values in a chunk), of all segments
+    objects: dict[str, tuple[int, int]] = {}  # path -> (bytes of a value, values in a chunk), of all segments
     active: dict[str, tuple[int, int]] = {}  # of the present one
     while place < len(data):
         head = data[place : place + _LEAD_IN]
@@ -69,9 +69,9 @@ def walk_tdms(data: bytes, where: object) -> dict[str, int]:
             damaged(where, "a TDMS segment does not begin where the last one ends", f"byte {place}", "TDSm")
         mask = struct.unpack_from("<L", head, 4)[0]
         order = ">" if mask & _BIG_ENDIAN else "<"
-        written, following, offset = struct.unpack_from(f"{order}LQQ", head, 8)
-        if written not in _VERSIONS:
-            version(where, "the TDMS file is of a version that is not read", written,
+        version_number, following, offset = struct.unpack_from(f"{order}LQQ", head, 8)
+        if version_number not in _VERSIONS:
+            version(where, "the TDMS file is of a version that is not read", version_number,
                     " or ".join(map(str, _VERSIONS)), "write it again as TDMS 2.0")  # fmt: skip
         if mask & _DAQMX:
             _daqmx(where)
@@ -86,14 +86,16 @@ def walk_tdms(data: bytes, where: object) -> dict[str, int]:
         if mask & _META_DATA:
             if mask & _NEW_LIST:
                 active = {}
-            _objects(_Reader(data, begin, begin + offset, order, where), known, active)
+            _objects(_Reader(data, begin, begin + offset, order, where), objects, active)
         if mask & _RAW_DATA:
             _count(counts, active, following - offset, where)
         place = end
     return counts
 
 
-def _objects(reader: _Reader, known: dict[str, tuple[int, int]], active: dict[str, tuple[int, int]]) -> None:
+def _objects(
+    reader: _Reader, objects: dict[str, tuple[int, int]], active: dict[str, tuple[int, int]]
+) -> None:
     for _ in range(reader.number()):
         path = reader.text().decode("utf-8", "replace")
         index = reader.number()
@@ -102,13 +104,13 @@ def _objects(reader: _Reader, known: dict[str, tuple[int, int]], active: dict[st
         if index == _NO_DATA:
             active.pop(path, None)
         elif index == _AS_BEFORE:
-            if path not in known:
+            if path not in objects:
                 damaged(
                     reader.where, "a TDMS channel repeats what was never said", path, "an index of its data"
                 )
-            active[path] = known[path]
+            active[path] = objects[path]
         else:
-            active[path] = known[path] = _raw_index(reader, path)
+            active[path] = objects[path] = _raw_index(reader, path)
         for _ in range(reader.number()):
             reader.text()
             kind = reader.number()

@@ -9,7 +9,7 @@ function cell(row, value, kind) {
   const td = document.createElement("td");
   if (kind === "grade") {
     const tag = document.createElement("span");
-    tag.className = "g"; tag.textContent = value; tag.style.setProperty("--c", data.colours[value]);
+    tag.className = "g"; tag.textContent = value; tag.dataset.grade = value;
     td.append(tag);
   } else if (kind === "number") {
     td.className = "n"; td.textContent = value === null ? "" : Number(value).toFixed(value < 1 ? 4 : 1);

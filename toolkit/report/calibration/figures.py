@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
     from toolkit.calibration.fit.report import FitReport
 
@@ -27,6 +28,28 @@ _NAMED = 5  # rows named in the influence figure
 
 def report_figures(report: FitReport, *, title: str) -> dict[str, bytes]:
     """Return the figures of a load by file name, PNG and SVG of each; ``title`` names record or session."""
+    made = {}
+    for name, (draw, what) in _drawings(report).items():
+        for kind, data in _drawn(draw, f"{title}, {report.load}: {what}").items():
+            made[f"{report.load}_{name}.{kind}"] = data
+    return made
+
+
+def open_figures(report: FitReport, *, title: str) -> dict[str, Callable[[], Figure]]:
+    """Return the same figures by name, each to be drawn when it is called: for a notebook."""
+    import matplotlib as mpl
+
+    def drawing(draw: Callable[[Axes], None], what: str) -> Callable[[], Figure]:
+        def open_figure() -> Figure:
+            with mpl.rc_context(_RC):
+                return _figure(draw, f"{title}, {report.load}: {what}")
+
+        return open_figure
+
+    return {f"{report.load}_{name}": drawing(draw, what) for name, (draw, what) in _drawings(report).items()}
+
+
+def _drawings(report: FitReport) -> dict[str, tuple[Callable[[Axes], None], str]]:
     drawings: list[tuple[str, Callable[[Axes], None], str]] = [
         ("residuals", lambda axes: _residuals(axes, report), "residuals against load"),
         ("fitted", lambda axes: _against(axes, report, report.fitted, "fitted"), "residuals against fitted"),
@@ -36,29 +59,15 @@ def report_figures(report: FitReport, *, title: str) -> dict[str, bytes]:
     ]  # fmt: skip
     if report.check_percent_fs is not None:
         drawings.append(("check", lambda axes: _check(axes, report), "check loads"))
-    made = {}
-    for name, draw, what in drawings:
-        for kind, data in _drawn(draw, f"{title}, {report.load}: {what}").items():
-            made[f"{report.load}_{name}.{kind}"] = data
-    return made
+    return {name: (draw, what) for name, draw, what in drawings}
 
 
 def _drawn(draw: Callable[[Axes], None], title: str) -> dict[str, bytes]:
     import matplotlib as mpl
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
 
     # A fixed salt and no date: the same data give the same file.
     with mpl.rc_context(_RC | {"svg.hashsalt": "toolkit", "svg.fonttype": "path"}):
-        figure = Figure(figsize=_SIZE, dpi=DPI, layout="constrained")
-        FigureCanvasAgg(figure)
-        axes = figure.add_subplot()
-        axes.set_title(title, fontsize=10.5, loc="left")
-        axes.grid(visible=True, color="#d9d9d9", linewidth=0.6)
-        axes.set_axisbelow(True)
-        for side in ("top", "right"):
-            axes.spines[side].set_visible(False)
-        draw(axes)
+        figure = _figure(draw, title)
         made = {}
         for kind in ("png", "svg"):
             stream = io.BytesIO()
@@ -66,6 +75,22 @@ def _drawn(draw: Callable[[Axes], None], title: str) -> dict[str, bytes]:
             figure.savefig(stream, format=kind, metadata=metadata)
             made[kind] = stream.getvalue()
     return made
+
+
+def _figure(draw: Callable[[Axes], None], title: str) -> Figure:
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=_SIZE, dpi=DPI, layout="constrained")
+    FigureCanvasAgg(figure)
+    axes = figure.add_subplot()
+    axes.set_title(title, fontsize=10.5, loc="left")
+    axes.grid(visible=True, color="#d9d9d9", linewidth=0.6)
+    axes.set_axisbelow(True)
+    for side in ("top", "right"):
+        axes.spines[side].set_visible(False)
+    draw(axes)
+    return figure
 
 
 def _marks(report: FitReport) -> list[tuple[str | None, np.ndarray, str, str]]:

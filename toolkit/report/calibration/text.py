@@ -90,15 +90,15 @@ def balance_dict(report: BalanceReport) -> dict[str, Any]:
         "newton_steps": report.newton_steps,
         "newton_difference": report.newton_difference,
         "loads": {
-            one.load: {
-                "direct_sd_percent_fs": one.direct_sd_percent_fs,
-                "direct_max_percent_fs": one.direct_max_percent_fs,
-                "iterated_sd_percent_fs": one.iterated_sd_percent_fs,
-                "iterated_max_percent_fs": one.iterated_max_percent_fs,
-                "check_direct_percent_fs": one.check_direct_percent_fs,
-                "check_iterated_percent_fs": one.check_iterated_percent_fs,
+            load.load: {
+                "direct_sd_percent_fs": load.direct_sd_percent_fs,
+                "direct_max_percent_fs": load.direct_max_percent_fs,
+                "iterated_sd_percent_fs": load.iterated_sd_percent_fs,
+                "iterated_max_percent_fs": load.iterated_max_percent_fs,
+                "check_direct_percent_fs": load.check_direct_percent_fs,
+                "check_iterated_percent_fs": load.check_iterated_percent_fs,
             }
-            for one in report.loads
+            for load in report.loads
         },
         "tares": None if tares is None else {
             "relative": tares.relative,
@@ -170,10 +170,10 @@ def balance_text(report: BalanceReport) -> str:
     if form.not_excited:
         lines.append(f"not told apart by these loads, left out of this form: {', '.join(form.not_excited)}")
     rows = [
-        [one.load, f"{one.direct_sd_percent_fs:.3g}", f"{one.direct_max_percent_fs:.3g}",
-         f"{one.iterated_sd_percent_fs:.3g}", f"{one.iterated_max_percent_fs:.3g}",
-         _or_dash(one.check_direct_percent_fs), _or_dash(one.check_iterated_percent_fs)]
-        for one in report.loads
+        [load.load, f"{load.direct_sd_percent_fs:.3g}", f"{load.direct_max_percent_fs:.3g}",
+         f"{load.iterated_sd_percent_fs:.3g}", f"{load.iterated_max_percent_fs:.3g}",
+         _or_dash(load.check_direct_percent_fs), _or_dash(load.check_iterated_percent_fs)]
+        for load in report.loads
     ]  # fmt: skip
     header = ["% FS", "direct sd", "max", "iterated sd", "max", "check direct", "check iterated"]
     lines += [
@@ -187,7 +187,7 @@ def balance_text(report: BalanceReport) -> str:
         lines += ["", f"tare loads by run, {kind} ({tares.steps} steps)"]
         lines.append(
             _table(
-                ["run", *(f"{one.load} [{one.unit}]" for one in report.loads)],
+                ["run", *(f"{load.load} [{load.unit}]" for load in report.loads)],
                 [
                     [str(run), *(plus_minus(v, u) for v, u in zip(row, errors, strict=True))]
                     for run, row, errors in zip(

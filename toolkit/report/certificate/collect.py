@@ -75,14 +75,14 @@ def collect(
     loads, check = stored_loads(registry.folder, record), stored_check(registry.folder, record)
     if loads is None:
         raise _refused(record.id, "certificate-unverified", "no reference loads", "its reference loads")
-    found = _found(registry, record, statements)
+    as_found_result = _found(registry, record, statements)
     results = load_results(
         record,
         loads,
         check,
         rule=stated.rule if check is not None else None,
         unverifiable=unverifiable(record, check),
-        found=None if found is None else _found_session(registry, found),
+        found=None if as_found_result is None else _found_session(registry, as_found_result),
         as_left=statements.phase == "as_left",
     )
     gaps = gaps_of(record, statements, stated)
@@ -111,15 +111,15 @@ def collect(
         method=stated.get("method"),
         model=_model(record),
         phase=statements.phase,
-        adjustment=_adjustment(statements, found),
+        adjustment=_adjustment(statements, as_found_result),
         temperature_C=statements.temperature_C,
         reference=statements.reference.standard,
         reference_certificate=statements.reference.certificate,
         reference_uncertainties=tuple(
-            (one.load, one.U, one.k, record.load(one.load).unit)
-            if one.relative is None
-            else (one.load, 100 * one.relative, one.k, "% of the applied load")
-            for one in statements.reference.uncertainties
+            (uncertainty.load, uncertainty.U, uncertainty.k, record.load(uncertainty.load).unit)
+            if uncertainty.relative is None
+            else (uncertainty.load, 100 * uncertainty.relative, uncertainty.k, "% of the applied load")
+            for uncertainty in statements.reference.uncertainties
         ),
         rule=stated.rule,
         interval=stated.interval,
@@ -184,7 +184,7 @@ def _admit(
         raise not_in_force(
             record.id, reasons, where=record.id, expected=expected, rule="certificate-candidate"
         )
-    return tuple(one.text for one in reasons)
+    return tuple(reason.text for reason in reasons)
 
 
 def _identity(record: CalibrationRecord, stated: Stated, replaces: str | None, amendment: str | None) -> str:
@@ -222,18 +222,18 @@ def _found_session(registry: Registry, found: AsFound) -> FoundSession | None:
     )
 
 
-def _adjustment(statements: Statements, found: AsFound | None) -> str:
+def _adjustment(statements: Statements, as_found: AsFound | None) -> str:
     if statements.phase is None:
         return "No adjustment or repair is stated: the results hold for the item as it was calibrated."
     if statements.phase == "as_found":
         text = "The results are those of the item as found, before any adjustment."
     else:
         text = "The results are those of the item as left, after adjustment."
-    if found is None:
+    if as_found is None:
         return f"{text} There is no record of the results before the adjustment."
-    if found.reason is not None:
-        return f"{text} As found could not be judged: {found.reason}."
-    return f"{text} As found is judged by {found.record}, the record in force when the item came in."
+    if as_found.reason is not None:
+        return f"{text} As found could not be judged: {as_found.reason}."
+    return f"{text} As found is judged by {as_found.record}, the record in force when the item came in."
 
 
 def _same_number(registry: Registry, record: CalibrationRecord, stated: Stated) -> str | None:
@@ -245,17 +245,17 @@ def _same_number(registry: Registry, record: CalibrationRecord, stated: Stated) 
     if number is None:
         return None
     ledger = registry.ledger(record.instrument)
-    for other in registry.ids(record.instrument):
-        path = registry.folder / record.instrument / f"{other}.json"
-        approved = any(entry.event == "approved" for entry in ledger.of(other))
-        if other == record.id or not approved or not path.is_file():
+    for record_id in registry.ids(record.instrument):
+        path = registry.folder / record.instrument / f"{record_id}.json"
+        approved = any(entry.event == "approved" for entry in ledger.of(record_id))
+        if record_id == record.id or not approved or not path.is_file():
             continue
         try:
             table = json.loads(from_bytes(path.read_bytes(), where=path).settings).get("certificate", {})
         except ToolkitError:
             continue  # 'verify' names a damaged record; this one is not concerned by it
         if str(table.get("number", "")) == number:
-            return other
+            return record_id
     return None
 
 
@@ -267,8 +267,8 @@ def _withdrawn(status: RecordStatus) -> str | None:
         if status.void_from and not status.void_always
         else ", void on every day"
     )
-    known = status.known_on.isoformat() if status.known_on else "an unknown day"
-    return f"{status.id} was withdrawn on {known}{void}: {status.reason or 'no reason stated'}"
+    day = status.known_on.isoformat() if status.known_on else "an unknown day"
+    return f"{status.id} was withdrawn on {day}{void}: {status.reason or 'no reason stated'}"
 
 
 def _model(record: CalibrationRecord) -> str:

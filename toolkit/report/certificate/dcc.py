@@ -9,15 +9,24 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from toolkit import __version__
 from toolkit.errors import ConfigError
 from toolkit.estimate import round_to_uncertainty, round_uncertainty
 from toolkit.recording.marks import OWN_OUTPUT
 from toolkit.report.certificate import content as words
-from toolkit.report.certificate.dcc_units import dsi, dsi_of_term
-from toolkit.report.certificate.dcc_xml import Node, node, quantity, quantity_list, release, rich, text
-from toolkit.report.certificate.decision import RULES
+from toolkit.report.certificate.dcc_xml import (
+    Node,
+    dsi,
+    dsi_of_term,
+    node,
+    quantity,
+    quantity_list,
+    release,
+    rich,
+    text,
+)
+from toolkit.report.certificate.statements import RULES
 from toolkit.units import unit
+from toolkit.version import __version__
 
 if TYPE_CHECKING:
     from toolkit.report.certificate.model import Certificate, LoadResult
@@ -45,8 +54,8 @@ def build_dcc(certificate: Certificate) -> bytes:
     root.set(place, f"https://ptb.de/dcc https://ptb.de/dcc/v{VERSION}/dcc.xsd")
     root.insert(0, etree.Comment(f" {OWN_OUTPUT}; toolkit {__version__} "))
     etree.indent(root, " ")
-    made: bytes = etree.tostring(root, xml_declaration=True, encoding="UTF-8")
-    return made + b"\n"
+    xml: bytes = etree.tostring(root, xml_declaration=True, encoding="UTF-8")
+    return xml + b"\n"
 
 
 def _administrative(c: Certificate) -> Node:
@@ -96,9 +105,9 @@ def _administrative(c: Certificate) -> Node:
                     "dcc:identifications",
                     _identification("calibrationLaboratory", c.instrument, "Instrument"),
                     *(
-                        _identification("manufacturer", one.serial, f"Serial number of {one.name}")
-                        for one in c.cells
-                        if one.serial
+                        _identification("manufacturer", cell.serial, f"Serial number of {cell.name}")
+                        for cell in c.cells
+                        if cell.serial
                     ),
                 ),
             ),
@@ -112,20 +121,20 @@ def _administrative(c: Certificate) -> Node:
 
 def _persons(c: Certificate) -> list[Node]:
     roles = [("calibrated", c.entered_by), ("checked", c.checked_by), ("approved", c.approved_by)]
-    told = [(role, name) for role, name in roles if name]
+    persons = [(role, name) for role, name in roles if name]
     return [
         node(
             "dcc:respPerson",
             node("dcc:person", text("dcc:name", name)),
             node("dcc:role", role),
-            node("dcc:mainSigner", "true" if at == len(told) - 1 and not c.draft else "false"),
+            node("dcc:mainSigner", "true" if at == len(persons) - 1 and not c.draft else "false"),
         )
-        for at, (role, name) in enumerate(told)
+        for at, (role, name) in enumerate(persons)
     ]
 
 
 def _statements(c: Certificate) -> list[Node]:
-    told: list[tuple[str, str | None]] = [
+    statements: list[tuple[str, str | None]] = [
         ("State", words.draft_text(c) if c.draft else None),
         ("Simulation", words.SIMULATED if c.simulated else None),
         ("Withdrawal", c.withdrawn),
@@ -142,24 +151,24 @@ def _statements(c: Certificate) -> list[Node]:
         ("Agreed with the customer", c.interval),
         ("Not stated", "; ".join(c.gaps) or None),
     ]
-    made = [
+    nodes = [
         node("dcc:statement", text("dcc:name", name), rich("dcc:declaration", words_))
-        for name, words_ in told
+        for name, words_ in statements
         if words_
     ]
     outside = dict.fromkeys(
         one for one in [*(o.unit for o in c.loads), *(o.unit for o in c.cells)] if _not_si(one)
     )
-    made += [
+    nodes += [
         node(
             "dcc:statement",
-            text("dcc:name", f"Unit {one} of the record"),
-            node("dcc:nonSIDefinition", f"1 {one} = {dsi(one).factor!r} {dsi(one).text}"),
-            node("dcc:nonSIUnit", f"|{one}"),
+            text("dcc:name", f"Unit {text_unit} of the record"),
+            node("dcc:nonSIDefinition", f"1 {text_unit} = {dsi(text_unit).factor!r} {dsi(text_unit).text}"),
+            node("dcc:nonSIUnit", f"|{text_unit}"),
         )
-        for one in outside
+        for text_unit in outside
     ]
-    return made
+    return nodes
 
 
 def _unverified(c: Certificate) -> str:
@@ -204,7 +213,7 @@ def _results(c: Certificate) -> Node:
                 ),
             ),
             _conditions(c),
-            node("dcc:results", *(result for one in c.loads for result in _load(c, one))),
+            node("dcc:results", *(result for load in c.loads for result in _load(c, load))),
         ),
     )
 
@@ -227,80 +236,90 @@ def _conditions(c: Certificate) -> Node | None:
     )
 
 
-def _load(c: Certificate, one: LoadResult) -> list[Node]:
-    made = [_equation(c, one), _range(one)]
-    if one.checks:
-        made.append(_check(one))
-    if one.adjustment:
-        made.append(_adjustment(one))
-    return made
+def _load(c: Certificate, load: LoadResult) -> list[Node]:
+    nodes = [_equation(c, load), _range(load)]
+    if load.checks:
+        nodes.append(_check(load))
+    if load.adjustment:
+        nodes.append(_adjustment(load))
+    return nodes
 
 
-def _equation(c: Certificate, one: LoadResult) -> Node:
+def _equation(c: Certificate, load: LoadResult) -> Node:
     units = {cell.name: cell.unit for cell in c.cells}
     lines = []
-    for term in one.terms:
-        made = dsi_of_term(one.unit, term.term, units)
-        u = f"{abs(term.standard_error * made.factor):.2g}"
-        told = f"issued: {term.issued!r} {term.unit}; full: {term.full!r} {term.unit}"
-        lines.append(quantity(term.term, repr(term.full * made.factor), made.text, told=told, standard=u))
+    for term in load.terms:
+        coefficient_unit = dsi_of_term(load.unit, term.term, units)
+        u = f"{abs(term.standard_error * coefficient_unit.factor):.2g}"
+        comment = f"issued: {term.issued!r} {term.unit}; full: {term.full!r} {term.unit}"
+        lines.append(
+            quantity(
+                term.term,
+                repr(term.full * coefficient_unit.factor),
+                coefficient_unit.text,
+                told=comment,
+                standard=u,
+            )
+        )
     return node(
         "dcc:result",
-        text("dcc:name", f"Coefficients of {one.load}"),
-        rich("dcc:description", f"{one.load} is the sum of coefficient x term; the terms are named below."),
+        text("dcc:name", f"Coefficients of {load.load}"),
+        rich("dcc:description", f"{load.load} is the sum of coefficient x term; the terms are named below."),
         node("dcc:data", *lines),
     )
 
 
-def _range(one: LoadResult) -> Node:
-    made = dsi(one.unit)
-    at = [e.at * made.factor for e in one.range]
-    U = [e.U * made.factor for e in one.range]
+def _range(load: LoadResult) -> Node:
+    load_unit = dsi(load.unit)
+    at = [e.at * load_unit.factor for e in load.range]
+    U = [e.U * load_unit.factor for e in load.range]
     return node(
         "dcc:result",
-        text("dcc:name", f"Expanded uncertainty of {one.load} over the calibrated range"),
+        text("dcc:name", f"Expanded uncertainty of {load.load} over the calibrated range"),
         node(
             "dcc:data",
             quantity_list(
-                one.load,
+                load.load,
                 [round_to_uncertainty(v, u) for v, u in zip(at, U, strict=True)],
-                made.text,
+                load_unit.text,
                 U=[round_uncertainty(u) for u in U],
-                k=[f"{e.k:.2f}" for e in one.range],
-                p=[f"{e.probability:g}" for e in one.range],
-                told=f"in the record: {one.unit}",
+                k=[f"{e.k:.2f}" for e in load.range],
+                p=[f"{e.probability:g}" for e in load.range],
+                told=f"in the record: {load.unit}",
             ),
         ),
     )
 
 
-def _check(one: LoadResult) -> Node:
-    made = dsi(one.unit)
-    U = [line.uncertainty.U * made.factor for line in one.checks]
+def _check(load: LoadResult) -> Node:
+    load_unit = dsi(load.unit)
+    U = [line.uncertainty.U * load_unit.factor for line in load.checks]
     rounded_U = [round_uncertainty(u) for u in U]
-    k = [f"{line.uncertainty.k:.2f}" for line in one.checks]
-    p = [f"{line.uncertainty.probability:g}" for line in one.checks]
+    k = [f"{line.uncertainty.k:.2f}" for line in load.checks]
+    p = [f"{line.uncertainty.probability:g}" for line in load.checks]
 
     def rounded(values: list[float]) -> list[str]:
-        return [round_to_uncertainty(v * made.factor, u) for v, u in zip(values, U, strict=True)]
+        return [round_to_uncertainty(v * load_unit.factor, u) for v, u in zip(values, U, strict=True)]
 
     deviation = quantity_list(
-        f"Deviation of {one.load}",
-        rounded([line.deviation for line in one.checks]),
-        made.text,
+        f"Deviation of {load.load}",
+        rounded([line.deviation for line in load.checks]),
+        load_unit.text,
         kind="basic_measurementError",
         U=rounded_U,
         k=k,
         p=p,
     )
-    stated = [line.verdict for line in one.checks]
+    stated = [line.verdict for line in load.checks]
     if all(stated):
         deviation.append(
             node(
                 "dcc:measurementMetaData",
                 node(
                     "dcc:metaData",
-                    rich("dcc:declaration", f"Tolerance {one.tolerance:.6g} {one.unit} by the decision rule"),
+                    rich(
+                        "dcc:declaration", f"Tolerance {load.tolerance:.6g} {load.unit} by the decision rule"
+                    ),
                     node("dcc:conformityXMLList", " ".join(str(v) for v in stated)),
                     refType="basic_conformity",
                 ),
@@ -308,21 +327,21 @@ def _check(one: LoadResult) -> Node:
         )
     return node(
         "dcc:result",
-        text("dcc:name", f"Check loads, {one.load}"),
+        text("dcc:name", f"Check loads, {load.load}"),
         node(
             "dcc:data",
             node(
                 "dcc:list",
                 quantity_list(
-                    f"Reference {one.load}",
-                    [f"{line.reference * made.factor:.10g}" for line in one.checks],
-                    made.text,
+                    f"Reference {load.load}",
+                    [f"{line.reference * load_unit.factor:.10g}" for line in load.checks],
+                    load_unit.text,
                     kind="basic_referenceValue",
                 ),
                 quantity_list(
-                    f"Result {one.load}",
-                    rounded([line.result for line in one.checks]),
-                    made.text,
+                    f"Result {load.load}",
+                    rounded([line.result for line in load.checks]),
+                    load_unit.text,
                     kind="basic_measuredValue",
                     U=rounded_U,
                     k=k,
@@ -334,26 +353,26 @@ def _check(one: LoadResult) -> Node:
     )
 
 
-def _adjustment(one: LoadResult) -> Node:
-    told = one.adjustment
-    assert told is not None  # noqa: S101  the caller asked
-    made = dsi(one.unit)
-    lines = [("as found", told.as_found, told.found, "basic_beforeAdjustment")]
-    if told.as_left is not None and told.left is not None:
-        lines.append(("as left", told.as_left, told.left, "basic_afterAdjustment"))
+def _adjustment(load: LoadResult) -> Node:
+    change = load.adjustment
+    assert change is not None  # noqa: S101  the caller asked
+    load_unit = dsi(load.unit)
+    lines = [("as found", change.as_found, change.found, "basic_beforeAdjustment")]
+    if change.as_left is not None and change.left is not None:
+        lines.append(("as left", change.as_left, change.left, "basic_afterAdjustment"))
     return node(
         "dcc:result",
-        text("dcc:name", f"Largest deviation of {one.load} before and after adjustment"),
+        text("dcc:name", f"Largest deviation of {load.load} before and after adjustment"),
         node(
             "dcc:data",
             *(
                 quantity(
                     name,
-                    round_to_uncertainty(value * made.factor, of.U * made.factor),
-                    made.text,
+                    round_to_uncertainty(value * load_unit.factor, of.U * load_unit.factor),
+                    load_unit.text,
                     kind=kind,
                     expanded=(
-                        round_uncertainty(of.U * made.factor),
+                        round_uncertainty(of.U * load_unit.factor),
                         f"{of.k:.2f}",
                         f"{of.probability:g}",
                     ),

@@ -5,9 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from toolkit.findings import Finding
-from toolkit.report.certificate.model import LoadResult
+from toolkit.report.certificate.model import MOST_FIGURES, LoadResult
 from toolkit.report.certificate.statements import Stated
-from toolkit.report.certificate.vocabulary import MOST_FIGURES
 
 if TYPE_CHECKING:
     from toolkit.calibration.records.record import CalibrationRecord
@@ -34,9 +33,9 @@ def gaps_of(record: CalibrationRecord, statements: Statements, stated: Stated) -
     if statements.reference.certificate is None:
         gaps.append("certificate of the reference standard")
     gaps += [
-        f"uncertainty of the reference standard for {one.load}"
-        for one in record.loads
-        if statements.reference.u(one.load) is None
+        f"uncertainty of the reference standard for {load.load}"
+        for load in record.loads
+        if statements.reference.u(load.load) is None
     ]
     gaps += [f"serial number of {cell.name}" for cell in record.cells if cell.serial is None]
     return tuple(gaps)
@@ -51,68 +50,68 @@ def result_findings(
     record: CalibrationRecord, results: tuple[LoadResult, ...], no_check: bool, stated: Stated
 ) -> list[Finding]:
     """Return the findings about the results: conformity, budget, pictures."""
-    made = []
+    findings = []
     if no_check and stated.rule is not None:
-        made.append(
+        findings.append(
             Finding(
                 rule="certificate-conformity",
                 where=record.id,
                 message="a decision rule is stated, but the session has no check loads to apply it to",
             )
         )
-    for one in results:
-        if one.verdict in ("conditionalFail", "fail"):
-            worst = max(one.checks, key=lambda line: abs(line.deviation))
-            made.append(
+    for result in results:
+        if result.verdict in ("conditionalFail", "fail"):
+            worst = max(result.checks, key=lambda line: abs(line.deviation))
+            findings.append(
                 Finding(
                     rule="certificate-conformity",
-                    where=one.load,
-                    message=f"{one.verdict}: check load {worst.row} deviates by {worst.deviation:+.4g} "
-                    f"{one.unit}, tolerance {one.tolerance:.4g} {one.unit}",
+                    where=result.load,
+                    message=f"{result.verdict}: check load {worst.row} deviates by {worst.deviation:+.4g} "
+                    f"{result.unit}, tolerance {result.tolerance:.4g} {result.unit}",
                 )
             )
-        made += [
+        findings += [
             Finding(
                 rule="certificate-conformity",
-                where=f"{one.load}, check row {line.row}",
+                where=f"{result.load}, check row {line.row}",
                 message=f"{', '.join(line.beyond)} lies beyond the fitted range: no conformity is stated",
             )
-            for line in one.checks
+            for line in result.checks
             if line.beyond
         ]
-        if one.not_stated:
-            made.append(
+        if result.not_stated:
+            findings.append(
                 Finding(
                     rule="certificate-budget",
-                    where=one.load,
-                    message=f"the uncertainty holds no contribution of {', '.join(one.not_stated)}: nothing "
-                    "was stated or measured",
+                    where=result.load,
+                    message=f"the uncertainty holds no contribution of {', '.join(result.not_stated)}: "
+                    "nothing was stated or measured",
                     level="note",
                 )
             )
     if len(results) > MOST_FIGURES:
-        made.append(
+        findings.append(
             Finding(
                 rule="certificate-figures",
                 where=record.id,
                 message=f"{len(results)} loads, of which the first {MOST_FIGURES} have a picture",
             )
         )
-    return made
+    return findings
 
 
 def state_findings(
     record: CalibrationRecord, reasons: tuple[str, ...], later: RecordStatus, same: str | None
 ) -> list[Finding]:
     """Return the findings about the record's state and the uniqueness of the certificate's number."""
-    made = []
+    findings = []
     if reasons:
         message = f"the paper says DRAFT and is no certificate: {'; '.join(reasons)}"
-        made.append(Finding(rule="certificate-draft", where=record.id, message=message))
+        findings.append(Finding(rule="certificate-draft", where=record.id, message=message))
     if later.state == "withdrawn":
         message = f"withdrawn since the day asked for: {later.reason or 'no reason stated'}"
-        made.append(Finding(rule="certificate-withdrawn", where=record.id, message=message))
+        findings.append(Finding(rule="certificate-withdrawn", where=record.id, message=message))
     if same is not None:
         message = f"{same} states the same certificate number: an id must be unique"
-        made.append(Finding(rule="certificate-number", where=record.id, message=message))
-    return made
+        findings.append(Finding(rule="certificate-number", where=record.id, message=message))
+    return findings

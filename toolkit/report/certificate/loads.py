@@ -9,8 +9,8 @@ import numpy as np
 
 from toolkit.calibration.terms import INTERCEPT, parse_term, term_matrix
 from toolkit.calibration.uncertainty.budget import calibration_budget, predict
-from toolkit.report.certificate.decision import decide
 from toolkit.report.certificate.model import Adjustment, CheckLine, Expanded, LoadResult, Part, TermLine
+from toolkit.report.certificate.statements import decide
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -51,37 +51,39 @@ def load_results(
     found : what the as-found session found by the record in force before, where that is known
     as_left : the record is of the session after the adjustment
     """
-    return tuple(_load(record, one, loads, check, rule, unverifiable, found, as_left) for one in record.loads)
+    return tuple(
+        _load(record, load, loads, check, rule, unverifiable, found, as_left) for load in record.loads
+    )
 
 
 def _load(
     record: CalibrationRecord,
-    one: LoadFit,
+    load: LoadFit,
     loads: Table,
     check: Table | None,
     rule: str | None,
     unverifiable: tuple[str, ...],
-    found: FoundSession | None,
+    session: FoundSession | None,
     as_left: bool,
 ) -> LoadResult:
-    reference = loads.column(one.load)
-    fitted = term_matrix(one.terms, loads.columns(record.indications)) @ np.asarray(one.coefficients)
+    reference = loads.column(load.load)
+    fitted = term_matrix(load.terms, loads.columns(record.indications)) @ np.asarray(load.coefficients)
     residuals = fitted - reference
-    tolerance = one.tolerance or 1e-3 * one.largest
-    checks = () if check is None else _checks(record, one, loads, check, rule, tolerance)
-    full = calibration_budget(record, loads, check, one.load)
-    errors = one.standard_errors
+    tolerance = load.tolerance or 1e-3 * load.largest
+    checks = () if check is None else _checks(record, load, loads, check, rule, tolerance)
+    full = calibration_budget(record, loads, check, load.load)
+    errors = load.standard_errors
     return LoadResult(
-        load=one.load,
-        unit=one.unit,
+        load=load.load,
+        unit=load.unit,
         terms=tuple(
-            TermLine(term=t, full=c, issued=i, standard_error=u, unit=_term_unit(record, one, t))
-            for t, c, i, u in zip(one.terms, one.coefficients, one.issued, errors, strict=True)
+            TermLine(term=t, full=c, issued=i, standard_error=u, unit=_term_unit(record, load, t))
+            for t, c, i, u in zip(load.terms, load.coefficients, load.issued, errors, strict=True)
         ),
-        method=one.method,
+        method=load.method,
         n=loads.rows,
-        dof=one.dof or 0,
-        residual_sd=one.residual_sd or 0.0,
+        dof=load.dof or 0,
+        residual_sd=load.residual_sd or 0.0,
         minimum=float(reference.min()),
         maximum=float(reference.max()),
         tolerance=tolerance,
@@ -89,7 +91,7 @@ def _load(
         residuals=tuple(residuals.tolist()),
         full_scale=_expanded(full),
         range=tuple(
-            _expanded(calibration_budget(record, loads, check, one.load, at))
+            _expanded(calibration_budget(record, loads, check, load.load, at))
             for at in steps(float(reference.min()), float(reference.max()))
         ),
         parts=tuple(
@@ -107,10 +109,10 @@ def _load(
         ),
         checks=checks,
         adjustment=_adjustment(
-            one, found, _left(record, one, loads, check, residuals, checks) if as_left else None
+            load, session, _left(record, load, loads, check, residuals, checks) if as_left else None
         ),
         unverifiable=tuple(
-            name.partition(": ")[2] for name in unverifiable if name.partition(": ")[0] == one.load
+            name.partition(": ")[2] for name in unverifiable if name.partition(": ")[0] == load.load
         ),
     )
 
@@ -129,22 +131,24 @@ def steps(low: float, high: float) -> tuple[float, ...]:
 
 
 def _checks(
-    record: CalibrationRecord, one: LoadFit, loads: Table, check: Table, rule: str | None, tolerance: float
+    record: CalibrationRecord, load: LoadFit, loads: Table, check: Table, rule: str | None, tolerance: float
 ) -> tuple[CheckLine, ...]:
     lines = []
     cells = check.matrix(record.indications).tolist()
-    for row, (point, reference) in enumerate(zip(cells, check.column(one.load).tolist(), strict=True), 1):
-        told = predict(record, loads, check, one.load, dict(zip(record.indications, point, strict=True)))
-        uncertainty = _expanded(told.budget)
-        stated = rule is not None and not told.beyond
+    for row, (point, reference) in enumerate(zip(cells, check.column(load.load).tolist(), strict=True), 1):
+        prediction = predict(
+            record, loads, check, load.load, dict(zip(record.indications, point, strict=True))
+        )
+        uncertainty = _expanded(prediction.budget)
+        stated = rule is not None and not prediction.beyond
         lines.append(
             CheckLine(
                 row=row,
                 reference=reference,
-                result=told.budget.at,
+                result=prediction.budget.at,
                 uncertainty=uncertainty,
-                beyond=told.beyond,
-                verdict=decide(rule, told.budget.at - reference, tolerance, uncertainty.U)
+                beyond=prediction.beyond,
+                verdict=decide(rule, prediction.budget.at - reference, tolerance, uncertainty.U)
                 if stated and rule
                 else None,
             )
@@ -158,7 +162,7 @@ def _expanded(budget: Budget) -> Expanded:
 
 def _left(
     record: CalibrationRecord,
-    one: LoadFit,
+    load: LoadFit,
     loads: Table,
     check: Table | None,
     residuals: NDArray[np.float64],
@@ -169,33 +173,33 @@ def _left(
         worst = max(checks, key=lambda line: abs(line.deviation))
         return worst.deviation, worst.uncertainty
     row = int(np.abs(residuals).argmax())
-    at = float(loads.column(one.load)[row])
-    return float(residuals[row]), _expanded(calibration_budget(record, loads, check, one.load, at))
+    at = float(loads.column(load.load)[row])
+    return float(residuals[row]), _expanded(calibration_budget(record, loads, check, load.load, at))
 
 
 def _adjustment(
-    one: LoadFit, found: FoundSession | None, left: tuple[float, Expanded] | None
+    load: LoadFit, session: FoundSession | None, as_left: tuple[float, Expanded] | None
 ) -> Adjustment | None:
-    told = next((o for o in found.result.loads if o.load == one.load), None) if found else None
-    if told is None or found is None or found.result.record is None:
+    deviation = next((o for o in session.result.loads if o.load == load.load), None) if session else None
+    if deviation is None or session is None or session.result.record is None:
         return None
     # The item's deviation under the reference is judged by what the as-found session knows of both: the
     # coefficients of the record in force are a given there, and have no share in it.
-    at = told.reference[told.worst_row - 1]
+    at = deviation.reference[deviation.worst_row - 1]
     return Adjustment(
-        found_by=found.result.record,
-        as_found=told.max_error,
-        found=_expanded(calibration_budget(found.session, found.loads, found.check, one.load, at)),
-        as_left=None if left is None else left[0],
-        left=None if left is None else left[1],
+        found_by=session.result.record,
+        as_found=deviation.max_error,
+        found=_expanded(calibration_budget(session.session, session.loads, session.check, load.load, at)),
+        as_left=None if as_left is None else as_left[0],
+        left=None if as_left is None else as_left[1],
     )
 
 
-def _term_unit(record: CalibrationRecord, one: LoadFit, term: str) -> str:
+def _term_unit(record: CalibrationRecord, load: LoadFit, term: str) -> str:
     if term == INTERCEPT:
-        return one.unit
+        return load.unit
     units = dict(zip(record.indications, record.indication_units, strict=True))
     parsed = parse_term(term)
     factors = [f"({units[name]})" + (f"^{power}" if power > 1 else "") for name, power in parsed.powers]
     factors += [f"({units[name]})" for name in parsed.absolutes]
-    return f"{one.unit}/" + (factors[0] if len(factors) == 1 else "(" + "*".join(factors) + ")")
+    return f"{load.unit}/" + (factors[0] if len(factors) == 1 else "(" + "*".join(factors) + ")")

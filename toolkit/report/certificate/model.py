@@ -15,6 +15,9 @@ from toolkit.calibration.records.record import DataFile, Indication
 from toolkit.calibration.records.use import CalibrationUse
 from toolkit.findings import Finding
 
+# Loads of a certificate that have a picture.
+MOST_FIGURES = 6
+
 Verdict = Literal["pass", "conditionalPass", "conditionalFail", "fail"]
 VERDICTS: dict[str, str] = {
     "pass": "pass",
@@ -127,15 +130,15 @@ class LoadResult:
     def verdict(self) -> Verdict | None:
         """The least favourable statement of the check loads; None where none was made."""
         order = list(VERDICTS)
-        stated = [one.verdict for one in self.checks]
+        stated = [check.verdict for check in self.checks]
         if not stated or None in stated:
             return None
-        return max((one for one in stated if one), key=order.index)
+        return max((verdict for verdict in stated if verdict), key=order.index)
 
     @property
     def not_stated(self) -> tuple[str, ...]:
         """Components of the budget for which nothing was stated or measured."""
-        return tuple(one.name for one in self.parts if not one.stated)
+        return tuple(part.name for part in self.parts if not part.stated)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -214,4 +217,4 @@ class Certificate:
     @property
     def unverifiable(self) -> tuple[tuple[str, str], ...]:
         """Return (load, term) of every term that the check loads could not verify."""
-        return tuple((one.load, term) for one in self.loads for term in one.unverifiable)
+        return tuple((load.load, term) for load in self.loads for term in load.unverifiable)

@@ -11,10 +11,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from toolkit.calibration.session.declaration import Fault, is_text
-from toolkit.calibration.session.keys import TEXTS, certificate_faults, rule_of
+from toolkit.calibration.session.session_file import TEXTS, certificate_faults, rule_of
+from toolkit.declared import Fault
 from toolkit.errors import ConfigError
 from toolkit.findings import Finding
+from toolkit.report.certificate.model import Verdict
 from toolkit.report.style import Style
 
 
@@ -75,14 +76,18 @@ def read_stated(table: Mapping[str, Any], style: Style, *, recall: str | None, w
 
 
 def _interval(
-    table: Mapping[str, Any], texts: Mapping[str, str], recall: str | None, where: str, found: list[Finding]
+    table: Mapping[str, Any],
+    texts: Mapping[str, str],
+    recall: str | None,
+    where: str,
+    findings: list[Finding],
 ) -> str | None:
     due = _date(table, "due")
     interval = texts.get("interval") or recall
     if not table.get("interval_agreed", False):
         return None
     if due is None and interval is None:
-        found.append(
+        findings.append(
             Finding(
                 rule="certificate-interval",
                 where=where,
@@ -99,13 +104,12 @@ def _interval(
 def _told(fault: Fault, where: str) -> Finding:
     """Return the finding of an entry of a record from before sessions were checked for it, or refuse it."""
     if fault.kind == "unknown":
-        known = f"did you mean {fault.near!r}?" if fault.near else f"known are {fault.expected}"
-        message = f"{fault.name!r} is not known and is not printed; {known}"
+        message = f"{fault.name!r} is not known and is not printed; {fault.hint}"
         return Finding(rule="certificate-key", where=f"{where}: [certificate]", message=message)
-    if fault.name == "decision_rule" and is_text(fault.got):
+    if fault.name == "decision_rule" and _is_text(fault.got):
         message = f"decision rule {fault.got!r} is not known ({fault.expected}): no conformity is stated"
         return Finding(rule="certificate-rule", where=where, message=message)
-    if fault.name == "country" and is_text(fault.got):
+    if fault.name == "country" and _is_text(fault.got):
         message = f"country {fault.got!r} is not {fault.expected}"
         return Finding(rule="certificate-country", where=where, message=message)
     raise ConfigError(
@@ -118,5 +122,46 @@ def _told(fault: Fault, where: str) -> Finding:
     )
 
 
+def _is_text(value: object) -> bool:
+    # A whole number may stand without quotes.
+    return (isinstance(value, str) and bool(value.strip())) or type(value) is int
+
+
 def _date(table: Mapping[str, Any], key: str) -> dt.date | None:
     return dt.date.fromisoformat(str(table[key])) if key in table else None
+
+
+# Decision rules of a conformity statement: ILAC-G8:09/2019, clauses 4.2.1 and 4.2.3.
+
+
+RULES = {
+    "simple": (
+        "Simple acceptance (ILAC-G8:09/2019, 4.2.1): pass where |deviation| does not exceed the tolerance, "
+        "else fail. The uncertainty is not part of the limit: for a deviation at the tolerance the risk of a "
+        "false acceptance, or of a false rejection, is up to 50 %."
+    ),
+    "guard_band": (
+        "Guard band w = U (ILAC-G8:09/2019, 4.2.3): pass where |deviation| does not exceed tolerance - U; "
+        "conditional pass up to the tolerance; conditional fail up to tolerance + U; fail beyond. The risk "
+        "of a false acceptance is at most 2.5 % for pass and 50 % for conditional pass; the risk of a false "
+        "rejection is at most 2.5 % for fail and 50 % for conditional fail."
+    ),
+}
+
+
+def decide(rule: str, deviation: float, tolerance: float, U: float) -> Verdict:
+    """Return the statement of one deviation; all three in one unit.
+
+    >>> [decide("guard_band", e, 1.0, 0.2) for e in (0.8, -0.9, 1.1, 1.3)]
+    ['pass', 'conditionalPass', 'conditionalFail', 'fail']
+    >>> decide("simple", 1.0, 1.0, 0.2), decide("simple", -1.01, 1.0, 0.2)
+    ('pass', 'fail')
+    """
+    size = abs(deviation)
+    if rule == "simple":
+        return "pass" if size <= tolerance else "fail"
+    if size <= tolerance - U:
+        return "pass"
+    if size <= tolerance:
+        return "conditionalPass"
+    return "conditionalFail" if size <= tolerance + U else "fail"

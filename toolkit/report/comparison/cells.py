@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from toolkit.comparison.quantities import QUANTITIES
+from toolkit.characteristics.catalogue import by_name
 from toolkit.estimate import plus_minus
 
 if TYPE_CHECKING:
@@ -19,14 +19,14 @@ MOST_ROWS = 90
 
 def shown_unit(name: str, style: Style) -> tuple[str, float]:
     """Return a quantity's unit as it is shown, and the factor from SI."""
-    quantity = QUANTITIES[name]
-    unit, factor = style.unit(quantity.unit)
-    return str(unit).replace("*", "·"), factor * quantity.factor
+    declared = by_name()[name]
+    unit, factor = style.unit(declared.printed_unit)
+    return str(unit).replace("*", "·"), factor * declared.factor
 
 
-def with_U(one: Estimate, factor: float, style: Style) -> str:
+def with_U(estimate: Estimate, factor: float, style: Style) -> str:
     """Return ``45.0 ± 0.6``: two digits of U, and the value to the same place."""
-    shown = one.scaled(factor, "")
+    shown = estimate.scaled(factor, "")
     return plus_minus(shown.value, shown.expanded()[0], decimal_comma=style.decimal_comma)
 
 
@@ -46,44 +46,48 @@ def named(name: str, rotation: str, SA_rad: float | None = None, *, title: bool 
     >>> named("FY", "forward", math.radians(-2)), named("PRAT", "both", title=True)
     ('FY at -2 deg, forward', 'PRAT at 0 deg')
     """
-    text = QUANTITIES[name].title if title else name
+    text = by_name()[name].title if title else name
     angle = "" if SA_rad is None else f" at {math.degrees(SA_rad):+.0f} deg".replace("+0 ", "0 ")
     return f"{text}{angle}" + ("" if rotation == "both" else f", {rotation}")
 
 
-def shown_rows(found: Comparison, part: Part) -> tuple[tuple[Difference, ...], str]:
+def shown_rows(comparison: Comparison, part: Part) -> tuple[tuple[Difference, ...], str]:
     """Return the rows of a table that people are shown, and in words which they are.
 
     Characteristics: all of them while they are few. Forces at slip angles: the significant ones.
     """
-    mine = tuple(one for one in found.differences if one.part == part)
-    certain = tuple(one for one in mine if one.significant)
+    mine = tuple(difference for difference in comparison.differences if difference.part == part)
+    certain = tuple(difference for difference in mine if difference.significant)
     if part == "characteristics" and len(mine) <= MOST_ROWS:
         return mine, f"all {len(mine)} rows"
     which = f"the {len(certain)} significant" if certain else "none is significant"
     return certain, f"{which} of {len(mine)} rows; the JSON answer holds all"
 
 
-def factor_text(one: FactorSpread, factor: float, style: Style) -> str:
+def factor_text(spread: FactorSpread, factor: float, style: Style) -> str:
     """Return an intermediate precision; a star where its factor adds significantly."""
-    return comma(f"{one.s * factor:.3g}", style) + (" *" if one.significant else "")
+    return comma(f"{spread.s * factor:.3g}", style) + (" *" if spread.significant else "")
 
 
-def conclusion(found: Comparison) -> str:
+def conclusion(comparison: Comparison) -> str:
     """Return what a comparison found, in sentences that its numbers alone make."""
     parts = []
     for part, title in (
         ("characteristics", "characteristics"),
         ("curves", "forces and moments at slip angles"),
     ):
-        mine = [one for one in found.differences if one.part == part and one.p is not None]
+        mine = [
+            difference
+            for difference in comparison.differences
+            if difference.part == part and difference.p is not None
+        ]
         if not mine:
             continue
         counts: dict[str, list[int]] = {}
         for one in mine:
-            counts.setdefault(QUANTITIES[one.name].title, [0, 0])
-            counts[QUANTITIES[one.name].title][0] += one.significant
-            counts[QUANTITIES[one.name].title][1] += 1
+            count = counts.setdefault(by_name()[one.name].title, [0, 0])
+            count[0] += one.significant
+            count[1] += 1
         certain = sum(n for n, _ in counts.values())
         listed = "; ".join(f"{name}: {n} of {of}" for name, (n, of) in counts.items() if n)
         parts.append(
@@ -91,6 +95,7 @@ def conclusion(found: Comparison) -> str:
             + (f" ({listed})." if listed else ".")
         )
     parts.append(
-        f"The chance of even one false decision in either table is at most {100 * found.level:g} % (Holm)."
+        "The chance of even one false decision in either table is at most "
+        f"{100 * comparison.level:g} % (Holm)."
     )
     return " ".join(parts)

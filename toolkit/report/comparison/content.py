@@ -1,14 +1,13 @@
-"""A comparison to the content of its document: texts, tables and figures of its vocabulary."""
+"""A comparison as a document: its texts, tables and figures, each declared with what builds it."""
 
 from __future__ import annotations
 
 import datetime as dt
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-from toolkit import __version__
-from toolkit.comparison.model import Comparison, Difference, Entry
+from toolkit.characteristics.catalogue import comparison_figures
 from toolkit.files import sha256_bytes
 from toolkit.report.comparison.cells import (
     comma,
@@ -21,11 +20,12 @@ from toolkit.report.comparison.cells import (
     with_U,
 )
 from toolkit.report.comparison.plots import comparison_plots
-from toolkit.report.comparison.vocabulary import COMPARISON, TABLES
-from toolkit.report.content import Cell, Plot, ReportContent, Table, Value
+from toolkit.report.content import Plot, ReportContent
+from toolkit.report.document import Document, Row, Rows, finding_table
+from toolkit.version import __version__
 
 if TYPE_CHECKING:
-    from toolkit.calibration.records.use import CalibrationUse
+    from toolkit.comparison.model import Comparison, Difference
     from toolkit.findings import Finding
     from toolkit.report.style import Style
 
@@ -42,115 +42,196 @@ _METHOD = (
     "budget stays. Significance by Student's t with Welch-Satterthwaite degrees of freedom, adjusted over "
     "each table by Holm's procedure. ±: expanded uncertainty, 95 %."
 )
+_DIFFERENCES = """
+    quantity|quantity, with slip angle and direction of rotation
+    load|load
+    unit|unit of the row
+    reference|value of the reference, with expanded uncertainty
+    label|what is compared with it
+    other|its value, with expanded uncertainty
+    difference|difference, with expanded uncertainty
+    p|p value adjusted over the table
+    significant|a star, or nothing
+    """
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Compared:
+    """A comparison with the findings and the day of its document."""
+
+    comparison: Comparison
+    findings: Sequence[Finding]
+    issued: dt.date
+
+    @property
+    def id(self) -> str:
+        """Identification: the same comparison has the same on any day."""
+        key = "\n".join(entry.identity for entry in self.comparison.entries)
+        return f"CMP-{sha256_bytes(f'{self.comparison.mode}|{key}'.encode())[:8].upper()}"
+
+    @property
+    def title(self) -> str:
+        """Title: the mode and what is compared."""
+        return f"{self.mode}: {', '.join(entry.label for entry in self.comparison.entries)}"
+
+    @property
+    def mode(self) -> str:
+        """What the comparison is about."""
+        return _MODES[self.comparison.mode]
+
+
+COMPARISON: Document[Compared] = Document(
+    name="comparison",
+    family="comparison",
+    package=__package__,
+    required=("tk:comparison.calibrations", "tk:comparison.id"),
+)
 
 
 def build_comparison_content(
-    found: Comparison, style: Style, findings: Sequence[Finding], *, issued: dt.date
+    comparison: Comparison, style: Style, findings: Sequence[Finding], *, issued: dt.date
 ) -> ReportContent:
     """Return everything that a template of a comparison can ask for."""
-    plots = {f"compared_{name}": replace(plot, name=f"compared_{name}") for name, plot in
-             comparison_plots(found, style).items()}  # fmt: skip
-    tables = {
-        name: Table(name=name, columns=TABLES[name][1], rows=tuple(rows))
-        for name, rows in _tables(found, style, findings).items()
-    }
-    values = {f"comparison.{n}": Value(kind="text", value=text) for n, text in _texts(found).items()}
-    values["comparison.issued"] = Value(kind="date", value=issued.isoformat())
-    values |= {f"caption.{name}": Value(kind="text", value=plot.caption) for name, plot in plots.items()}
-    return ReportContent(
-        values=values,
-        tables=tables,
-        plots=plots,
-        conditions=_conditions(found, values, tables, plots, findings),
-        calibrations=found.uses,
-        title=str(values["comparison.title"].value),
+    source = Compared(comparison=comparison, findings=findings, issued=issued)
+    return COMPARISON.content(
+        source,
+        style,
+        calibrations=comparison.uses,
+        title=source.title,
         author=style.laboratory or "toolkit",
-        identity=str(values["comparison.id"].value),
+        identity=source.id,
         subject="Comparison of tire force and moment tests",
-        issued=issued.isoformat(),
-        marks=_marks(found),
-        style=style,
-        vocabulary=COMPARISON,
+        issued=issued,
     )
 
 
-def _marks(found: Comparison) -> tuple[tuple[str, str], ...]:
-    marks = []
-    if any(one.simulated for one in found.entries):
-        marks.append(("simulated", "SIMULATED: a test of the virtual machine is compared."))
-    legacy = ", ".join(one.label for one in found.entries if one.calibration and one.calibration.unverified)
-    if legacy:
-        marks.append(("unverified", f"UNVERIFIED: computed by a legacy import: {legacy}."))
-    drafts = "; ".join(f"{one.id}: {one.status}" for one in found.uses if one.draft)
-    if drafts:
-        marks.append(("draft", f"Calibrations: {drafts}."))
-    return tuple(marks)
+def _calibrations(source: Compared, _style: Style) -> str:
+    listed = []
+    for use in source.comparison.uses:
+        standing = f", {use.status}" if use.draft or use.since else " UNVERIFIED" if use.unverified else ""
+        listed.append(f"{use.id} ({use.sha256}){standing}")
+    return "; ".join(dict.fromkeys(listed)) or "none: makers' tables only"
 
 
-def _conditions(
-    found: Comparison,
-    values: dict[str, Value],
-    tables: dict[str, Table],
-    plots: dict[str, Plot],
-    findings: Sequence[Finding],
-) -> dict[str, bool]:
-    made = dict.fromkeys(COMPARISON.conditions, False)
-    made |= {path: not value.missing for path, value in values.items()}
-    made |= {name: bool(table.rows) for name, table in tables.items()} | dict.fromkeys(plots, True)
-    return made | {
-        "simulated": any(one.simulated for one in found.entries),
-        "unverified": any(one.unverified for one in found.uses),
-        "draft": any(one.draft for one in found.uses),
-        "repeats": found.repeats is not None,
-        "no_findings": not findings,
-    }
+def _reproducibility(source: Compared, _style: Style) -> str | None:
+    repeats = source.comparison.repeats
+    return None if repeats is None else f"Reproducibility: {repeats.reproducibility_note}."
 
 
-def _texts(found: Comparison) -> dict[str, str | None]:
-    key = "\n".join(one.identity for one in found.entries)
-    calibrations = dict.fromkeys(_calibration(one) for one in found.uses)
-    names = ", ".join(one.label for one in found.entries)
-    return {
-        "id": f"CMP-{sha256_bytes(f'{found.mode}|{key}'.encode())[:8].upper()}",
-        "title": f"{_MODES[found.mode]}: {names}",
-        "mode": _MODES[found.mode],
-        "reference": found.reference.label,
-        "conclusion": conclusion(found),
-        "method": _METHOD,
-        "calibrations": "; ".join(calibrations) or "none: makers' tables only",
-        "reproducibility": None
-        if found.repeats is None
-        else f"Reproducibility: {found.repeats.reproducibility_note}.",
-        "shown": f"Characteristics: {shown_rows(found, 'characteristics')[1]}; "
-        f"* marks the significant ones. Forces and moments at slip angles: {shown_rows(found, 'curves')[1]}.",
-        "left_out": "; ".join(found.left_out) or None,
-        "software": f"toolkit {__version__}",
-    }
+def _shown(source: Compared, _style: Style) -> str:
+    return (
+        f"Characteristics: {shown_rows(source.comparison, 'characteristics')[1]}; * marks the significant "
+        f"ones. Forces and moments at slip angles: {shown_rows(source.comparison, 'curves')[1]}."
+    )
 
 
-def _calibration(one: CalibrationUse) -> str:
-    said = f", {one.status}" if one.draft or one.since else " UNVERIFIED" if one.unverified else ""
-    return f"{one.id} ({one.sha256}){said}"
+def _simulated(source: Compared, _style: Style) -> bool:
+    return any(entry.simulated for entry in source.comparison.entries)
 
 
-def _tables(
-    found: Comparison, style: Style, findings: Sequence[Finding]
-) -> dict[str, list[tuple[Cell, ...]]]:
-    return {
-        "compared": [_entry(one) for one in found.entries],
-        "differences": [_difference(one, style) for one in shown_rows(found, "characteristics")[0]],
-        "curve_differences": [_difference(one, style) for one in shown_rows(found, "curves")[0]],
-        "factors": _factors(found),
-        "precision": _precision(found, style),
-        "pattern": _pattern(found, style),
-        "comparison_findings": [(one.rule, one.level, one.where, one.message) for one in findings],
-    }
+def _simulated_mark(source: Compared, style: Style) -> str | None:
+    return "SIMULATED: a test of the virtual machine is compared." if _simulated(source, style) else None
 
 
-def _entry(one: Entry) -> tuple[Cell, ...]:
+def _unverified_mark(source: Compared, _style: Style) -> str | None:
+    labels = [
+        entry.label
+        for entry in source.comparison.entries
+        if entry.calibration and entry.calibration.unverified
+    ]
+    return f"UNVERIFIED: computed by a legacy import: {', '.join(labels)}." if labels else None
+
+
+def _draft_mark(source: Compared, _style: Style) -> str | None:
+    drafts = "; ".join(f"{use.id}: {use.status}" for use in source.comparison.uses if use.draft)
+    return f"Calibrations: {drafts}." if drafts else None
+
+
+DECLARED = (
+    COMPARISON.text(
+        "id", "identification of the comparison, made from what is compared", lambda source, _: source.id
+    ),
+    COMPARISON.text("title", "title", lambda source, _: source.title),
+    COMPARISON.text("mode", "what the comparison is about", lambda source, _: source.mode),
+    COMPARISON.text(
+        "reference",
+        "what all others are compared with",
+        lambda source, _: source.comparison.reference.label,
+    ),
+    COMPARISON.text(
+        "conclusion", "what was found, in numbers", lambda source, _: conclusion(source.comparison)
+    ),
+    COMPARISON.text("method", "how differences and their significance are decided", lambda *_: _METHOD),
+    COMPARISON.text("calibrations", "calibration records of the tests, with their hashes", _calibrations),
+    COMPARISON.text("reproducibility", "reproducibility, or why there is none", _reproducibility),
+    COMPARISON.text("shown", "which rows the tables of differences show", _shown),
+    COMPARISON.text(
+        "left_out",
+        "what could not be compared, and why",
+        lambda source, _: "; ".join(source.comparison.left_out) or None,
+    ),
+    COMPARISON.date("issued", "day of the comparison", lambda source, _: source.issued),
+    COMPARISON.text("software", "program and version that made it", lambda *_: f"toolkit {__version__}"),
+    COMPARISON.condition("simulated", "one of the tests is of a virtual machine", _simulated),
+    COMPARISON.condition(
+        "unverified",
+        "one of the tests was computed by an unverified record",
+        lambda source, _: any(use.unverified for use in source.comparison.uses),
+    ),
+    COMPARISON.condition(
+        "draft",
+        "one of the tests was computed by a record that was not in force for it",
+        lambda source, _: any(use.draft for use in source.comparison.uses),
+    ),
+    COMPARISON.condition(
+        "repeats",
+        "the tests are repeats of one tire",
+        lambda source, _: source.comparison.repeats is not None,
+    ),
+    COMPARISON.condition(
+        "no_findings", "nothing departs from what was expected", lambda source, _: not source.findings
+    ),
+    COMPARISON.mark("simulated", "if.simulated", _simulated_mark),
+    COMPARISON.mark("unverified", "if.unverified comparison.calibrations", _unverified_mark),
+    COMPARISON.mark("draft", "comparison.calibrations", _draft_mark),
+    finding_table(
+        COMPARISON, "comparison_findings", "test, file or condition", lambda source: source.findings
+    ),
+)
+
+
+@COMPARISON.table(
+    "compared",
+    "what is compared: one row a test or a maker's table",
+    """
+    label|name
+    what|tire, or the kind of table
+    surface|surface
+    pressure|inflation pressure
+    day|date of the test
+    operator|operator
+    mounting|mounting
+    calibration|calibration record
+    """,
+)
+def entries(source: Compared, _style: Style) -> Rows:
+    """Return what is compared, with its stated conditions."""
     names = ("surface", "pressure", "day", "operator", "mounting", "calibration")
-    what = one.condition("tire") if one.kind == "test" else _KINDS[one.kind]
-    return (one.label, what or "-", *(one.condition(name) or "-" for name in names))
+    for entry in source.comparison.entries:
+        what = entry.condition("tire") if entry.kind == "test" else _KINDS[entry.kind]
+        yield entry.label, what or "-", *(entry.condition(name) or "-" for name in names)
+
+
+@COMPARISON.table("differences", "differences of characteristics from the reference", _DIFFERENCES)
+def differences(source: Compared, style: Style) -> Rows:
+    """Return the differences of characteristics that people are shown."""
+    return (_difference(row, style) for row in shown_rows(source.comparison, "characteristics")[0])
+
+
+@COMPARISON.table("curve_differences", "significant differences of FY and MZ at slip angles", _DIFFERENCES)
+def curve_differences(source: Compared, style: Style) -> Rows:
+    """Return the differences at slip angles that people are shown."""
+    return (_difference(row, style) for row in shown_rows(source.comparison, "curves")[0])
 
 
 def _load(load_N: float, style: Style) -> str:
@@ -158,56 +239,102 @@ def _load(load_N: float, style: Style) -> str:
     return f"{load_N * factor:.0f} {unit}"
 
 
-def _difference(one: Difference, style: Style) -> tuple[Cell, ...]:
-    unit, factor = shown_unit(one.name, style)
+def _difference(row: Difference, style: Style) -> Row:
+    unit, factor = shown_unit(row.name, style)
     return (
-        named(one.name, one.rotation, one.SA_rad, title=True),
-        _load(one.load_N, style),
+        named(row.name, row.rotation, row.SA_rad, title=True),
+        _load(row.load_N, style),
         unit,
-        with_U(one.reference, factor, style),
-        one.label,
-        with_U(one.other, factor, style),
-        with_U(one.difference, factor, style),
-        p_text(one.p_holm, style),
-        "*" if one.significant else "",
+        with_U(row.reference, factor, style),
+        row.label,
+        with_U(row.other, factor, style),
+        with_U(row.difference, factor, style),
+        p_text(row.p_holm, style),
+        "*" if row.significant else "",
     )
 
 
-def _factors(found: Comparison) -> list[tuple[Cell, ...]]:
-    return [
-        (one.name, ", ".join(level or "-" for level in one.levels), one.note or "told apart")
-        for one in (found.repeats.factors if found.repeats else ())
-    ]
+@COMPARISON.table(
+    "factors",
+    "factors of repeats: what changed between them",
+    """
+    factor|factor
+    levels|its level in each test
+    note|what can be said of it
+    """,
+)
+def factors(source: Compared, _style: Style) -> Rows:
+    """Return the factors of repeats."""
+    repeats = source.comparison.repeats
+    for factor in repeats.factors if repeats else ():
+        yield factor.name, ", ".join(level or "-" for level in factor.levels), factor.note or "told apart"
 
 
-def _precision(found: Comparison, style: Style) -> list[tuple[Cell, ...]]:
-    rows: list[tuple[Cell, ...]] = []
-    for one in found.repeats.precisions if found.repeats else ():
-        unit, factor = shown_unit(one.name, style)
+@COMPARISON.table(
+    "precision",
+    "repeatability and intermediate precision: one row a quantity and load",
+    """
+    quantity|quantity, with direction of rotation
+    load|load
+    unit|unit of the row
+    n|number of tests
+    mean|mean
+    s|standard deviation of all
+    s_r|repeatability standard deviation, where tests of the same conditions are there
+    limit|repeatability limit
+    intermediate|intermediate precision by factor; * where the factor adds significantly
+    """,
+)
+def precision(source: Compared, style: Style) -> Rows:
+    """Return the precision of each quantity at each load."""
+    repeats = source.comparison.repeats
+    for row in repeats.precisions if repeats else ():
+        unit, factor = shown_unit(row.name, style)
 
         def number(value: float | None, factor: float = factor) -> str:
             return "-" if value is None else comma(f"{value * factor:.3g}", style)
 
-        rows.append(
-            (
-                named(one.name, one.rotation, title=True),
-                _load(one.load_N, style),
-                unit,
-                str(one.n),
-                comma(f"{one.mean * factor:.4g}", style),
-                number(one.total.value),
-                number(one.repeatability.value if one.repeatability else None),
-                number(one.limit_r),
-                "; ".join(f"{f.factor} {factor_text(f, factor, style)}" for f in one.factors) or "-",
-            )
+        yield (
+            named(row.name, row.rotation, title=True),
+            _load(row.load_N, style),
+            unit,
+            str(row.n),
+            comma(f"{row.mean * factor:.4g}", style),
+            number(row.total.value),
+            number(row.repeatability.value if row.repeatability else None),
+            number(row.limit_r),
+            "; ".join(f"{f.factor} {factor_text(f, factor, style)}" for f in row.factors) or "-",
         )
-    return rows
 
 
-def _pattern(found: Comparison, style: Style) -> list[tuple[Cell, ...]]:
-    rows: list[tuple[Cell, ...]] = []
-    for one in found.pattern:
-        unit, factor = shown_unit(one.name, style)
-        shown = (with_U(e, factor, style) for e in (one.regular, one.reversed, one.pattern, one.body))
-        rows.append((one.name, _load(one.load_N, style), unit, *shown))
-    return rows
+@COMPARISON.table(
+    "pattern",
+    "pattern effect from a regular and a reversed belt",
+    """
+    quantity|definition of PRAT
+    load|load
+    unit|unit of the row
+    regular|PRAT of the regular belt
+    reversed|PRAT of the reversed belt
+    pattern|pattern effect
+    body|body effect
+    """,
+)
+def pattern(source: Compared, style: Style) -> Rows:
+    """Return the pattern and body effect of each PRAT."""
+    for row in source.comparison.pattern:
+        unit, factor = shown_unit(row.name, style)
+        shown = (with_U(e, factor, style) for e in (row.regular, row.reversed, row.pattern, row.body))
+        yield row.name, _load(row.load_N, style), unit, *shown
+
+
+@COMPARISON.figures(
+    {
+        f"compared_{figure.name}": f"{figure.title} against load, a series an entry"
+        for figure in comparison_figures()
+    }
+)
+def figures(source: Compared, style: Style) -> Iterator[Plot]:
+    """Return the characteristics against load that two entries at least have values for."""
+    for name, plot in comparison_plots(source.comparison, style).items():
+        yield replace(plot, name=f"compared_{name}")

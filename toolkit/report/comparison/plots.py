@@ -3,58 +3,17 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from toolkit.characteristics.catalogue import comparison_figures
 from toolkit.estimate import plus_minus
 from toolkit.report.content import Curve, Plot
 from toolkit.report.style import Style
 from toolkit.report.tags import format_number
 
 if TYPE_CHECKING:
+    from toolkit.characteristics.characteristic import Characteristic, Figure
     from toolkit.comparison.model import Comparison, Entry
-
-_PER_DEGREE = math.pi / 180
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Wanted:
-    name: str
-    quantities: tuple[str, ...]
-    title: str
-    unit: str
-    per_degree: bool = False
-
-
-FIGURES: tuple[_Wanted, ...] = (
-    _Wanted(name="conicity", quantities=("conicity",), title="conicity", unit="N"),
-    _Wanted(name="plysteer", quantities=("plysteer",), title="plysteer", unit="N"),
-    _Wanted(name="crat", quantities=("CRAT",), title="conicity residual aligning torque", unit="N*m"),
-    _Wanted(
-        name="prat", quantities=("PRAT",), title="plysteer residual aligning torque at 0 deg", unit="N*m"
-    ),
-    _Wanted(
-        name="prat_at_fy_zero",
-        quantities=("PRAT_at_FY_zero",),
-        title="plysteer residual aligning torque at FY = 0",
-        unit="N*m",
-    ),
-    _Wanted(
-        name="cornering_stiffness",
-        quantities=("secant_cornering", "slope_cornering"),
-        title="cornering stiffness",
-        unit="N",
-        per_degree=True,
-    ),
-    _Wanted(
-        name="aligning_stiffness",
-        quantities=("secant_aligning", "slope_aligning"),
-        title="aligning stiffness",
-        unit="N*m",
-        per_degree=True,
-    ),
-)
-_WAYS = {"secant": "±1 deg secant", "slope": "slope at 0 deg"}
 
 
 def comparison_plots(comparison: Comparison, style: Style) -> dict[str, Plot]:
@@ -62,18 +21,18 @@ def comparison_plots(comparison: Comparison, style: Style) -> dict[str, Plot]:
 
     Stiffness is drawn by the ±1 deg secant, as the source document has it, with the drum forward.
     """
-    plots = (_plot(comparison, wanted, style) for wanted in FIGURES)
+    plots = (_plot(comparison, figure, drawn, style) for figure, drawn in comparison_figures().items())
     return {plot.name: plot for plot in plots if plot is not None}
 
 
-def _plot(comparison: Comparison, wanted: _Wanted, style: Style) -> Plot | None:
-    unit, factor = style.unit(f"{wanted.unit}/deg" if wanted.per_degree else wanted.unit)
+def _plot(comparison: Comparison, figure: Figure, drawn: Characteristic, style: Style) -> Plot | None:
+    unit, factor = style.unit(drawn.printed_unit)
     load_unit, load_factor = style.unit("N")
-    scale = factor * (_PER_DEGREE if wanted.per_degree else 1.0)
+    scale = factor * drawn.factor
     shown_unit = str(unit).replace("*", "·")
-    curves, said = [], []
+    curves, sentences = [], []
     for place, entry in enumerate(comparison.entries):
-        x, y, U = _series(entry, wanted.quantities[0])
+        x, y, U = _series(entry, drawn.name)
         if not x:
             continue
         x, y, U = [a * load_factor for a in x], [b * scale for b in y], [c * scale for c in U]
@@ -87,24 +46,23 @@ def _plot(comparison: Comparison, wanted: _Wanted, style: Style) -> Plot | None:
             f"{plus_minus(b, c, decimal_comma=style.decimal_comma)} at {_number(a, style)}"
             for a, b, c in zip(x, y, U, strict=True)
         )
-        said.append(f"{entry.label}: {listed} {load_unit}")
+        sentences.append(f"{entry.label}: {listed} {load_unit}")
     if len(curves) < 2:
         return None
-    simulated = any(one.simulated for one in comparison.entries)
-    words = (*(one.word for one in comparison.uses), "SIMULATED" if simulated else None)
-    mark = " - ".join(dict.fromkeys(one for one in words if one))
-    way = _WAYS.get(wanted.quantities[0].partition("_")[0])
-    title = wanted.title + (f", {way}, drum forward" if way else "")
+    simulated = any(entry.simulated for entry in comparison.entries)
+    words = (*(use.word for use in comparison.uses), "SIMULATED" if simulated else None)
+    mark = " - ".join(dict.fromkeys(word for word in words if word))
+    title = figure.title + (f", {drawn.series_label}, drum forward" if drawn.scope == "direction" else "")
     title = title[:1].upper() + title[1:]
     return Plot(
-        name=wanted.name,
+        name=figure.name,
         x_label=f"load FZ [{load_unit}]",
-        y_label=f"{wanted.title} [{shown_unit}]",
+        y_label=f"{figure.title} [{shown_unit}]",
         curves=tuple(curves),
         caption=f"{title} against load; bars: expanded uncertainty (95 %). SAE J670 axes.",
         alt=(f"{mark}. " if mark else "")
         + f"{title} [{shown_unit}] against load with expanded uncertainty. "
-        + "; ".join(said)
+        + "; ".join(sentences)
         + ". Axis system: SAE J670.",
         watermark=mark or None,
         legend_title="compared",
@@ -113,16 +71,18 @@ def _plot(comparison: Comparison, wanted: _Wanted, style: Style) -> Plot | None:
 
 def _series(entry: Entry, name: str) -> tuple[list[float], list[float], list[float]]:
     """Return loads [N], values and expanded uncertainties in SI of one quantity of an entry."""
-    rows = sorted(
-        (row for row in entry.rows if row.name == name and row.rotation in ("both", "forward")),
-        key=lambda row: row.load_N,
+    points = sorted(
+        (
+            (row.load_N, row.estimate.value, row.estimate.expanded()[0])
+            for row in entry.rows
+            if row.estimate is not None and row.name == name and row.rotation in ("both", "forward")
+        ),
+        key=lambda point: point[0],
     )
-    estimates = [row.number.estimate() for row in rows]
-    U = [one.expanded()[0] for one in estimates]
     return (
-        [row.load_N for row in rows],
-        [one.value for one in estimates],
-        [one if math.isfinite(one) else 0.0 for one in U],
+        [load for load, _, _ in points],
+        [value for _, value, _ in points],
+        [U if math.isfinite(U) else 0.0 for _, _, U in points],
     )
 
 

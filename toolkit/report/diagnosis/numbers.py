@@ -25,5 +25,23 @@ def over(channel: str, variables: Sequence[str]) -> str:
     >>> over("FY", ["SA", "FZ"]), over("FY", ["more than its stated noise"])
     ('FY over SA and FZ', 'FY is off by more than its stated noise')
     """
-    told = " and ".join(variables)
-    return f"{channel} is off by {told}" if told.startswith("more than") else f"{channel} over {told}"
+    names = " and ".join(variables)
+    return f"{channel} is off by {names}" if names.startswith("more than") else f"{channel} over {names}"
+
+
+# How small a chance is said to be: none is zero.
+
+
+_LEAST = 1e-300
+
+
+def chance(p_value: float, *, decimal_comma: bool = False) -> str:
+    """Return a p-value in words for people.
+
+    >>> chance(0.0312), chance(0.0)
+    ('p = 0.031', 'p < 1e-300')
+    """
+    if math.isnan(p_value):
+        return "p unknown"
+    text = f"p = {p_value:.2g}" if p_value >= _LEAST else f"p < {_LEAST:g}"
+    return text.replace(".", ",") if decimal_comma else text

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,52 +13,46 @@ from toolkit.diagnosis.answer.locate import time_unit
 from toolkit.report.content import Curve, Plot
 from toolkit.report.diagnosis.figures import binned, variable_of, worst_run
 from toolkit.report.diagnosis.numbers import few
-from toolkit.report.diagnosis.vocabulary import WHERE
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from toolkit.diagnosis.answer.answer import Diagnosis, Mismatch
-    from toolkit.diagnosis.diagnose import Result
     from toolkit.diagnosis.search.search import Search
     from toolkit.report.style import Style
 
+WHERE = 3  # figures of places at most
 _STEPS = ("as declared", "refitted", "with the effects")
 _MOST = 300  # points of a curve in print
 
 
-def diagnosis_plots(result: Result, style: Style) -> dict[str, Plot]:
-    """Return the figures by name; none where nothing was searched."""
-    found, made = result.search, result.diagnosis
-    if found is None:
-        return {}
-    plots = [errors_plot(made, style)] if made.held_out else []
-    wheres = (_where(found, one, made, style) for one in made.mismatch)
-    for i, plot in enumerate([one for one in wheres if one is not None][:WHERE], start=1):
-        plots.append(_named(plot, f"diagnosis_where_{i}"))
-    if made.mismatch:
-        plots.append(_run(found, made, style))
-    return {plot.name: plot for plot in plots}
+def search_plots(search: Search, diagnosis: Diagnosis, style: Style) -> Iterator[Plot]:
+    """Return where the mismatch of each output is, and the run with the largest one."""
+    wheres = (_where(search, mismatch, diagnosis, style) for mismatch in diagnosis.mismatch)
+    for i, plot in enumerate([plot for plot in wheres if plot is not None][:WHERE], start=1):
+        yield replace(plot, name=f"diagnosis_where_{i}")
+    if diagnosis.mismatch:
+        yield _run(search, diagnosis, style)
 
 
-def errors_plot(made: Diagnosis, style: Style) -> Plot:
+def errors_plot(diagnosis: Diagnosis, style: Style) -> Plot:
     """Return the errors on held-out rows over the noise, before and after: the chart of ten seconds."""
-    steps = _STEPS if made.effects else _STEPS[:2]
+    steps = _STEPS if diagnosis.effects else _STEPS[:2]
     names: list[str] = []
     bars: list[tuple[list[float], list[float]]] = [([], []) for _ in steps]
-    said = []
-    for one in made.held_out:
-        errors = (one.nominal_rmse, one.refitted_rmse, one.augmented_rmse)
-        if not all(map(math.isfinite, (*errors, one.noise_floor))):
+    sentences = []
+    for fit in diagnosis.held_out:
+        errors = (fit.nominal_rmse, fit.refitted_rmse, fit.augmented_rmse)
+        if not all(map(math.isfinite, (*errors, fit.noise_floor))):
             continue
-        over = [value / max(one.noise_floor, 1e-300) for value in errors][: len(steps)]
+        over = [value / max(fit.noise_floor, 1e-300) for value in errors][: len(steps)]
         for i, value in enumerate(over):
             bars[i][0].append(float(len(names)))
             bars[i][1].append(value)
-            names.append(one.channel if i == len(steps) // 2 else "")
+            names.append(fit.channel if i == len(steps) // 2 else "")
         names.append("")
         listed = ", ".join(f"{s} {_number(v, style)}" for s, v in zip(steps, over, strict=True))
-        said.append(f"{one.channel}: {listed}")
+        sentences.append(f"{fit.channel}: {listed}")
     names = names[:-1]
     curves = [
         Curve(
@@ -74,25 +70,25 @@ def errors_plot(made: Diagnosis, style: Style) -> Plot:
         curves=tuple(curves),
         caption="Root mean square error on rows that no fit has seen, over the noise of the output. A "
         "simulation that misses nothing stands at 1.",
-        alt="Error over noise: " + "; ".join(said) + ".",
+        alt="Error over noise: " + "; ".join(sentences) + ".",
         legend_title="simulation",
         decimal_comma=style.decimal_comma,
         names=tuple(names),
     )
 
 
-def _where(found: Search, one: Mismatch, made: Diagnosis, style: Style) -> Plot | None:
+def _where(search: Search, mismatch: Mismatch, diagnosis: Diagnosis, style: Style) -> Plot | None:
     """Return an output's residual over the first variable that has numbers, in means of equal counts."""
-    problem = found.problem
-    kept = problem.kept[one.channel]
-    for place in one.where:
-        x = variable_of(found, place.variable)
+    problem = search.problem
+    kept = problem.kept[mismatch.channel]
+    for place in mismatch.where:
+        x = variable_of(search, place.variable)
         if x is None or not isinstance(place.start, float) or not isinstance(place.end, float):
             continue
-        unit = _unit(found, one.channel)
-        series = [("refitted", 1, found.refitted.residual[one.channel])]
-        if made.effects:
-            series.append(("with the effects", 0, found.augmented.residual[one.channel]))
+        unit = _unit(search, mismatch.channel)
+        series = [("refitted", 1, search.refitted.residual[mismatch.channel])]
+        if diagnosis.effects:
+            series.append(("with the effects", 0, search.augmented.residual[mismatch.channel]))
         curves = []
         for label, group, residual in series:
             at, mean = binned(x[kept], residual[kept])
@@ -104,24 +100,25 @@ def _where(found: Search, one: Mismatch, made: Diagnosis, style: Style) -> Plot 
         return Plot(
             name="",
             x_label=f"{place.variable} [{place.unit}]" if place.unit else place.variable,
-            y_label=f"recorded − simulated {one.channel} [{unit}]",
+            y_label=f"recorded − simulated {mismatch.channel} [{unit}]",
             curves=tuple(curves),
-            caption=f"{one.channel}: mean residual over {place.variable}; the mismatch is {much} {span}.",
-            alt=f"Mean of recorded less simulated {one.channel} over {place.variable}, {much} {span}.",
+            caption=f"{mismatch.channel}: mean residual over {place.variable}; "
+            f"the mismatch is {much} {span}.",
+            alt=f"Mean of recorded less simulated {mismatch.channel} over {place.variable}, {much} {span}.",
             legend_title="simulation",
             decimal_comma=style.decimal_comma,
         )
     return None
 
 
-def _run(found: Search, made: Diagnosis, style: Style) -> Plot:
-    problem, channel = found.problem, made.mismatch[0].channel
-    which = worst_run(found, channel)
+def _run(search: Search, diagnosis: Diagnosis, style: Style) -> Plot:
+    problem, channel = search.problem, diagnosis.mismatch[0].channel
+    which = worst_run(search, channel)
     rows, run = problem.slices[which], problem.runs[which]
-    some = slice(None, None, max(1, -(-run.rows // _MOST)))
-    good = np.isfinite(problem.observed[channel][rows][some])
+    stride = slice(None, None, max(1, -(-run.rows // _MOST)))
+    good = np.isfinite(problem.observed[channel][rows][stride])
     clock, seconds = time_unit(problem.case)
-    t = run.t[some] / seconds
+    t = run.t[stride] / seconds
 
     def curve(label: str, group: int, y: NDArray[np.float64], *, points: bool = False) -> Curve:
         chosen = good if points else np.ones(len(t), dtype=bool)
@@ -131,16 +128,16 @@ def _run(found: Search, made: Diagnosis, style: Style) -> Plot:
         )  # fmt: skip
 
     curves = [
-        curve("recorded", 6, problem.observed[channel][rows][some], points=True),
-        curve("refitted", 1, found.refitted.simulated[channel][rows][some]),
+        curve("recorded", 6, problem.observed[channel][rows][stride], points=True),
+        curve("refitted", 1, search.refitted.simulated[channel][rows][stride]),
     ]
-    if made.effects:
-        curves.append(curve("with the effects", 0, found.augmented.simulated[channel][rows][some]))
+    if diagnosis.effects:
+        curves.append(curve("with the effects", 0, search.augmented.simulated[channel][rows][stride]))
     timed = problem.case.has_time
     return Plot(
         name="diagnosis_run",
         x_label=f"time [{clock}]" if timed else "row",
-        y_label=f"{channel} [{_unit(found, channel)}]",
+        y_label=f"{channel} [{_unit(search, channel)}]",
         curves=tuple(curves),
         caption=f"{channel} in {run.name}, the run with the largest mismatch.",
         alt=f"{channel} in {run.name}: recorded and simulated over {'time' if timed else 'rows'}.",
@@ -149,14 +146,8 @@ def _run(found: Search, made: Diagnosis, style: Style) -> Plot:
     )
 
 
-def _named(plot: Plot, name: str) -> Plot:
-    from dataclasses import replace
-
-    return replace(plot, name=name)
-
-
-def _unit(found: Search, channel: str) -> str:
-    text = next(one.unit for one in found.problem.model.outputs if one.name == channel)
+def _unit(search: Search, channel: str) -> str:
+    text = next(output.unit for output in search.problem.model.outputs if output.name == channel)
     return text.replace("*", "·")
 
 

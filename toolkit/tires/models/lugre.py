@@ -60,9 +60,9 @@ def forces(values: Sequence[Any], rows: Rows) -> Responses:
     g = with_load(MU, MU_Z, rows.dfz) * (R + (1 - R) * np.exp(-np.sqrt(speed / VS)))
     front, rear = (1 - TOP) * FRONT, (1 - TOP) * (1 - FRONT)
     growth = with_load(C, C_Z, rows.dfz, C_ZZ) * slip / (g * centroid(front, rear))
-    whole, moment = filled(growth, front, rear)
+    filling, moment = filled(growth, front, rear)
     viscous = S2 * speed
-    F = rows.FZ * (g * whole + viscous)
+    F = rows.FZ * (g * filling + viscous)
     arm = g * moment + viscous * (0.5 - centroid(front, rear))
     MZ = -rows.FZ * 2 * half_length(L / 2, L_P, rows) * arm * across
     return Responses(FX=F * along, FY=-F * across + rows.FZ * SV, MZ=MZ + rows.FZ * SM)
@@ -88,7 +88,7 @@ def filled(growth: Any, front: Any, rear: Any) -> tuple[Array, Array]:
     """
     node, weight = np.polynomial.legendre.leggauss(_NODES)
     node, weight = 0.5 * (node + 1), 0.5 * weight
-    K, f, r = (np.asarray(one)[..., None] for one in (growth, front, rear))
+    K, f, r = (np.asarray(array)[..., None] for array in (growth, front, rear))
     flat = 1.0 - f - r
     t = np.concatenate(np.broadcast_arrays(f * node, f + flat * node, 1 - r * node), axis=-1)
     # The rise and the fall are linear in their own coordinate, which is 0 at the outer edge.

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from toolkit.tires.global_model import GlobalModel
 from toolkit.tires.mf52 import forces
-from toolkit.tires.mf_global import mf_forces, mf_starts
-from toolkit.tires.mf_parameters import MF52
+from toolkit.tires.mf_parameters import MF52, mf_forces, mf_starts
 
 MODEL = GlobalModel(
     name="mf52",

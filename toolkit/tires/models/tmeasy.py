@@ -72,10 +72,10 @@ def forces(values: Sequence[Any], rows: Rows) -> Responses:
     )
     sx, sy = slips(rows, p["SH"])
     sy = sy - p["K_IA"] * np.sin(rows.IA)
-    for one in (x, y):
-        one[2] = np.maximum(one[2], 2 * one[1] / one[0])
-        one[3] = np.maximum(one[3], _LEAST * one[1])
-        one[4] = one[2] + one[4]
+    for axis in (x, y):
+        axis[2] = np.maximum(axis[2], 2 * axis[1] / axis[0])
+        axis[3] = np.maximum(axis[3], _LEAST * axis[1])
+        axis[4] = axis[2] + axis[4]
     ratio = x[1] / x[0] / (x[1] / x[0] + y[1] / y[0])
     hx, hy = x[2] / (x[2] + y[2]) + ratio, y[2] / (x[2] + y[2]) + 1 - ratio
     slip, cos, sin = directed(sx / hx, sy / hy)
@@ -145,8 +145,8 @@ def _with_changes(table: str) -> str:
     lines = []
     for line in filter(None, table.splitlines()):
         name, *_, stage, needs, _ = line.split(maxsplit=8)
-        both = f"{needs.replace('-', '')}2"
-        lines += [line, f"{name}_Z  1  0.0  -0.8  1.5  0.2  {stage}  {both}  change of {name} with load"]
+        pair = f"{needs.replace('-', '')}2"
+        lines += [line, f"{name}_Z  1  0.0  -0.8  1.5  0.2  {stage}  {pair}  change of {name} with load"]
     return "\n".join(lines)
 
 

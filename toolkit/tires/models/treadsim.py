@@ -101,16 +101,20 @@ def _leaders(p: Mapping[str, Any], shape: tuple[int, ...]) -> tuple[NDArray[np.i
     # (copies,) the first copy whose bristles are nearly those of each copy, and where they are the same: a
     # derivative asks for copies of one tire that differ by a millionth, or in what acts on the sums alone.
     copies = shape[0] if len(shape) == 2 else 1
-    searched = [one for one in MODEL.parameters if one.name not in _OUTSIDE and np.size(p[one.name]) > 1]
+    searched = [
+        parameter
+        for parameter in MODEL.parameters
+        if parameter.name not in _OUTSIDE and np.size(p[parameter.name]) > 1
+    ]
     if copies == 1 or not searched:
         return np.zeros(copies, dtype=np.intp), np.arange(copies) > 0
-    places = np.stack([np.ravel(p[one.name]) / one.size for one in searched], axis=1)
-    found = np.full(copies, -1)
+    places = np.stack([np.ravel(p[parameter.name]) / parameter.size for parameter in searched], axis=1)
+    nearest = np.full(copies, -1)
     for copy in range(copies):
-        if found[copy] < 0:
+        if nearest[copy] < 0:
             near = np.abs(places - places[copy]).max(axis=1) <= _NEAR
-            found[near & (found < 0)] = copy
-    return found, (places == places[found]).all(axis=1) & (found != np.arange(copies))
+            nearest[near & (nearest < 0)] = copy
+    return nearest, (places == places[nearest]).all(axis=1) & (nearest != np.arange(copies))
 
 
 def _sums(
@@ -122,17 +126,19 @@ def _sums(
     if not led.any():
         return balance(tread, sx, sy, lines=lines).sums
     of_copy = np.arange(len(sy)).reshape(copies, -1)
-    first, rest = of_copy[~led].ravel(), of_copy[led & ~same].ravel()
+    first, followers = of_copy[~led].ravel(), of_copy[led & ~same].ravel()
     leading = tread.take(first)
     start = balance(leading, sx[first], sy[first], lines=lines)
-    if len(rest) > _MANY * len(first):
+    if len(followers) > _MANY * len(first):
         start = sharpened(leading, sx[first], sy[first], start, lines=lines)
     # Of each copy, its leader's cases among those that lead.
     begun = np.arange(len(first)).reshape(-1, of_copy.shape[1])[(np.cumsum(~led) - 1)[leaders]]
-    made = start.sums[:, begun.ravel()]
+    sums = start.sums[:, begun.ravel()]
     near = start.take(begun[led & ~same].ravel())
-    made[:, rest] = balance(tread.take(rest), sx[rest], sy[rest], lines=lines, near=near).sums
-    return made
+    sums[:, followers] = balance(
+        tread.take(followers), sx[followers], sy[followers], lines=lines, near=near
+    ).sums
+    return sums
 
 
 def _limit(p: Mapping[str, Any], load: Array, growth: Any, shape: tuple[int, ...], bristles: int) -> Array:
@@ -148,9 +154,9 @@ def _limit(p: Mapping[str, Any], load: Array, growth: Any, shape: tuple[int, ...
 
 def _flat(arrays: Mapping[str, Any]) -> tuple[tuple[int, ...], dict[str, Array]]:
     # All at one shape, then in one line of cases.
-    together = np.broadcast_arrays(*(np.asarray(one, dtype=np.float64) for one in arrays.values()))
+    together = np.broadcast_arrays(*(np.asarray(array, dtype=np.float64) for array in arrays.values()))
     shape = together[0].shape
-    return shape, {name: np.ravel(one) for name, one in zip(arrays, together, strict=True)}
+    return shape, {name: np.ravel(array) for name, array in zip(arrays, together, strict=True)}
 
 
 def starts(seeds: Seeds) -> tuple[Mapping[str, float], ...]:

@@ -1,0 +1,228 @@
+"""`toolkit calibration budget, certificate, standard, chart, due`: what records amount to."""
+
+from __future__ import annotations
+
+import time
+from datetime import datetime
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from toolkit.cli.console import (
+    Calibrations,
+    Home,
+    Id,
+    Json,
+    KnownAt,
+    Quiet,
+    answer,
+    day,
+    exit_code,
+    progress,
+)
+
+CERTIFICATE = "certificate"
+
+
+def budget(
+    record_id: Id,
+    load: Annotated[str | None, typer.Option("--load", help="One load; default: all of them.")] = None,
+    at: Annotated[
+        str | None,
+        typer.Option("--at", help="Load value, with a unit or in the record's; default: full scale."),
+    ] = None,
+    indications: Annotated[
+        str | None, typer.Option("--indications", help="Predict from D51=..,D52=.. in the record's units.")
+    ] = None,
+    temperature_range: Annotated[
+        float | None, typer.Option("--temperature-range", help="Use within +- this many K of the session.")
+    ] = None,
+    temperature_coefficient: Annotated[
+        float | None,
+        typer.Option(
+            "--temperature-coefficient", help="Relative, a kelvin; default: what the session states."
+        ),
+    ] = None,
+    trials: Annotated[
+        int | None, typer.Option("--monte-carlo", help="Check by this many trials; 0: until settled.")
+    ] = None,
+    seed: Annotated[int, typer.Option("--seed", help="Of the trials.")] = 0,
+    digits: Annotated[int, typer.Option("--digits", min=1, max=2, help="Digits of u that count.")] = 2,
+    figure: Annotated[
+        Path | None, typer.Option("--figure", help="Draw shares and U over the range: .png, .svg or .pdf.")
+    ] = None,
+    calibrations: Calibrations = None,
+    home: Home = None,
+    as_json: Json = False,
+    quiet: Quiet = False,
+) -> int:
+    """Tell the uncertainty of a record's loads: components with shares, U with k, U over the range.
+
+    Example: toolkit calibration budget m15-r2 --load FY --at 4000N
+    """
+    from toolkit.lab.budget import BudgetOrder, budget_answer, temperature_of
+    from toolkit.lab.home import open_registry
+
+    order = BudgetOrder(
+        load=load, at=at, indications=indications, trials=trials, seed=seed, digits=digits, figure=figure,
+        temperature=temperature_of(temperature_range, temperature_coefficient),
+    )  # fmt: skip
+    payload, text, findings = budget_answer(open_registry(calibrations, home), record_id, order)
+    answer(payload, text, as_json=as_json, quiet=quiet)
+    return exit_code(findings)
+
+
+def certificate(
+    record_id: Annotated[str, typer.Argument(metavar="ID", help="Record id, such as m15-r2.")],
+    template: Annotated[
+        Path | None,
+        typer.Option("--template", help="Word template; default: report_templates/certificate.docx."),
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option("--out", help="Output folder; default: certificate-<ID> here.")
+    ] = None,
+    dcc: Annotated[bool, typer.Option("--dcc", help="Also write the DCC 3.3.0 file (XML).")] = False,
+    replaces: Annotated[
+        str | None, typer.Option("--replaces", help="Id of the certificate that this one replaces.")
+    ] = None,
+    amendment_reason: Annotated[
+        str | None, typer.Option("--amendment-reason", help="Why it is replaced; printed.")
+    ] = None,
+    draft: Annotated[
+        bool, typer.Option("--draft", help="Allow a record that is not approved: every page says DRAFT.")
+    ] = False,
+    known_at: KnownAt = None,
+    keep: Annotated[
+        bool, typer.Option("--keep", help="Keep what was not verified in rejected/ of the folder.")
+    ] = False,
+    calibrations: Calibrations = None,
+    home: Home = None,
+    json: Json = False,
+    quiet: Quiet = False,
+) -> int:
+    """Make the calibration certificate of a record: Word, verified PDF, and with --dcc the XML.
+
+    A legacy import, a candidate and a withdrawn record have none. What nobody stated is a visible gap
+    (exit 1). --known-at is the day of issue, and of what was known.
+
+    Example: toolkit calibration certificate m15-r3 --out certificates --dcc
+    """
+    from toolkit.lab.certificate import certificate_payload, certificate_text, deliver_certificate
+    from toolkit.lab.home import home_template, open_registry
+    from toolkit.report.word.package import read_template
+
+    started = time.perf_counter()
+    opened = read_template(template or home_template("certificate.docx", home))
+    with progress(None, "certificate", show=not (json or quiet)) as step:
+        issued, delivered = deliver_certificate(
+            open_registry(calibrations, home), record_id, opened,
+            out or Path.cwd() / f"certificate-{record_id}", issued=day(known_at), draft=draft,
+            replaces=replaces, amendment=amendment_reason, dcc=dcc, keep=keep, step=step,
+        )  # fmt: skip
+    payload = certificate_payload(issued, delivered) | {"timing": {"seconds": time.perf_counter() - started}}
+    answer(payload, certificate_text(issued, delivered), as_json=json, quiet=quiet)
+    return 1 if delivered.warnings else exit_code(issued.findings)
+
+
+def standard(
+    record_id: Id,
+    name: Annotated[str, typer.Option("--standard", help="e74 or iso376.")],
+    load: Annotated[str | None, typer.Option("--load", help="One load; needed where there are more.")] = None,
+    indication: Annotated[
+        str | None, typer.Option("--indication", help="One indication; needed where there are more.")
+    ] = None,
+    degree: Annotated[
+        int | None, typer.Option("--degree", help="Of the curve; E74: by its annex, ISO 376: 3.")
+    ] = None,
+    preloads: Annotated[
+        int | None,
+        typer.Option(
+            "--preloads",
+            help="Preloads to the largest force (ISO 376); default: [standard] preloads of the session.",
+        ),
+    ] = None,
+    calibrations: Calibrations = None,
+    home: Home = None,
+    as_json: Json = False,
+    quiet: Quiet = False,
+) -> int:
+    """Evaluate one indication under one load by a standard: figures, class, reasons.
+
+    Example: toolkit calibration standard cell-r1 --standard iso376 --preloads 3
+    """
+    from toolkit.calibration.control.standard import evaluate_record
+    from toolkit.errors import ConfigError
+    from toolkit.lab.control_answer import evaluation_text
+    from toolkit.lab.home import open_registry
+
+    if name not in ("e74", "iso376"):
+        raise ConfigError(
+            "no such standard", where="--standard", got=name, expected="e74 or iso376",
+            next_step="name one of them", rule="usage",
+        )  # fmt: skip
+    evaluations = evaluate_record(
+        open_registry(calibrations, home), record_id,
+        standard="e74" if name == "e74" else "iso376",
+        load=load, indication=indication, degree=degree, preloads=preloads,
+    )  # fmt: skip
+    payload = {
+        "id": record_id,
+        "standard": name,
+        "evaluations": [evaluation.as_dict() for evaluation in evaluations],
+    }
+    answer(payload, "\n\n".join(map(evaluation_text, evaluations)), as_json=as_json, quiet=quiet)
+    return 0
+
+
+def chart(
+    instrument: Annotated[str, typer.Argument(help="The instrument.")],
+    out: Annotated[Path | None, typer.Option("--out", help="A picture: FILE.png or FILE.svg.")] = None,
+    load: Annotated[str | None, typer.Option("--load", help="One load only.")] = None,
+    baseline: Annotated[
+        int | None,
+        typer.Option(
+            "--baseline", min=4, help="First sessions that make the limits; default: all but the last."
+        ),
+    ] = None,
+    calibrations: Calibrations = None,
+    home: Home = None,
+    as_json: Json = False,
+    quiet: Quiet = False,
+) -> int:
+    """Chart the error of each check load over the sessions; exit code 1 where the newest breaks a rule.
+
+    Example: toolkit calibration chart m15 --out chart.png
+    """
+    from toolkit.lab.control_answer import chart_answer
+    from toolkit.lab.home import open_registry
+
+    payload, text, findings = chart_answer(
+        open_registry(calibrations, home), instrument, load=load, baseline=baseline, out=out
+    )
+    answer(payload, text, as_json=as_json, quiet=quiet)
+    return exit_code(findings)
+
+
+def due(
+    instrument: Annotated[str | None, typer.Argument(help="One instrument; default: all.")] = None,
+    on: Annotated[
+        datetime | None, typer.Option("--on", formats=["%Y-%m-%d"], help="The day to judge; default: today.")
+    ] = None,
+    calibrations: Calibrations = None,
+    home: Home = None,
+    as_json: Json = False,
+    quiet: Quiet = False,
+) -> int:
+    """Tell when each instrument is due, as the ledger says; exit code 1 where one is overdue.
+
+    Example: toolkit calibration due --on 2026-12-01
+    """
+    from toolkit.calibration.registry.clock import today
+    from toolkit.lab.control_answer import due_answer
+    from toolkit.lab.home import open_registry
+
+    registry = open_registry(calibrations, home)
+    payload, text, findings = due_answer(registry, instrument, day(on) or today())
+    answer(payload, text, as_json=as_json, quiet=quiet)
+    return exit_code(findings)

@@ -1,0 +1,106 @@
+"""`toolkit init, doctor, qualify, explain`: the home, what the machine lacks, what the software reaches."""
+
+from __future__ import annotations
+
+import json as jsonlib
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from toolkit.cli.console import Json, Quiet, answer
+
+
+def init(
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="The home to make.")],
+    json: Json = False,
+    quiet: Quiet = False,
+) -> int:
+    """Make a laboratory's home folder.
+
+    An empty calibrations/ and the default report_templates/. What is there already is left as it is.
+
+    Example: toolkit init lab
+    """
+    from toolkit.lab.home import TEMPLATES, make_home
+
+    written = make_home(folder)
+    text = (
+        f"home: {folder}\n"
+        f"  calibrations/       fill it with: toolkit calibrate SESSION.toml --home {folder}\n"
+        f"  report_templates/   {', '.join(p.name for p in sorted((folder / TEMPLATES).glob('*.docx')))}"
+    )
+    answer({"home": folder.resolve(), "written": list(written)}, text, as_json=json, quiet=quiet)
+    return 0
+
+
+def doctor(json: Json = False, quiet: Quiet = False) -> int:
+    """Tell what this machine lacks, and what mends it.
+
+    Example: toolkit doctor
+    """
+    from toolkit.lab.answers import table
+    from toolkit.lab.doctor import checks, mending_command
+
+    looked_for = checks()
+    mend = None if all(check.ok for check in looked_for) else mending_command()
+    rows = [["ok" if c.ok else "MISSING", c.name, c.found, c.needed_for] for c in looked_for]
+    text = table(["", "what", "found", "needed for"], rows, align="<<<<")
+    text += f"\n\nmend it with:\n  {mend}" if mend else "\n\nnothing is missing"
+    payload = {
+        "checks": [
+            {"name": c.name, "ok": c.ok, "found": c.found, "needed_for": c.needed_for} for c in looked_for
+        ],
+        "mend": mend,
+    }
+    answer(payload, text, as_json=json, quiet=quiet)
+    return 1 if mend else 0
+
+
+def qualify(
+    out: Annotated[
+        Path | None, typer.Option("--out", help="Write the record here: .json, else as text.")
+    ] = None,
+    json: Json = False,
+    quiet: Quiet = False,
+) -> int:
+    """Qualify this installation: certified sets, published examples, golden vectors, and every refusal once.
+
+    Example: toolkit qualify --out qualification.json
+    """
+    from toolkit.files import write_atomic
+    from toolkit.lab.home import packaged_home
+    from toolkit.lab.qualification_answer import qualification_payload, qualification_text
+    from toolkit.qualification.run import qualify as run
+
+    record = run(calibrations=packaged_home() / "calibrations", on=datetime.now(tz=UTC).date())
+    payload, text = qualification_payload(record), qualification_text(record)
+    if out is not None:
+        document = jsonlib.dumps({"schema": 1, **payload}, ensure_ascii=False, indent=2, allow_nan=False)
+        write_atomic(out, (document if out.suffix.lower() == ".json" else text) + "\n")
+        text += f"\nwritten: {out}"
+    answer(payload, text, as_json=json, quiet=quiet)
+    return 0 if record.passed else 1
+
+
+def explain(
+    rule: Annotated[
+        str | None,
+        typer.Argument(
+            metavar="RULE",
+            help="Rule id, or the name of an effect or of a characteristic; without it, all of them.",
+        ),
+    ] = None,
+    json: Json = False,
+    quiet: Quiet = False,
+) -> int:
+    """Explain a finding's rule and what to do, an effect that a diagnosis names, or a characteristic.
+
+    Examples: toolkit explain no-tare, toolkit explain relaxation, toolkit explain PRAT
+    """
+    from toolkit.lab.rules import explained
+
+    payload, text = explained(rule)
+    answer(payload, text, as_json=json, quiet=quiet)
+    return 0

@@ -1,0 +1,220 @@
+"""Faults of a file's entries: all are told at once, each with its key, its line and what was expected."""
+
+from __future__ import annotations
+
+import datetime as dt
+import difflib
+import json
+from collections.abc import Container, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+from toolkit.declared.marks import Format, Path, Quantity
+from toolkit.errors import ConfigError
+
+LIKE = 0.5  # of `difflib`: what is less alike was not meant
+_LONGEST = 160
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Fault:
+    """An entry that cannot stand.
+
+    A declared class yields its own from ``faults(self)``: ``key`` is the path of keys below the class's table
+    (``("column", 2, "symbol")``, lists counted from 0; empty for the table itself), ``expected`` what may
+    stand there. ``what`` is a sentence without the key, where "cannot be used" does not say enough; ``rule``
+    a rule id of its own; ``got`` what stood there, if it is not the entry itself.
+    """
+
+    key: Path = ()
+    expected: str
+    got: Any = None
+    what: str | None = None
+    rule: str | None = None
+    kind: Literal["wrong", "missing", "unknown"] = "wrong"
+    near: str | None = None
+    form: Format = field(default_factory=Format)
+
+    @property
+    def name(self) -> str:
+        """The entry with the tables that it stands in: ``column[3].symbol``, lists counted from 1."""
+        return key_text(self.key)
+
+    @property
+    def rule_id(self) -> str:
+        """The rule id: the fault's own, else the format's for its kind."""
+        if self.rule is not None:
+            return self.rule
+        if self.kind == "unknown":
+            return "unknown-key"
+        return self.form.missing if self.kind == "missing" else self.form.wrong
+
+    @property
+    def hint(self) -> str:
+        """What was meant by an unknown key, or what is known."""
+        return f"did you mean {self.near!r}?" if self.near else f"known are {self.expected}"
+
+    @property
+    def text(self) -> str:
+        """The fault in a line."""
+        name = self.name or "the file"
+        if self.kind == "unknown":
+            return f"{name}: unknown key; {self.hint}"
+        if self.kind == "missing":
+            return f"{name}: missing; expected {self.expected}"
+        problem = self.what or f"{display(self.got, quoted=True)} cannot be used"
+        return f"{name}: {problem}; expected {self.expected}"
+
+
+def key_text(path: Path) -> str:
+    """Return a path of keys as people read it.
+
+    >>> key_text(("column", 2, "symbol"))
+    'column[3].symbol'
+    """
+    text = ""
+    for part in path:
+        text += f"[{part + 1}]" if isinstance(part, int) else f".{part}" if text else part
+    return text
+
+
+def display(value: Any, *, quoted: bool = False) -> str:
+    """Return a value as a settings file writes it, cut where it is long.
+
+    >>> display({"value": 80, "unit": "km/h"})
+    '{ value = 80, unit = "km/h" }'
+    """
+    if value is None:
+        return "nothing"
+    if isinstance(value, Quantity):
+        return f"{_inline(value.value)} {value.unit}"
+    if isinstance(value, str) and not quoted:
+        text = value if value.strip() else "an empty text"
+    else:
+        text = _inline(value)
+    return text if len(text) <= _LONGEST else f"{text[:_LONGEST]} ..."
+
+
+def _inline(value: Any) -> str:
+    if isinstance(value, Mapping):
+        return "{ " + ", ".join(f"{key} = {_inline(entry)}" for key, entry in value.items()) + " }"
+    if isinstance(value, list | tuple):
+        return "[" + ", ".join(_inline(entry) for entry in value) + "]"
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, str):
+        return json.dumps(value, ensure_ascii=False)
+    if isinstance(value, int) and abs(value) >= 10**_LONGEST:
+        return "a whole number of more digits than can be read"  # nor can Python print every one
+    return value.isoformat() if isinstance(value, dt.date | dt.time) else str(value)
+
+
+def nearest(name: str, candidates: Sequence[str], present: Container[str] = ()) -> str | None:
+    """Return the known name that was meant, None where none is alike.
+
+    Case does not count: ``dot`` is DOT. Of two that are as near, that which is not there yet was meant.
+
+    >>> nearest("dat", ["date", "data"], present=["date"])
+    'data'
+    """
+
+    def likeness(candidate: str) -> tuple[float, bool, str]:
+        ratio = difflib.SequenceMatcher(None, name.lower(), candidate.lower()).ratio()
+        return ratio, candidate not in present, candidate
+
+    near = max(candidates, key=likeness, default=None)
+    return None if near is None or likeness(near)[0] < LIKE else near
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Source:
+    """A text that entries were read from: its name in messages, and what it extends.
+
+    ``inherited`` are the paths of the entries that were taken from ``base``.
+    """
+
+    where: object
+    text: str | None = None
+    base: Source | None = None
+    inherited: frozenset[Path] = frozenset()
+
+    def place(self, path: Path) -> tuple[Source, int | None]:
+        """Return the source and the line of an entry, or of the nearest table above it."""
+        if self.base is not None and any(path[:size] in self.inherited for size in range(1, len(path) + 1)):
+            return self.base.place(path)
+        from toolkit.declared.lines import lines_of
+
+        lines = {} if self.text is None else lines_of(self.text)
+        while path:
+            if path in lines:
+                return self, lines[path]
+            path = path[:-1]
+        return self, None
+
+    def excerpt(self, line: int) -> str:
+        """Return a line with its number: ``12 | speed = 80``."""
+        text = (self.text or "").replace("\r\n", "\n").split("\n")[line - 1].strip()
+        return f"{line} | {text if len(text) <= _LONGEST else text[:_LONGEST] + ' ...'}"
+
+
+def refuse(faults: Sequence[Fault], source: Source) -> None:
+    """Raise the error of a file with faults; return where there is none.
+
+    Raises
+    ------
+    ConfigError
+        the rule of the fault; of several with different rules that of the format
+    """
+    if not faults:
+        return
+    if len(faults) > 1:
+        _refuse_all(faults, source)
+    fault = faults[0]
+    document, line = source.place(fault.key)
+    if fault.kind == "unknown":
+        table = key_text(fault.key[:-1])
+        raise ConfigError(
+            f"unknown key {str(fault.key[-1])!r}",
+            where=f"{document.where}: {table}" if table else document.where,
+            line=None if line is None else document.excerpt(line),
+            got=fault.key[-1],
+            expected=fault.near or fault.expected,
+            next_step=f"{fault.hint} " * bool(fault.near) + _next_step(fault, "correct or remove it"),
+            rule=fault.rule_id,
+        )
+    name = fault.name or "the file"
+    what = fault.what or ("is missing" if fault.kind == "missing" else "has a value that cannot be used")
+    raise ConfigError(
+        f"{name} {what}" if fault.what is None else f"{name}: {what}",
+        where=f"{document.where}: {fault.name}" if fault.name else document.where,
+        line=None if line is None else document.excerpt(line),
+        got=display(fault.got),
+        expected=fault.expected,
+        next_step=_next_step(fault),
+        rule=fault.rule_id,
+    )
+
+
+def _refuse_all(faults: Sequence[Fault], source: Source) -> None:
+    lines = []
+    for fault in faults:
+        document, line = source.place(fault.key)
+        lines.append(fault.text)
+        if line is not None:
+            elsewhere = f"{document.where}, " if document is not source else ""
+            lines.append(f"  {elsewhere}{document.excerpt(line)}")
+    rules = {fault.rule_id for fault in faults}
+    raise ConfigError(
+        f"{len(faults)} entries cannot be used",
+        where=source.where,
+        got="\n".join([lines[0], *(" " * 12 + text for text in lines[1:])]),
+        expected="; ".join(f"{fault.name or 'the file'}: {fault.near or fault.expected}" for fault in faults),
+        next_step=_next_step(faults[0], "correct every entry that is named"),
+        rule=rules.pop() if len(rules) == 1 else faults[0].form.wrong,
+    )
+
+
+def _next_step(fault: Fault, act: str | None = None) -> str:
+    """Return the format's next step; ``act`` replaces its first part, what follows a semicolon stays."""
+    first, semicolon, then = fault.form.next_step.partition(";")
+    return (act or first.format(key=fault.name or "the file")) + semicolon + then

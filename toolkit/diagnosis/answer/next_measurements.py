@@ -1,0 +1,130 @@
+"""What to measure next: what parts a class, what narrows down the unknown, what a search had no time for."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from toolkit.diagnosis.answer.answer import FoundEffect, Verdict, cut_short
+from toolkit.diagnosis.fit.problem import Problem
+from toolkit.diagnosis.policy import PRIORS, VERDICT
+from toolkit.diagnosis.search.case_view import CaseView
+from toolkit.diagnosis.search.forward_step import Step
+from toolkit.effects.applied import AppliedEffect
+from toolkit.effects.catalogue import effects as catalogue
+
+if TYPE_CHECKING:
+    from toolkit.diagnosis.search.search import Search
+
+# Classes of effects that a recording cannot tell apart, and the measurement that would.
+
+
+def equivalent_to(problem: Problem, step: Step) -> tuple[str, ...]:
+    """Return the other names that explain a step as well, without the step's own."""
+    names = [rival.active.effect.name for rival in step.rivals if rival.difference > -VERDICT.close]
+    names += _always(problem, step.active)
+    own = step.active.effect.name
+    return tuple(dict.fromkeys(name for name in names if name != own))
+
+
+def apart(effect: FoundEffect) -> str:
+    """Return the measurements that would tell an effect from its class, and of which names each speaks."""
+    statements: dict[str, list[str]] = {}
+    for name in (effect.name, *effect.equivalent_to):
+        statements.setdefault(catalogue()[name].separates, []).append(name)
+    return "; ".join(f"{text} ({', '.join(names)})" for text, names in statements.items() if text)
+
+
+def parted(effect: FoundEffect) -> str:
+    """Return the sentence that says what would tell an effect from its class, or from what is like it."""
+    others = effect.equivalent_to or _akin(effect.name)
+    if not others:
+        return ""
+    return f"To tell {effect.name} from {', '.join(others)}: {apart(replace(effect, equivalent_to=others))}."
+
+
+def _akin(name: str) -> tuple[str, ...]:
+    """Return the other effects for which one may always be taken, however the recording parts them."""
+    akin = catalogue()[name].akin
+    return tuple(
+        effect.name for effect in catalogue().values() if akin and effect.akin == akin and effect.name != name
+    )
+
+
+def _always(problem: Problem, active: AppliedEffect) -> list[str]:
+    """Return the class that holds on this machine whatever the recording, the tire's effects first."""
+    alike = active.effect.alike
+    if alike is None or not alike.holds(CaseView(problem, active.channel, active.source)):
+        return []
+    members = [
+        effect.name
+        for effect in catalogue().values()
+        if effect.alike is not None and effect.alike.group == alike.group
+    ]
+    return members[::-1]
+
+
+def implausible(search: Search) -> tuple[str, ...]:
+    """Return the parameters that are far off their priors beside every effect that was found."""
+    values = zip(search.problem.free, search.augmented.p, strict=True)
+    return tuple(
+        parameter.name
+        for parameter, p in values
+        if parameter.sd is not None and abs(p - parameter.value) > PRIORS.far * parameter.sd
+    )
+
+
+def next_measurements(search: Search, effects: tuple[FoundEffect, ...], verdict: Verdict) -> tuple[str, ...]:
+    """Return a sentence for each measurement that would say more than this case does."""
+    sentences = [text for effect in effects if (text := parted(effect))]
+    if verdict == "unknown":
+        sentences += to_find_it(search)
+        beside = ", ".join(dict.fromkeys(step.active.effect.name for step in search.steps))
+        sentences += [
+            f"Measure {name} by itself: even beside the nearest effects ({beside}) it is far off its prior."
+            for name in (implausible(search) if search.steps else ())
+        ]
+    if cut_short(search.skipped):
+        sentences.append(
+            "Give the search more time (--budget): it ended before every known effect was tried."
+        )
+    elif verdict == "untestable":
+        sentences.append(
+            "Tighten the priors of the parameters that moved (certificate, data sheet), or vary the inputs."
+        )
+    if len(search.problem.runs) == 1:
+        sentences.append("Repeat the run: with one recording alone, only blocks of it could be held out.")
+    return tuple(sentences)
+
+
+def to_find_it(search: Search) -> list[str]:
+    """Return what would narrow down a mismatch that no effect explains, by what it depends on."""
+    variables = dict.fromkeys(name for structure in search.structure for name in structure.variables)
+    channels = {channel.name for channel in search.problem.case.drivers}
+    rates = {f"d{name}/dt": f"the rate of {name}" for name in channels}
+    varied = [rates.get(name, name) for name in variables if name in channels or name in rates]
+    sentences = []
+    if varied:
+        sentences.append(
+            f"The mismatch depends on {', '.join(varied)}: repeat the run with {varied[0]} alone varied, "
+            "everything else held."
+        )
+    outputs = [output.name for output in search.problem.model.outputs if output.name in variables]
+    if outputs:
+        sentences.append(
+            f"The mismatch depends on the size of {', '.join(outputs)}: apply known loads over its range."
+        )
+    lines = [
+        name.removeprefix("time (a line at ").removesuffix(")") for name in variables if "a line at" in name
+    ]
+    if lines:
+        sentences.append(
+            f"The mismatch swings at {' and '.join(lines)}: record what turns or swings at this frequency."
+        )
+    if "run" in variables:
+        sentences.append(
+            "The mismatch differs from run to run: repeat one run unchanged, and note what else changed."
+        )
+    if "time" in variables:
+        sentences.append("The mismatch goes with time: hold all inputs still for as long as a run takes.")
+    return sentences or ["Vary one input alone, everything else held, and record what else may act."]

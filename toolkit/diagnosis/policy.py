@@ -1,0 +1,265 @@
+"""The policy of the verdict: every number that decides what is searched, named, withdrawn, held out or told.
+
+A number stands in the section of what it decides, with its unit and the reason for it, and nowhere else in
+the search and the answer. Tolerances of one algorithm (an integrator's, a descent's) stand beside it,
+and what holds of one effect alone stands in that effect's own file.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+from typing import TypeVar
+
+T = TypeVar("T")
+
+
+def _set(value: T, unit: str, why: str) -> T:
+    return dataclasses.field(default=value, metadata={"unit": unit, "why": why})
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Budget:
+    """What a budget of time allows beside the search."""
+
+    quick_s: float = _set(2.0, "s of one simulation", "a slower one is not run twice to see that it repeats")
+    grace: float = _set(0.25, "of the budget", "left for predictions after a search that has spent all of it")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Rows:
+    """Which rows count, and which are held out."""
+
+    isolated: float = _set(
+        8.0, "robust sd from the neighbours' median", "no physics does that in one row: it is an outlier"
+    )
+    outliers: float = _set(0.03, "of a run's rows", "more than that is no outlier but a pattern")
+    fewest_for_outliers: int = _set(12, "rows of a run", "fewer have no scatter that a row could be far off")
+    folds: int = _set(5, "parts", "each fit sees four fifths of the rows, at the price of five fits")
+    fewest: int = _set(3, "rows of an output", "with as many nothing can be told apart from anything")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Priors:
+    """How far a parameter of the simulation may move."""
+
+    within: float = _set(4.0, "prior sd", "further off it is not uncertain but imitates an effect: a bound")
+    far: float = _set(3.0, "prior sd", "one in 370 by chance: beyond, the fit has absorbed what was left out")
+    masked: int = _set(
+        4, "candidates", "of those seen from the declared values, fitted jointly where a prior is far off"
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Noise:
+    """What of a residual is taken for noise."""
+
+    gap: float = _set(3.0, "median steps of time", "beyond, a series begins anew: its past tells nothing")
+    fewest: int = _set(24, "values of a segment", "below, nothing can be told of its colour")
+    orders: int = _set(8, "orders of the autoregression", "the highest that BIC may choose")
+    mismatch: float = _set(3.0, "times a stated noise", "a larger residual is mostly no noise")
+    absorbed: float = _set(
+        0.05,
+        "of the plain fit's residual variance",
+        "more in the coloured fit: its noise has absorbed physics",
+    )
+    absorbed_by_chance: float = _set(
+        3.0, "independent rows for each parameter", "what the plain fit takes of the noise by its parameters"
+    )
+    apart: float = _set(
+        2.0, "sd of the difference", "a larger one of the coloured and the plain solution is none of chance"
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Screening:
+    """Which candidates a look from one hypothesis at all others finds significant."""
+
+    alpha: float = _set(
+        0.003, "of the whole search, a step", "four steps stay below the bar of 2 % false names on nulls"
+    )
+    sharpened: int = _set(
+        30, "starts", "whose gain is computed with the noise estimated anew: quick ones rank"
+    )
+    starts: int = _set(
+        6, "starts of one candidate", "among the sharpened: one candidate cannot crowd out all"
+    )
+    turns: int = _set(2, "estimates of the noise", "the second is that of what the responses leave")
+    short: float = _set(
+        10.0, "independent rows", "a gain of so few is all chance: found on clean AR(1) series"
+    )
+    least_trust: float = _set(0.3, "of a gain", "that the shortest series keeps: found on clean AR(1) series")
+    collinear: float = _set(1e-11, "of the largest eigenvalue", "below, nothing could be told apart")
+    draws: int = _set(4_000, "draws of the null", "a p-value of 0.003 has twelve draws below it")
+    fewest_draws: int = _set(20, "draws below a statistic", "with fewer the drawn share is mostly chance")
+    tail: float = _set(
+        0.01, "of the draws", "from there on Bonferroni goes on, on the tests that the tail shows"
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Starts:
+    """Where the search for an effect starts."""
+
+    subsets: int = _set(
+        8, "groups of runs by one condition", "each is a test more; the first are the likeliest"
+    )
+    late: tuple[int, ...] = _set((1, 4, 12), "rows", "delays of a plant whose rows are far apart")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Step:
+    """Which candidate of those that are significant becomes a step."""
+
+    most_effects: int = _set(4, "effects", "every further step has less evidence and more ways to be wrong")
+    refined: int = _set(8, "candidates", "fitted jointly, of those that screening ranks first")
+    judged: int = _set(3, "joint fits", "held out one after the other, the best first, until one stands")
+    far_behind: float = _set(0.25, "of the best gain", "a candidate below cannot win a joint fit")
+    near: float = _set(
+        40.0, "of twice the log-likelihood", "however large its share: so near to the best gain it may win"
+    )
+    least_behind: float = _set(
+        0.5,
+        "of the held-out mean square",
+        "what one far behind must take away, where no first one can be fitted",
+    )
+    least_gain: float = _set(1.5, "of the held-out log score", "less is what chance gives on rows not seen")
+    first: float = _set(
+        0.02,
+        "of the held-out mean square",
+        "what a first effect takes: a hundredth of an error matters to nobody",
+    )
+    later: float = _set(
+        0.05,
+        "of the held-out mean square",
+        "what an effect beside others takes: their own laws are off by some",
+    )
+    bound: float = _set(
+        1e-3, "of a bound", "an estimate as near to it ends there: the effect only imitates another"
+    )
+    signal: float = _set(0.5, "of an output in its right unit", "what else it may have in it")
+    visible: float = _set(0.01, "of the noise", "an effect that never moves an output by more is not there")
+    band_noise: float = _set(2.0, "of the log posterior", "noise before a dead band is taken for more likely")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Lattice:
+    """Whether recorded values stand on coarse steps."""
+
+    fewest: int = _set(20, "values", "fewer have a common step by chance")
+    fewest_steps: int = _set(3, "different steps", "two numbers always have a common measure, near enough")
+    coarse: float = _set(0.1, "of the residual's variance", "what rounding to the step must make to matter")
+    exact: float = _set(1e-3, "of a step", "by which values may miss the lattice")
+    finer: float = _set(1.5, "last places", "a step of one last place is only how the file was printed")
+    coarser: float = _set(10.0, "last places", "a few values have a step of two or five places by chance")
+    many: int = _set(8, "different steps", "from as many on a step of two or five places is none of chance")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Structure:
+    """Which structure of a residual counts as unknown physics."""
+
+    alpha: float = _set(
+        0.0005, "of all groups", "stricter than an effect's: no held-out run has a say in what is left"
+    )
+    sharpened: int = _set(
+        15, "groups", "whose gain is computed with the noise estimated anew: quick ones rank"
+    )
+    knots: int = _set(7, "knots of a spline", "a smooth dependence, over the quantiles of the variable")
+    rows_per_column: float = _set(4.0, "rows for each column", "fewer would fit the noise")
+    stated: float = _set(
+        1.1, "times a stated noise", "that a residual may have: certificates are round numbers"
+    )
+    stated_rows: int = _set(10, "values of an output", "fewer do not show that they scatter too much")
+    stated_worth: float = _set(3.0, "degrees of freedom", "at least, however coloured the noise is")
+    line: float = _set(1e-8, "p-value of a spectral line", "the noise's own resonances are lines as well")
+    line_share: float = _set(0.05, "of a residual's variance", "a line with less matters to nobody")
+    line_around: int = _set(
+        12, "frequencies on each side", "whose median is the level that a line stands above"
+    )
+    line_rows: int = _set(64, "rows of a run", "a shorter one has too few frequencies for a level")
+    line_even: float = _set(0.05, "of the mean step", "by which the runs' clocks may differ to be added")
+    line_cycles: int = _set(8, "cycles a run", "slower is a trend, not a line")
+    line_jitter: float = _set(0.9, "of a step", "by which single steps may differ: an even clock is put in")
+    line_kept: float = _set(0.9, "of a run's rows", "fewer recorded ones make lines of their own")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Verdict:
+    """What the answer says of what the search has found."""
+
+    close: float = _set(3.0, "of the log-likelihood", "within which the data prefer neither of two effects")
+    mostly: float = _set(0.5, "of the log-likelihood", "named effects explain it, beside what stays unknown")
+    taken: float = _set(
+        2 / 3, "of the held-out mean square above the noise", "named effects take, in one output"
+    )
+    shown: float = _set(1.1, "times the noise's mean square", "an output with less shows no mismatch")
+    telling: float = _set(
+        20.0, "of the summed squares over the noise's", "an output moved by less is not told"
+    )
+    interval: float = _set(0.95, "probability", "of the confidence intervals that the contract promises")
+    open_interval: float = _set(1e5, "times the value", "a wider interval is none: the data leave it open")
+    power: float = _set(0.8, "probability", "with which the smallest detectable size would have been found")
+    observable: float = _set(
+        1e-3, "of a response", "left beside the nominal parameters, or nothing is seen of it"
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Location:
+    """Where a mismatch is said to be."""
+
+    bins: int = _set(10, "quantiles of a variable", "the ends of a range fall on them")
+    held: float = _set(0.8, "of the mismatch's energy", "a range must hold to be the place of it")
+    narrow: float = _set(0.7, "of the rows", "a range that is wider says nothing")
+    whole: float = _set(0.95, "of the rows", "a range as wide is all that was recorded")
+    ranges: int = _set(3, "ranges", "told of one mismatch, the narrowest first")
+    run: float = _set(
+        0.2, "of the mean energy of a run", "a run with less is not named among those of a range"
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Surface:
+    """Whether simulated columns are known well enough at other slip angles and loads."""
+
+    missed: float = _set(0.02, "of the output's spread", "a surface that misses more is none of a tire")
+    closer: float = _set(
+        8.0, "times", "a left-out angle has neighbours twice as far away; of third order that is off by 2^3"
+    )
+    cell_rows: int = _set(20, "rows of a run", "fewer do not tell what its cells carried from its loads")
+
+
+BUDGET, ROWS, PRIORS, NOISE = _Budget(), _Rows(), _Priors(), _Noise()
+SCREENING, STARTS, STEP, LATTICE = _Screening(), _Starts(), _Step(), _Lattice()
+STRUCTURE, VERDICT, LOCATION, SURFACE = _Structure(), _Verdict(), _Location(), _Surface()
+SECTIONS = (
+    BUDGET, ROWS, PRIORS, NOISE, SCREENING, STARTS, STEP, LATTICE, STRUCTURE, VERDICT, LOCATION,
+    SURFACE,
+)  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Threshold:
+    """One number of the policy."""
+
+    section: str
+    name: str
+    value: float | tuple[int, ...]
+    unit: str
+    why: str
+
+
+def thresholds() -> tuple[Threshold, ...]:
+    """Return every number of the policy, section by section."""
+    return tuple(
+        Threshold(
+            section=type(section).__name__.removeprefix("_").lower(),
+            name=field.name,
+            value=getattr(section, field.name),
+            unit=field.metadata["unit"],
+            why=field.metadata["why"],
+        )
+        for section in SECTIONS
+        for field in dataclasses.fields(section)
+    )

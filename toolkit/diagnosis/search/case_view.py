@@ -1,0 +1,125 @@
+"""A case as the effects of the catalogue see it: spreads, durations and sizes of motion, at one place."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from toolkit.diagnosis.simulators.parameter_units import channel_unit
+from toolkit.effects.surroundings import MotionSizes
+from toolkit.errors import UnitError
+from toolkit.units import unit
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from toolkit.diagnosis.fit.problem import Problem
+
+
+class CaseView:
+    """`toolkit.effects.surroundings.Surroundings` of a problem, at a channel or state and its source."""
+
+    def __init__(self, problem: Problem, channel: str | None = None, source: str | None = None) -> None:
+        self._problem = problem
+        self.channel, self.source = channel, source
+
+    @property
+    def drivers(self) -> frozenset[str]:
+        """Channels that were recorded beside the outputs."""
+        return frozenset(channel.name for channel in self._problem.case.drivers)
+
+    @property
+    def outputs(self) -> frozenset[str]:
+        """Channels that are judged."""
+        return frozenset(self._problem.names)
+
+    @property
+    def cells(self) -> frozenset[str]:
+        """Load cells from which loads are computed."""
+        return frozenset(self._problem.model.capability.cells)
+
+    @property
+    def nominal_load_N(self) -> float | None:
+        """Nominal load that the simulation itself states [N]."""
+        return self._problem.model.capability.nominal_load_N
+
+    @property
+    def rows(self) -> int:
+        """Rows of all runs."""
+        return self._problem.rows
+
+    @cached_property
+    def row_time(self) -> float:
+        """Usual time from row to row [s]."""
+        steps = [np.diff(run.t) for run in self._problem.runs if run.rows > 1]
+        return float(np.median(np.concatenate(steps or [np.ones(1)])))
+
+    @property
+    def minutes(self) -> float:
+        """Duration of all runs together [min]."""
+        return sum(float(run.t[-1] - run.t[0]) for run in self._problem.runs if run.rows > 1) / 60
+
+    @property
+    def longest_run(self) -> float:
+        """Duration of the longest run [s]."""
+        return max((float(run.t[-1] - run.t[0]) for run in self._problem.runs if run.rows), default=0.0)
+
+    @property
+    def integrates(self) -> bool:
+        """The simulation integrates its own equation of motion."""
+        moving = self._problem.model.capability.motion
+        return moving is not None and moving.integrates
+
+    @cached_property
+    def motion(self) -> MotionSizes:
+        """Sizes of the motion that the place belongs to; of nothing that moves, the channel's own."""
+        moving = self._problem.model.capability.motion
+        if moving is not None:
+            return moving.sizes(self.channel, self.spread)
+        return MotionSizes(
+            force=self.spread(self.channel), speed=1.0, place=1.0, fastest=1.0, farthest=1.0, level=1.0,
+            has_position=False,
+        )  # fmt: skip
+
+    @property
+    def way(self) -> tuple[float, float]:
+        """Longest way of a run over the position and the usual one from row to row."""
+        moving = self._problem.model.capability.motion
+        return (0.0, 0.0) if moving is None else moving.way(self.channel)
+
+    def spread(self, name: str | None) -> float:
+        """Return the largest magnitude of a channel over all runs, 1 where nothing was recorded of it."""
+        if name is None:
+            return 1.0
+        values = np.abs(self.values(name))
+        return float(values.max()) if len(values) and values.max() > 0 else 1.0
+
+    def values(self, name: str | None) -> NDArray[np.float64]:
+        """Return the recorded values of a channel over all runs, (n,) without gaps; none where it was not."""
+        if name is not None and name in self._problem.observed:
+            values = self._problem.observed[name]
+        else:
+            columns = [run.columns[str(name)] for run in self._problem.runs if name in run.columns]
+            values = np.concatenate(columns) if columns else np.zeros(0)
+        return values[np.isfinite(values)]
+
+    def recorded_range(self, *names: str) -> float:
+        """Return the range of the first of these channels that was recorded, 1 where none was."""
+        for name in names:
+            columns = [run.columns[name] for run in self._problem.runs if name in run.columns]
+            if columns:
+                return float(np.ptp(np.concatenate(columns)))
+        return 1.0
+
+    def dimension(self) -> str | None:
+        """Return the dimension of the place's channel, None where its unit is not known."""
+        try:
+            return unit(channel_unit(self._problem.case, self._problem.model, self.channel)).dimension
+        except UnitError:
+            return None
+
+    def conditions(self, key: str) -> frozenset[str]:
+        """Return the values that a condition has in the runs."""
+        return frozenset(run.conditions[key] for run in self._problem.runs if key in run.conditions)

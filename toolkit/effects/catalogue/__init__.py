@@ -1,0 +1,45 @@
+"""The catalogue: every effect by its name, one file of this folder each, found and never listed by hand."""
+
+from __future__ import annotations
+
+import difflib
+from functools import cache
+from importlib import import_module
+from pkgutil import iter_modules
+from typing import get_args
+
+from toolkit.effects.effect import Effect, Stage
+from toolkit.errors import ConfigError
+
+_ORDER = get_args(Stage)  # of the stages in a list: from the recording back to the road
+
+
+@cache
+def effects() -> dict[str, Effect]:
+    """Return every effect of the catalogue by its name, in the catalogue's order.
+
+    >>> list(effects())[:2], effects()["relaxation"].stage
+    (['unit_error', 'channel_sign'], 'tire')
+    """
+    listed = [import_module(f"{__name__}.{module.name}").EFFECT for module in iter_modules(__path__)]
+    listed.sort(key=lambda effect: (_ORDER.index(effect.stage), effect.rank, effect.name))
+    return {effect.name: effect for effect in listed}
+
+
+def effect(name: str, *, where: str = "--effect") -> Effect:
+    """Return one effect.
+
+    Raises
+    ------
+    ConfigError
+        no effect has that name
+    """
+    listed = effects()
+    if name in listed:
+        return listed[name]
+    near = difflib.get_close_matches(name, listed, n=1, cutoff=0.5)
+    raise ConfigError(
+        f"unknown effect {name!r}", where=where, got=name, expected=", ".join(listed),
+        next_step=f"did you mean {near[0]!r}?" if near else "use one of those expected",
+        rule="unknown-effect",
+    )  # fmt: skip

@@ -1,0 +1,42 @@
+"""A state that cannot rise beyond a level: a tank that runs over."""
+
+from __future__ import annotations
+
+from toolkit.effects.effect import Effect, EffectParameter
+from toolkit.effects.facts import Term, Values
+from toolkit.effects.surroundings import Surroundings
+
+_WIDTH = 1e-3  # of the state's spread, over which the rate falls to nothing
+
+
+def _stopped(state: float, spread: float, values: Values) -> float:
+    return min(max((values["level"] - state) / (_WIDTH * spread), 0.0), 1.0)
+
+
+def _highest(case: Surroundings) -> float:
+    return case.motion.level
+
+
+EFFECT = Effect(
+    name="overflow",
+    stage="dynamics",
+    rank=7,
+    in_time=False,
+    statement="The state runs over: beyond a level it cannot rise.",
+    equation="x' = min(x', 0) where x >= level",
+    reference="mass balance of an open tank",
+    signature="flat tops while the input goes on",
+    separates="a run that stays below the level",
+    parameters=(
+        EffectParameter(
+            name="level",
+            unit="{position}",
+            text="that the state cannot pass",
+            typical=(0.5, 0.98),
+            off=float("inf"),
+            scale=_highest,
+            starts=(0.4, 0.5, 0.6, 0.68, 0.76, 0.84, 0.9, 0.95),
+        ),
+    ),
+    term=Term(of="state", limit=_stopped, shares=(1.0,)),
+)

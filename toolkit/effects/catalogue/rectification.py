@@ -1,0 +1,36 @@
+"""A channel that has lost its sign."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from toolkit.effects.effect import Effect
+from toolkit.effects.facts import ChannelFacts, Values
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from toolkit.effects.signals import Setting
+
+
+def _folded(y: NDArray[np.float64], values: Values, setting: Setting) -> NDArray[np.float64]:
+    return np.abs(y)
+
+
+EFFECT = Effect(
+    name="rectification",
+    stage="acquisition",
+    rank=10,
+    in_time=False,
+    statement="The channel shows magnitudes: its sign was lost.",
+    equation="y = |y_model|",
+    reference="the acquisition program's own abs()",
+    signature="folded at zero",
+    separates="a load of the other sign",
+    parameters=(),
+    channel=_folded,
+    on_channel=ChannelFacts(where=("output", "cell", "program_load"), tare="own", by_value=False),
+    discrete=True,
+)

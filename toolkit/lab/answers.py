@@ -1,0 +1,158 @@
+"""What all answers share: keys of the JSON document, tables and marks of the text, names of files."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+from toolkit.errors import ConfigError
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from toolkit.calibration.records.use import CalibrationUse
+    from toolkit.estimate import Estimate
+    from toolkit.findings import Finding
+    from toolkit.report.deliver import Delivered
+    from toolkit.report.style import Style
+
+
+def needs_attention(findings: Sequence[Finding]) -> bool:
+    """Tell whether a finding asks for a person's attention; notes only inform."""
+    return any(finding.level != "note" for finding in findings)
+
+
+def finding_lines(findings: Sequence[Finding]) -> list[str]:
+    """Return findings as lines for people: level, rule and place, then the sentence, wrapped."""
+    import textwrap
+
+    lines = []
+    for finding in findings:
+        lines.append(f"  {finding.level:<8}{finding.rule:<20} {finding.where}")
+        indent = " " * 10
+        lines += textwrap.wrap(finding.message, width=98, initial_indent=indent, subsequent_indent=indent)
+    return lines
+
+
+def findings_text(findings: Sequence[Finding]) -> str:
+    """Return findings under the line that says where more stands; empty without any."""
+    if not findings:
+        return ""
+    return "findings (toolkit explain RULE tells more):\n" + "\n".join(finding_lines(findings))
+
+
+def table(header: Sequence[str], rows: Sequence[Sequence[str]], *, align: str = "") -> str:
+    """Return a plain text table; ``align`` has one of ``<`` and ``>`` a column, default ``<`` then ``>``."""
+    if not rows:
+        return ""
+    align = align or "<" + ">" * (len(header) - 1)
+    widths = [max(len(str(row[i])) for row in [header, *rows]) for i in range(len(header))]
+    lines = [
+        "  ".join(
+            f"{cell!s:{side}{width}}" for cell, side, width in zip(row, align, widths, strict=True)
+        ).rstrip()
+        for row in [header, ["-" * width for width in widths], *rows]
+    ]
+    return "\n".join(lines)
+
+
+def draft_keys(*uses: CalibrationUse) -> dict[str, Any]:
+    """Return whether an answer is a draft, and why: the same keys in every answer and manifest."""
+    reasons = dict.fromkeys(f"{use.id}: {reason}" for use in uses for reason in use.draft_reasons)
+    return {"draft": bool(reasons), "draft_reasons": list(reasons)}
+
+
+def mark_words(*uses: CalibrationUse) -> str:
+    """Return the marks of the records as the end of a line for people."""
+    words = dict.fromkeys(
+        word
+        for use in uses
+        for word, on in (("DRAFT", use.draft), ("UNVERIFIED", use.unverified), ("KNOWN SINCE", use.since))
+        if on
+    )
+    return "".join(f"  {word}" for word in words)
+
+
+def estimate_keys(estimate: Estimate) -> dict[str, Any]:
+    """Return an estimate under the keys of the answers, with its expanded uncertainty."""
+    U, k = estimate.expanded()
+    return {
+        "value": estimate.value,
+        "standard_uncertainty": estimate.u,
+        "dof": estimate.dof,
+        "expanded_uncertainty": U,
+        "k": k,
+        "unit": estimate.unit,
+    }
+
+
+def delivered_keys(delivered: Delivered) -> dict[str, Any]:
+    """Return what an answer says of any delivered document: files, pages, checks, hashes, warnings."""
+    return {
+        "docx": delivered.docx,
+        "pdf": delivered.pdf,
+        "pages": delivered.pages,
+        "verified": True,
+        "checks": [check.as_dict() for check in delivered.checks],
+        "template_sha256": delivered.template_sha256,
+        "content_sha256": delivered.content_sha256,
+        "figures": [{"tag": tag, "alt": alt} for tag, alt in delivered.filled.figures],
+        "warnings": list(delivered.warnings),
+    }
+
+
+def file_name(text: str, *, otherwise: str) -> str:
+    """Return the name of a test, or the id of a certificate, as a file's name.
+
+    >>> file_name("CAL 2026/017", otherwise="certificate"), file_name("../", otherwise="test")
+    ('CAL-2026-017', 'test')
+    """
+    return re.sub(r"[^\w.-]+", "-", text).strip("-.")[:100] or otherwise
+
+
+def unit_choice(units: str) -> Style:
+    """Return the units of text and figures: N and N·m, or lbf and lbf·ft.
+
+    Raises
+    ------
+    ConfigError
+        the choice is neither ``SI`` nor ``lbf``
+    """
+    from toolkit.report.style import Style
+
+    choices = {"SI": Style(), "lbf": Style(force="lbf", moment="lbf*ft")}
+    if units not in choices:
+        raise ConfigError(
+            f"unknown units {units!r}", where="--units", got=units, expected=", ".join(choices),
+            next_step="name one of those expected", rule="unknown-units",
+        )  # fmt: skip
+    return choices[units]
+
+
+def refuse_unwritable(folder: Path | None) -> None:
+    """Refuse a folder for figures that cannot be written, before anything is.
+
+    Raises
+    ------
+    OutputError
+        ``not-writable``
+    """
+    import os
+
+    from toolkit.errors import OutputError
+
+    if folder is None:
+        return
+    near = folder
+    while not near.exists() and near != near.parent:
+        near = near.parent
+    if not near.is_dir() or not os.access(near, os.W_OK | os.X_OK):
+        raise OutputError(
+            "the figures cannot be written",
+            where=folder,
+            got=f"{near} is {'not writable' if near.is_dir() else 'no folder'}",
+            expected="a folder with write permission",
+            next_step="choose another folder with --figures; nothing was written",
+            rule="not-writable",
+        )

@@ -1,0 +1,167 @@
+"""What an audit says: the JSON document, whose long lists are iterators, and the text for people."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from toolkit.audit.model import CLEAN
+from toolkit.lab.answers import table
+
+if TYPE_CHECKING:
+    from toolkit.audit.archive import ArchiveAudit
+    from toolkit.audit.corrected import Copy
+    from toolkit.audit.linked import Linked
+    from toolkit.audit.since_good import Drift, DriftedFile, DriftedTest
+    from toolkit.lab.amended import Amended
+
+_SHOWN, _SETTINGS = 40, 10
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class AuditAnswer:
+    """An audit and what was asked for besides; None where it was not."""
+
+    made: ArchiveAudit
+    linked: Linked | None
+    drift: Drift | None
+    drifted: tuple[DriftedFile, ...]
+    drifted_tests: tuple[DriftedTest, ...]
+    copies: tuple[Copy, ...] | None
+    amended: tuple[Amended, ...] = ()
+
+
+def payload_of(answer: AuditAnswer) -> dict[str, Any]:
+    """Return the JSON document; what there may be many of are iterators."""
+    audit = answer.made
+    payload: dict[str, Any] = {
+        "archive": audit.archive,
+        "known_at": audit.known_at.isoformat(),
+        "files": files_of(answer),
+        "summary": {"files": len(audit.files), "grades": dict(audit.grades), "undated": audit.undated},
+        "tests": _tests(answer),
+        "refused_records": [{"id": r.id, "rule": r.rule, "reason": r.reason} for r in audit.refused],
+        "heads": dict(audit.heads),
+        "findings": (finding.as_dict() for finding in audit.findings),
+    }
+    if answer.linked is not None:
+        payload["reports"] = [report.as_dict() for report in answer.linked.reports]
+        payload["report_unknown"] = list(answer.linked.unknown)
+    if answer.drift is not None:
+        payload["since_good"] = {
+            **answer.drift.as_dict(),
+            "tests": [test.as_dict() for test in answer.drifted_tests],
+            "files": [file.as_dict() for file in answer.drifted],
+        }
+    if answer.copies is not None:
+        payload["repaired"] = [copy.as_dict() for copy in answer.copies]
+        payload["amended"] = [report.as_dict() for report in answer.amended]
+    return payload
+
+
+def files_of(answer: AuditAnswer) -> Iterator[dict[str, Any]]:
+    """Yield every file's result; with the reports of its test where reports were asked about."""
+    for file in answer.made.files.plain():
+        if answer.linked is not None:
+            file["reports"] = answer.linked.of_test(file["test"])
+        yield file
+
+
+def _tests(answer: AuditAnswer) -> Iterator[dict[str, Any]]:
+    for test in answer.made.tests:
+        if answer.linked is not None:
+            test["reports"] = answer.linked.of_test(test["test"])
+        yield test
+
+
+def text_of(answer: AuditAnswer) -> str:
+    """Return the answer for people."""
+    from toolkit.reduction.physics import RULES
+
+    audit = answer.made
+    rows = list(_rows(audit))
+    bad = len(audit.files) - audit.grades["exact"] - audit.grades["rounding"]
+    header = ["file", "grade", "computed by", "how", "in force", "dFY [N]", "dMZ [N·m]"]
+    lines = [table(header, rows, align="<<<<<>>")] if rows else []
+    if bad > len(rows):
+        lines.append(f"... and {bad - len(rows)} more; --json tells all of them")
+    counted = ", ".join(f"{count} {grade}" for grade, count in audit.grades.items() if count)
+    lines += ["", f"{len(audit.files)} files: {counted or 'none'}; known at {audit.known_at.isoformat()}"]
+    notes = Counter(finding.rule for finding in audit.findings if finding.level == "note")
+    if notes:
+        lines.append("also: " + ", ".join(f"{count} {rule}" for rule, count in sorted(notes.items())))
+    impossible = {finding.where for finding in audit.findings if finding.rule in RULES}
+    if impossible:
+        places = ", ".join(sorted(impossible)[:3]) + (", ..." if len(impossible) > 3 else "")
+        lines.append(f"Fy or Mz that no tire has, in files: {len(impossible)} ({places}); --json tells why")
+    settings = Counter(finding.message for finding in audit.findings if finding.rule == "test-toml")
+    lines += [f"{count} files: {message}" for message, count in settings.most_common(_SETTINGS)]
+    if len(settings) > _SETTINGS:
+        lines.append(f"... and {len(settings) - _SETTINGS} more of test.toml; --json tells all of them")
+    lines += [f"refused record {record.id}: {record.reason}" for record in audit.refused]
+    lines += [f"head of {name}: {head}" for name, head in audit.heads]
+    return "\n".join([*lines, *_asked(answer)])
+
+
+def _asked(answer: AuditAnswer) -> Iterator[str]:
+    if answer.linked is not None:
+        yield ""
+        for report in answer.linked.reports:
+            why = f"to be amended, {report.not_clean} of {report.files} files are not right"
+            why = why if report.to_amend else "stands"
+            tests = ", ".join(sorted(report.tests))
+            yield (
+                f"report {report.report} ({tests}): {why}"
+                if report.files
+                else f"report unknown: {report.report}"
+            )
+        if answer.linked.unknown:
+            unknown = answer.linked.unknown
+            yield f"report unknown: {len(unknown)} tests, {', '.join(unknown[:10])}"
+    if answer.drift is not None:
+        drift = answer.drift
+        yield ""
+        yield drift.statement
+        yield (
+            f"since {drift.good} ({drift.good_date}) {len(answer.drifted)} files were recorded; an estimate "
+            "of the effect, interpolated by days:"
+        )
+        rows = [
+            [t.test, t.date.isoformat(), f"{t.share:.0%}", str(t.files),
+             "" if t.FY_N is None else f"{t.FY_N:.2f}", "" if t.MZ_Nm is None else f"{t.MZ_Nm:.3f}",
+             f"without {t.left_out} files, see --json" if t.left_out else ""]
+            for t in answer.drifted_tests[:_SHOWN]
+        ]  # fmt: skip
+        yield table(["test", "date", "share", "files", "dFY [N]", "dMZ [N·m]", ""], rows, align="<<>>>><")
+        if len(answer.drifted_tests) > len(rows):
+            yield f"... and {len(answer.drifted_tests) - len(rows)} more; --json tells all of them"
+    if answer.copies is not None:
+        written = [copy for copy in answer.copies if copy.sha256 is not None]
+        yield f"{len(written)} corrected copies"
+        yield from (f"no copy of {copy.path}: {copy.reason}" for copy in answer.copies if copy.sha256 is None)
+        for amended in answer.amended:
+            pdf = amended.as_dict()["pdf"]
+            yield f"{pdf or 'NO REPORT: ' + str(amended.outcome)} replaces {amended.replaces}"
+
+
+def _rows(audit: ArchiveAudit) -> Iterator[list[str]]:
+    shown = 0
+    for file in audit.files.plain():
+        if file["grade"] in CLEAN:
+            continue
+        if shown == _SHOWN:
+            return
+        shown += 1
+        repair = file["repair"] or {"FY_max_abs_N": None, "MZ_max_abs_Nm": None}
+        FY, MZ = repair["FY_max_abs_N"], repair["MZ_max_abs_Nm"]
+        yield [
+            file["path"],
+            file["grade"],
+            file["record"] or ", ".join(file["candidates"]),
+            file["variant"] or file["reason"] or "",
+            file["in_force"] or "",
+            "" if FY is None else f"{FY:.1f}",
+            "" if MZ is None else f"{MZ:.2f}",
+        ]

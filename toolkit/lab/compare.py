@@ -1,0 +1,127 @@
+"""What is compared: tests and makers' tables read to one kind of entry; the figures and the document."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from datetime import date
+    from pathlib import Path
+
+    from toolkit.comparison.model import Comparison, Entry
+    from toolkit.findings import Finding
+    from toolkit.report.deliver import Delivered
+    from toolkit.report.style import Style
+    from toolkit.report.word.package import Template
+
+
+def comparison_template(template: Path | None, out: Path | None, home: Path | None) -> Template | None:
+    """Return the template of a comparison's document, judged before anything is read; None without one."""
+    from toolkit.errors import ConfigError
+    from toolkit.lab.home import home_template
+    from toolkit.report.word.package import read_template
+
+    if out is None:
+        if template is not None:
+            raise ConfigError(
+                "a template needs a folder for what it makes", where="--template", got=template,
+                expected="--out DIR beside it", next_step="add --out DIR", rule="template-without-out",
+            )  # fmt: skip
+        return None
+    return read_template(template or home_template("comparison.docx", home))
+
+
+def deliver_comparison(
+    comparison: Comparison,
+    opened: Template,
+    out: Path,
+    findings: Sequence[Finding],
+    known_at: date | None,
+    units: Style | None,
+) -> Delivered:
+    """Deliver ``comparison.docx`` and its verified ``comparison.pdf``."""
+    from datetime import date
+
+    from toolkit.report.comparison.content import build_comparison_content
+    from toolkit.report.deliver import deliver
+    from toolkit.report.style import read_style, style_file
+
+    style = read_style(style_file(opened.path))
+    if units is not None:
+        style = style.in_units_of(units)
+    content = build_comparison_content(comparison, style, findings, issued=known_at or date.today())  # noqa: DTZ011
+    return deliver(opened, content, out, name="comparison")
+
+
+def read_entries(sources: Sequence[Path], *, axes: str, **options: Any) -> tuple[list[Entry], list[Finding]]:
+    """Return what is compared, tests first read so that tables are read at their slip angles."""
+    from toolkit.comparison.compare import DEFAULT_ANGLES
+
+    entries: dict[int, Entry] = {}
+    findings: list[Finding] = []
+    tables = [i for i, path in enumerate(sources) if path.suffix.lower() == ".csv" and not path.is_dir()]
+    for place, path in enumerate(sources):
+        if place not in tables:
+            entries[place], own_findings = _test(path, **options)
+            findings += own_findings
+    angles = sorted(
+        {row.SA_rad for entry in entries.values() for row in entry.rows if row.SA_rad is not None}
+    ) or list(DEFAULT_ANGLES)
+    for place in tables:
+        entries[place], own_findings = _table(sources[place], axes=axes, angles=angles)
+        findings += own_findings
+    return [entries[place] for place in range(len(sources))], findings
+
+
+def _test(path: Path, **options: Any) -> tuple[Entry, list[Finding]]:
+    from dataclasses import replace
+
+    from toolkit.comparison.compare import test_entry
+    from toolkit.lab.resolve import resolve_test
+    from toolkit.machine import load_machine
+
+    resolved = resolve_test(path, **options)
+    reduced = resolved.result.reduced
+    entry = test_entry(
+        reduced,
+        resolved.result.characteristics,
+        machine=load_machine(reduced.info.machine),
+        record=resolved.record,
+        source=str(path),
+    )
+    return entry, [replace(finding, where=f"{entry.label}: {finding.where}") for finding in resolved.findings]
+
+
+def _table(path: Path, *, axes: str, angles: Sequence[float]) -> tuple[Entry, list[Finding]]:
+    import hashlib
+
+    from toolkit.comparison.maker_characteristics import is_characteristics_table, maker_characteristics
+    from toolkit.comparison.maker_table import maker_rows
+    from toolkit.comparison.model import Entry
+
+    if path.is_file() and is_characteristics_table(path):
+        identity = hashlib.sha256(path.read_bytes()).hexdigest()[:12]
+        rows = maker_characteristics(path, identity=identity)
+        return Entry(
+            label=path.stem, kind="characteristics", identity=identity, source=str(path), rows=rows
+        ), []
+    identity = hashlib.sha256(path.read_bytes()).hexdigest()[:12] if path.is_file() else ""
+    read, findings = maker_rows(path, axes=axes, angles_rad=angles, identity=identity)
+    return Entry(label=path.stem, kind="table", identity=identity, source=str(path), rows=read), list(
+        findings
+    )
+
+
+def write_figures(comparison: Comparison, style: Style, folder: Path) -> dict[str, Path]:
+    """Write the figures of a comparison into a folder; return their paths by name."""
+    from toolkit.files import write_atomic
+    from toolkit.report.comparison.plots import comparison_plots
+    from toolkit.report.figures import draw
+
+    drawn = {}
+    for name, plot in comparison_plots(comparison, style).items():
+        path = folder / f"{name}.png"
+        write_atomic(path, draw(plot).png)
+        drawn[name] = path
+    return drawn

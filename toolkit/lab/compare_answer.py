@@ -1,0 +1,261 @@
+"""What `toolkit compare` answers: the JSON document in SI, and tables for people in the units of choice."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from toolkit.lab.answers import draft_keys, estimate_keys, finding_lines, mark_words, table
+
+if TYPE_CHECKING:
+    from toolkit.comparison.model import Comparison, Difference, Entry, FactorSpread, Spread
+    from toolkit.findings import Finding
+    from toolkit.report.style import Style
+
+
+def comparison_payload(comparison: Comparison) -> dict[str, Any]:
+    """Return a comparison as the JSON answer, in SI (angles in rad, stiffness per rad) and SAE axes."""
+    return {
+        "mode": comparison.mode,
+        "axes": "SAE",
+        "level": comparison.level,
+        "reference": comparison.reference.label,
+        **draft_keys(*comparison.uses),
+        "entries": [_entry(entry) for entry in comparison.entries],
+        "differences": [_difference(difference) for difference in comparison.differences],
+        "significant": sum(difference.significant for difference in comparison.differences),
+        "repeats": None if comparison.repeats is None else _repeats(comparison),
+        "pattern_effect": [
+            {
+                "quantity": effect.name,
+                "load_N": effect.load_N,
+                "regular": estimate_keys(effect.regular),
+                "reversed": estimate_keys(effect.reversed),
+                "pattern": estimate_keys(effect.pattern),
+                "body": estimate_keys(effect.body),
+            }
+            for effect in comparison.pattern
+        ],
+        "left_out": list(comparison.left_out),
+    }
+
+
+def _entry(entry: Entry) -> dict[str, Any]:
+    return {
+        "label": entry.label,
+        "kind": entry.kind,
+        "source": entry.source,
+        "simulated": entry.simulated,
+        "calibration": entry.calibration and entry.calibration.as_dict(),
+        "unverified": entry.calibration is not None and entry.calibration.unverified,
+        "conditions": dict(entry.conditions),
+    }
+
+
+def _difference(difference: Difference) -> dict[str, Any]:
+    base = difference.reference.value
+    return {
+        "table": difference.part,
+        "quantity": difference.name,
+        "rotation": difference.rotation,
+        "SA_rad": difference.SA_rad,
+        "load_N": difference.load_N,
+        "label": difference.label,
+        "reference": estimate_keys(difference.reference),
+        "other": estimate_keys(difference.other),
+        "difference": estimate_keys(difference.difference),
+        "difference_percent": 100 * difference.difference.value / abs(base) if base else None,
+        "standard_uncertainty_if_nothing_were_shared": difference.u_apart,
+        "p": difference.p,
+        "p_holm": difference.p_holm,
+        "significant": difference.significant,
+    }
+
+
+def _repeats(comparison: Comparison) -> dict[str, Any]:
+    repeats = comparison.repeats
+    assert repeats is not None  # noqa: S101  asked before
+    return {
+        "factors": [
+            {
+                "factor": factor.name,
+                "levels": list(factor.levels),
+                "varied": factor.varied,
+                "same_as": list(factor.same_as),
+                "note": factor.note,
+            }
+            for factor in repeats.factors
+        ],
+        "reproducibility": repeats.reproducibility,
+        "reproducibility_note": repeats.reproducibility_note,
+        "precision": [
+            {
+                "quantity": precision.name,
+                "rotation": precision.rotation,
+                "load_N": precision.load_N,
+                "n": precision.n,
+                "mean": precision.mean,
+                "s": _spread(precision.total),
+                "repeatability_s_r": None
+                if precision.repeatability is None
+                else _spread(precision.repeatability),
+                "repeatability_limit_r": precision.limit_r,
+                "intermediate": [_factor(factor) for factor in precision.factors],
+                "farthest": precision.farthest,
+                "grubbs_p": precision.outlier_p,
+                "grubbs_p_holm": precision.outlier_p_holm,
+                "outlier": precision.outlier,
+            }
+            for precision in repeats.precisions
+        ],
+    }
+
+
+def _spread(spread: Spread) -> dict[str, Any]:
+    return {"value": spread.value, "dof": spread.dof, "low": spread.low, "high": spread.high}
+
+
+def _factor(factor: FactorSpread) -> dict[str, Any]:
+    return {
+        "factor": factor.factor,
+        "levels": factor.levels,
+        "s_I": factor.s,
+        "s_between": factor.s_between,
+        "F": factor.F,
+        "p": factor.p,
+        "p_holm": factor.p_holm,
+        "significant": factor.significant,
+    }
+
+
+def comparison_text(
+    comparison: Comparison, style: Style, findings: Sequence[Finding], drawn: Mapping[str, Path]
+) -> str:
+    """Return a comparison for people."""
+    from toolkit.comparison.model import PARTS
+    from toolkit.report.comparison.cells import conclusion, shown_rows
+
+    simulated = "  SIMULATED" if any(entry.simulated for entry in comparison.entries) else ""
+    marks = simulated + mark_words(*comparison.uses)
+    parts = [f"comparison of {comparison.mode}, reference {comparison.reference.label}{marks}"]
+    parts += [_conditions(comparison), conclusion(comparison)]
+    for part in PARTS:
+        rows, which = shown_rows(comparison, part)
+        if any(difference.part == part for difference in comparison.differences):
+            parts.append(f"{part}: {which}; * marks what is significant")
+            parts.append(_table(rows, style))
+    if comparison.repeats is not None:
+        parts += [
+            _factors(comparison),
+            _precision(comparison, style),
+            comparison.repeats.reproducibility_note,
+        ]
+    if comparison.pattern:
+        parts.append(_pattern(comparison, style))
+    if comparison.left_out:
+        parts.append("\n".join(f"not compared: {reason}" for reason in comparison.left_out))
+    if drawn:
+        parts.append("\n".join(str(path) for path in drawn.values()))
+    if findings:
+        lines = finding_lines(findings)
+        parts.append("\n".join([f"findings: {len(findings)} (toolkit explain RULE tells more)", *lines]))
+    return "\n\n".join(part_text for part_text in parts if part_text)
+
+
+def _conditions(comparison: Comparison) -> str:
+    """Return what the entries state: what differs as a table, what is the same in one line each."""
+    names = dict.fromkeys(name for entry in comparison.entries for name, value in entry.conditions if value)
+    rows, same = [], []
+    for name in names:
+        values = [entry.condition(name) for entry in comparison.entries]
+        if len(set(values)) == 1:
+            same.append(f"{name}: {values[0]}")
+        else:
+            rows.append([name, *(str(value or "-") for value in values)])
+    head = table(
+        ["", *(entry.label for entry in comparison.entries)], rows, align="<" * (len(comparison.entries) + 1)
+    )
+    return "\n".join(
+        one for one in (head, "the same in all:" if same else "", *(f"  {s}" for s in same)) if one
+    )
+
+
+def _table(rows: Sequence[Difference], style: Style) -> str:
+    from toolkit.report.comparison.cells import named, p_text, shown_unit, with_U
+
+    load_unit, load_factor = style.unit("N")
+    shown = []
+    for row in rows:
+        unit, factor = shown_unit(row.name, style)
+        shown.append(
+            [
+                named(row.name, row.rotation, row.SA_rad),
+                f"{row.load_N * load_factor:.0f}",
+                unit,
+                with_U(row.reference, factor, style),
+                row.label,
+                with_U(row.other, factor, style),
+                with_U(row.difference, factor, style),
+                p_text(row.p_holm, style),
+                "*" if row.significant else "",
+            ]
+        )
+    head = ["quantity", f"FZ [{load_unit}]", "unit", "reference", "other", "value", "difference", "p (Holm)"]
+    return table([*head, ""], shown, align="<><><>>><")
+
+
+def _factors(comparison: Comparison) -> str:
+    assert comparison.repeats is not None  # noqa: S101  asked before
+    rows = [
+        [factor.name, ", ".join(str(level or "-") for level in factor.levels), factor.note or "told apart"]
+        for factor in comparison.repeats.factors
+    ]
+    return table(["factor", "in the tests", ""], rows, align="<<<")
+
+
+def _precision(comparison: Comparison, style: Style) -> str:
+    assert comparison.repeats is not None  # noqa: S101  asked before
+    load_unit, load_factor = style.unit("N")
+    from toolkit.report.comparison.cells import factor_text, named, shown_unit
+
+    names = [factor.name for factor in comparison.repeats.factors if factor.varied]
+    rows = []
+    for precision in comparison.repeats.precisions:
+        unit, factor = shown_unit(precision.name, style)
+        rows.append(
+            [
+                named(precision.name, precision.rotation),
+                f"{precision.load_N * load_factor:.0f}",
+                unit,
+                str(precision.n),
+                f"{precision.mean * factor:.4g}",
+                f"{precision.total.value * factor:.3g}",
+                "-" if precision.repeatability is None else f"{precision.repeatability.value * factor:.3g}",
+                "-" if precision.limit_r is None else f"{precision.limit_r * factor:.3g}",
+                *(
+                    factor_text(next(f for f in precision.factors if f.factor == name), factor, style)
+                    for name in names
+                ),
+            ]
+        )
+    head = ["quantity", f"FZ [{load_unit}]", "unit", "n", "mean", "s", "s_r", "limit r"]
+    return table([*head, *(f"s_I({name})" for name in names)], rows, align="<><>" + ">" * (4 + len(names)))
+
+
+def _pattern(comparison: Comparison, style: Style) -> str:
+    from toolkit.report.comparison.cells import shown_unit, with_U
+
+    load_unit, load_factor = style.unit("N")
+    rows = []
+    for effect in comparison.pattern:
+        unit, factor = shown_unit(effect.name, style)
+        rows.append(
+            [effect.name, f"{effect.load_N * load_factor:.0f}", unit]
+            + [
+                with_U(e, factor, style)
+                for e in (effect.regular, effect.reversed, effect.pattern, effect.body)
+            ]
+        )
+    head = ["pattern effect", f"FZ [{load_unit}]", "unit", "regular belt", "reversed belt", "pattern", "body"]
+    return table(head, rows, align="<><>>>>")

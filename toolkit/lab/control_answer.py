@@ -1,0 +1,229 @@
+"""What the control of calibrations says: charts of check loads, due dates, evaluations by a standard."""
+
+from __future__ import annotations
+
+import datetime as dt
+from typing import TYPE_CHECKING, Any
+
+from toolkit.errors import ConfigError
+from toolkit.findings import Finding
+from toolkit.lab.answers import finding_lines, table
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from toolkit.calibration.control.chart import Series
+    from toolkit.calibration.registry.registry import Registry
+    from toolkit.calibration.standards.e74 import E74Result
+    from toolkit.calibration.standards.evaluation import Evaluation
+    from toolkit.calibration.standards.iso376 import Iso376Result
+
+Answer = tuple[dict[str, Any], str, list[Finding]]
+
+
+def chart_answer(
+    registry: Registry, instrument: str, *, load: str | None, baseline: int | None, out: Path | None
+) -> Answer:
+    """Return the control charts of an instrument as JSON, as text, and their findings; draw them to ``out``.
+
+    Raises
+    ------
+    ConfigError
+        the picture's name, the instrument or the sessions do not serve
+    """
+    from toolkit.calibration.control.chart import chart_findings, control_chart
+
+    kind = None if out is None else out.suffix.lower().lstrip(".")
+    if kind not in (None, "png", "svg"):
+        raise ConfigError(
+            "the picture's name has another ending", where="--out", got=out, expected=".png or .svg",
+            next_step="choose one of them; nothing was written", rule="output-name",
+        )  # fmt: skip
+    if instrument not in registry.instruments():
+        raise ConfigError(
+            "the registry has no such instrument", where=registry.folder, got=instrument,
+            expected=", ".join(registry.instruments()) or "an instrument",
+            next_step="see 'toolkit calibration list'", rule="missing",
+        )  # fmt: skip
+    chart = control_chart(registry, instrument, baseline=baseline, load=load)
+    if not chart.series:
+        raise ConfigError(
+            "there is nothing to chart", where=instrument,
+            got="; ".join(f"{i}: {why}" for i, why in chart.left_out) or f"no load {load}",
+            expected="sessions with check loads and a record in force before them",
+            next_step="calibrate with check loads; the chart begins at the second session", rule="no-chart",
+        )  # fmt: skip
+    newest = max((s.points[-1] for s in chart.series), key=lambda point: (point.date, point.session_record))
+    findings = chart_findings(chart, newest.session_record)
+    if out is not None:
+        from toolkit.files import write_atomic
+        from toolkit.report.calibration.chart_figures import draw_chart
+
+        write_atomic(out, draw_chart(chart, kind or "png"))
+    text = [table(
+        ["load", "check load", "points", "centre", "lower", "upper", "newest", "unit", "rules broken"],
+        [_row(series) for series in chart.series], align="<<>>>>><<",
+    )]  # fmt: skip
+    text += [f"left out: {record_id}: {why}" for record_id, why in chart.left_out]
+    if any(series.limits is None for series in chart.series):
+        text.append("no limits: at least 4 sessions before the newest, which do not all agree, are needed")
+    elif any(series.limits is not None and series.limits.provisional for series in chart.series):
+        text.append("limits of fewer than 20 sessions are provisional")
+    text += ["findings:", *finding_lines(findings)] if findings else []
+    text += [f"picture: {out}"] if out else []
+    payload = {
+        "instrument": instrument,
+        "series": [_series(series) for series in chart.series],
+        "left_out": [{"id": record_id, "reason": why} for record_id, why in chart.left_out],
+        "findings": [finding.as_dict() for finding in findings],
+        "picture": out,
+    }
+    return payload, "\n".join(text), list(findings)
+
+
+def due_answer(registry: Registry, instrument: str | None, date: dt.date) -> Answer:
+    """Return when each instrument is due, as JSON, as text, and the findings.
+
+    Raises
+    ------
+    ToolkitError
+        the one instrument that was named cannot be judged
+    """
+    from toolkit.calibration.control.recall import due_findings, due_of
+    from toolkit.errors import ToolkitError
+
+    rows: list[dict[str, Any]] = []
+    findings: list[Finding] = []
+    for name in [instrument] if instrument else registry.instruments():
+        try:
+            due = due_of(registry, name, date)
+        except ToolkitError as error:
+            if instrument:
+                raise
+            # Of many instruments one that cannot be judged must not hide the others.
+            findings.append(
+                Finding(rule=error.rule or "ledger", where=name, message=f"{error.what}: {error.got}")
+            )
+            continue
+        findings += due_findings(due)
+        advice = due.recommendation
+        rows.append({
+            "instrument": name, "record": due.record, "session_date": due.session_date.isoformat(),
+            "recall": due.recall, "due": due.due and due.due.isoformat(), "days_left": due.days_left,
+            "overdue": due.overdue,
+            "recommended": {
+                "days": advice.days, "drift_per_year": advice.drift_per_year, "results": advice.results,
+                "reason": advice.reason,
+            },
+        })  # fmt: skip
+    lines = [
+        table(
+            ["instrument", "in force", "session", "recall", "due", "days left", "recommended"],
+            [[r["instrument"], r["record"], r["session_date"], r["recall"] or "-", r["due"] or "-",
+              "-" if r["days_left"] is None else str(r["days_left"]),
+              "-" if r["recommended"]["days"] is None else f"{r['recommended']['days']} days"] for r in rows],
+            align="<<<<<><",
+        ) or "no instrument has a record in force"
+    ]  # fmt: skip
+    lines += [f"{r['instrument']}: {r['recommended']['reason']}" for r in rows]
+    lines += ["findings:", *finding_lines(findings)] if findings else []
+    payload = {"on": date.isoformat(), "instruments": rows, "findings": [f.as_dict() for f in findings]}
+    return payload, "\n".join(lines), findings
+
+
+def _row(series: Series) -> list[str]:
+    limits = [f"{v:+.4g}" for v in (series.limits.centre, series.limits.lower, series.limits.upper)] if (
+        series.limits
+    ) else ["-"] * 3  # fmt: skip
+    broken = ", ".join(f"{b.rule.number} ({series.points[b.index].date.isoformat()})" for b in series.breaks)
+    newest = f"{series.points[-1].error:+.4g}"
+    return [
+        series.load, str(series.check_load), str(len(series.points)), *limits, newest, series.unit, broken
+    ]  # fmt: skip
+
+
+def _series(series: Series) -> dict[str, Any]:
+    limits = series.limits
+    return {
+        "load": series.load,
+        "unit": series.unit,
+        "check_load": [{"load": n, "value": v, "unit": u} for n, v, u in series.check_load.loads],
+        "tolerance": series.tolerance,
+        "limits": None if limits is None else {
+            "centre": limits.centre, "sigma": limits.sigma, "lower": limits.lower, "upper": limits.upper,
+            "mean_range": limits.mean_range, "upper_range": limits.upper_range, "points": limits.points,
+            "provisional": limits.provisional,
+        },
+        "points": [
+            {"session": p.session_record, "date": p.date.isoformat(), "record": p.record, "error": p.error,
+             "rows": p.rows}
+            for p in series.points
+        ],
+        "moving_ranges": list(series.ranges),
+        "breaks": [
+            {"rule": b.rule.number, "text": b.rule.text, "session": series.points[b.index].session_record}
+            for b in series.breaks
+        ],
+    }  # fmt: skip
+
+
+def evaluation_text(evaluation: Evaluation) -> str:
+    """Return an evaluation by a standard for people."""
+    from toolkit.calibration.standards.e74 import E74Result
+
+    title = "ASTM E74" if evaluation.standard == "e74" else "ISO 376"
+    sense = {"up": ", increasing", "down": ", decreasing"}.get(evaluation.direction or "", "")
+    lines = [
+        f"{title}: {evaluation.indication} [{evaluation.indication_unit}] under "
+        f"{evaluation.load} [{evaluation.load_unit}], {evaluation.sense} force{sense}",
+        f"class {evaluation.class_name}" if evaluation.class_name else "no class",
+    ]
+    if isinstance(evaluation.result, E74Result):
+        lines += _e74(evaluation.result, evaluation.load_unit, evaluation.indication_unit or "")
+    elif evaluation.result is not None:
+        lines += _iso376(evaluation.result, evaluation.load_unit, evaluation.indication_unit or "")
+    if evaluation.all_reasons:
+        lines += ["not better because", *(f"  {reason}" for reason in evaluation.all_reasons)]
+    if evaluation.left_out:
+        lines.append(f"{evaluation.left_out} rows are left out: another load acts")
+    return "\n".join(lines)
+
+
+def _e74(result: E74Result, force: str, reading: str) -> list[str]:
+    rows = [
+        [str(c.degree) + (" *" if c.degree == result.degree else ""),
+         f"{c.s_m:.6g}", f"{c.llf:.6g}", str(c.dof),
+         "-" if c.lack_of_fit is None else f"{c.lack_of_fit.F:.4g}",
+         "-" if c.lack_of_fit is None else f"{c.lack_of_fit.p:.3g}"]
+        for c in result.curves
+    ]  # fmt: skip
+    chosen = "as asked for" if result.requested else "by the annex"
+    return [
+        f"{result.points} points at {result.levels} forces in {result.runs} runs; "
+        f"degree {result.degree} {chosen}",
+        table(["degree", f"s_m [{reading}]", f"LLF [{force}]", "dof", "lack of fit F", "p"], rows),
+        f"lower limit factor {result.llf:.6g} {force}",
+        *(
+            f"class {c.name}: {c.lower_limit:.6g} to {c.upper_limit:.6g} {force}"
+            + ("" if c.granted else "  (not granted)")
+            for c in result.classes
+        ),
+    ]
+
+
+def _iso376(result: Iso376Result, force: str, reading: str) -> list[str]:
+    rows = [
+        [f"{r.force:g}", f"{r.deflection:.6g}", _percent(r.b), _percent(r.b_same), _percent(r.fc),
+         _percent(r.v), (r.class_name or "none") if not result.procedure else "-"]
+        for r in result.forces
+    ]  # fmt: skip
+    return [
+        table([f"force [{force}]", f"deflection [{reading}]", "b %", "b' %", "fc %", "v %", "class"], rows,
+              align=">>>>>>>"),
+        f"zero f0 {_percent(result.f0)} %, creep c {_percent(result.c)} %",
+        *(f"class {r.class_name}: {r.lower:g} to {r.upper:g} {force}" for r in result.ranges),
+    ]  # fmt: skip
+
+
+def _percent(value: float | None) -> str:
+    return "-" if value is None else f"{value:.4f}"

@@ -1,0 +1,251 @@
+"""A diagnosis: its answer, page, predictions and model file in one folder, and its Word document."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from toolkit.lab.answers import delivered_keys, draft_keys, finding_lines, table
+
+if TYPE_CHECKING:
+    from toolkit.calibration.records.use import CalibrationUse
+    from toolkit.diagnosis.answer.answer import Diagnosis
+    from toolkit.diagnosis.case.case import Case
+    from toolkit.diagnosis.diagnose import Result
+    from toolkit.report.word.package import Template
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Diagnosed:
+    """A case with its result, and how the calibration that it names stands."""
+
+    case: Case
+    result: Result
+    use: CalibrationUse | None
+
+    def model(self, folder: Path) -> str | None:
+        """Return the model file for a folder; None where nothing is named that could go back into use."""
+        from toolkit.diagnosis.answer.model_text import model_text
+
+        if self.result.search is None:
+            return None
+        return model_text(self.case, self.result.search, self.result.diagnosis, folder)
+
+
+def diagnose_case(
+    file: Path,
+    *,
+    out: Path | None = None,
+    model: Path | None = None,
+    calibrations: Path | None = None,
+    home: Path | None = None,
+    budget_s: float = 600.0,
+    tell: Callable[[str], None] = lambda _text: None,
+) -> Diagnosed:
+    """Return the diagnosis of a case.
+
+    Parameters
+    ----------
+    out : where `write_diagnosis` will put it: judged before the search, not after it
+    model : model file in place of the case's simulation
+    tell : told what is searched
+
+    Raises
+    ------
+    ToolkitError
+        the case cannot be read or used, or the folder not written
+    """
+    from toolkit.diagnosis.answer.case_findings import calibration_use
+    from toolkit.diagnosis.case.reader import read_case
+    from toolkit.diagnosis.diagnose import diagnose
+
+    case = read_case(file, model=model)
+    if out is not None:
+        check_folder(out, model or case.model)
+    registry = machine_registry(case.simulation.kind, calibrations, home)
+    result = diagnose(case, registry, budget_s=budget_s, tell=tell)
+    tell("")
+    return Diagnosed(case=case, result=result, use=calibration_use(case, registry))
+
+
+def check_folder(out: Path, model: Path | None) -> None:
+    """Refuse a folder that cannot be written, or whose model file is the one that was started from."""
+    from toolkit.diagnosis.answer.model_text import MODEL
+
+    _writable(out)
+    _apart(model, out / MODEL)
+
+
+def machine_registry(kind: str, calibrations: Path | None, home: Path | None) -> Path | None:
+    """Return the registry's folder for a simulation of the machine; None for others, and without a home."""
+    from toolkit.lab.home import registry_if_any
+
+    registry = registry_if_any(calibrations, home) if kind == "machine" else None
+    return None if registry is None else registry.folder
+
+
+def write_diagnosis(
+    diagnosed: Diagnosed, out: Path, *, timing: Callable[[], dict[str, Any]]
+) -> dict[str, Any]:
+    """Write predictions, model file, page and answer; return the answer. ``timing`` is asked at its end."""
+    from toolkit.diagnosis.answer.model_text import MODEL
+    from toolkit.diagnosis.answer.serial import as_json
+    from toolkit.files import write_atomic
+    from toolkit.report.diagnosis.page import page
+
+    model = diagnosed.model(out)
+    marks = draft_keys(*([diagnosed.use] if diagnosed.use else []))
+    payload = as_json(diagnosed.result.diagnosis) | marks | {"model": None if model is None else MODEL}
+    drawn = page(diagnosed.result, diagnosed.use)
+    payload["timing"] = timing()
+    text = json.dumps({"schema": 1, **payload}, ensure_ascii=False, indent=2, allow_nan=False) + "\n"
+    for name, content in diagnosed.result.predictions:
+        write_atomic(out / "predictions" / name, content)
+    _write_model(out / MODEL, model)
+    write_atomic(out / "diagnosis.html", drawn)
+    write_atomic(out / "diagnosis.json", text)
+    return payload
+
+
+def write_document(diagnosed: Diagnosed, opened: Template, out: Path, *, by: str | None) -> dict[str, Any]:
+    """Deliver ``diagnosis.docx`` and ``diagnosis.pdf``; return what the JSON answer says of them."""
+    from datetime import date
+
+    from toolkit.files import sha256_bytes
+    from toolkit.report.deliver import deliver
+    from toolkit.report.diagnosis.content import build_diagnosis_content
+    from toolkit.report.style import read_style, style_file
+
+    model = diagnosed.model(out)
+    content = build_diagnosis_content(
+        diagnosed.case,
+        diagnosed.result,
+        read_style(style_file(opened.path)),
+        issued=date.today(),  # noqa: DTZ011
+        use=diagnosed.use,
+        model_sha256=None if model is None else sha256_bytes(model.encode()),
+        by=by,
+    )
+    return delivered_keys(deliver(opened, content, out, name="diagnosis"))
+
+
+def _apart(model: Path | None, target: Path) -> None:
+    """Refuse to write the new model over the one that the simulation was taken from."""
+    from toolkit.errors import OutputError
+
+    if model is not None and model.resolve() == target.resolve():
+        raise OutputError(
+            "the answer's model would replace the one that it starts from", where=target,
+            got=f"--model {model}", expected="another folder",
+            next_step="choose another folder with --out", rule="not-writable",
+        )  # fmt: skip
+
+
+def _write_model(path: Path, text: str | None) -> None:
+    """Write the model file; one of an earlier answer does not stay beside an answer that names nothing."""
+    from toolkit.files import read_toml, write_atomic
+    from toolkit.simulation.model_file import is_model
+
+    if text is not None:
+        write_atomic(path, text)
+    elif path.is_file() and is_model(read_toml(path)):
+        path.unlink()
+
+
+def _writable(out: Path) -> None:
+    """Refuse a folder that cannot be written before the search, not after it."""
+    import os
+
+    from toolkit.errors import OutputError
+
+    folder = out.absolute()
+    while not folder.exists() and folder != folder.parent:
+        folder = folder.parent
+    if not folder.is_dir() or not os.access(folder, os.W_OK | os.X_OK):
+        raise OutputError(
+            "the answer's folder cannot be written",
+            where=out,
+            got="a file" if folder.is_file() else f"no write permission in {folder}",
+            expected="a folder, or a place where one can be made",
+            next_step="choose another folder with --out",
+            rule="not-writable",
+        )
+
+
+def diagnosis_text(answer: Diagnosis, out: Path) -> str:
+    """Return a diagnosis for people."""
+    from toolkit.diagnosis.answer.answer import cut_short
+    from toolkit.report.diagnosis.numbers import chance
+
+    cut = answer.verdict == "unknown" and cut_short(answer.skipped)
+    lines = [f"{answer.title}: {_CUT if cut else _VERDICTS[answer.verdict]}"]
+    for effect in answer.effects:
+        channel = f" on {effect.channel}" if effect.channel else ""
+        lines += ["", f"{effect.name}{channel} ({effect.stage}): {effect.statement}", f"  {effect.equation}"]
+        for parameter in effect.parameters:
+            if isinstance(parameter.value, str):
+                lines.append(f"  {parameter.name} = {parameter.value}")
+                continue
+            reach = (
+                "" if parameter.ci95 is None else f"  [{parameter.ci95[0]:.4g}, {parameter.ci95[1]:.4g}] 95 %"
+            )
+            lines.append(f"  {parameter.name} = {parameter.value:.4g} {parameter.unit}{reach}")
+        runs = next((parameter.runs for parameter in effect.parameters if parameter.runs is not None), None)
+        if runs is not None:
+            lines.append(f"  in {', '.join(runs)} alone")
+        if effect.equivalent_to:
+            lines.append(f"  this recording cannot tell it from: {', '.join(effect.equivalent_to)}")
+        lines.append(
+            f"  held-out log score +{effect.held_out_log_score_gain:.1f}, "
+            f"{chance(effect.p_value)} in the search"
+        )
+    for channel, names in answer.depends_on:
+        lines.append(f"{channel}: structure that no named effect explains, over {' and '.join(names)}")
+    for place in answer.mismatch:
+        for at in place.where[:1]:
+            much = "over all of" if at.whole else "mostly where"
+            lines.append(
+                f"{place.channel}: mismatch {much} {at.variable}{',' if at.whole else ' is'} "
+                f"{at.ends('{:.4g}'.format)} {at.unit}".rstrip()
+            )
+    rows = [
+        [
+            o.channel,
+            o.unit,
+            *(f"{v:.4g}" for v in (o.nominal_rmse, o.refitted_rmse, o.augmented_rmse, o.noise_floor)),
+        ]
+        for o in answer.held_out
+    ]
+    if rows:
+        lines += ["", f"error on held-out rows (by {answer.held_out_by}):"]
+        lines.append(
+            table(["output", "unit", "nominal", "refitted", "augmented", "noise"], rows, align="<<>>>>")
+        )
+    moved = [parameter for parameter in answer.nominal_parameters if parameter.prior_sd]
+    if moved:
+        cells = [
+            [o.name, o.unit, f"{o.before:.5g}", f"{o.after:.5g}", f"{o.shift_in_sd or 0:+.1f}"] for o in moved
+        ]
+        lines += ["", table(["parameter", "unit", "before", "after", "shift/sd"], cells, align="<<>>>")]
+    lines += ["", *answer.next_measurements] if answer.next_measurements else []
+    if not answer.complete:
+        lines += [
+            "",
+            f"incomplete: the budget was spent before {answer.skipped[0]}; a larger --budget goes on",
+        ]
+    if answer.findings:
+        lines += ["", "findings (toolkit explain RULE tells more):", *finding_lines(answer.findings)]
+    return "\n".join([*lines, "", f"written to {out}"])
+
+
+_CUT = "something is missing; the budget was spent before every known effect was tried"
+_VERDICTS = {
+    "named": "the missing physics has a name",
+    "equivalent": "a class of effects explains it, which this recording cannot tell apart",
+    "unknown": "something is missing that no known effect explains",
+    "nothing": "nothing is missing that this recording could show",
+    "untestable": "this recording cannot tell",
+}

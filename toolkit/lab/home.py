@@ -1,0 +1,146 @@
+"""A laboratory's home, the nearest folder upward with ``calibrations/``: its registry, its templates."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from toolkit.errors import ConfigError, OutputError
+
+if TYPE_CHECKING:
+    from toolkit.calibration.registry.registry import Registry
+
+TEMPLATES = "report_templates"
+_PACKAGE = Path(__file__).resolve().parents[1]
+
+
+def packaged_home() -> Path:
+    """Return the home that comes with the package: its copy in a wheel, the checkout otherwise."""
+    inside = _PACKAGE / "_home"
+    return inside if inside.is_dir() else _PACKAGE.parent
+
+
+def find_home(home: Path | None = None) -> Path:
+    """Return the laboratory's home: ``--home``, ``TOOLKIT_HOME``, or the nearest folder upward.
+
+    Raises
+    ------
+    ConfigError
+        there is none; the message names ``toolkit init``
+    """
+    stated = home or (Path(os.environ["TOOLKIT_HOME"]) if os.environ.get("TOOLKIT_HOME") else None)
+    if stated is not None:
+        if not (stated / "calibrations").is_dir():
+            raise _no_home(stated)
+        return stated.resolve()
+    cwd = Path.cwd().resolve()
+    for folder in (cwd, *cwd.parents):
+        if (folder / "calibrations").is_dir():
+            return folder
+    raise _no_home(cwd)
+
+
+def calibrations_folder(calibrations: Path | None = None, home: Path | None = None) -> Path:
+    """Return the registry folder: ``--calibrations DIR``, else that of the home."""
+    if calibrations is None:
+        return find_home(home) / "calibrations"
+    if not calibrations.is_dir():
+        raise ConfigError(
+            "the registry folder does not exist",
+            where=calibrations,
+            got="no folder",
+            expected="a folder with one sub-folder an instrument",
+            next_step="check --calibrations, or make a home with 'toolkit init DIR'",
+            rule="no-registry",
+        )
+    return calibrations.resolve()
+
+
+def registry_to_write(calibrations: Path | None = None, home: Path | None = None) -> Path:
+    """Return the registry folder of a command that enters a record: one that was named may yet be made."""
+    if calibrations is not None and not calibrations.exists():
+        return calibrations.absolute()
+    return calibrations_folder(calibrations, home)
+
+
+def open_registry(calibrations: Path | None = None, home: Path | None = None) -> Registry:
+    """Return the registry of `calibrations_folder`."""
+    from toolkit.calibration.registry.registry import Registry
+
+    return Registry(calibrations_folder(calibrations, home))
+
+
+def registry_if_any(calibrations: Path | None = None, home: Path | None = None) -> Registry | None:
+    """Return the registry, None where there is no home and none was named.
+
+    A file can be looked into, and a plan run, anywhere; but a registry that is named is never passed over.
+    """
+    try:
+        return open_registry(calibrations, home)
+    except ConfigError:
+        if calibrations is not None or home is not None:
+            raise
+        return None
+
+
+def home_template(name: str, home: Path | None = None) -> Path:
+    """Return a template of the home's ``report_templates/``; the packaged one where the home has none.
+
+    Raises
+    ------
+    ConfigError
+        ``home`` was given and is none
+    """
+    packaged = packaged_home() / TEMPLATES / name
+    try:
+        own_template = find_home(home) / TEMPLATES / name
+    except ConfigError:
+        if home is not None:
+            raise
+        return packaged
+    return own_template if own_template.is_file() else packaged
+
+
+def make_home(folder: Path) -> tuple[str, ...]:
+    """Make a home: an empty ``calibrations/`` and the default templates; return what was written.
+
+    What is there already is left as it is.
+
+    Raises
+    ------
+    OutputError
+        the folder cannot be written to
+    """
+    templates = folder / TEMPLATES
+    written: list[str] = []
+    try:
+        (folder / "calibrations").mkdir(parents=True, exist_ok=True)
+        templates.mkdir(exist_ok=True)
+        for source in sorted((packaged_home() / TEMPLATES).iterdir()):
+            target = templates / source.name
+            if source.is_file() and not target.exists():
+                shutil.copyfile(source, target)
+                written.append(str(target.relative_to(folder)))
+    except OSError as error:
+        raise OutputError(
+            "the home cannot be made",
+            where=folder,
+            got=error.strerror,
+            expected="a folder that can be written to",
+            next_step="choose another folder",
+        ) from error
+    return tuple(written)
+
+
+def _no_home(where: Path) -> ConfigError:
+    return ConfigError(
+        "no laboratory home was found",
+        where=where,
+        got="no folder calibrations/ here or above",
+        expected="a folder that holds calibrations/",
+        next_step="run inside the laboratory's home, name it with --home or TOOLKIT_HOME, "
+        "or make one with 'toolkit init DIR'",
+        rule="no-home",
+    )

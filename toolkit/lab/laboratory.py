@@ -1,0 +1,210 @@
+"""A laboratory: its home folder with the registry of calibrations and the templates of its reports."""
+
+from __future__ import annotations
+
+import datetime as dt
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from toolkit.lab.faces import Face, Facts
+from toolkit.lab.home import calibrations_folder, find_home, home_template, open_registry
+from toolkit.lab.record import Record, Records
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from toolkit.calibration.registry.registry import Registry
+    from toolkit.calibration.registry.verify import VerifyRow
+    from toolkit.lab.archive import Audit
+    from toolkit.lab.test import ProcessedTest, Report, Test
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class Laboratory(Face):
+    """An open laboratory; its records are read from the disk as they are asked for.
+
+    ``home`` is its folder, None where only a registry was named; ``calibrations`` is the registry's folder.
+    """
+
+    home: Path | None
+    calibrations: Path
+
+    @property
+    def registry(self) -> Registry:
+        """The registry of the calibration records."""
+        return open_registry(self.calibrations)
+
+    @property
+    def instruments(self) -> tuple[str, ...]:
+        """The instruments that have records."""
+        return self.registry.instruments()
+
+    @property
+    def records(self) -> Records:
+        """The records that pass every gate, candidates and withdrawn ones among them."""
+        registry = self.registry
+        return Records(
+            tuple(
+                Record(result=record, registry=registry)
+                for instrument in registry.instruments()
+                for record in registry.usable(instrument)[0]
+            )
+        )
+
+    def record(self, record_id: str, *, on: dt.date | None = None, known_at: dt.date | None = None) -> Record:
+        """Return a record by its id, to be judged for a day (default: today).
+
+        Raises
+        ------
+        RecordError
+            it is missing, or fails a gate: its hash, its data, its refit
+        RegistryError
+            the text is no record id
+        """
+        registry = self.registry
+        return Record(result=registry.load(record_id), registry=registry, on=on, known_at=known_at)
+
+    def in_force(
+        self, instrument: str, *, on: dt.date | None = None, known_at: dt.date | None = None
+    ) -> Record:
+        """Return the record in force for an instrument on a day, as known on another (default: today).
+
+        Raises
+        ------
+        RegistryError
+            none is in force on that day
+        RecordError
+            the one that is fails a gate
+        """
+        registry, day = self.registry, on or dt.date.today()  # noqa: DTZ011
+        record = registry.in_force(instrument, on=day, known_at=known_at)
+        return Record(result=record, registry=registry, on=day, known_at=known_at)
+
+    def verify(self, head: str | None = None) -> Verification:
+        """Refit every record from its stored data, and name every file that is not as it was entered.
+
+        ``head`` is a ledger's hash that was printed earlier.
+        """
+        from toolkit.calibration.registry.verify import verify_registry
+
+        return Verification(tuple(verify_registry(self.registry, head)))
+
+    def read_test(self, path: str | Path) -> Test:
+        """Return `toolkit.read_test` of a test that this laboratory's records compute."""
+        from toolkit.lab.test import read_test
+
+        return read_test(path, calibrations=self.calibrations)
+
+    def write_report(
+        self, test: ProcessedTest, out: str | Path, *, template: str | Path | None = None, **options: Any
+    ) -> Report:
+        """Return `toolkit.write_report` by a template of this laboratory; default ``org.docx``."""
+        from toolkit.lab.test import write_report
+
+        return write_report(test, out, template=template or self.template("org.docx"), **options)
+
+    def audit_archive(self, archive: str | Path, **options: Any) -> Audit:
+        """Return `toolkit.audit_archive` by the records of this laboratory."""
+        from toolkit.lab.archive import audit_archive
+
+        return audit_archive(archive, calibrations=self.calibrations, **options)
+
+    def template(self, name: str) -> Path:
+        """Return a template of ``report_templates/``; the packaged one where the laboratory has none."""
+        return home_template(name, self.home)
+
+    def to_dataframe(self) -> pd.DataFrame:
+        """Return the records, one a row."""
+        return self.records.to_dataframe()
+
+    def _facts(self) -> Facts:
+        registry = self.registry
+        return {
+            "laboratory": self.home or self.calibrations,
+            "records": f"{sum(len(registry.ids(name)) for name in registry.instruments())} records",
+            "instruments": ", ".join(registry.instruments()) or "no instrument yet",
+        }
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class Verification(Face):
+    """The registry verified: ``rows`` has one entry for every record and every file that belongs to none."""
+
+    rows: tuple[VerifyRow, ...]
+
+    @property
+    def ok(self) -> bool:
+        """Whether everything is as it was entered."""
+        return all(row.ok for row in self.rows)
+
+    def to_dataframe(self) -> pd.DataFrame:
+        """Return one row a record or stray file: id, ok, verified, reason."""
+        import pandas as pd
+
+        return pd.DataFrame(
+            [{"id": r.id, "ok": r.ok, "verified": r.verified, "reason": r.reason} for r in self.rows]
+        )
+
+    def _facts(self) -> Facts:
+        sound = sum(row.ok for row in self.rows)
+        return {
+            "records": f"{sound} of {len(self.rows)} ok",
+            "not ok": ", ".join(f"{row.id}: {row.reason}" for row in self.rows if not row.ok) or None,
+        }
+
+
+def open_laboratory(home: str | Path | None = None, *, calibrations: str | Path | None = None) -> Laboratory:
+    """Open a laboratory's home: the folder named, else ``TOOLKIT_HOME``, else the nearest folder upward.
+
+    Parameters
+    ----------
+    home : folder that holds ``calibrations/`` and, where it likes, ``report_templates/``
+    calibrations : a registry in place of the home's
+
+    Raises
+    ------
+    ConfigError
+        there is no such folder; the message names ``toolkit init``
+
+    Examples
+    --------
+    >>> laboratory = open_laboratory(example("home"))
+    >>> [record.id for record in laboratory.records]
+    ['m15-r1', 'm15-r2', 'm15-virtual-r1']
+    """
+    folder = None if home is None else Path(home)
+    if calibrations is not None:
+        return Laboratory(home=folder, calibrations=calibrations_folder(Path(calibrations)))
+    nearest = find_home(folder)
+    return Laboratory(home=nearest, calibrations=nearest / "calibrations")
+
+
+def example(name: str) -> Path:
+    """Return a packaged example to try things on: nothing in it is written to.
+
+    ``home`` is a laboratory with its records and templates; ``test_plan``, ``session_plan`` and
+    ``continuous_plan`` are plans of the virtual machine, ``tire`` its tire property file; ``fig4_4`` is a
+    real recording of the machine M-15.
+
+    Raises
+    ------
+    ConfigError
+        there is no example of that name
+
+    >>> example("tire").name
+    'tire.tir'
+    """
+    from toolkit.errors import ConfigError
+    from toolkit.examples.fig4_4 import packaged_fig4_4
+    from toolkit.lab.home import packaged_home
+
+    virtual = Path(__file__).parents[1] / "examples" / "virtual"
+    examples = {"home": packaged_home(), "tire": virtual / "tire.tir", "fig4_4": packaged_fig4_4()[0]}
+    examples |= {plan.stem: plan for plan in sorted(virtual.glob("*.toml"))}
+    if name not in examples:
+        raise ConfigError(
+            f"there is no example {name!r}", where="example", got=name, expected=", ".join(examples),
+            next_step="name one of those expected", rule="wrong-value",
+        )  # fmt: skip
+    return examples[name]

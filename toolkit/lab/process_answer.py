@@ -1,0 +1,170 @@
+"""What `process` says of a test: the JSON of the files contract in SI and SAE axes, and tables for people."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+from toolkit.channels import CHANNELS
+from toolkit.characteristics.characteristic import BOTH
+from toolkit.estimate import plus_minus
+from toolkit.lab.answers import draft_keys, estimate_keys, finding_lines, mark_words, table
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from toolkit.estimate import Estimate
+    from toolkit.lab.resolve import Resolved
+    from toolkit.report.style import Style
+
+
+def process_payload(resolved: Resolved) -> dict[str, Any]:
+    """Return a reduced test as the JSON answer: SI units, SAE axes; names carry the units.
+
+    ``u_FY_N`` and ``u_MZ_Nm`` of a condition hold every source of its budget, null where it is not used.
+    """
+    from toolkit.characteristics.model import answer_lists
+
+    reduced, characteristics = resolved.result.reduced, resolved.result.characteristics
+    points = {(p.file, p.first_row): p for p in characteristics.points}
+    return {
+        "test": reduced.info.name,
+        "machine": reduced.info.machine,
+        "simulated": reduced.info.simulated,
+        "axes": reduced.axes,
+        "averaging": reduced.averaging,
+        "protocol": reduced.protocol,
+        "reversal": reduced.info.reversal,
+        "calibration": reduced.calibration.as_dict(),
+        **draft_keys(reduced.calibration),
+        "tare": {
+            "source": reduced.tare.source,
+            "values": dict(reduced.tare.values),
+            "unit": reduced.tare.unit,
+        },
+        "stated": [
+            {
+                "symbol": component.symbol,
+                "u": component.u,
+                "unit": CHANNELS[component.symbol].si if component.symbol in CHANNELS else "1",
+                "relative": component.relative,
+                "effect": component.effect,
+                "common": component.common,
+                "source": component.source,
+            }
+            for component in reduced.stated
+        ],
+        "conditions": [
+            {
+                "file": c.file,
+                "rotation": c.rotation,
+                "rows": [c.first_row, c.last_row],
+                "step_SA_rad": c.step_SA,
+                "step_FZ_N": c.step_FZ,
+                "SA_rad": c.SA,
+                "FZ_N": c.FZ,
+                "FY_N": c.FY,
+                "MZ_Nm": c.MZ,
+                "u_FY_N": points[c.file, c.first_row].u_FY if c.used else None,
+                "u_FY_repeatability_N": c.u_FY,
+                "u_MZ_Nm": points[c.file, c.first_row].u_MZ if c.used else None,
+                "u_MZ_repeatability_Nm": c.u_MZ,
+                "FY_file_N": c.FY_file,
+                "MZ_file_Nm": c.MZ_file,
+                "FZ_common_N": c.FZ_common,
+                "FY_common_N": c.FY_common,
+                "MZ_common_Nm": c.MZ_common,
+                "u_FY_common_N": math.hypot(c.u_FY_common, c.u_FY_zero),
+                "u_MZ_common_Nm": math.hypot(c.u_MZ_common, c.u_MZ_zero),
+                "used": c.used,
+                "calibration_sha256": c.calibration_sha256,
+            }
+            for c in reduced.conditions
+        ],
+        "characteristics": {
+            **{
+                name: [_entry(entry) for entry in entries]
+                for name, entries in answer_lists(characteristics.rows).items()
+            },
+            "budgets": [
+                {
+                    "load_N": row.load_N,
+                    "rotation": row.rotation,
+                    "name": row.name,
+                    "unit": row.estimate.unit,
+                    "standard_uncertainty": dict(row.sources),
+                }
+                for row in characteristics.rows
+                if row.estimate is not None and row.SA_rad is None
+            ],
+        },
+        "impossible": [finding.as_dict() for finding in reduced.impossible],
+        "findings": [finding.as_dict() for finding in resolved.findings],
+    }
+
+
+def _entry(entry: dict[str, Any]) -> dict[str, Any]:
+    from toolkit.estimate import Estimate
+
+    return {
+        key: estimate_keys(value) if isinstance(value, Estimate) else value for key, value in entry.items()
+    }
+
+
+def process_text(resolved: Resolved, out: Path | None, style: Style) -> str:
+    """Return a reduced test for people: conditions, marks, the characteristics of each load, findings."""
+    reduced = resolved.result.reduced
+    mark = "  SIMULATED" if reduced.info.simulated else ""
+    used = sum(c.used for c in reduced.conditions)
+    lines = [
+        f"{reduced.info.name}: {used} conditions of {len({c.file for c in reduced.conditions})} files{mark}",
+        f"calibration {reduced.calibration.id} ({reduced.calibration.sha256[:12]}...)"
+        + mark_words(reduced.calibration),
+        *(["IMPOSSIBLE VALUES: no tire has them, see the findings"] if reduced.impossible else []),
+        f"averaging: {reduced.averaging}",
+        f"tare: {reduced.tare.source}",
+        *(["reversed runs: the tire turned round on the hub"] if reduced.info.reversal == "tire" else []),
+        "",
+        _characteristics_table(resolved, style),
+    ]
+    if resolved.findings:
+        lines += ["", f"findings: {len(resolved.findings)} (toolkit explain RULE tells more)"]
+        lines += finding_lines(resolved.findings)
+    lines.append("")
+    lines.append(
+        f"written: {out}" if out else "nothing written; --out test.xlsx keeps the whole test in one file"
+    )
+    return "\n".join(lines)
+
+
+def _characteristics_table(resolved: Resolved, style: Style) -> str:
+    """Return the printed characteristics, one row a load; those of a direction with the drum forward."""
+    from toolkit.characteristics.catalogue import columns, tables
+    from toolkit.units import from_si
+
+    printed = [one for table in tables() for one in columns(table) if one.console_heading is not None]
+    units = {characteristic.name: style.unit(characteristic.printed_unit) for characteristic in printed}
+    characteristics = resolved.result.characteristics
+    lines = []
+    for load in characteristics.loads_N:
+        rotations = {row.rotation for row in characteristics.rows if row.load_N == load}
+        direction = "forward" if "forward" in rotations else "reverse"
+        cells = [f"{load:.0f}", f"{float(from_si(load, 'lbf')):.0f}"]
+        for one in printed:
+            row = characteristics.at(one.name, load, BOTH if one.scope == "load" else direction)
+            factor = one.factor * units[one.name][1]
+            cells.append(_shown(row.estimate if row is not None else None, factor, one.digits))
+        lines.append(cells)
+    head = ["FZ [N]", "FZ [lbf]"]
+    head += [
+        f"{characteristic.console_heading} [{str(units[characteristic.name][0]).replace('*', '·')}]"
+        for characteristic in printed
+    ]
+    return table(head, lines, align=">" * len(head))
+
+
+def _shown(estimate: Estimate | None, factor: float, digits: int) -> str:
+    if estimate is None:
+        return "-"
+    shown = estimate.scaled(factor, "")
+    return plus_minus(shown.value, shown.expanded()[0], spec=f".{digits}f")

@@ -1,0 +1,192 @@
+"""What `calibrate` and `calibration report` say of a session: its record, its fit, the next step, figures."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Any
+
+from toolkit.errors import SessionError, ToolkitError
+from toolkit.estimate import round_uncertainty
+from toolkit.lab.answers import finding_lines, table
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from toolkit.calibration.fit.session_fit import SessionFit
+    from toolkit.calibration.records.record import CalibrationRecord
+    from toolkit.calibration.registry.candidate import Candidate
+    from toolkit.calibration.registry.registry import Registry
+
+NOT_ENTERED = "not entered"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FitReport:
+    """The report as JSON by load, what stands beside the loads, and as text."""
+
+    loads: dict[str, Any]
+    payload: dict[str, Any]
+    text: str
+
+
+def fit_report(fit: SessionFit, *, title: str, full: bool, figures: Path | None) -> FitReport:
+    """Return a fit's report, and write its figures where a folder is named.
+
+    Raises
+    ------
+    OutputError
+        a figure cannot be written; the record stands
+    """
+    from toolkit.calibration.fit.balance_report import report_balance
+    from toolkit.calibration.fit.report import report_session
+    from toolkit.report.calibration.text import balance_dict, balance_text, report_dict, report_text
+
+    reports = report_session(fit)
+    blocks = [report_text(report) for report in reports] if full else []
+    payload: dict[str, Any] = {}
+    if fit.session.model == "balance":
+        try:
+            balance = report_balance(fit)
+        except SessionError as error:
+            # The finding says why; the record's own form is not touched by it.
+            payload["balance"] = None
+            blocks += [f"no balance form: {error.what}; got {error.got}"] if full else []
+        else:
+            payload["balance"] = balance_dict(balance)
+            blocks += [balance_text(balance)] if full else []
+    if figures is not None:
+        payload["figures"] = _write(fit, title, figures)
+        blocks.append(f"{len(payload['figures'])} figures in {figures}")
+    return FitReport(
+        loads={report.load: report_dict(report, rows=full) for report in reports},
+        payload=payload,
+        text="".join(f"\n\n{block}" for block in blocks),
+    )
+
+
+def _write(fit: SessionFit, title: str, folder: Path) -> list[str]:
+    from toolkit.calibration.fit.report import report_session
+    from toolkit.files import write_atomic
+    from toolkit.report.calibration.figures import report_figures
+
+    pictures: dict[str, bytes] = {}
+    for report in report_session(fit):
+        pictures |= report_figures(report, title=title)
+    for name, data in pictures.items():
+        write_atomic(folder / name, data)
+    return sorted(pictures)
+
+
+def candidate_payload(candidate: Candidate, status: str) -> dict[str, Any]:
+    """Return a session's record and fit as the JSON answer."""
+    from toolkit.calibration.fit.readings import readings_json
+    from toolkit.calibration.fit.session_fit import residual_correlation
+
+    record = candidate.record
+    names = [load.setting.name for load in candidate.fit.loads]
+
+    def by_load(values: list[Any]) -> dict[str, Any]:
+        return dict(zip(names, values, strict=True))
+
+    loads = {}
+    for load in candidate.fit.loads:
+        # Of a session that is recorded already the record's own figures hold, whatever a fit gives today.
+        fit, diagnostics, stored = load.fit, load.diagnostics, record.load(load.setting.name)
+        loads[load.setting.name] = {
+            "unit": load.setting.unit,
+            "indication_units": dict(zip(record.indications, record.indication_units, strict=True)),
+            "coefficients": dict(zip(fit.terms, fit.coefficients, strict=True)),
+            "issued": dict(zip(fit.terms, stored.issued, strict=True)),
+            "standard_errors": dict(zip(fit.terms, stored.standard_errors, strict=True)),
+            "covariance_model": stored.covariance_model,
+            "scatter": None if stored.scatter is None else asdict(stored.scatter),
+            "residual_sd": fit.residual_sd,
+            "dof": fit.dof,
+            "condition_number": candidate.fit.condition_number,
+            "condition_number_terms": candidate.fit.condition_number_terms,
+            "vif": dict(zip(record.indications, candidate.fit.vif, strict=True)),
+            "llf": load.llf,
+            "check_max_percent_fs": load.check_max_percent_fs,
+            "press": diagnostics.press,
+            "reversibility": diagnostics.reversibility,
+            "outlier_rows": list(diagnostics.outliers),
+        }
+    return {
+        "record": {
+            "id": record.id,
+            "sha256": record.sha256,
+            "status": status,
+            "existing": candidate.existing,
+            "path": str(candidate.path),
+        },
+        "findings": [finding.as_dict() for finding in candidate.findings],
+        "readings": readings_json(candidate.readings),
+        "residual_correlation": by_load(
+            [by_load(row) for row in residual_correlation(candidate.fit).tolist()]
+        ),
+        "loads": loads,
+    }
+
+
+def candidate_text(candidate: Candidate, status: str) -> str:
+    """Return a session's record and fit for people."""
+    record = candidate.record
+    lines = [
+        f"{record.id}  {status}"
+        + ("  (already recorded; nothing was written)" if candidate.existing else ""),
+        f"sha256 {record.sha256}",
+        f"file   {candidate.path}" + ("  (not written: a dry run)" if status == NOT_ENTERED else ""),
+    ]
+    for load in candidate.fit.loads:
+        stored = record.load(load.setting.name)
+        units = dict(zip(record.indications, record.indication_units, strict=True))
+        rows = [
+            [term, f"{c:.10g}", f"{i:.8g}", round_uncertainty(u), _per(term, load.setting.unit, units)]
+            for term, c, i, u in zip(
+                load.fit.terms, load.fit.coefficients, stored.issued, stored.standard_errors, strict=True
+            )
+        ]
+        check = "no check loads" if load.check_max_percent_fs is None else (
+            f"check loads within {load.check_max_percent_fs:.3g} % of full scale"
+        )  # fmt: skip
+        lines += [
+            "",
+            f"{load.setting.name} [{load.setting.unit}]",
+            table(["term", "coefficient", "issued", "std error", "unit"], rows, align="<>>><"),
+            f"residual sd {load.fit.residual_sd:.3g} {load.setting.unit}, {load.fit.dof} degrees of freedom, "
+            f"lower limit factor {load.llf:.3g} {load.setting.unit}; {check}",
+            *([stored.scatter_words] if stored.scatter_words else []),
+        ]
+    lines += ["", f"condition number of the indications {candidate.fit.condition_number:.3g}"]
+    if candidate.findings:
+        lines += ["findings:", *finding_lines(candidate.findings)]
+    return "\n".join(lines)
+
+
+def next_step(registry: Registry, record: CalibrationRecord, machine: str | None) -> str:
+    """Return the approval, with what its gates ask for; where they block it, what comes before."""
+    from toolkit.calibration.registry.judgement import machine_of
+    from toolkit.calibration.registry.standing import failed_gates, gate_words
+
+    try:
+        failed = failed_gates(registry, record, machine=machine_of(record.instrument, machine))
+    except ToolkitError as error:
+        return f"what an approval would be refused for: {error.what} ({error.where}); {error.next_step}"
+    blocks = [check for check in failed if check.effect == "blocks"]
+    if blocks:
+        return (
+            f"settle what 'calibration approve' would refuse: {gate_words(blocks)} (toolkit explain RULE "
+            f"tells more); where the session is wrong, correct it, calibrate again and discard {record.id}"
+        )
+    words = f"toolkit calibration approve {record.id} --in-force-from {record.date} --checked-by NAME"
+    asked = {check.rule for check in failed}
+    words += f" --machine {machine}" if machine else ""
+    words += " --reason TEXT" if "replacement" in asked else ""
+    words += " --polarity FILE" if "polarity-reading" in asked else ""
+    return words
+
+
+def _per(term: str, load_unit: str, units: dict[str, str]) -> str:
+    if term == "intercept":
+        return load_unit
+    return f"{load_unit}/({units[term]})" if term in units else f"{load_unit} per unit of {term}"

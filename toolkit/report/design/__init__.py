@@ -1,1 +1,0 @@
-"""The templates that come with the toolkit, built by code and kept byte for byte."""

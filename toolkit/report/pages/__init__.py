@@ -1,0 +1,1 @@
+"""The page kit: every HTML page is one file that opens without a network and asks for nothing."""

@@ -1,0 +1,1 @@
+"""A test's report: its content, tables and figures."""

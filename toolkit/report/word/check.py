@@ -1,0 +1,347 @@
+"""The template lint: what a template must be before it is filled, each finding with a rule and a place.
+
+Errors keep a report from being made; warnings do not. What makes a file unsafe to open is refused
+earlier, by `toolkit.report.word.package`.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+
+from toolkit.report.style import Style
+from toolkit.report.tags import format_problem, parse_tag
+from toolkit.report.vocabulary import Vocabulary
+from toolkit.report.word.lint import RULES, LintFinding, missing_fonts, surroundings
+from toolkit.report.word.package import Template, open_package
+from toolkit.report.word.scan import (
+    LITERAL,
+    Site,
+    broken_literals,
+    control_tag,
+    filled_by,
+    misspelt,
+    own_rows,
+    place_of,
+    row_in,
+    scan,
+    table_of,
+)
+from toolkit.report.word.xml import (
+    SDT_CONTENT,
+    W_P,
+    W_SDT,
+    W_TC,
+    W_TR,
+    Element,
+    Story,
+    ancestor,
+    own_texts,
+    q,
+    stories,
+)
+
+
+def check_template(
+    template: Template, style: Style, vocabularies: Mapping[str, Vocabulary], *, fonts: bool = True
+) -> tuple[LintFinding, ...]:
+    """Return what is wrong with a template, errors first, in document order.
+
+    Parameters
+    ----------
+    template : a template that is safe to open
+    style : its style file, for required tags and style names
+    vocabularies : of the kinds of documents that it may be of, by their names (see `vocabulary_of`)
+    fonts : also ask the system which fonts it has
+    """
+    package = open_package(template)
+    parts = stories(package)
+    vocabulary = vocabulary_of(scan(parts), vocabularies)
+    return check_stories(package, parts, template, style, vocabulary, fonts=fonts)
+
+
+def check_stories(
+    package: object,
+    parts: list[Story],
+    template: Template,
+    style: Style,
+    words: Vocabulary,
+    *,
+    fonts: bool,
+) -> tuple[LintFinding, ...]:
+    """Return the findings of an opened package (see `check_template`)."""
+    sites = scan(parts)
+    findings = [
+        *_tags(sites, style, words),
+        *_tables(sites, words),
+        *_broken(parts),
+        *surroundings(package, parts, style),
+    ]
+    findings += [
+        LintFinding(
+            rule="attached-template",
+            level="warning",
+            part="word/settings.xml",
+            place="part",
+            message=f"attached template {target} is dropped",
+        )
+        for target in template.dropped
+    ]
+    if fonts:
+        findings += [
+            LintFinding(
+                rule="font-unavailable",
+                level="warning",
+                part="word/styles.xml",
+                place=name,
+                message=f"font {name!r} is not installed and will be replaced: check the layout of the PDF",
+            )
+            for name in missing_fonts(package, parts)
+        ]
+    return tuple(sorted(findings, key=lambda finding: finding.level != "error"))
+
+
+def vocabulary_of(sites: list[Site], vocabularies: Mapping[str, Vocabulary]) -> Vocabulary:
+    """Return the vocabulary that a template was made for, by its tags: the first one where none tells.
+
+    The first kind may have the tags of another one too, a report those of a diagnosis: it is meant where the
+    template also has a value that the other kind does not know.
+    """
+    first, *others = vocabularies
+    for name in others:
+        beginning = f"{name}."
+        if any(site.tag.path.startswith(beginning) for site in sites):
+            default, other = vocabularies[first], vocabularies[name]
+            shared = any(entry.path.startswith(beginning) for entry in default.values)
+            return default if shared and _beyond(sites, default, other) else other
+    return vocabularies[first]
+
+
+def _beyond(sites: list[Site], first: Vocabulary, vocabulary: Vocabulary) -> bool:
+    paths = {site.tag.path for site in sites if site.tag.family == "value"}
+    return any(first.knows(path) and not vocabulary.knows(path) for path in paths)
+
+
+def _at(site: Site, rule: str, message: str) -> LintFinding:
+    return LintFinding(rule=rule, level="error", part=site.story.name, place=site.place, message=message)
+
+
+def _tags(sites: list[Site], style: Style, words: Vocabulary) -> Iterator[LintFinding]:
+    main = sites[0].story.name if sites else "word/document.xml"
+    if not sites:
+        yield LintFinding(
+            rule="no-tags",
+            level="error",
+            part=main,
+            place="part",
+            message="the template has no tag: neither a content control tagged tk:... nor {{tk:...}}",
+        )
+    present = {f"tk:{site.tag.path}" for site in sites}
+    for required in words.demanded(style.required):
+        if required not in present:
+            yield LintFinding(
+                rule="missing-required",
+                level="error",
+                part=main,
+                place="part",
+                message=f"the template lacks the required tag {required}",
+            )
+    counted: dict[str, int] = {}
+    for site in sites:
+        yield from _one(site, words)
+        if site.tag.family in ("figure", "table") and site.story.body and not site.fallback:
+            counted[site.tag.path] = counted.get(site.tag.path, 0) + 1
+            if counted[site.tag.path] == 2:
+                yield _at(
+                    site, "doubled-tag", f"tk:{site.tag.path} stands twice in the body; once is allowed"
+                )
+
+
+def _one(site: Site, words: Vocabulary) -> Iterator[LintFinding]:
+    tag, family = site.tag, site.tag.family
+    known: dict[str, Mapping[str, object]] = {
+        "figure": words.figures,
+        "table": words.tables,
+    }
+    if not tag.path or re.search(r"[\s|{}]", tag.path):
+        yield _at(site, "malformed-tag", f"'{tag}' has no path, or white space in it")
+        return
+    asked = family == "if" and not words.knows_condition(tag.name)
+    if (
+        asked
+        or (family == "value" and not words.knows(tag.path))
+        or (tag.name not in known.get(family, {tag.name: ""}))
+    ):
+        yield _at(site, "unknown-tag", f"{tag} is not known: {_near(tag.path, words)}")
+        return
+    kind = family
+    if family == "value":
+        entry = words.value(tag.path)
+        kind = entry.kind if entry else "number"
+    if family != "row" and (problem := format_problem(kind, tag.spec)):
+        yield _at(site, "bad-format", f"{tag}: {problem}")
+    if family == "if" and site.form == "literal":
+        yield _at(site, "wrong-place", f"{tag} must be a content control around what it keeps, not a literal")
+    if family == "figure" and _in_heading(site):
+        yield _at(site, "wrong-place", f"{tag}: a figure cannot stand in a heading")
+    if family == "figure" and site.story.root.tag in (q("w:footnotes"), q("w:endnotes")):
+        # LibreOffice 7.4 loses every picture of a note when it reads a .docx.
+        yield _at(site, "wrong-place", f"{tag}: a figure in a note would be missing from the PDF")
+    if site.form == "control":
+        content = site.element.find(SDT_CONTENT)
+        if content is None:
+            yield _at(site, "wrong-place", f"{tag}: the control has no content")
+        elif family not in ("if", "table") and content.find(W_TR) is not None:
+            yield _at(site, "wrong-place", f"{tag}: a value or figure cannot stand around a table row")
+        if family in ("value", "figure", "row"):
+            yield from _swallowed(site)
+        outer = next(
+            (
+                s
+                for s in site.element.iterancestors(W_SDT)
+                if (t := control_tag(s)) and t.family in ("value", "figure", "row")
+            ),
+            None,
+        )
+        if outer is not None:
+            yield _at(
+                site, "overlapping-tags", f"{tag} stands inside {control_tag(outer)}, which replaces it"
+            )
+
+
+def _swallowed(site: Site) -> Iterator[LintFinding]:
+    """Find literals of other tags inside a control that will be filled as a whole; its own is its prompt."""
+    for paragraph in {id(p): p for p in [*site.element.iter(W_P), *site.element.iterancestors(W_P)]}.values():
+        inside = [t for t in own_texts(paragraph) if filled_by(t) is site.element]
+        for match in LITERAL.finditer("".join(t.text or "" for t in inside)):
+            other = parse_tag(match[1])
+            if other is not None and other.path != site.tag.path:
+                yield _at(site, "overlapping-tags", f"{other} stands inside {site.tag}, which replaces it")
+
+
+def _near(path: str, words: Vocabulary) -> str:
+    import difflib
+
+    near = difflib.get_close_matches(path, [entry.path for entry in words.entries], n=1, cutoff=0.5)
+    return f"did you mean tk:{near[0]}?" if near else "see 'toolkit template tags'"
+
+
+def _in_heading(site: Site) -> bool:
+    first = (
+        site.element
+        if site.element.tag == W_P
+        else (
+            ancestor(site.element, W_P)
+            if ancestor(site.element, W_P) is not None
+            else next(site.element.iter(W_P), None)
+        )
+    )
+    if first is None:
+        return False
+    style = first.find(f"{q('w:pPr')}/{q('w:pStyle')}")
+    if first.find(f"{q('w:pPr')}/{q('w:outlineLvl')}") is not None:
+        return True
+    if style is None:
+        return False
+    identity = style.get(q("w:val")) or ""
+    names = {identity.lower()}
+    styles = getattr(site.story.part, "_styles_part", None)
+    if styles is not None:
+        for one in styles.element.iter(q("w:style")):
+            if one.get(q("w:styleId")) == identity:
+                names.add((one.find(q("w:name")).get(q("w:val")) or "").lower())
+                if one.find(f"{q('w:pPr')}/{q('w:outlineLvl')}") is not None:
+                    return True
+    return any(name.startswith("heading") for name in names)
+
+
+def _tables(sites: list[Site], words: Vocabulary) -> Iterator[LintFinding]:
+    inside: set[int] = set()
+    for site in sites:
+        if site.tag.family != "table" or site.tag.name not in words.tables:
+            continue
+        table = table_of(site)
+        if table is None:
+            yield _at(
+                site, "no-table", f"{site.tag}: no table inside the control, nor right after its paragraph"
+            )
+            continue
+        columns = [column.name for column in words.tables[site.tag.name].columns]
+        rows: list[Element] = []
+        for other in sites:
+            row = row_in(table, other.element) if other.story is site.story else None
+            if row is None:
+                continue
+            inside.add(id(other))
+            if other.tag.family == "row":
+                if row not in rows:
+                    rows.append(row)
+                if other.tag.name not in columns:
+                    yield _at(
+                        other,
+                        "unknown-column",
+                        f"{other.tag} is no column of {site.tag}; it has {', '.join(columns)}",
+                    )
+                else:
+                    kind = next(
+                        c.kind for c in words.tables[site.tag.name].columns if c.name == other.tag.name
+                    )
+                    if problem := format_problem(kind, other.tag.spec):
+                        yield _at(other, "bad-format", f"{other.tag}: {problem}")
+            elif other.tag.family == "table" and other is not site:
+                yield _at(other, "overlapping-tags", f"{other.tag} stands inside {site.tag}")
+        if len(rows) > 1:
+            yield _at(
+                site,
+                "prototype",
+                f"{site.tag}: {len(rows)} rows hold tk:row tags; one prototype row is expected",
+            )
+        if not rows:
+            yield from _untagged(site, table, columns)
+        elif any(o.tag.family == "figure" and row_in(table, o.element) is rows[0] for o in sites):
+            yield _at(site, "wrong-place", f"{site.tag}: a figure cannot stand in the prototype row")
+    for site in sites:
+        if site.tag.family == "row" and id(site) not in inside:
+            yield _at(site, "wrong-place", f"{site.tag} stands outside the table of a tk:table tag")
+
+
+def _untagged(site: Site, table: Element, columns: list[str]) -> Iterator[LintFinding]:
+    rows = own_rows(table)
+    if len(rows) < 2:
+        yield _at(
+            site,
+            "prototype",
+            f"{site.tag}: the table has {len(rows)} rows; a header and a prototype row are expected",
+        )
+        return
+    cells = [cell for cell in rows[-1].iter(W_TC) if ancestor(cell, W_TR) is rows[-1]]
+    if len(cells) != len(columns):
+        yield _at(
+            site,
+            "column-count",
+            f"{site.tag}: the prototype row has {len(cells)} cells and no tags, the table has "
+            f"{len(columns)} columns: {', '.join(columns)}",
+        )
+
+
+def _broken(parts: list[Story]) -> Iterator[LintFinding]:
+    for story in parts:
+        for paragraph in broken_literals(story):
+            yield LintFinding(
+                rule="malformed-tag",
+                level="error",
+                part=story.name,
+                place=place_of(paragraph, story),
+                message="a literal {{tk: is not closed by }} in the same paragraph",
+            )
+        for element, text in misspelt(story):
+            yield LintFinding(
+                rule="malformed-tag",
+                level="error",
+                part=story.name,
+                place=place_of(element, story),
+                message=f"{text!r} would be printed as it stands: a tag begins with 'tk:' in small letters",
+            )
+
+
+__all__ = ["RULES", "LintFinding", "check_stories", "check_template"]

@@ -1,0 +1,232 @@
+"""Fill one place: a content control or the literals of a paragraph, keeping the look that stands there."""
+
+from __future__ import annotations
+
+import unicodedata
+from collections.abc import Callable
+from copy import deepcopy
+from typing import Any
+
+from lxml import etree
+
+from toolkit.report.tags import Tag, parse_tag
+from toolkit.report.word.scan import LITERAL, visible_texts
+from toolkit.report.word.xml import (
+    SDT_CONTENT,
+    SDT_PR,
+    W_P,
+    W_R,
+    W_SDT,
+    W_TBL,
+    W_TC,
+    W_TR,
+    Element,
+    Story,
+    new_run,
+    q,
+    set_text,
+)
+
+P_PR, R_PR, TC_PR = q("w:pPr"), q("w:rPr"), q("w:tcPr")
+
+
+def fill_control(sdt: Element, text: str, *, iso_date: str | None = None) -> None:
+    """Put a text into a control at run, paragraph or cell level; tag and lock stay, the placeholder goes."""
+    run = new_run(text, run_properties(sdt))
+    settle(sdt, iso_date)
+    replace_content(sdt, run)
+
+
+def settle(sdt: Element, iso_date: str | None = None) -> None:
+    """Take the placeholder state and the data binding off a control."""
+    properties = sdt.find(SDT_PR)
+    if properties is None:
+        return
+    for name in ("w:showingPlcHdr", "w:dataBinding", "w15:dataBinding"):
+        for element in properties.findall(q(name)):
+            properties.remove(element)
+    date = properties.find(q("w:date"))
+    if date is not None:
+        # A stale full date would be shown by Word instead of the text once the control is touched.
+        date.attrib.pop(q("w:fullDate"), None)
+        if iso_date is not None:
+            date.set(q("w:fullDate"), f"{iso_date}T00:00:00Z")
+
+
+def release(paragraph: Element) -> None:
+    """Settle the controls of others around a paragraph's literals: Word would show their own data again."""
+    holders = [t for t in visible_texts(paragraph) if "{{" in (t.text or "") or "}}" in (t.text or "")]
+    for element in [paragraph, *holders]:
+        for outer in element.iterancestors(W_SDT):
+            settle(outer)
+
+
+def replace_content(sdt: Element, run: Element) -> None:
+    """Make one run the whole content of a control, in the first paragraph or cell that it has."""
+    content = sdt.find(SDT_CONTENT)
+    cell = content.find(W_TC)
+    holder = cell if cell is not None else content
+    paragraph = next(holder.iter(W_P), None)
+    if cell is None and paragraph is None and in_line(sdt):
+        _clear(content)
+        content.append(run)
+        return
+    keep = paragraph if paragraph is not None else etree.Element(W_P)
+    fresh = etree.Element(W_P)
+    properties = keep.find(P_PR)
+    if properties is not None:
+        fresh.append(deepcopy(properties))
+    fresh.append(run)
+    if cell is not None:
+        for child in list(content):
+            if child is not cell:
+                content.remove(child)
+        for child in list(cell):
+            if child.tag != TC_PR:
+                cell.remove(child)
+        cell.append(fresh)
+    else:
+        _clear(content)
+        content.append(fresh)
+
+
+def in_line(element: Element) -> bool:
+    """Tell whether an element stands in a line of text, and not between paragraphs, in a text box too."""
+    holder = next(element.iterancestors(W_P, q("w:txbxContent")), None)
+    return holder is not None and holder.tag == W_P
+
+
+def run_properties(sdt: Element) -> Element | None:
+    """Return the run properties that a control's text keeps: its first run's, no placeholder style."""
+    properties = sdt.find(SDT_PR)
+    showing = properties.find(q("w:showingPlcHdr")) is not None
+    first = next(sdt.find(SDT_CONTENT).iter(W_R), None)
+    found = None if first is None else first.find(R_PR)
+    own = properties.find(R_PR)
+    if showing and own is not None:
+        return own
+    if found is None:
+        return own
+    found = deepcopy(found)
+    style = found.find(q("w:rStyle"))
+    if style is not None and (showing or style.get(q("w:val")) == "PlaceholderText"):
+        found.remove(style)
+    return found
+
+
+def fill_literals(paragraph: Element, resolve: Callable[[Tag], str]) -> None:
+    """Replace every ``{{tk:...}}`` of a paragraph; the first run of each tag gives the look.
+
+    Values are never scanned again: the matches are found once, on the template's own text.
+    """
+    texts = visible_texts(paragraph)
+    ends, total = [], 0
+    for t in texts:
+        total += len(t.text or "")
+        ends.append(total)
+    joined = "".join(t.text or "" for t in texts)
+    replacements = []
+    for match in LITERAL.finditer(joined):
+        tag = parse_tag(match[1])
+        if tag is not None:
+            replacements.append((match.start(), match.end(), resolve(tag)))
+    for start, end, text in reversed(replacements):
+        first = next(i for i, stop in enumerate(ends) if start < stop)
+        last = next(i for i, stop in enumerate(ends) if end <= stop)
+        head = start - (ends[first - 1] if first else 0)
+        tail = end - (ends[last - 1] if last else 0)
+        after = (texts[last].text or "")[tail:]
+        before = (texts[first].text or "")[:head]
+        if first == last:
+            set_text(texts[first], before + text + after)
+        else:
+            for middle in texts[first + 1 : last]:
+                middle.text = ""
+            _keep(texts[last], after)
+            set_text(texts[first], before + text)
+
+
+def _keep(t: Element, text: str) -> None:
+    set_text(t, text)
+
+
+def set_cell(cell: Element, text: str) -> None:
+    """Make a text the whole content of a table cell, in the look of its first run."""
+    paragraph = cell.find(W_P)
+    first = next(cell.iter(W_R), None)
+    run = new_run(text, None if first is None else first.find(R_PR))
+    fresh = etree.Element(W_P)
+    if paragraph is not None and paragraph.find(P_PR) is not None:
+        fresh.append(deepcopy(paragraph.find(P_PR)))
+    fresh.append(run)
+    for child in list(cell):
+        if child.tag != TC_PR:
+            cell.remove(child)
+    cell.append(fresh)
+
+
+def apply_condition(sdt: Element, keep: bool) -> None:
+    """Resolve a ``tk:if`` control: its wrapper goes, and with ``keep`` false its content too."""
+    parent, content = sdt.getparent(), sdt.find(SDT_CONTENT)
+    children = list(content) if content is not None else []
+    cells = [child for child in children if child.tag == W_TC]
+    if keep or cells:
+        at = parent.index(sdt)
+        for child in reversed(children):
+            parent.insert(at, child)
+        parent.remove(sdt)
+        if not keep:
+            # A cell that went away would tear the row: it stays, empty.
+            for cell in cells:
+                set_cell(cell, "")
+        return
+    parent.remove(sdt)
+    _repair(parent)
+
+
+def _repair(parent: Element) -> None:
+    if parent.tag == W_TBL and next(parent.iter(W_TR), None) is None:
+        above = parent.getparent()
+        above.remove(parent)
+        _repair(above)
+        return
+    holders = (W_TC, q("w:hdr"), q("w:ftr"), q("w:footnote"), q("w:endnote"), q("w:txbxContent"))
+    if parent.tag in holders and (len(parent) == 0 or (parent.tag == W_TC and parent[-1].tag != W_P)):
+        etree.SubElement(parent, W_P)
+
+
+def _clear(element: Element) -> None:
+    for child in list(element):
+        element.remove(child)
+
+
+# Values in a document that is read from the right: a number keeps its sign, a size its order.
+
+
+_LRM = "\u200e"
+_OFF = ("0", "false", "off")
+
+
+def from_the_right(package: Any, parts: list[Story]) -> bool:
+    """Tell whether some paragraph, table or style of a document is set from right to left."""
+    styles = getattr(package.main_document_part, "_styles_part", None)
+    roots = [story.root for story in parts] + ([] if styles is None else [styles.element])
+    return any(
+        (one.get(q("w:val")) or "1").lower() not in _OFF
+        for root in roots
+        for one in root.iter(q("w:bidi"), q("w:bidiVisual"))
+    )
+
+
+def kept_whole(text: str) -> str:
+    """Return a text with a digit, and no letter from the right, between marks from the left, line by line.
+
+    >>> kept_whole("-33.4") == "\\u200e-33.4\\u200e", kept_whole("steel")
+    (True, 'steel')
+    """
+    return "\n".join(f"{_LRM}{line}{_LRM}" if _wants_marks(line) else line for line in text.split("\n"))
+
+
+def _wants_marks(line: str) -> bool:
+    kinds = {unicodedata.bidirectional(character) for character in line}
+    return "EN" in kinds and not kinds & {"R", "AL", "AN"}

@@ -1,0 +1,245 @@
+"""What the template lint says: its rules, and a finding with its rule and place."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cache
+from typing import Any, Literal
+
+from lxml import etree
+
+from toolkit.report.style import Style
+from toolkit.report.word.contents import can_update, contents_fields
+from toolkit.report.word.scan import place_of
+from toolkit.report.word.xml import NS, Element, Story, parser, q, walk_fields
+
+RULES = {
+    "no-tags": "the template has no tag of the toolkit",
+    "unknown-tag": "a tag is not in the catalogue",
+    "malformed-tag": "a literal tag is not closed or has no path",
+    "missing-required": "a required tag is not in the template",
+    "doubled-tag": "a figure or table stands twice in the body",
+    "bad-format": "the format after the bar does not fit the tag",
+    "wrong-place": "a tag stands where it cannot be filled",
+    "overlapping-tags": "a tag stands inside a control that will be filled as a whole",
+    "no-table": "a table tag has no table",
+    "prototype": "a table has no prototype row, or more than one",
+    "unknown-column": "a prototype row names a column that the table has not",
+    "column-count": "a prototype row without tags has more or fewer cells than the table has columns",
+    "tracked-changes": "the template holds tracked changes",
+    "comments": "the template holds comments",
+    "date-field": "a DATE or TIME field becomes the day of printing",
+    "if-field": "an IF field is not evaluated",
+    "contents": "a table of contents or an index is of a kind that is not updated",
+    "missing-style": "a style that the style file names is not in the template",
+    "font-unavailable": "a font is not installed and will be replaced",
+    "attached-template": "the template is attached to another file, which is dropped",
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LintFinding:
+    """One finding: rule, level, the part of the package, the place in it, and a sentence."""
+
+    rule: str
+    level: Literal["error", "warning"]
+    part: str
+    place: str
+    message: str
+
+    def as_dict(self) -> dict[str, str]:
+        """Return the finding as a JSON-ready dict."""
+        return {
+            "rule": self.rule,
+            "level": self.level,
+            "part": self.part,
+            "place": self.place,
+            "message": self.message,
+        }
+
+
+# The lint around the tags: tracked changes, comments, fields, styles, and tags where nothing is filled.
+
+
+_INDEXES = ("TOC", "INDEX", "TOA", "BIBLIOGRAPHY")
+_TRACKED = tuple(q(f"w:{one}") for one in ("ins", "del", "moveFrom", "moveTo", "rPrChange", "pPrChange"))
+
+
+def surroundings(package: object, parts: list[Story], style: Style) -> Iterator[LintFinding]:
+    """Yield what around the tags asks for a look, and tags that stand where nothing is filled."""
+
+    def warn(rule: str, story: Story, element: Element, message: str) -> LintFinding:
+        return LintFinding(
+            rule=rule, level="warning", part=story.name, place=place_of(element, story), message=message
+        )
+
+    # Their elements are held, so that an identity stays that of one element.
+    written = [field.begin for field in contents_fields(parts[0].root) if can_update(field)]
+    known = {id(one) for one in written}
+    for story in parts:
+        for element in story.root.iter(*_TRACKED):
+            yield warn("tracked-changes", story, element, "tracked changes: accept or reject them before use")
+            break
+        for element in story.root.iter(q("w:del"), q("w:moveFrom")):
+            if _TAG.search("".join(one.text or "" for one in element.iter(q("w:delText"), q("w:t")))):
+                yield LintFinding(
+                    rule="tracked-changes",
+                    level="error",
+                    part=story.name,
+                    place=place_of(element, story),
+                    message="a tag stands in a tracked deletion and would be printed: accept the deletion",
+                )
+        for element in story.root.iter(q("w:commentReference")):
+            yield warn("comments", story, element, "a comment will stand in the report")
+            break
+        for element, code in walk_fields(story.root):
+            word = code.split()[0].upper() if code.split() else ""
+            if word in ("DATE", "TIME"):
+                yield warn(
+                    "date-field", story, element, f"{word} becomes the day of printing; use tk:report.date"
+                )
+            elif word == "IF":
+                yield warn("if-field", story, element, "an IF field is not evaluated; use a tk:if control")
+            elif word in _INDEXES and id(element) not in known:
+                yield warn(
+                    "contents",
+                    story,
+                    element,
+                    f"this {word} field is updated by Word alone, not in the PDF: contents of headings, of "
+                    "styles or of captions, in the body, are",
+                )
+    yield from _unreached(package, parts)
+    names = _style_names(package)
+    for use, name in style.styles:
+        if name.lower() not in names:
+            yield LintFinding(
+                rule="missing-style",
+                level="warning",
+                part="word/styles.xml",
+                place=name,
+                message=f"the style file names {name!r} for {use}; the template has no such style",
+            )
+
+
+def _style_names(package: object) -> set[str]:
+    main = package.main_document_part  # type: ignore[attr-defined]
+    return {
+        (one.find(q("w:name")).get(q("w:val")) or "").lower()
+        for one in main._styles_part.element.iter(q("w:style"))
+        if one.find(q("w:name")) is not None
+    }
+
+
+_TAG = re.compile(r"\{\{\s*tk:")
+_TEXTS = ("t", "v")  # a:t of drawings and diagrams, m:t of formulas, c:v of charts
+_WORDS = q("w:t")[: -len("t")]
+
+
+def _unreached(package: Any, parts: list[Story]) -> Iterator[LintFinding]:
+    """Find literal tags in formulas, diagrams and charts: they would be printed as they are."""
+    trees = [(story.name, story.root) for story in parts]
+    walked = {name for name, _ in trees}
+    for part in package.iter_parts():
+        name = str(part.partname).lstrip("/")
+        if name in walked or not re.search(r"/(charts|diagrams|drawings)/[^/]*\.xml$", name):
+            continue
+        trees.append((name, etree.fromstring(part.blob, parser())))
+    for name, root in trees:
+        text = "".join(
+            e.text or ""
+            for e in root.iter()
+            if isinstance(e.tag, str) and e.tag.rpartition("}")[2] in _TEXTS and not e.tag.startswith(_WORDS)
+        )
+        if _TAG.search(text):
+            yield LintFinding(
+                rule="wrong-place",
+                level="error",
+                part=name,
+                place="part",
+                message="a literal tag stands in a formula, a diagram or a chart, where nothing is filled",
+            )
+
+
+# Which fonts a template asks for, and which of them this machine cannot show as they are.
+
+
+# Fonts of equal metrics: a text keeps its line breaks.
+_EQUAL = {
+    "calibri": "carlito",
+    "cambria": "caladea",
+    "arial": "liberation sans",
+    "helvetica": "liberation sans",
+    "times new roman": "liberation serif",
+    "times": "liberation serif",
+    "courier new": "liberation mono",
+}
+_SYMBOLS = ("symbol", "wingdings", "wingdings 2", "wingdings 3", "webdings")
+
+
+@cache
+def installed_fonts() -> frozenset[str]:
+    """Return the families that fontconfig knows, in lower case; empty where it is not installed."""
+    try:
+        done = subprocess.run(["fc-list", ":", "family"], capture_output=True, timeout=20, check=False)
+    except (OSError, subprocess.TimeoutExpired):
+        return frozenset()
+    text = done.stdout.decode("utf-8", "replace").replace("\n", ",")
+    return frozenset(name.strip().lower() for name in text.split(",") if name.strip())
+
+
+def missing_fonts(package: object, parts: list[Story]) -> list[str]:
+    """Return the fonts of the text and its styles that are not installed, nor one of equal metrics."""
+    have = installed_fonts()
+    if not have:
+        return []
+    wanted = {name for name in _wanted(package, parts) if name}
+    return sorted(
+        name
+        for name in wanted
+        if name.lower() not in have and _EQUAL.get(name.lower()) not in have and name.lower() not in _SYMBOLS
+    )
+
+
+def _wanted(package: object, parts: list[Story]) -> Iterator[str]:
+    main = package.main_document_part  # type: ignore[attr-defined]
+    theme = _theme(main)
+    used = {
+        e.get(q("w:val"))
+        for story in parts
+        for tag in ("pStyle", "rStyle", "tblStyle")
+        for e in story.root.iter(q(f"w:{tag}"))
+    }
+    for story in parts:
+        for fonts in story.root.iter(q("w:rFonts")):
+            yield from _names(fonts, theme)
+    root = main._styles_part.element
+    for style in root.iter(q("w:style"), q("w:rPrDefault")):
+        default = style.tag == q("w:rPrDefault") or style.get(q("w:default")) == "1"
+        if default or style.get(q("w:styleId")) in used:
+            for fonts in style.iter(q("w:rFonts")):
+                yield from _names(fonts, theme)
+
+
+def _names(fonts: Element, theme: dict[str, str]) -> Iterator[str]:
+    for side in ("ascii", "hAnsi"):
+        named = fonts.get(q(f"w:{side}Theme"))
+        yield theme.get(named[:5], "") if named else fonts.get(q(f"w:{side}")) or ""
+
+
+def _theme(main: object) -> dict[str, str]:
+    from lxml import etree
+
+    from toolkit.report.word.xml import parser
+
+    for rel in main.rels.values():  # type: ignore[attr-defined]
+        if rel.reltype.endswith("/theme") and not rel.is_external:
+            root = etree.fromstring(rel.target_part.blob, parser())
+            return {
+                kind: latin.get("typeface") or ""
+                for kind in ("minor", "major")
+                if (latin := root.find(f".//a:{kind}Font/a:latin", NS)) is not None
+            }
+    return {}

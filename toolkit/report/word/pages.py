@@ -1,0 +1,259 @@
+"""Which headers, footers and notes a page can show."""
+
+from __future__ import annotations
+
+import datetime as dt
+from typing import TYPE_CHECKING, Any
+
+from docx.enum.section import WD_HEADER_FOOTER
+from lxml import etree
+
+from toolkit.calibration.records.use import DRAFT
+from toolkit.recording.marks import output_keywords
+from toolkit.report.content import ReportContent
+from toolkit.report.word.scan import LITERAL, visible_texts
+from toolkit.report.word.xml import W_P, Element, Story, clean, in_fallback, new_run, q
+from toolkit.version import __version__
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+_NOTES = ("footnote", "endnote")
+_OFF = ("0", "false", "off")
+
+
+def headers_shown(
+    package: Any, parts: list[Story]
+) -> tuple[tuple[str, ...], tuple[tuple[str, tuple[str, ...]], ...]]:
+    """Return the headers, footers and notes that no page shows, and the headers that some page may show.
+
+    Call it before the template is filled: the words are its own, without tags.
+
+    A section's first page has a header of its own only with ``titlePg``, even pages only where the settings
+    ask for them; the others then depend on how many pages there are.
+    """
+    main = package.main_document_part
+    even = switched_on(getattr(settings_of(main), "element", None), "w:evenAndOddHeaders")
+    certain: set[str] = set()
+    possible: set[str] = set()
+    title_somewhere = any(switched_on(s, "w:titlePg") for s in main.element.iter(q("w:sectPr")))
+    for section in main.element.iter(q("w:sectPr")):
+        for reference in section.iter(q("w:headerReference"), q("w:footerReference")):
+            rel = main.rels.get(reference.get(q("r:id")))
+            if rel is None or rel.is_external:
+                continue
+            name = str(rel.target_part.partname).lstrip("/")
+            kind = reference.get(q("w:type")) or "default"
+            # A later section may show the first page's header of the one before.
+            if kind == "default" and not even and not switched_on(section, "w:titlePg"):
+                certain.add(name)
+            elif kind == "default" or (kind == "first" and title_somewhere) or (kind == "even" and even):
+                possible.add(name)
+    own = {story.name: story for story in parts if story.root.tag in (q("w:hdr"), q("w:ftr"))}
+    noted = {kind for kind, _ in notes_used(main.element)}
+    unseen = {
+        story.name
+        for story in parts
+        for kind in _NOTES
+        if story.root.tag == q(f"w:{kind}s") and kind not in noted
+    }
+    never = tuple(sorted((set(own) - certain - possible) | unseen))
+    perhaps = tuple(
+        (
+            name,
+            tuple(
+                words
+                for p in own[name].root.iter(W_P)
+                if not in_fallback(p)
+                for words in LITERAL.split("".join(t.text or "" for t in visible_texts(p)))[::2]
+            ),
+        )
+        for name in sorted((possible - certain) & set(own))
+    )
+    return never, perhaps
+
+
+def notes_used(body: Any) -> set[tuple[str, str]]:
+    """Return (kind, id) of the footnotes and endnotes that a body refers to."""
+    return {(kind, one.get(q("w:id")) or "") for kind in _NOTES for one in body.iter(q(f"w:{kind}Reference"))}
+
+
+def drop_notes(parts: list[Story]) -> None:
+    """Take out the footnotes and endnotes that no mark refers to, or none any more: nothing prints them.
+
+    Separators have a type, and stay.
+    """
+    used = notes_used(parts[0].root)
+    for story in parts:
+        for kind in _NOTES:
+            if story.root.tag != q(f"w:{kind}s"):
+                continue
+            for note in list(story.root.findall(q(f"w:{kind}"))):
+                special = (note.get(q("w:type")) or "normal") != "normal"
+                if not special and (kind, note.get(q("w:id")) or "") not in used:
+                    story.root.remove(note)
+
+
+def settings_of(main: Any) -> Any:
+    """Return the part with the document's settings, None where it has none."""
+    return next(
+        (
+            rel.target_part
+            for rel in main.rels.values()
+            if not rel.is_external and rel.reltype.endswith("/settings")
+        ),
+        None,
+    )
+
+
+def switched_on(element: Any, name: str) -> bool:
+    """Tell whether a child that is a switch is on."""
+    found = None if element is None else element.find(q(name))
+    return found is not None and (found.get(q("w:val")) or "1").lower() not in _OFF
+
+
+# A line that stands on every page of a document, whatever its template: it goes in by the toolkit.
+
+
+PAGE_MARK = "mark:pages"
+_TOP = 300  # twips from the edge of the page: what most printers can print, above most headers
+_SIDES = 1100  # twips of the page's width that the frame leaves free
+_LETTER = 12240  # twips, where a section states no width
+_HALF_POINTS = 16
+_RED = "B00000"
+
+
+def mark_pages(package: Any, text: str) -> None:
+    """Put a line of text on every page: first, even and odd ones, of every section."""
+    main = package.main_document_part
+    sections = [one for one in main.element.iter(q("w:sectPr")) if one.getparent().tag != q("w:sectPrChange")]
+    if not sections:
+        sections = [etree.SubElement(main.element.find(q("w:body")), q("w:sectPr"))]
+    headers = {id(element): element for element in _headers(main, sections)}
+    for kind in _needed(main, sections):
+        # A later section without a header of a kind shows that of the one before it.
+        if _reference(sections[0], kind) is None:
+            part, identity = main.add_header_part()
+            sections[0].add_headerReference(kind, identity)
+            headers[id(part.element)] = part.element
+    frame = _frame(text, min(_width(section) for section in sections) - _SIDES)
+    for header in headers.values():
+        _insert(header, frame)
+
+
+def _headers(main: Any, sections: Sequence[Element]) -> Iterator[Element]:
+    for section in sections:
+        for reference in section.findall(q("w:headerReference")):
+            rel = main.rels.get(reference.get(q("r:id")))
+            if rel is not None and not rel.is_external:
+                yield rel.target_part.element
+
+
+def _needed(main: Any, sections: Sequence[Element]) -> Iterator[WD_HEADER_FOOTER]:
+    yield WD_HEADER_FOOTER.PRIMARY
+    if any(switched_on(section, "w:titlePg") for section in sections):
+        yield WD_HEADER_FOOTER.FIRST_PAGE
+    if switched_on(getattr(settings_of(main), "element", None), "w:evenAndOddHeaders"):
+        yield WD_HEADER_FOOTER.EVEN_PAGE
+
+
+def _reference(section: Element, kind: WD_HEADER_FOOTER) -> Element | None:
+    wanted = {
+        WD_HEADER_FOOTER.PRIMARY: "default",
+        WD_HEADER_FOOTER.FIRST_PAGE: "first",
+        WD_HEADER_FOOTER.EVEN_PAGE: "even",
+    }[kind]
+    return next(
+        (
+            element
+            for element in section.findall(q("w:headerReference"))
+            if (element.get(q("w:type")) or "default") == wanted
+        ),
+        None,
+    )
+
+
+def _width(section: Element) -> int:
+    size = section.find(q("w:pgSz"))
+    return int((None if size is None else size.get(q("w:w"))) or _LETTER)
+
+
+def _frame(text: str, width: int) -> Element:
+    """Return the frame: a paragraph of its own look, whatever the styles of the template say."""
+    paragraph = etree.Element(W_P)
+    properties = etree.SubElement(paragraph, q("w:pPr"))
+
+    def add(parent: Element, name: str, **values: str | int) -> Element:
+        made = etree.SubElement(parent, q(name))
+        for key, value in values.items():
+            made.set(q(f"w:{key}"), str(value))
+        return made
+
+    add(
+        properties, "w:framePr", w=width, hSpace=0, wrap="around", vAnchor="page", hAnchor="page",
+        xAlign="center", y=_TOP,
+    )  # fmt: skip
+    add(properties, "w:pBdr")
+    for side in ("top", "left", "bottom", "right"):
+        add(properties[-1], f"w:{side}", val="single", sz=4, space=1, color=_RED)
+    add(properties, "w:shd", val="clear", color="auto", fill="FFFFFF")
+    add(properties, "w:suppressAutoHyphens")
+    add(properties, "w:bidi", val=0)
+    add(properties, "w:spacing", before=0, after=0, line=240, lineRule="auto")
+    add(properties, "w:ind", left=0, right=0, firstLine=0)
+    add(properties, "w:jc", val="center")
+    look = etree.Element(q("w:rPr"))
+    add(look, "w:b")
+    for off in ("i", "caps", "smallCaps", "strike", "vanish"):
+        add(look, f"w:{off}", val=0)
+    add(look, "w:color", val=_RED)
+    add(look, "w:spacing", val=0)
+    add(look, "w:sz", val=_HALF_POINTS)
+    add(look, "w:u", val="none")
+    paragraph.append(new_run(text, look))
+    return paragraph
+
+
+def _insert(header: Element, frame: Element) -> None:
+    """Put a copy of the frame before a paragraph, on which it hangs."""
+    from copy import deepcopy
+
+    anchor = next((one for one in header if one.tag == W_P), None)
+    if anchor is None:
+        anchor = etree.SubElement(header, W_P)
+    anchor.addprevious(deepcopy(frame))
+
+
+# Document properties: the report's own title, author and dates in place of python-docx's of 2013.
+
+
+def set_properties(package: Any, content: ReportContent) -> None:
+    """Set title, author and dates; the dates are the day of issue, so that the content is reproducible."""
+    _one_core(package)
+    core = package.core_properties
+    day = dt.datetime.combine(dt.date.fromisoformat(content.issued), dt.time(), tzinfo=dt.UTC).replace(
+        tzinfo=None
+    )
+    title = f"{DRAFT}: {content.title}" if content.draft_reasons else content.title
+    core.title, core.author = clean(title)[:255], clean(content.author)[:255]
+    core.last_modified_by = f"toolkit {__version__}"
+    core.subject = clean(content.subject)[:255]
+    core.identifier = content.identity
+    # So that a report that lies in a test's folder is never taken for a recording.
+    core.keywords = output_keywords(simulated=any(name == "simulated" for name, _ in content.marks))
+    core.comments = ""
+    core.created = core.modified = day
+    core.revision = 1
+
+
+def _one_core(package: Any) -> None:
+    """Let go of properties that stand there under another program's name for their relation.
+
+    LibreOffice writes its own (``officedocument`` in small letters); python-docx does not see it and would
+    add a second part of the same name, a file that Word calls damaged.
+    """
+    from docx.opc.constants import RELATIONSHIP_TYPE
+
+    for identity, one in list(package.rels.items()):
+        if one.reltype.endswith("/core-properties") and one.reltype != RELATIONSHIP_TYPE.CORE_PROPERTIES:
+            del package.rels[identity]

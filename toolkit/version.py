@@ -1,0 +1,3 @@
+"""The version of the toolkit: written into every record, reduced test and document."""
+
+__version__ = "0.1.0"
