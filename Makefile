@@ -10,7 +10,7 @@ JOBS   ?= 2
 
 APT_PACKAGES := libreoffice-writer-nogui fonts-crosextra-carlito fonts-crosextra-caladea fonts-liberation2 poppler-utils
 
-.PHONY: demo test check golden bench coverage proof setup lock clean
+.PHONY: demo test check golden house pages bench coverage proof setup lock clean
 
 setup: $(STAMP) $(SYSTEM)
 
@@ -29,6 +29,14 @@ check: $(STAMP)
 # Every frozen answer (records, reduced tests, tires, audits, diagnoses, documents) against the code of today.
 golden: setup
 	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m tests.golden check
+
+# Lines, modules, names and arrows of the package.
+house: $(STAMP)
+	$(BIN)/python -m tests.house
+
+# The pages of docs/ that are printed from declarations: formats, effects, characteristics, rules, tags.
+pages: $(STAMP)
+	$(BIN)/python -m tests.house.pages
 
 bench: setup
 	$(BIN)/python -m tests.benchmarks

@@ -2,7 +2,8 @@
 
 A page is prose, written by hand, above a line that says so, and below it what the declarations say: one page
 for each file format, one each for the effects, the characteristics and the rules. A page that does not exist
-yet is begun with its title; its prose is then to be written.
+yet is begun with its title; its prose is then to be written. The page of tags is the report's own
+(`toolkit.report.kinds`) and is written with them.
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ from toolkit.declared.describe import _sections
 from toolkit.effects.catalogue import effects
 from toolkit.effects.effect import Effect, Stage
 from toolkit.lab.rules import effect_keys, rules_catalogue
+from toolkit.report.kinds import write_manual
 
 GENERATED = "<!-- Written by `make pages` from here on: change the declarations, not this text. -->"
 
@@ -152,6 +154,11 @@ def main() -> int:
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_text(text, encoding="utf-8")
             print(path.relative_to(ROOT))  # noqa: T201
+    tags = ROOT / "docs" / "templates.md"
+    present = tags.read_text(encoding="utf-8")
+    write_manual(tags)
+    if tags.read_text(encoding="utf-8") != present:
+        print(tags.relative_to(ROOT))  # noqa: T201
     return 0
 
 
