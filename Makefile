@@ -30,7 +30,7 @@ check: $(STAMP)
 golden: setup
 	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m tests.golden check
 
-# Lines, modules, names and arrows of the package.
+# The house in figures: sizes, names, commands, effects named outside their file, imports up, pages.
 house: $(STAMP)
 	$(BIN)/python -m tests.house
 

@@ -256,7 +256,7 @@ def refused(action):
     "address", ["tcp://127.0.0.1:{port}", "nonsense://x:1", "tcp://", "tcp://127.0.0.1:not-a-port"]
 )
 def test_a_scheduler_that_cannot_be_reached(address, monkeypatch):
-    monkeypatch.setattr("toolkit.audit.scheduler.CONNECT_S", 1.0)
+    monkeypatch.setattr("toolkit.audit.cluster.CONNECT_S", 1.0)
     where = address.format(port=free_port())
     error = refused(lambda: list(run_on_cluster(make, ["a"], address=where)))
     assert error.rule == "cluster"
@@ -264,7 +264,7 @@ def test_a_scheduler_that_cannot_be_reached(address, monkeypatch):
 
 
 def test_something_that_is_no_scheduler_answers(monkeypatch):
-    monkeypatch.setattr("toolkit.audit.scheduler.CONNECT_S", 0.3)
+    monkeypatch.setattr("toolkit.audit.cluster.CONNECT_S", 0.3)
     with socket.create_server(("127.0.0.1", 0)) as other:
         address = f"tcp://127.0.0.1:{other.getsockname()[1]}"
         assert refused(lambda: list(run_on_cluster(make, ["a"], address=address))).rule == "cluster"

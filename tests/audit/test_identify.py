@@ -215,7 +215,7 @@ def test_every_variant_of_a_record_is_recognised_as_itself(order, turned, seed):
 
 
 def test_rows_that_a_candidate_meets_by_chance_do_not_part_an_unknown_file():
-    from toolkit.audit.segments import Hit, Run, without_chance
+    from toolkit.audit.identify import Hit, Run, without_chance
 
     def hit(group):
         return (Hit(group=group, signs=(("FY", 0), ("MZ", 0))),)

@@ -42,7 +42,7 @@ def fits(group, file, rows):
 @pytest.mark.parametrize("name", FILES)
 def test_whatever_explains_every_row_passes(name):
     file = FILES[name]
-    passed = set(screen_of(RECORDS, file).whole(file))
+    passed = set(screen_of(RECORDS, file).for_all_rows(file))
     for key, group in every(file):
         if all(fit.all(axis=1).any() for fit in fits(group, file, slice(None))):
             assert key in passed
@@ -100,4 +100,4 @@ def test_equations_with_higher_terms_always_pass():
     )  # fmt: skip
     curved = sealed(dataclasses.replace(R2, id="m15-r9", loads=loads))
     file = columns()
-    assert len(screen_of((curved,), file).whole(file)) == len(list(itertools.permutations(range(3))))
+    assert len(screen_of((curved,), file).for_all_rows(file)) == len(list(itertools.permutations(range(3))))

@@ -7,8 +7,7 @@ from pathlib import Path
 import pytest
 
 from toolkit.audit import archive as archive_module
-from toolkit.audit.archive import audit_archive
-from toolkit.audit.sums import SUMS, read_sums, sum_up, write_sums
+from toolkit.audit.archive import SUMS, audit_archive, read_sums, sum_up, write_sums
 from toolkit.calibration.registry.registry import Registry
 from toolkit.errors import OutputError
 from toolkit.examples.fig4_4 import write_fig4_4
@@ -117,7 +116,7 @@ def test_a_full_disk_leaves_no_part_of_them(tmp_path, monkeypatch):
         yield b"{}\n"
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("toolkit.audit.sums._lines", full)
+    monkeypatch.setattr("toolkit.audit.archive._lines", full)
     with pytest.raises(OutputError, match="No space left"):
         write_sums(tmp_path, sum_up([]), "a key")
     assert list(tmp_path.iterdir()) == []

@@ -41,8 +41,7 @@ _PAIRS = 3
 
 def run(folder: Path, count: int) -> list[dict[str, object]]:
     """Time the audit against its peers, then a second run, memory, and hold every grade against the truth."""
-    from toolkit.audit.archive import audit_archive
-    from toolkit.audit.inventory import inventory
+    from toolkit.audit.archive import audit_archive, inventory
     from toolkit.calibration.registry.registry import Registry
 
     big = make_archive(folder / "big", files=FILES)

@@ -193,7 +193,7 @@ def _per_point(count: int) -> Result:
 
 def _families(folder: Path, count: int) -> Result:
     from toolkit.channels import signs
-    from toolkit.simulation.bakker1987 import aligning_moment, lateral_force
+    from toolkit.simulation.tire import aligning_moment, lateral_force
     from toolkit.tires.catalog import find, model_names
     from toolkit.tires.fit import Curve, fit_curves
     from toolkit.tires.global_data import measured

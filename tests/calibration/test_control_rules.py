@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from toolkit.calibration.control.shewhart import RULES, breaks_of, broken_rules, limits_of
+from toolkit.calibration.control.chart import RULES, breaks_of, broken_rules, limits_of
 
 # z that break exactly one rule, at the last point; and the same sequence with the last point harmless.
 ONLY = {

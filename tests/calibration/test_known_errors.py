@@ -14,10 +14,9 @@ from test_mutations import forge, refuse_all
 
 from toolkit.calibration.fit.diagnostics import diagnose
 from toolkit.calibration.fit.findings import session_findings
-from toolkit.calibration.fit.gls import fit_gls
 from toolkit.calibration.fit.odr import fit_odr
 from toolkit.calibration.fit.regression import TermFit, fit_terms
-from toolkit.calibration.fit.session_fit import fit_session
+from toolkit.calibration.fit.session_fit import fit_gls, fit_session
 from toolkit.calibration.records.precise import solve_gls_precisely, solve_odr_precisely
 from toolkit.calibration.records.record import CalibrationRecord
 from toolkit.calibration.registry.candidate import calibrate

@@ -15,7 +15,6 @@ import pytest
 from tire_factory import LOAD, M15, reduced_test
 
 from tests.recipes import file_of
-from toolkit.characteristics.budget import COLUMNS, CORRECTION
 from toolkit.characteristics.catalogue import (
     by_channel,
     characteristics,
@@ -27,9 +26,15 @@ from toolkit.characteristics.catalogue import (
     tables,
 )
 from toolkit.characteristics.characterise import characterise
-from toolkit.characteristics.characteristic import PRINTED, Characteristic
+from toolkit.characteristics.characteristic import (
+    COLUMNS,
+    CORRECTION,
+    PRINTED,
+    PULL,
+    STIFFNESS,
+    Characteristic,
+)
 from toolkit.characteristics.groups import CHANNELS
-from toolkit.characteristics.layout import PULL, STIFFNESS
 from toolkit.lab.home import packaged_home
 from toolkit.report.test.content import REPORT
 from toolkit.simulation.plan import Plan

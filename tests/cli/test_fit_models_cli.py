@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 from toolkit.cli import fit
 from toolkit.errors import ToolkitError
 from toolkit.lab.fit_models import model_choice
-from toolkit.simulation.bakker1987 import aligning_moment, lateral_force
+from toolkit.simulation.tire import aligning_moment, lateral_force
 from toolkit.tires.catalog import model_names
 
 KEYS = (

@@ -7,9 +7,8 @@ from types import SimpleNamespace as Of
 import numpy as np
 import pytest
 
-from toolkit.diagnosis.answer.classes import apart
 from toolkit.diagnosis.answer.locate import places
-from toolkit.diagnosis.answer.next_measurements import to_find_it
+from toolkit.diagnosis.answer.next_measurements import apart, to_find_it
 
 
 def found(*variables):

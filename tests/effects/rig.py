@@ -10,8 +10,8 @@ import dataclasses
 
 import numpy as np
 
+from toolkit.effects.forward import similar
 from toolkit.effects.signals import Drive, Setting, Tire, TireForces, drive
-from toolkit.effects.similarity import similar
 
 PEAK, SLOPE, TRAIL = 1.0, 15.0, 0.02  # of the load: friction [1], stiffness [1/rad]; trail [m]
 NOMINAL = 4000.0

@@ -11,7 +11,8 @@ Rules
   them must stay, and the check lists such sentences apart.
 - Times, software versions, ledger heads and folders are no results and are left out
   (`tests.golden.workplace`).
-- On another processor or with other libraries the last bits of linear algebra differ. The files hold a
-  fingerprint of the arithmetic that made them; where it is another, numbers are compared to a relative 1e-6.
+- On another processor or with other libraries the last bits of linear algebra differ, and with them hashes
+  and the ends of searches. The files hold a fingerprint of the arithmetic that made them; where it is
+  another, nothing is compared, and the check tells how to freeze the same commit there.
 - What the command line cannot give is imported in `tests.golden.surface` and nowhere else.
 """

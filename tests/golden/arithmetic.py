@@ -10,8 +10,15 @@ import numpy as np
 import scipy
 import scipy.linalg
 import scipy.special
+from numpy.typing import NDArray
 
 _FILE = "arithmetic.json"
+OTHER_ARITHMETIC = """error: this machine's arithmetic is not that of the frozen files
+  got:      another processor, more than one thread (OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1), or other
+            versions of numpy and scipy: the last bits of results differ
+  expected: the fingerprint in arithmetic.json beside the files
+  next:     freeze the commit that froze the files here, with its package first in PYTHONPATH
+            (python -m tests.golden freeze --out DIR), then compare with it (check --frozen DIR)"""
 
 
 def fingerprint() -> dict[str, str]:
@@ -35,9 +42,16 @@ def fingerprint() -> dict[str, str]:
             np.fft.rfft(right).view(float),
             np.array([right.sum(), right.std(), right @ right]),
         ]
-        for part in parts:
-            digest.update(np.ascontiguousarray(part, float).tobytes())
+        _add(digest, *parts)
+    # Large enough to be shared by threads, which sum in another order.
+    matrix = rng.normal(size=(300, 300))
+    _add(digest, matrix.T @ matrix, matrix @ matrix.T, np.linalg.inv(matrix))
     return {"numpy": np.__version__, "scipy": scipy.__version__, "sha256": digest.hexdigest()}
+
+
+def _add(digest: hashlib._Hash, *values: NDArray[np.float64]) -> None:
+    for value in values:
+        digest.update(np.ascontiguousarray(value, float).tobytes())
 
 
 def read_fingerprint(folder: Path) -> dict[str, str] | None:

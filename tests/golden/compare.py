@@ -1,6 +1,6 @@
 """Two answers, frozen and of today, walked side by side: what differs, where, and by how much.
 
-Three rules, by the area of an entry:
+Two rules, by the area of an entry:
 
 bit-equal
     The same JSON: a number that differs in its last bit differs, so does 1 from 1.0.
@@ -8,14 +8,12 @@ standard error
     Of a diagnosis: a value and its interval may differ by 1e-9 of the value's standard error, a shift of a
     nominal parameter by 1e-9 of its prior's, evidence and errors of prediction by a relative 1e-7: they
     follow the values.
-other arithmetic
-    Where the processor's arithmetic is not that of the frozen files: numbers to a relative 1e-6.
-
 A sentence for people may be worded anew: where its numbers are the same, the difference is one of wording.
 """
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import math
 import re
@@ -25,7 +23,6 @@ from typing import Any
 
 SHARE_OF_STANDARD_ERROR = 1e-9
 SHARE_OF_EVIDENCE = 1e-7
-SHARE_ON_OTHER_ARITHMETIC = 1e-6
 BY_STANDARD_ERROR = ("diagnosis", "proof")
 """Areas that are compared by standard errors."""
 SENTENCES = frozenset("message statement reason note why equation reference description".split())
@@ -49,9 +46,9 @@ class Difference:
         return f"{self.path}\n    frozen {self.frozen}\n    today  {self.today}{by}"
 
 
-def differences(frozen: Any, today: Any, area: str, *, same_arithmetic: bool = True) -> list[Difference]:
+def differences(frozen: Any, today: Any, area: str) -> list[Difference]:
     """Return every difference between two answers of an entry in an area."""
-    return list(_walk(frozen, today, _Place(area in BY_STANDARD_ERROR, same_arithmetic)))
+    return list(_walk(frozen, today, _Place(area in BY_STANDARD_ERROR)))
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,31 +56,27 @@ class _Place:
     """Where the walk is: the key path, its last key, and how far a number may be off."""
 
     by_standard_error: bool
-    same_arithmetic: bool
     path: str = ""
     key: str = ""
     scale: float | None = None
 
     def at(self, key: str, parent: Mapping[str, Any]) -> _Place:
+        """Return the place of an entry of a table."""
         scale = _scale(key, parent) if self.by_standard_error else None
-        return _Place(
-            self.by_standard_error, self.same_arithmetic, f"{self.path}.{key}".lstrip("."), key,
-            self.scale if scale is None else scale,
-        )  # fmt: skip
+        path = f"{self.path}.{key}".lstrip(".")
+        return _Place(self.by_standard_error, path, key, self.scale if scale is None else scale)
 
     def row(self, number: int) -> _Place:
-        return _Place(
-            self.by_standard_error, self.same_arithmetic, f"{self.path}[{number}]", self.key, self.scale
-        )
+        """Return the place of an entry of a list."""
+        return dataclasses.replace(self, path=f"{self.path}[{number}]")
 
     def allowed(self, frozen: float) -> float:
         """Return how far a number may be from the frozen one."""
-        other = 0.0 if self.same_arithmetic else SHARE_ON_OTHER_ARITHMETIC * max(abs(frozen), self.scale or 0)
         if not self.by_standard_error:
-            return other
+            return 0.0
         if self.scale is not None:
-            return max(other, SHARE_OF_STANDARD_ERROR * self.scale)
-        return max(other, SHARE_OF_EVIDENCE * abs(frozen))
+            return SHARE_OF_STANDARD_ERROR * self.scale
+        return SHARE_OF_EVIDENCE * abs(frozen)
 
 
 def _scale(key: str, parent: Mapping[str, Any]) -> float | None:

@@ -45,13 +45,13 @@ def measure(root: Path = ROOT) -> dict[str, Any]:
         "cli_without_command": structure.without_command(modules),
         "effects_named_outside": {
             "mentions": [dataclasses.asdict(mention) for mention in effects],
-            "modules": len({mention.module for mention in effects}),
+            "modules": len({mention.place for mention in effects}),
         },
         "arrows_up": {
             room: [dataclasses.asdict(arrow) for arrow in structure.arrows_up(graph, room, root)]
             for room in structure.ROOMS
         },
-        "pages_missing": [dataclasses.asdict(m) for m in citations.pages_missing(modules, root)],
+        "pages_missing": [dataclasses.asdict(m) for m in citations.pages_missing(root)],
         "imported_once": [
             {"module": module, "importer": importer} for module, importer in structure.imported_once(graph)
         ],

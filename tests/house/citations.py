@@ -6,7 +6,7 @@ import ast
 import io
 import re
 import tokenize
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -22,15 +22,15 @@ conicity), unless the module imports the effects or the diagnosis.
 
 @dataclass(frozen=True, slots=True)
 class Mention:
-    """A word at a line of a module."""
+    """A word at a line of a module or page."""
 
-    module: str
+    place: str
     line: int
     word: str
 
 
 def effect_names(modules: Sequence[Module]) -> frozenset[str]:
-    """Return the names of the effects: the files of ``toolkit/effects`` that define ``EFFECT``."""
+    """Return the names of the effects: the files of the layer ``effects`` that define ``EFFECT``."""
     return frozenset(
         module.path.stem
         for module in modules
@@ -43,22 +43,26 @@ def _binds(node: ast.stmt, name: str) -> bool:
     return any(isinstance(target, ast.Name) and target.id == name for target in targets)
 
 
-def effects_named(modules: Sequence[Module], catalogue: str = "toolkit.effects.catalogue") -> list[Mention]:
+PLAN_KEYS = ("toolkit.simulation.plan", "toolkit.simulation.plan_sections")
+"""Modules in which such words are keys of a plan's sections: the truth of the virtual machine, a format."""
+
+
+def effects_named(modules: Sequence[Module]) -> list[Mention]:
     """Return where an effect is named outside its own file, each name once a line.
 
     A name is a string equal to it, alone or before ``.``, ``=`` or ``:``, or a word of a string that is a
     list of such names; and an import of the effect's module. Other identifiers are free: the virtual tire
-    has a conicity, and a parameter of a tire file may be a pressure change. So are docstrings and comments.
-    The catalogue's own list counts once, until the catalogue is found by scan.
+    has a conicity, and a parameter of a tire file may be a pressure change. So are docstrings and comments,
+    and the keys of a plan.
     """
     names = effect_names(modules)
     mentions: list[Mention] = []
     for module in modules:
         if module.layer not in EFFECT_LAYERS and not _imports_effects(module):
             continue
+        if module.name in PLAN_KEYS:
+            continue
         at = {pair for pair in _words(module.tree, names) if pair[1] != module.path.stem}
-        if module.name == catalogue:
-            at = set(sorted(at)[:1])
         mentions += [Mention(module.name, line, word) for line, word in sorted(at)]
     return mentions
 
@@ -97,28 +101,31 @@ _FOLDER = re.compile(r"(?<![\w./-])(docs/[\w./-]*\w)")
 _SECTION = re.compile(r"\.md[`'\"]?,\s+(?:section\s+)?[\"“']([^\"”']+)[\"”']")
 
 
-def pages_missing(modules: Sequence[Module], root: Path) -> list[Mention]:
+def pages_missing(root: Path) -> list[Mention]:
     """Return citations of pages, or of their sections, that the checkout does not hold.
 
-    Read are docstrings, comments and messages: every ``page.md``, ``docs/...``, ``page.md#section`` and
-    ``page.md, "Section"``. A page may be cited by its path or by its name alone.
+    Read are docstrings, comments and messages of the package and its tests, and the pages themselves: every
+    ``page.md``, ``docs/...``, ``page.md#section`` and ``page.md, "Section"``. A page may be cited by its path
+    or by its name alone. The CHANGELOG tells of pages that were, and these tests of pages that never are.
     """
     pages = {path.relative_to(root).as_posix(): path for path in _pages(root)}
-    mentions: list[Mention] = []
-    for module in modules:
-        for line, text in _prose(module):
-            for match in _PAGE.finditer(text):
-                page = _page(match[1], pages, root)
-                title = _SECTION.match(text, match.end(1) - 3)
-                section = match[2] or (title and title[1])
-                if page is None or (section and not _has_section(page, section)):
-                    mentions.append(Mention(module.name, line, match[0] + (f", {title[1]}" if title else "")))
-            mentions += [
-                Mention(module.name, line, match[1])
-                for match in _FOLDER.finditer(text)
-                if not match[1].endswith(".md") and not (root / match[1]).exists()
-            ]
-    return mentions
+    return [
+        Mention(place, line, cited)
+        for place, line, text in _prose(root, pages.values())
+        for cited in _missing(text, pages, root)
+    ]
+
+
+def _missing(text: str, pages: dict[str, Path], root: Path) -> Iterator[str]:
+    for match in _PAGE.finditer(text):
+        page = _page(match[1], pages, root)
+        title = _SECTION.match(text, match.end(1) - 3)
+        section = match[2] or (title and title[1])
+        if page is None or (section and not _has_section(page, section)):
+            yield match[0] + (f", {title[1]}" if title else "")
+    for match in _FOLDER.finditer(text):
+        if not match[1].endswith(".md") and not (root / match[1]).exists():
+            yield match[1]
 
 
 def _pages(root: Path) -> Iterator[Path]:
@@ -144,11 +151,18 @@ def _anchor(title: str) -> str:
     return re.sub(r"[^\w -]", "", title.lower()).replace(" ", "-")
 
 
-def _prose(module: Module) -> Iterator[tuple[int, str]]:
-    """Yield comments and strings with their lines; a string of many lines line by line."""
-    if ".md" not in module.text and "docs/" not in module.text:
-        return
-    for token in tokenize.generate_tokens(io.StringIO(module.text).readline):
-        if token.type in (tokenize.COMMENT, tokenize.STRING):
-            for number, text in enumerate(token.string.splitlines()):
-                yield token.start[0] + number, text
+def _prose(root: Path, pages: Iterable[Path]) -> Iterator[tuple[str, int, str]]:
+    """Yield place, line and text of every comment, string and page; strings of many lines line by line."""
+    for page in pages:
+        if page.name != "CHANGELOG.md":
+            for number, text in enumerate(page.read_text(encoding="utf-8").splitlines(), start=1):
+                yield page.relative_to(root).as_posix(), number, text
+    for folder in (PACKAGE, "tests", "proof"):
+        for path in sorted((root / folder).rglob("*.py")):
+            text = path.read_text(encoding="utf-8")
+            if path.is_relative_to(root / "tests" / "house") or not (".md" in text or "docs/" in text):
+                continue
+            for token in tokenize.generate_tokens(io.StringIO(text).readline):
+                if token.type in (tokenize.COMMENT, tokenize.STRING):
+                    for number, line in enumerate(token.string.splitlines(), start=token.start[0]):
+                        yield path.relative_to(root).as_posix(), number, line

@@ -10,7 +10,7 @@ from workbook_factory import DATA, HEADERS, members, packed, sheet_xml, table_xm
 from toolkit.errors import CellError, ColumnError, RecordingError, ToolkitError, UnreadableError
 from toolkit.machine import load_machine
 from toolkit.recording import read_recording
-from toolkit.recording.crosscheck import cross_check
+from toolkit.recording.read import cross_check
 from toolkit.recording.safe_open import gate
 from toolkit.recording.table import Table
 

@@ -16,7 +16,7 @@ from tests.campaigns.tires import sweep
 from toolkit.examples.fig4_4 import ROWS
 from toolkit.reduction import limits
 from toolkit.reduction.physics import Readings, departures, longest_trail, of_sizes
-from toolkit.simulation import bakker1987
+from toolkit.simulation.tire import aligning_moment, lateral_force
 from toolkit.tires.models import tmeasy
 from toolkit.tires.tir import read_tir
 from toolkit.tires.tir_evaluate import evaluate_tir
@@ -36,8 +36,8 @@ def bakker(**changes: object) -> Readings:
     return sweep(
         ANGLES,
         (1112, 2522, 3705, 4897, 6103),
-        FY=lambda a, FZ: bakker1987.lateral_force(slip_angle=-a, load=FZ),
-        MZ=lambda a, FZ: bakker1987.aligning_moment(slip_angle=-a, load=FZ),
+        FY=lambda a, FZ: lateral_force(slip_angle=-a, load=FZ),
+        MZ=lambda a, FZ: aligning_moment(slip_angle=-a, load=FZ),
         trail_m=longest_trail(0.316),
         **changes,
     )

@@ -14,8 +14,8 @@ from toolkit.machine import load_machine
 from toolkit.pipeline import process, read_test
 from toolkit.recording.folder import read_test_folder
 from toolkit.recording.labview import write_labview
+from toolkit.reduction.blocks import find_rests
 from toolkit.reduction.model import ReducedTest
-from toolkit.reduction.rests import find_rests
 
 M15 = load_machine("m15")
 ANGLES, LOADS = (0.0, 2.0, -2.0), (400.0, 800.0)

@@ -17,8 +17,7 @@ import pytest
 from tests.conftest import EXAMPLES
 from toolkit.audit.archive import audit_archive
 from toolkit.audit.linked import PastReport, link
-from toolkit.audit.timeline import timelines
-from toolkit.audit.traces import traces, worst_files
+from toolkit.audit.timeline import timelines, traces, worst_files
 from toolkit.calibration.registry.registry import Registry
 from toolkit.lab.rules import rules_catalogue
 from toolkit.recording.marks import own_output

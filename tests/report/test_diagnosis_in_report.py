@@ -23,9 +23,8 @@ from toolkit.findings import Finding
 from toolkit.report.content import ReportContent
 from toolkit.report.diagnosis.answer import DIAGNOSIS, Told
 from toolkit.report.figures import Picture, _figure
-from toolkit.report.kinds import VOCABULARIES
+from toolkit.report.kinds import VOCABULARIES, list_tags
 from toolkit.report.kinds import check as check_template
-from toolkit.report.reference import list_tags
 from toolkit.report.style import Style
 from toolkit.report.test.content import REPORT, build_content
 from toolkit.report.word.check import vocabulary_of

@@ -13,8 +13,7 @@ from template_factory import FOLDER, make, p, tbl, texts
 
 import toolkit.report.test
 from tests.recipes import file_of
-from toolkit.report.kinds import VOCABULARIES, check, write_manual
-from toolkit.report.reference import list_tags, reference_page
+from toolkit.report.kinds import VOCABULARIES, check, list_tags, reference_page, write_manual
 from toolkit.report.style import Style
 from toolkit.report.test.content import REPORT, build_content
 from toolkit.report.vocabulary import Entry, TableEntry, Vocabulary, columns_of

@@ -3,7 +3,7 @@ import math
 import numpy as np
 import pytest
 
-from toolkit.simulation.bakker1987 import ALIGNING, LATERAL, aligning_moment, lateral_force
+from toolkit.simulation.tire import ALIGNING, LATERAL, aligning_moment, lateral_force
 
 # Load [kN], cornering stiffness [N/deg], aligning stiffness [N·m/deg] of the published coefficients, as
 # worked out beside the data set apart from this code (data set bakker1987_mf_coeffs, PROVENANCE.txt).

@@ -13,10 +13,9 @@ import toolkit
 from toolkit.effects.signals import drive
 from toolkit.errors import ConfigError, ToolkitError
 from toolkit.simulation.file_tire import read_file_tire
-from toolkit.simulation.maker import table_csv, write_table
 from toolkit.simulation.plan import read_plan, with_effects
 from toolkit.simulation.run import simulate
-from toolkit.simulation.steady import settled, steady_of
+from toolkit.simulation.steady import settled, steady_of, table_csv, write_table
 from toolkit.simulation.truth import truth_document
 from toolkit.tires.table import read_table
 from toolkit.tires.tir import read_tir

@@ -241,7 +241,7 @@ def test_pooled_error_on_a_real_tire_binned_by_a_quarter_degree():
     path = DATA / "ttc_cornering" / "cornering_IA0_P83kPa.csv"
     if not path.is_file():
         pytest.skip("the cornering data set is not beside this checkout")
-    from toolkit.tires.blocks import load_blocks
+    from toolkit.tires.global_data import load_blocks
 
     with path.open() as stream:
         rows = list(csv.DictReader(stream))

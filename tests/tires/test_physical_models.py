@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tests.conftest import SHARED_DATA
-from toolkit.simulation.bakker1987 import aligning_moment, lateral_force
+from toolkit.simulation.tire import aligning_moment, lateral_force
 from toolkit.tires.catalog import find
 from toolkit.tires.global_data import measured
 from toolkit.tires.global_fit import fit_global

@@ -12,7 +12,7 @@ from toolkit.audit.columns import Columns, columns_of
 from toolkit.audit.context import Context, context_of
 from toolkit.audit.identify import identify_columns, recompute
 from toolkit.audit.model import CLEAN, TELLS, Identification
-from toolkit.audit.stored import impossible
+from toolkit.audit.quality import impossible
 from toolkit.errors import RecordError, RegistryError
 from toolkit.findings import Finding
 from toolkit.recording.read import read_recording

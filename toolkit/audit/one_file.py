@@ -19,8 +19,7 @@ from toolkit.audit.context import DEFAULT_MACHINE, Context, MachineSource, conte
 from toolkit.audit.estimate import Estimate, estimate
 from toolkit.audit.identify import identify_columns, recompute
 from toolkit.audit.model import Grade, Identification
-from toolkit.audit.quality import quality
-from toolkit.audit.stored import impossible
+from toolkit.audit.quality import impossible, quality
 from toolkit.calibration.registry.registry import Registry
 from toolkit.channels import REVERSALS, ROTATIONS, Rotation, seen_by_cells, signs
 from toolkit.errors import ToolkitError

@@ -177,3 +177,123 @@ class Characteristic:
             directions = [by_rotation[rotation] for rotation in self.runs]
         unmet = (need.text for need in self.needs if not all(need.met(direction) for direction in directions))
         return next(unmet, "the data do not determine it")
+
+
+# The tables that characteristics are columns of, and the figures that several of them share.
+
+
+STIFFNESS = WideTable(
+    name="stiffness",
+    scope="direction",
+    text="cornering and aligning stiffness, one row a load and direction",
+    place=1,
+    answer="stiffness",
+)
+PULL = WideTable(
+    name="pull",
+    scope="load",
+    text="pull characteristics by symmetry, one row a load",
+    place=2,
+    answer="pull",
+)
+PULL_THESIS = WideTable(
+    name="pull_thesis",
+    scope="load",
+    text="the same by the thesis's formulas, and the single-direction residual moments",
+    place=3,
+    answer="pull",
+)
+AT_ANGLES = WideTable(
+    name="at_angles",
+    scope="angle",
+    text="FY and MZ off the curves at the slip angles of the protocol, one row a load, direction and angle",
+    place=4,
+    answer="at_angles",
+)
+
+PRAT_FIGURE = Figure(
+    name="prat",
+    title="plysteer residual aligning torque",
+    text="plysteer residual aligning torque against load, both definitions",
+)
+CORNERING_FIGURE = Figure(
+    name="cornering_stiffness",
+    title="cornering stiffness",
+    text="cornering stiffness against load, secant and slope",
+)
+ALIGNING_FIGURE = Figure(
+    name="aligning_stiffness",
+    title="aligning stiffness",
+    text="aligning stiffness against load, secant and slope",
+)
+SECANT_LABEL = "±1 deg secant"
+SLOPE_LABEL = "slope at 0 deg"
+
+
+# The sources of uncertainty that the budget of a characteristic names, and the columns that show them.
+
+
+CALIBRATION = "calibration"
+CELL_ZERO = "cell zero"
+TARE = "tare"
+CORRECTION = "machine correction"
+ANGLE_ZERO = "slip angle zero"
+ANGLE_SCALE = "slip angle scale"
+ANGLE_SCATTER = "slip angle scatter"
+LOAD = "load"
+PRESSURE = "pressure"
+REPEATABILITY = "repeatability"
+FIT = "fit"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BudgetColumn:
+    """A column of a printed budget: the sources that it adds in quadrature, and what they are."""
+
+    name: str
+    sources: tuple[str, ...]
+    text: str
+
+
+COLUMNS = (
+    BudgetColumn(
+        name="calibration",
+        sources=(CALIBRATION,),
+        text="calibration record: fit and what its session stated",
+    ),
+    BudgetColumn(
+        name="zero",
+        sources=(CELL_ZERO, TARE),
+        text="zero of the cells: an open one, or the scatter of the tare",
+    ),
+    BudgetColumn(name="SA_zero", sources=(ANGLE_ZERO,), text="zero of the slip angle"),
+    BudgetColumn(name="SA_scale", sources=(ANGLE_SCALE,), text="scale of the slip angle"),
+    BudgetColumn(name="load_cell", sources=(LOAD,), text="load"),
+    BudgetColumn(name="pressure", sources=(PRESSURE,), text="inflation pressure"),
+    BudgetColumn(
+        name="repeatability",
+        sources=(REPEATABILITY, ANGLE_SCATTER),
+        text="scatter of the rows within each block",
+    ),
+    BudgetColumn(
+        name="fit",
+        sources=(FIT,),
+        text="scatter of the blocks about the curves beyond that of their rows",
+    ),
+)
+
+# What makes uncertain whatever is read off the fitted curves.
+CURVE_BUDGET = (
+    CALIBRATION,
+    CELL_ZERO,
+    TARE,
+    CORRECTION,
+    ANGLE_ZERO,
+    ANGLE_SCALE,
+    LOAD,
+    PRESSURE,
+    REPEATABILITY,
+    FIT,
+)
+# Of the measured steps themselves: their slip angles scatter too.
+STEP_BUDGET = (*CURVE_BUDGET, ANGLE_SCATTER)

@@ -71,8 +71,7 @@ def tags(
     Example: toolkit template tags --test tests/2019-06-04
     """
     from toolkit.lab.answers import table
-    from toolkit.report.kinds import VOCABULARIES
-    from toolkit.report.reference import list_tags
+    from toolkit.report.kinds import VOCABULARIES, list_tags
     from toolkit.report.style import read_style, style_file
     from toolkit.report.test.content import build_content
 

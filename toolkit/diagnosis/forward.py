@@ -78,7 +78,8 @@ def case_of(model: ModelFile, inputs: Sequence[Path], conditions: Mapping[str, s
     if not inputs:
         raise ConfigError(
             "a model file is run on inputs", where=model.path, got="no --inputs",
-            expected=f"CSV files with {', '.join(one.name for one in channels if one.role != 'output')}",
+            expected="CSV files with "
+            + ", ".join(channel.name for channel in channels if channel.role != "output"),
             next_step="give --inputs FILE.csv, or name the model as [tire] file of a plan", rule="model-file",
         )  # fmt: skip
     runs = tuple(

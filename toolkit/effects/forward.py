@@ -15,16 +15,37 @@ import numpy as np
 
 from toolkit.effects.applied import AppliedEffect, in_order
 from toolkit.effects.effect import STAGES
-from toolkit.effects.similarity import Steady, similar
+from toolkit.effects.signals import Drive, TireForces
 from toolkit.errors import FitError
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from toolkit.effects.signals import Drive, Setting, Tire, TireForces
+    from toolkit.effects.signals import Setting, Tire
 
     Signals = dict[str, NDArray[np.float64]]
     View = Callable[[str, NDArray[np.float64]], NDArray[np.float64]]
+
+# A steady tire under other friction, stiffness and trail: the similarity method, for any tire as it is.
+
+
+Steady = Callable[["NDArray[np.float64]", Drive], TireForces]
+
+
+def similar(steady: Steady, drive: Drive) -> TireForces:
+    """Return the forces of a drive in the machine's axes.
+
+    Parameters
+    ----------
+    steady : (slip angle [rad], drive) -> forces of the nominal steady tire
+    drive : with what the effects have made of friction, stiffness, trail and forces on top
+    """
+    nominal = steady(drive.SA * drive.stiffness / drive.friction, drive)
+    return TireForces(
+        FY=drive.friction * nominal.FY + drive.FY,
+        MZ=drive.friction * drive.trail * nominal.MZ + drive.MZ,
+    )
+
 
 _STEPS = 8
 _EXACT = 1e-9  # of the largest value: no digit that a recording has

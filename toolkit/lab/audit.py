@@ -58,9 +58,8 @@ def audit(order: AuditOrder, *, stage: Stage | None = None) -> tuple[AuditAnswer
     ToolkitError
         the archive, the registry or a folder cannot be used: told before any file is read
     """
-    from toolkit.audit.archive import audit_archive
+    from toolkit.audit.archive import audit_archive, inventory
     from toolkit.audit.corrected import check_target, write_copies
-    from toolkit.audit.inventory import inventory
     from toolkit.audit.linked import link, read_reports
     from toolkit.audit.parquet import check_parquet, write_parquet
     from toolkit.audit.since_good import drift_since, drifted_files, drifted_tests
@@ -138,8 +137,7 @@ def write_folder(
     TemplateError, RenderError
         the summary cannot be made; the page and the lines are there
     """
-    from toolkit.audit.timeline import timelines
-    from toolkit.audit.traces import traces
+    from toolkit.audit.timeline import timelines, traces
     from toolkit.files import atomic_path
     from toolkit.lab.rules import rules_catalogue
     from toolkit.recording.marks import GENERATOR, OWN_OUTPUT

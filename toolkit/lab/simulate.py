@@ -109,7 +109,7 @@ def _check_apart(folder: Path, out: Path) -> None:
 
 
 def _table(plan: Plan, out: Path) -> tuple[dict[str, Any], str]:
-    from toolkit.simulation.maker import TABLE, write_table
+    from toolkit.simulation.steady import TABLE, write_table
     from toolkit.simulation.write import check_folder
 
     check_folder(out, {TABLE})

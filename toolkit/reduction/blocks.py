@@ -1,8 +1,10 @@
-"""Load blocks: the runs of rows at one vertical load."""
+"""How rows are parted: load blocks at one vertical load, and the rests of a continuous recording."""
 
 from __future__ import annotations
 
 import itertools
+from collections import deque
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -61,3 +63,142 @@ def find_blocks(FZ: NDArray[np.float64]) -> tuple[Block, ...]:
 def is_tare(block: Block, *, smallest_load: float) -> bool:
     """Tell whether a block is a tare: under 5 % of the smallest load of the protocol [N]."""
     return abs(block.mean_FZ) < 0.05 * smallest_load
+
+
+# Rests of a continuous recording: where slip angle and load stand still between the moves.
+
+# The rows with which a move ends lie inside the bands too; a rest begins where both have come this near,
+# as a part of the band, to their median over the rest.
+_ARRIVED = 0.25
+
+
+def find_rests(
+    *,
+    SA: NDArray[np.float64],
+    FZ: NDArray[np.float64],
+    turns: NDArray[np.float64],
+    band_SA: float,
+    band_FZ: float,
+    floor_FZ: float,
+    least_turns: float,
+) -> tuple[Block, ...]:
+    """Return the rests of a recording that holds the moves too, in the order of recording.
+
+    Parameters
+    ----------
+    SA, FZ : (rows,) slip angle [rad] and load [N]
+    turns : (rows,) revolutions since the first row, rising
+    band_SA : range of the slip angle [rad] within one rest
+    band_FZ : range of the load within one rest, as a part of its largest value; ``floor_FZ`` [N] is the
+        range that is always allowed, so that a lifted wheel rests too
+    least_turns : a rest lasts so many revolutions; what is shorter is part of a move
+
+    Notes
+    -----
+    The longest run of rows inside both bands is a rest; then the longest of what is left on either side. A
+    single row beyond a band ends a run, so that a band must be wider than the noise.
+
+    Examples
+    --------
+    >>> SA = np.radians([0, 0, 0, 0, 1, 2, 2, 2, 2])
+    >>> rests = find_rests(SA=SA, FZ=np.full(9, 1000.0), turns=np.arange(9) / 3, band_SA=0.01,
+    ...     band_FZ=0.1, floor_FZ=50.0, least_turns=1.0)
+    >>> [(rest.start, rest.stop) for rest in rests]
+    [(0, 4), (5, 9)]
+    """
+    ends = _ends(SA, FZ, band_SA=band_SA, band_FZ=band_FZ, floor_FZ=floor_FZ)
+    row = float(turns[-1] - turns[0]) / max(len(turns) - 1, 1)
+    blocks: list[Block] = []
+    open_parts = [(0, len(SA))]
+    while open_parts:
+        first, last = open_parts.pop()
+        if last <= first or turns[last - 1] - turns[first] + row < least_turns * (1 - 1e-9):
+            continue
+        stops = np.minimum(ends[first:last], last)
+        lengths = turns[stops - 1] - turns[first:last]
+        start = first + int(np.argmax(lengths))
+        stop = int(stops[start - first])
+        a, b = _arrived(SA, FZ, start, stop, band_SA=band_SA, band_FZ=band_FZ, floor_FZ=floor_FZ)
+        if lengths[start - first] + row < least_turns * (1 - 1e-9):
+            continue
+        if turns[b - 1] - turns[a] + row >= least_turns * (1 - 1e-9):
+            blocks.append(Block(start=a, stop=b, mean_FZ=float(FZ[a:b].mean())))
+        open_parts += [(first, start), (stop, last)]
+    return tuple(sorted(blocks, key=lambda block: block.start))
+
+
+def _ends(
+    SA: NDArray[np.float64], FZ: NDArray[np.float64], *, band_SA: float, band_FZ: float, floor_FZ: float
+) -> NDArray[np.int64]:
+    """Return for every row where the run that begins there leaves a band, (rows,), the row excluded."""
+    angles, loads = _Extremes(SA.tolist()), _Extremes(FZ.tolist())
+    ends = np.empty(len(SA), dtype=np.int64)
+    start = 0
+    for row in range(len(SA)):
+        angles.add(row)
+        loads.add(row)
+        while start < row and (
+            angles.range > band_SA or loads.range > max(band_FZ * loads.largest, floor_FZ)
+        ):
+            ends[start] = row
+            start += 1
+            angles.drop_before(start)
+            loads.drop_before(start)
+    ends[start:] = len(SA)
+    return ends
+
+
+class _Extremes:
+    """Largest and smallest value of a window that moves over a list (monotone queues)."""
+
+    def __init__(self, values: list[float]) -> None:
+        self._values = values
+        self._high: deque[int] = deque()
+        self._low: deque[int] = deque()
+
+    def add(self, row: int) -> None:
+        values = self._values
+        while self._high and values[self._high[-1]] <= values[row]:
+            self._high.pop()
+        while self._low and values[self._low[-1]] >= values[row]:
+            self._low.pop()
+        self._high.append(row)
+        self._low.append(row)
+
+    def drop_before(self, row: int) -> None:
+        for queue in self._queues():
+            while queue and queue[0] < row:
+                queue.popleft()
+
+    def _queues(self) -> Iterator[deque[int]]:
+        yield self._high
+        yield self._low
+
+    @property
+    def largest(self) -> float:
+        return self._values[self._high[0]]
+
+    @property
+    def range(self) -> float:
+        return self.largest - self._values[self._low[0]]
+
+
+def _arrived(
+    SA: NDArray[np.float64],
+    FZ: NDArray[np.float64],
+    start: int,
+    stop: int,
+    *,
+    band_SA: float,
+    band_FZ: float,
+    floor_FZ: float,
+) -> tuple[int, int]:
+    """Return the run without the rows at its ends in which the machine still moves."""
+    stretch = slice(start, stop)
+    middle_SA, middle_FZ = float(np.median(SA[stretch])), float(np.median(FZ[stretch]))
+    room_FZ = max(band_FZ * middle_FZ, floor_FZ)
+    there = (np.abs(SA[stretch] - middle_SA) <= _ARRIVED * band_SA) & (
+        np.abs(FZ[stretch] - middle_FZ) <= _ARRIVED * room_FZ
+    )
+    rows = np.flatnonzero(there)
+    return (start + int(rows[0]), start + int(rows[-1]) + 1) if rows.size else (start, stop)

@@ -18,7 +18,7 @@ from toolkit.reduction.common_load import at_one_angle, carry, slopes
 from toolkit.reduction.corrections import correction_findings
 from toolkit.reduction.model import CalibrationUse, Condition, ReducedTest, Tare
 from toolkit.reduction.prepare_rows import OpenedFile, check_record, open_file, split_rests
-from toolkit.reduction.repeats import drift_findings
+from toolkit.reduction.remarks import drift_findings
 from toolkit.reduction.tare import choose_tares, zero_shifts
 from toolkit.version import __version__
 

@@ -3,19 +3,112 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from toolkit.report.reference import reference_page
+from toolkit.report.content import ReportContent, Value
+from toolkit.report.style import Style
+from toolkit.report.vocabulary import Entry, TableEntry, Vocabulary
 from toolkit.report.word.check import LintFinding, check_template
 
 if TYPE_CHECKING:
     from toolkit.report.document import Document
-    from toolkit.report.style import Style
-    from toolkit.report.vocabulary import Vocabulary
     from toolkit.report.word.package import Template
+
+# The list of tags of a kind of document: for programs, and as the page of the manual.
+
+
+_TITLES = {
+    "report": "The report of a test",
+    "certificate": "A calibration certificate",
+    "comparison": "A comparison",
+    "diagnosis": "A diagnosis",
+    "audit": "An audit's summary",
+}
+
+
+def list_tags(content: ReportContent | None, style: Style, vocabulary: Vocabulary) -> list[dict[str, Any]]:
+    """Return every tag as a JSON-ready dict; ``available`` and ``value`` are null without a test."""
+    entries = vocabulary.entries
+    listed = {entry.path for entry in entries}
+    more = [
+        Entry(
+            path=path, kind=value.kind, description="coefficient of the calibration record", unit=value.unit
+        )
+        for path, value in (content.values if content else {}).items()
+        if path not in listed
+    ]
+    return [_tag(entry, content, style, vocabulary) for entry in (*entries, *more)]
+
+
+def _tag(entry: Entry, content: ReportContent | None, style: Style, vocabulary: Vocabulary) -> dict[str, Any]:
+    available: bool | None = None
+    shown: str | bool | None = None
+    name = entry.path.partition(".")[2]
+    unit = style.unit(entry.unit)[0]
+    if content is not None and entry.kind in ("text", "number", "date"):
+        value = content.values.get(entry.path, Value(kind="text", value=None))
+        available = not value.missing
+        shown = value.text(None, content.style) if available else None
+        unit = value.unit or unit
+    elif content is not None and entry.kind == "figure":
+        available = name in content.plots
+        shown = content.plots[name].alt if available else None
+    elif content is not None and entry.kind == "table":
+        rows = content.tables[name].rows
+        available, shown = bool(rows), f"{len(rows)} rows"
+    elif content is not None and entry.kind == "if":
+        available = shown = content.conditions.get(name, False)
+    return {
+        "tag": f"tk:{entry.path}",
+        "kind": entry.kind,
+        "unit": unit,
+        "required": f"tk:{entry.path}" in vocabulary.demanded(style.required),
+        "columns": [column.name for column in entry.columns],
+        "available": available,
+        "value": shown,
+        "description": entry.description,
+    }
+
+
+def reference_page(vocabularies: Iterable[Vocabulary]) -> str:
+    """Return the page of the manual: every value, figure, table and condition of every kind, as Markdown."""
+    return "\n".join(line for vocabulary in vocabularies for line in _chapter(vocabulary))
+
+
+def _chapter(vocabulary: Vocabulary) -> Iterator[str]:
+    yield from (f"## {_TITLES[vocabulary.name]}", "")
+    yield from ("A template must hold " + ", ".join(f"`{tag}`" for tag in vocabulary.required) + ".", "")
+    yield from ("### Values", "", "| tag | kind | unit | value |", "|---|---|---|---|")
+    for entry in vocabulary.values:
+        yield _row(f"`tk:{entry.path}`", entry.kind, entry.unit or "", entry.description)
+    yield from ("", "### Figures", "", "Each has its caption as `tk:caption.<name>`.", "")
+    yield from ("| tag | figure |", "|---|---|")
+    for name, description in vocabulary.figures.items():
+        yield _row(f"`tk:figure.{name}`", description)
+    yield from ("", "### Tables", "")
+    for name, table in vocabulary.tables.items():
+        yield from _table(name, table)
+    yield from ("### Conditions", "")
+    yield from ("Beside these, `tk:if.<name>` takes the name of any value, figure or table.", "")
+    yield from ("| tag | kept when |", "|---|---|")
+    for name, description in vocabulary.conditions.items():
+        yield _row(f"`tk:if.{name}`", description)
+    yield ""
+
+
+def _table(name: str, table: TableEntry) -> Iterator[str]:
+    yield from (f"`tk:table.{name}`: {table.description}.", "", "| tag | unit | column |", "|---|---|---|")
+    for column in table.columns:
+        yield _row(f"`tk:row.{column.name}`", column.unit or "", column.description)
+    yield ""
+
+
+def _row(*cells: str) -> str:
+    return f"| {' | '.join(cell.replace('|', chr(92) + '|') for cell in cells)} |"
+
 
 # The report of a test stands first: a template without the tags of another kind is its own.
 _DOCUMENTS = {

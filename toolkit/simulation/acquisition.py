@@ -89,8 +89,8 @@ def low_pass(signal: NDArray[np.float64], *, time_constant: float, dt: float) ->
 
     pole = math.exp(-dt / time_constant)
     first = np.asarray(signal[:1], dtype=np.float64)
-    made, _ = lfilter([1.0 - pole], [1.0, -pole], signal, axis=0, zi=pole * first)
-    return np.asarray(made, dtype=np.float64)
+    filtered, _ = lfilter([1.0 - pole], [1.0, -pole], signal, axis=0, zi=pole * first)
+    return np.asarray(filtered, dtype=np.float64)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -115,9 +115,9 @@ def draw_noise(truth: AcquisitionTruth, cells: CellsTruth, rows: int, rng: np.ra
 def joined(parts: Sequence[Noise]) -> Noise:
     """Return the noise of parts one after another."""
     return Noise(
-        cells=np.concatenate([one.cells for one in parts]),
-        SA=np.concatenate([one.SA for one in parts]),
-        FZ=np.concatenate([one.FZ for one in parts]),
+        cells=np.concatenate([part.cells for part in parts]),
+        SA=np.concatenate([part.SA for part in parts]),
+        FZ=np.concatenate([part.FZ for part in parts]),
     )
 
 
@@ -150,12 +150,12 @@ def own_columns(
 
 def printed(machine: Machine, channels: dict[str, NDArray[np.float64]]) -> dict[str, NDArray[np.float64]]:
     """Return the columns as the machine's files have them: their units, their order, their digits."""
-    made: dict[str, NDArray[np.float64]] = {}
+    columns: dict[str, NDArray[np.float64]] = {}
     for column in machine.columns:
         if column.symbol in channels:
             values = from_si(channels[column.symbol], column.unit)
-            made[column.symbol] = round_printed(column.symbol, values)
-    return made
+            columns[column.symbol] = round_printed(column.symbol, values)
+    return columns
 
 
 def round_printed(symbol: str, values: NDArray[np.float64]) -> NDArray[np.float64]:

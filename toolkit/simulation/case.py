@@ -17,11 +17,11 @@ from toolkit.errors import ConfigError
 from toolkit.files import read_bytes, write_atomic
 from toolkit.simulation.case_plan import COLUMNS, Free
 from toolkit.simulation.cells import CELLS
-from toolkit.simulation.columns import shown, unit_of
 from toolkit.simulation.file_tire import FileTire
 from toolkit.simulation.plan import Plan
 from toolkit.simulation.run import VirtualFile, VirtualTest
 from toolkit.simulation.steady import steady_of
+from toolkit.simulation.write import shown, unit_of
 from toolkit.tires.tir import read_tir
 from toolkit.tires.tir_write import file_text
 from toolkit.units import from_si
@@ -38,7 +38,15 @@ _TARE_BEFORE_S = 60.0  # how long before the first run the tare ended
 
 def write_runs(test: VirtualTest, folder: Path) -> tuple[Path, ...]:
     """Write every recording as plain CSV, all columns, names in the header; return the files."""
-    names = ("t", "SA", "FZ", *CELLS, "FY", "MZ", *(one for one in COLUMNS if one not in ("SA", "FZ")))
+    names = (
+        "t",
+        "SA",
+        "FZ",
+        *CELLS,
+        "FY",
+        "MZ",
+        *(column for column in COLUMNS if column not in ("SA", "FZ")),
+    )
     return tuple(
         _csv(folder / name, _columns(file, names, []))
         for name, file in zip(run_names(test.plan), test.files, strict=True)
@@ -64,18 +72,18 @@ def write_case(test: VirtualTest, folder: Path, *, record: str | None = None) ->
     outputs = list(CELLS) if cells else ["FY", "MZ"]
     names = ("t", *inputs, *_judged(plan), *outputs)
     simulated = [] if kind == "machine" else ["FY", "MZ"]
-    made = []
+    lines = []
     for name, file in zip(run_names(plan), test.files, strict=True):
         nominal = _nominal(test, file) if simulated else []
-        made.append(_csv(folder / RUNS / name, _columns(file, names, nominal)))
+        lines.append(_csv(folder / RUNS / name, _columns(file, names, nominal)))
     if cells:
-        made.append(_csv(folder / RUNS / _TARE, _tare(test, names)))
+        lines.append(_csv(folder / RUNS / _TARE, _tare(test, names)))
     if plan.tire_file is not None:
         # As the plan has it: of a model file the coefficients that were refitted.
         write_atomic(folder / TIRE, _tire_text(plan.tire_file))
-        made.append(folder / TIRE)
+        lines.append(folder / TIRE)
     write_atomic(folder / CASE, case_toml(test, kind=kind, record=record, inputs=inputs, outputs=outputs))
-    return (folder / CASE, *made)
+    return (folder / CASE, *lines)
 
 
 def case_toml(
@@ -97,8 +105,8 @@ def case_toml(
             lines.append(f"calibration = {_text(str(record))}")
     else:
         lines.append('simulated = { FY = "FY_sim", MZ = "MZ_sim" }')
-    for one in plan.case.parameters:
-        lines += ["", f"[simulation.parameters.{one.name}]", *_parameter(one)]
+    for parameter in plan.case.parameters:
+        lines += ["", f"[simulation.parameters.{parameter.name}]", *_parameter(parameter)]
     lines += ["", "[recording]", 'time = "t"', 'axes = "machine"', "", "[recording.channels]"]
     lines.append('t = { unit = "s", role = "time" }')
     lines += [f'{name} = {{ unit = {_text(unit_of(name))}, role = "{_role(name)}" }}' for name in inputs]
@@ -147,15 +155,15 @@ def _tire_text(file: FileTire) -> bytes:
 def _inputs(test: VirtualTest) -> list[str]:
     """Return the driving columns: slip angle and load, and those that the plan names or that vary."""
     load = test.plan.case.load
-    wanted = test.plan.case.columns
-    if wanted is None:
-        wanted = tuple(
+    columns = test.plan.case.columns
+    if columns is None:
+        columns = tuple(
             name
             for name in COLUMNS
             if not name.endswith("_CMD")
             and len({float(v) for file in test.files for v in shown(file.signals, name)[[0, -1]]}) > 1
         )
-    chosen = dict.fromkeys(("SA", "FZ" if load == "measured" else "FZ_CMD", *wanted))
+    chosen = dict.fromkeys(("SA", "FZ" if load == "measured" else "FZ_CMD", *columns))
     return [name for name in chosen if name != "FZ" or load == "measured"]
 
 
@@ -167,12 +175,12 @@ def _role(name: str) -> str:
     return "input" if name in ("SA", "FZ", "V", "SA_CMD", "FZ_CMD") else "covariate"
 
 
-def _parameter(one: Free) -> list[str]:
-    lines = [f"value = {one.value!r}", f"unit = {_text(one.unit)}"]
-    if one.sd is not None:
-        lines.append(f"sd = {one.sd!r}")
-    if one.bounds is not None:
-        lines.append(f"bounds = [{one.bounds[0]!r}, {one.bounds[1]!r}]")
+def _parameter(free: Free) -> list[str]:
+    lines = [f"value = {free.value!r}", f"unit = {_text(free.unit)}"]
+    if free.sd is not None:
+        lines.append(f"sd = {free.sd!r}")
+    if free.bounds is not None:
+        lines.append(f"bounds = [{free.bounds[0]!r}, {free.bounds[1]!r}]")
     return lines
 
 
@@ -188,28 +196,28 @@ def _nominal(test: VirtualTest, file: VirtualFile) -> list[tuple[str, NDArray[np
     pressure = plan.pressure_Pa if file.run.pressure_Pa is None else file.run.pressure_Pa
     steady = steady_of(plan, rotation=file.rotation, facing=facing, pressure_Pa=pressure)
     start: Drive = drive(signals["t"], signals["SA"], signals["FZ"], V=signals["V"])
-    made = steady(start.SA, start)
+    responses = steady(start.SA, start)
     return [
-        ("FY_sim", np.round(made.FY, 5) + 0.0),
-        ("MZ_sim", np.round(made.MZ, 6) + 0.0),
+        ("FY_sim", np.round(responses.FY, 5) + 0.0),
+        ("MZ_sim", np.round(responses.MZ, 6) + 0.0),
     ]
 
 
 def _tare(test: VirtualTest, names: Sequence[str]) -> list[tuple[str, NDArray[np.float64]]]:
     rows = len(test.tare_rows[CELLS[0]])
     first = {name: values[:1] for name, values in test.files[0].signals.items()}
-    made: list[tuple[str, NDArray[np.float64]]] = []
+    columns: list[tuple[str, NDArray[np.float64]]] = []
     for name in names:
         if name == "t":
             times = -_TARE_BEFORE_S + test.tare_dt * np.arange(rows)
-            made.append((name, np.round(times, 6)))
+            columns.append((name, np.round(times, 6)))
         elif name in CELLS:
-            made.append((name, np.round(from_si(test.tare_rows[name], unit_of(name)), 8) + 0.0))
+            columns.append((name, np.round(from_si(test.tare_rows[name], unit_of(name)), 8) + 0.0))
         elif name in ("SA", "FZ", "SA_CMD", "FZ_CMD"):
-            made.append((name, np.zeros(rows)))
+            columns.append((name, np.zeros(rows)))
         else:
-            made.append((name, np.full(rows, shown(first, name)[0])))
-    return made
+            columns.append((name, np.full(rows, shown(first, name)[0])))
+    return columns
 
 
 def run_names(plan: Plan) -> tuple[str, ...]:

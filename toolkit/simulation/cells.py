@@ -74,8 +74,8 @@ class CellsTruth:
 
 def cell_forces(loads: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the forces [N] (rows, 3: D51, D52, E5) in the cells under loads (rows, 3: FY, MZ, MX)."""
-    made: NDArray[np.float64] = np.linalg.solve(np.array(MAP), np.asarray(loads, dtype=np.float64).T).T
-    return made
+    indications: NDArray[np.float64] = np.linalg.solve(np.array(MAP), np.asarray(loads, dtype=np.float64).T).T
+    return indications
 
 
 def outputs(truth: CellsTruth, *, loads: NDArray[np.float64], tared: bool = False) -> NDArray[np.float64]:

@@ -15,9 +15,8 @@ import numpy as np
 
 from toolkit.effects.applied import acting, in_order
 from toolkit.effects.filters import lag
-from toolkit.effects.forward import driven
+from toolkit.effects.forward import driven, similar
 from toolkit.effects.signals import Drive, Setting, TireForces, drive
-from toolkit.effects.similarity import similar
 from toolkit.simulation import carriage, road
 from toolkit.simulation.places import through_machine
 from toolkit.simulation.plan import Plan
@@ -63,34 +62,36 @@ def walk(plan: Plan, run: RunSteps, line: Timeline, before: Before) -> Walked:
     pressure = plan.pressure_Pa if run.pressure_Pa is None else run.pressure_Pa
     steady = steady_of(plan, rotation=run.rotation, facing=setting.facing, pressure_Pa=pressure)
 
-    def tire(one: Drive) -> TireForces:
-        return similar(steady, one)
+    def tire(drive: Drive) -> TireForces:
+        return similar(steady, drive)
 
-    rolling = [one for one in effects if one.effect.stage in ("road", "tire")]
+    rolling = [effect for effect in effects if effect.effect.stage in ("road", "tire")]
     carried = in_order(effects, "carriage")
-    held = [one for one in carried if one.effect.follows_command == "FZ"]
-    turned = [one for one in carried if one.effect.follows_command != "FZ"]
+    commanded = [applied for applied in carried if applied.effect.follows_command == "FZ"]
+    turned = [applied for applied in carried if applied.effect.follows_command != "FZ"]
     wheel = carriage.wheel_angle(plan.carriage, step_rad=line.SA_CMD)
     start = drive(line.t, wheel, line.FZ_SET, IA=plan.carriage.camber_offset_rad, V=speed)
     start = driven(start, in_order(rolling, "road"), setting, tire)
-    start = driven(start, held, setting, tire)
+    start = driven(start, commanded, setting, tire)
     angle = setting.channels["DRUM_ANGLE"]
     FZ = road.load_on_drum(plan.road, load=start.FZ, angle=angle)
     FZ = through_machine({"FZ": FZ}, rolling, setting, plan.machine)["FZ"]
     start = driven(dataclasses.replace(start, FZ=FZ), turned, setting, tire)
 
-    own = in_order(rolling, "tire")
-    heats = any(one.effect.by_temperature for one in own)
+    on_tire = in_order(rolling, "tire")
+    heats = any(applied.effect.by_temperature for applied in on_tire)
     for _ in range(_HEAT_TURNS if heats else 1):
-        made = driven(start, own, setting, tire)
+        made = driven(start, on_tire, setting, tire)
         forces = tire(made)
         power = np.abs(forces.FY * made.V * np.sin(made.SA))
         setting = _warmed(plan, setting, line, power, before)
     on_top = through_machine({"FY": forces.FY, "MZ": forces.MZ}, rolling, setting, plan.machine)
     answer = HubTire(FY=on_top["FY"], MZ=on_top["MZ"], loaded_radius=loaded_radius(plan, made.FZ))
-    if any(one.effect.by_slip_work for one in own):
+    if any(applied.effect.by_slip_work for applied in on_tire):
         # The effect counts the work of the tire as new: what wear itself adds to it is of second order.
-        new = driven(start, [one for one in own if not one.effect.by_slip_work], setting, tire)
+        new = driven(
+            start, [applied for applied in on_tire if not applied.effect.by_slip_work], setting, tire
+        )
         power = np.abs(tire(new).FY * new.V * np.sin(new.SA))
     steps = 0.5 * (power[1:] + power[:-1]) * np.diff(line.t)
     gap = plan.motion.between_files_s

@@ -51,7 +51,7 @@ def parse_effect(text: str, machine: Machine) -> tuple[AppliedEffect, ...]:
         value outside the effect's bounds, a value where there is none to give, or none where one is needed
     """
     where = f"--effect {text}"
-    head, equals, given = text.partition("=")
+    head, equals, value_text = text.partition("=")
     head, at, confined = head.partition("@")
     name, *parts = [part.strip() for part in head.split(".")]
     effect = find_effect(name, where=where)
@@ -67,17 +67,19 @@ def parse_effect(text: str, machine: Machine) -> tuple[AppliedEffect, ...]:
     source, channels = _signals(effect, parts, where)
     condition = _condition(confined, where) if at else None
     if effect.replaces_record:
-        if not given.strip():
+        if not value_text.strip():
             raise _wrong(
                 "the record that was used is not named", where, "nothing", "a registry id, such as m15-r1",
                 f"write --effect {effect.name}=ID",
             )  # fmt: skip
-        return (AppliedEffect(effect=effect, source=given.strip(), condition=condition),)
-    made = []
+        return (AppliedEffect(effect=effect, source=value_text.strip(), condition=condition),)
+    effects_read = []
     for channel in channels or (None,):
-        units = {one.name: _unit(one, machine, channel, source) for one in effect.parameters}
-        values = _values(effect, parameter, given if equals else None, units, where)
-        made.append(
+        units = {
+            parameter.name: _unit(parameter, machine, channel, source) for parameter in effect.parameters
+        }
+        values = _values(effect, parameter, value_text if equals else None, units, where)
+        effects_read.append(
             AppliedEffect(
                 effect=effect,
                 channel=channel,
@@ -87,30 +89,30 @@ def parse_effect(text: str, machine: Machine) -> tuple[AppliedEffect, ...]:
                 condition=condition,
             )
         )
-    return tuple(made)
+    return tuple(effects_read)
 
 
 def _signals(
     effect: Effect, parts: Sequence[str], where: str
 ) -> tuple[str | None, tuple[str, ...]]:  # source, channels
-    known = channels_of(effect)
+    channels = channels_of(effect)
     if is_paired(effect):
         if len(parts) != 2 or parts[0] == parts[1]:
             raise _wrong(
                 f"effect {effect.name!r} is between two signals", where, ".".join(parts) or "none",
-                f"two of {', '.join(dict.fromkeys((*sources_of(effect), *known)))}",
+                f"two of {', '.join(dict.fromkeys((*sources_of(effect), *channels)))}",
                 f"write {effect.name}.{'D51.D52' if effect.exchanges else 'FZ.FY=0.01'}",
             )  # fmt: skip
         # A swap names two signals, crosstalk says from which to which.
         source = _one_of(parts[0], sources_of(effect), effect, where)
-        channel = _one_of(parts[1], known, effect, where)
+        channel = _one_of(parts[1], channels, effect, where)
         if not can_join(effect, source, channel):
             raise _wrong(
                 f"effect {effect.name!r} cannot join {source} and {channel}", where, ".".join(parts),
                 "two cells, or two loads", "name two signals of one kind",
             )  # fmt: skip
         return source, (channel,)
-    if not known and parts:
+    if not channels and parts:
         expected = f"the effect's name alone{', or .' + ', .'.join(effect.names) if effect.names else ''}"
         near = difflib.get_close_matches(parts[0], effect.names, n=1, cutoff=0.5)
         raise _wrong(
@@ -119,16 +121,16 @@ def _signals(
         )  # fmt: skip
     if len(parts) > 1:
         raise _wrong(
-            f"effect {effect.name!r} acts on one signal", where, ".".join(parts), ", ".join(known),
+            f"effect {effect.name!r} acts on one signal", where, ".".join(parts), ", ".join(channels),
             "name one; give the option again for another",
         )  # fmt: skip
-    return None, (_one_of(parts[0], known, effect, where),) if parts else default_channels(effect)
+    return None, (_one_of(parts[0], channels, effect, where),) if parts else default_channels(effect)
 
 
-def _one_of(part: str, known: Sequence[str], effect: Effect, where: str) -> str:
-    if part in known:
+def _one_of(part: str, choices: Sequence[str], effect: Effect, where: str) -> str:
+    if part in choices:
         return part
-    names = [*known, *effect.names]
+    names = [*choices, *effect.names]
     near = difflib.get_close_matches(part, names, n=1, cutoff=0.5)
     raise _wrong(
         f"effect {effect.name!r} knows no part {part!r}", where, part, ", ".join(names),
@@ -138,7 +140,7 @@ def _one_of(part: str, known: Sequence[str], effect: Effect, where: str) -> str:
 
 def _condition(text: str, where: str) -> Condition:
     key, colon, values = text.partition(":")
-    chosen = tuple(one.strip() for one in values.split("+"))
+    chosen = tuple(level.strip() for level in values.split("+"))
     if not key.strip() or not colon or not all(chosen):
         raise _wrong(
             "a condition is not whole", where, f"@{text}", "@KEY:VALUE or @KEY:VALUE+VALUE",
@@ -147,47 +149,47 @@ def _condition(text: str, where: str) -> Condition:
     return key.strip(), chosen
 
 
-def _unit(one: EffectParameter, machine: Machine, channel: str | None, source: str | None) -> str:
-    if "{" not in one.unit:
-        return one.unit
+def _unit(parameter: EffectParameter, machine: Machine, channel: str | None, source: str | None) -> str:
+    if "{" not in parameter.unit:
+        return parameter.unit
     names = {"channel": channel, "from": source}
     shown = {key: "1" if name is None else unit_of(machine, name) for key, name in names.items()}
-    if one.unit != "{channel}":  # "1/N*m" would be read from left to right
+    if parameter.unit != "{channel}":  # "1/N*m" would be read from left to right
         shown = {key: f"({text})" if set("/*") & set(text) else text for key, text in shown.items()}
-    return re.sub(r"\((\w+)\)", r"\1", one.unit.format_map(shown))  # no brackets around one name
+    return re.sub(r"\((\w+)\)", r"\1", parameter.unit.format_map(shown))  # no brackets around one name
 
 
 def _values(
-    effect: Effect, parameter: str | None, given: str | None, units: dict[str, str], where: str
+    effect: Effect, parameter: str | None, value_text: str | None, units: dict[str, str], where: str
 ) -> dict[str, float]:
     if not effect.parameters:
-        if given is not None:
+        if value_text is not None:
             raise _wrong(
-                f"effect {effect.name!r} is there or not", where, given or "nothing", "no value",
+                f"effect {effect.name!r} is there or not", where, value_text or "nothing", "no value",
                 "leave out the = and what follows",
             )  # fmt: skip
         return {}
-    known = {one.name: one for one in effect.parameters}
-    made: dict[str, float] = {}
-    for item in (given or "").split(","):
+    declared = {parameter.name: parameter for parameter in effect.parameters}
+    values: dict[str, float] = {}
+    for item in (value_text or "").split(","):
         name, colon, text = item.rpartition(":")
         name = name.strip() if colon else (parameter or effect.parameters[0].name)
-        if name not in known:
-            near = difflib.get_close_matches(name, list(known), n=1, cutoff=0.5)
+        if name not in declared:
+            near = difflib.get_close_matches(name, list(declared), n=1, cutoff=0.5)
             raise _wrong(
-                f"effect {effect.name!r} has no parameter {name!r}", where, name, ", ".join(known),
+                f"effect {effect.name!r} has no parameter {name!r}", where, name, ", ".join(declared),
                 f"did you mean {near[0]!r}?" if near else "use one of those expected",
             )  # fmt: skip
-        if name in made:
+        if name in values:
             raise _wrong(
-                f"the parameter {name!r} is given twice", where, given, f"{name} once", "remove one",
+                f"the parameter {name!r} is given twice", where, value_text, f"{name} once", "remove one",
             )  # fmt: skip
-        made[name] = _number(effect, known[name], text, units[name], where)
-    return {one.name: made.get(one.name, _usual(one)) for one in effect.parameters}
+        values[name] = _number(effect, declared[name], text, units[name], where)
+    return {parameter.name: values.get(parameter.name, _usual(parameter)) for parameter in effect.parameters}
 
 
-def _number(effect: Effect, one: EffectParameter, text: str, stated: str, where: str) -> float:
-    words = {} if one.words is None else one.words()
+def _number(effect: Effect, parameter: EffectParameter, text: str, stated: str, where: str) -> float:
+    words = {} if parameter.words is None else parameter.words()
     if text.strip() in words:
         return words[text.strip()]
     match = _QUANTITY.fullmatch(text)
@@ -195,37 +197,39 @@ def _number(effect: Effect, one: EffectParameter, text: str, stated: str, where:
     if not match or not math.isfinite(value):
         raise _wrong(
             f"effect {effect.name!r} has no number", where, text.strip() or "nothing",
-            f"a number in {stated} ({one.name}: {one.text})", f"write --effect {effect.name}=VALUE",
+            f"a number in {stated} ({parameter.name}: {parameter.text})",
+            f"write --effect {effect.name}=VALUE",
         )  # fmt: skip
     if match[2]:
-        value *= _factor(match[2], stated, one, where)
-    if not one.bounds[0] <= value <= one.bounds[1]:
+        value *= _factor(match[2], stated, parameter, where)
+    if not parameter.bounds[0] <= value <= parameter.bounds[1]:
         raise _wrong(
-            f"the parameter {one.name!r} of {effect.name!r} cannot be that", where, text.strip(),
-            f"from {one.bounds[0]:g} to {one.bounds[1]:g} {stated}", "give another value",
+            f"the parameter {parameter.name!r} of {effect.name!r} cannot be that", where, text.strip(),
+            f"from {parameter.bounds[0]:g} to {parameter.bounds[1]:g} {stated}", "give another value",
         )  # fmt: skip
     return value
 
 
-def _factor(text: str, stated: str, one: EffectParameter, where: str) -> float:
+def _factor(text: str, stated: str, parameter: EffectParameter, where: str) -> float:
     try:
-        given, own = unit(text, where=where), unit(stated)
+        written_unit, expected = unit(text, where=where), unit(stated)
     except UnitError as error:
         raise _wrong(
-            f"the unit of {one.name!r} is not known", where, text, stated, f"write it in {stated}", error,
+            f"the unit of {parameter.name!r} is not known", where, text, stated,
+            f"write it in {stated}", error,
         ) from error  # fmt: skip
-    if given.dimension != own.dimension or given.offset != own.offset:
+    if written_unit.dimension != expected.dimension or written_unit.offset != expected.offset:
         raise _wrong(
-            f"the parameter {one.name!r} is in a unit of another dimension", where,
-            f"{text} ({given.dimension})", f"{stated} ({own.dimension})", f"write it in {stated}",
+            f"the parameter {parameter.name!r} is in a unit of another dimension", where,
+            f"{text} ({written_unit.dimension})", f"{stated} ({expected.dimension})", f"write it in {stated}",
         )  # fmt: skip
-    return given.factor / own.factor
+    return written_unit.factor / expected.factor
 
 
-def _usual(one: EffectParameter) -> float:
-    if one.off is not None:
-        return one.off
-    return one.starts[0] if one.starts else 0.5 * (one.typical[0] + one.typical[1])
+def _usual(parameter: EffectParameter) -> float:
+    if parameter.off is not None:
+        return parameter.off
+    return parameter.starts[0] if parameter.starts else 0.5 * (parameter.typical[0] + parameter.typical[1])
 
 
 def _wrong(

@@ -116,6 +116,6 @@ def file_forces(
         KAPPA=0.0, pressure_change=change, V=V, V0=tire.LONGVL if tire.version == "6.x" else None,
         angles="star",
     )  # fmt: skip
-    made = (mf52 if tire.version == "5.2" else mf61).forces(p, q, UNLOADED_RADIUS=tire.UNLOADED_RADIUS)
-    FY, MZ = np.where(loaded, made.FY, 0.0), np.where(loaded, made.MZ, 0.0)
+    responses = (mf52 if tire.version == "5.2" else mf61).forces(p, q, UNLOADED_RADIUS=tire.UNLOADED_RADIUS)
+    FY, MZ = np.where(loaded, responses.FY, 0.0), np.where(loaded, responses.MZ, 0.0)
     return TireForces(FY=FY if reverse else -FY, MZ=-MZ)

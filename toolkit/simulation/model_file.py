@@ -130,10 +130,12 @@ def read_model(path: Path) -> ModelFile:
     if axes not in AXES:
         raise _wrong("unknown axis system", f"{path}: axes", axes, ", ".join(AXES))
     load = table.get("nominal_load_N")
-    rest = {key: one for key, one in simulation.items() if key not in (*FILES, "parameters", "sha256")}
-    named = {key: simulation[key] for key in FILES if key in simulation}
-    known = _table(simulation.get("sha256", {}), f"{path}: simulation.sha256")
-    check_keys(known, FILES, where=f"{path}: simulation.sha256")
+    settings = {
+        key: entry for key, entry in simulation.items() if key not in (*FILES, "parameters", "sha256")
+    }
+    files = {key: simulation[key] for key in FILES if key in simulation}
+    hashes = _table(simulation.get("sha256", {}), f"{path}: simulation.sha256")
+    check_keys(hashes, FILES, where=f"{path}: simulation.sha256")
     return ModelFile(
         path=path,
         sha256=sha256_bytes(data),
@@ -143,15 +145,15 @@ def read_model(path: Path) -> ModelFile:
         complete=answer.get("complete") is True,
         case_sha256=_text(answer.get("case_sha256"), f"{path}: answer.case_sha256"),
         recordings=tuple(
-            (name, _text(one, f"{path}: answer.recordings"))
-            for name, one in _table(answer.get("recordings"), f"{path}: answer.recordings").items()
+            (name, _text(digest, f"{path}: answer.recordings"))
+            for name, digest in _table(answer.get("recordings"), f"{path}: answer.recordings").items()
         ),
         axes=axes,
         time=None if table.get("time") is None else _text(table["time"], f"{path}: time"),
         nominal_load_N=None if load is None else _number(load, f"{path}: nominal_load_N"),
         kind=_text(simulation.get("kind"), f"{path}: simulation.kind"),
-        simulation=rest | {key: one for key, one in named.items() if key not in known},
-        files=tuple((key, _same(path, key, named.get(key), one)) for key, one in known.items()),
+        simulation=settings | {key: file for key, file in files.items() if key not in hashes},
+        files=tuple((key, _same(path, key, files.get(key), digest)) for key, digest in hashes.items()),
         parameters=_parameters(simulation.get("parameters", {}), f"{path}: simulation.parameters"),
         channels=_table(table.get("channels", {}), f"{path}: channels"),
         effects=_effects(
@@ -163,15 +165,15 @@ def read_model(path: Path) -> ModelFile:
     )
 
 
-def _same(path: Path, key: str, name: object, known: object) -> Path:
+def _same(path: Path, key: str, name: object, digest: object) -> Path:
     """Return a file of the simulation, or refuse one that has changed."""
     where = f"{path}: simulation.{key}"
     file = path.parent / _text(name, where)
-    found = sha256_bytes(read_bytes(file))
-    if found != known:
+    actual = sha256_bytes(read_bytes(file))
+    if actual != digest:
         raise ConfigError(
             "a file of the model is not the one that was fitted", where=where,
-            got=f"{file.name} with SHA-256 {found[:16]}...", expected=f"{str(known)[:16]}...",
+            got=f"{file.name} with SHA-256 {actual[:16]}...", expected=f"{str(digest)[:16]}...",
             next_step="restore the file, or diagnose the case again", rule="model-changed",
         )  # fmt: skip
     return file
@@ -180,28 +182,28 @@ def _same(path: Path, key: str, name: object, known: object) -> Path:
 def _effects(entry: object, path: Path, axes: Axes, origin: str) -> tuple[FittedEffect, ...]:
     if not isinstance(entry, list):
         raise _wrong("effects are no list of tables", f"{path}: effect", entry, "[[effect]]")
-    made = []
+    effects = []
     for i, one in enumerate(entry, start=1):
         where = f"{path}: effect[{i}]"
         table = _table(one, where)
         check_keys(table, _EFFECT, where=where)
         effect = find_effect(_text(table.get("name"), f"{where}.name"), where=where)
         parameters = _parameters(table.get("parameters", {}), f"{where}.parameters")
-        check_keys({each.name: 0 for each in parameters}, effect.names, where=f"{where}.parameters")
-        there = {each.name for each in parameters}
+        check_keys({parameter.name: 0 for parameter in parameters}, effect.names, where=f"{where}.parameters")
+        there = {parameter.name for parameter in parameters}
         parameters += tuple(
-            ModelParameter(name=each.name, value=each.absent, unit=each.unit)
-            for each in effect.parameters
-            if each.name not in there and each.absent is not None
+            ModelParameter(name=parameter.name, value=parameter.absent, unit=parameter.unit)
+            for parameter in effect.parameters
+            if parameter.name not in there and parameter.absent is not None
         )
-        missing = [name for name in effect.names if name not in {each.name for each in parameters}]
+        missing = [name for name in effect.names if name not in {parameter.name for parameter in parameters}]
         if missing:
             raise _wrong(
                 "a parameter of the effect is missing", f"{where}.parameters", "nothing", ", ".join(missing)
             )
-        for parameter, own in zip(_in_order(parameters, effect), effect.parameters, strict=True):
+        for parameter, declared in zip(_in_order(parameters, effect), effect.parameters, strict=True):
             # One bound may be the other's mirror: axes turn the sense of an angle.
-            limit = max(abs(own.bounds[0]), abs(own.bounds[1]))
+            limit = max(abs(declared.bounds[0]), abs(declared.bounds[1]))
             if abs(parameter.value) > limit * (1 + 1e-9):
                 raise _wrong(
                     "a parameter lies outside what the effect can have",
@@ -213,19 +215,21 @@ def _effects(entry: object, path: Path, axes: Axes, origin: str) -> tuple[Fitted
             name: _number(value, f"{where}.numerics.{name}")
             for name, value in _table(table.get("numerics", {}), f"{where}.numerics").items()
         }
-        made.append(
+        effects.append(
             FittedEffect(
                 applied=AppliedEffect(
                     effect=effect,
                     channel=_maybe(table.get("channel"), f"{where}.channel"),
                     source=_maybe(table.get("source"), f"{where}.source"),
-                    values={each.name: each.value for each in parameters} | numerics,
-                    units={each.name: each.unit for each in parameters},
+                    values={parameter.name: parameter.value for parameter in parameters} | numerics,
+                    units={parameter.name: parameter.unit for parameter in parameters},
                     runs=None if "runs" not in table else frozenset(_texts(table["runs"], f"{where}.runs")),
                     condition=None if condition is None else _condition(condition, f"{where}.condition"),
                 ),
                 standard_errors={
-                    each.name: each.standard_error for each in parameters if each.standard_error is not None
+                    parameter.name: parameter.standard_error
+                    for parameter in parameters
+                    if parameter.standard_error is not None
                 },
                 equivalent_to=_texts(table.get("equivalent_to", []), f"{where}.equivalent_to"),
                 nuisance=table.get("nuisance") is True,
@@ -233,7 +237,7 @@ def _effects(entry: object, path: Path, axes: Axes, origin: str) -> tuple[Fitted
                 origin=origin,
             )
         )
-    return tuple(made)
+    return tuple(effects)
 
 
 def effect_lines(fitted: FittedEffect) -> list[str]:
@@ -288,7 +292,7 @@ def _toml(value: Any) -> str:
 
 
 def _in_order(parameters: tuple[ModelParameter, ...], effect: Effect) -> tuple[ModelParameter, ...]:
-    return tuple(sorted(parameters, key=lambda one: effect.names.index(one.name)))
+    return tuple(sorted(parameters, key=lambda parameter: effect.names.index(parameter.name)))
 
 
 def _condition(entry: object, where: str) -> Condition:
@@ -300,31 +304,31 @@ def _condition(entry: object, where: str) -> Condition:
 
 
 def _parameters(entry: object, where: str) -> tuple[ModelParameter, ...]:
-    made = []
-    for name, one in _table(entry, where).items():
-        here = f"{where}.{name}"
-        table = _table(one, here)
-        check_keys(table, ("value", "unit", "standard_error", "bounds"), where=here)
-        text = _text(table.get("unit"), f"{here}.unit")
-        unit(text, where=f"{here}.unit")
+    parameters = []
+    for name, value in _table(entry, where).items():
+        place = f"{where}.{name}"
+        table = _table(value, place)
+        check_keys(table, ("value", "unit", "standard_error", "bounds"), where=place)
+        text = _text(table.get("unit"), f"{place}.unit")
+        unit(text, where=f"{place}.unit")
         error = table.get("standard_error")
-        if error is not None and not _number(error, f"{here}.standard_error") > 0:
-            raise _wrong("a standard error is not positive", f"{here}.standard_error", error, "above zero")
+        if error is not None and not _number(error, f"{place}.standard_error") > 0:
+            raise _wrong("a standard error is not positive", f"{place}.standard_error", error, "above zero")
         bounds = table.get("bounds")
         if bounds is not None and (not isinstance(bounds, list) or len(bounds) != 2):
-            raise _wrong("bounds are two numbers", f"{here}.bounds", bounds, "[low, high]")
-        made.append(
+            raise _wrong("bounds are two numbers", f"{place}.bounds", bounds, "[low, high]")
+        parameters.append(
             ModelParameter(
                 name=name,
-                value=_number(table.get("value"), f"{here}.value"),
+                value=_number(table.get("value"), f"{place}.value"),
                 unit=text,
                 standard_error=None if error is None else float(error),
                 bounds=None
                 if bounds is None
-                else (_number(bounds[0], f"{here}.bounds"), _number(bounds[1], f"{here}.bounds")),
+                else (_number(bounds[0], f"{place}.bounds"), _number(bounds[1], f"{place}.bounds")),
             )
         )
-    return tuple(made)
+    return tuple(parameters)
 
 
 def _table(entry: object, where: str) -> dict[str, Any]:
@@ -344,7 +348,7 @@ def _text(entry: object, where: str) -> str:
 
 
 def _texts(entry: object, where: str) -> tuple[str, ...]:
-    if not isinstance(entry, list) or not all(isinstance(one, str) for one in entry):
+    if not isinstance(entry, list) or not all(isinstance(text, str) for text in entry):
         raise _wrong("an entry is no list of texts", where, entry, '["run01.csv"]')
     return tuple(cast("Iterable[str]", entry))
 

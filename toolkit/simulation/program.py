@@ -47,39 +47,42 @@ def other_programs(plan: Plan, registry: Registry | None) -> dict[str, OwnProgra
         a registry id without a registry; RegistryError: an unknown or damaged record; RecordError: a record
         that is not of these cells or not in their unit
     """
-    made = {}
-    for one in plan.effects:
-        if not one.effect.replaces_record or one.source is None or one.source in made:
+    own_programs = {}
+    for effect in plan.effects:
+        if not effect.effect.replaces_record or effect.source is None or effect.source in own_programs:
             continue
-        path = Path(one.source)
+        path = Path(effect.source)
         if path.suffix == ".json" and path.is_file():
             record = from_bytes(read_bytes(path), where=path)
         elif registry is None:
             raise ConfigError(
                 "a wrong calibration is named and there is no registry",
-                where=f"--effect {one.effect.name}={one.source}", got=one.source,
+                where=f"--effect {effect.effect.name}={effect.source}", got=effect.source,
                 expected="a home with calibrations/, or the path of a record (.json)",
                 next_step="give --calibrations DIR", rule="effect-value",
             )  # fmt: skip
         else:
-            record = registry.load(one.source)
-        written = unit(plan.machine.column(CELLS[0]).unit)
+            record = registry.load(effect.source)
+        cell_unit = unit(plan.machine.column(CELLS[0]).unit)
         for text in record.indication_units:
-            if unit(text).dimension != written.dimension:
-                raise _unfit(record, f"indications in {text}", f"indications in {written.text}")
-        made[one.source] = program_from(record)
-    return made
+            if unit(text).dimension != cell_unit.dimension:
+                raise _unfit(record, f"indications in {text}", f"indications in {cell_unit.text}")
+        own_programs[effect.source] = program_from(record)
+    return own_programs
 
 
 def _linear(record: CalibrationRecord, fit: LoadFit) -> tuple[float, ...]:
     # SI: load unit over indication unit, in the order of CELLS, the constant last (0 where there is none).
-    given = dict(zip(fit.terms, fit.issued, strict=True))
-    constant = given.pop("intercept", 0.0)
-    if set(given) - set(CELLS):
+    coefficients = dict(zip(fit.terms, fit.issued, strict=True))
+    constant = coefficients.pop("intercept", 0.0)
+    if set(coefficients) - set(CELLS):
         raise _unfit(record, f"{fit.load}: terms {', '.join(fit.terms)}", "a linear equation")
     scale = si_scale(fit.unit)
     units = dict(zip(record.indications, record.indication_units, strict=True))
-    return (*(given.get(name, 0.0) * scale / si_scale(units[name]) for name in CELLS), constant * scale)
+    return (
+        *(coefficients.get(name, 0.0) * scale / si_scale(units[name]) for name in CELLS),
+        constant * scale,
+    )
 
 
 def _unfit(record: CalibrationRecord, got: str, expected: str) -> RecordError:

@@ -105,13 +105,15 @@ def simulate(
     ConfigError
         a wrong calibration that ``others`` does not have
     """
-    given = (true_program(plan.cells) if program is None else program).with_negated(plan.acquisition.negated)
-    known = dict(others or {})
-    for one in plan.effects:
-        if one.effect.replaces_record and one.source not in known:
+    acquisition_program = (true_program(plan.cells) if program is None else program).with_negated(
+        plan.acquisition.negated
+    )
+    programs = dict(others or {})
+    for effect in plan.effects:
+        if effect.effect.replaces_record and effect.source not in programs:
             raise ConfigError(
-                "the record of a wrong calibration is not known", where=f"--effect {one.effect.name}",
-                got=one.source, expected=", ".join(known) or "a registry with that record",
+                "the record of a wrong calibration is not known", where=f"--effect {effect.effect.name}",
+                got=effect.source, expected=", ".join(programs) or "a registry with that record",
                 next_step="give --calibrations DIR or --home DIR", rule="effect-value",
             )  # fmt: skip
     tare_rows, tare_dt = _tare(plan)
@@ -119,14 +121,14 @@ def simulate(
     files: list[VirtualFile] = []
     before = Before()
     for number, run in enumerate(plan.recordings, start=1):
-        made, before = _file(plan, given, known, run, number, before, tare_rows)
-        files.append(made)
+        recording, before = _file(plan, acquisition_program, programs, run, number, before, tare_rows)
+        files.append(recording)
     return VirtualTest(
         plan=plan,
         files=tuple(files),
         tare=tare,
         tare_unit=unit,
-        program=given,
+        program=acquisition_program,
         tare_rows=tare_rows,
         tare_dt=tare_dt,
     )
@@ -135,7 +137,7 @@ def simulate(
 def _file(
     plan: Plan,
     program: OwnProgram,
-    others: Mapping[str, OwnProgram],
+    own_programs: Mapping[str, OwnProgram],
     run: RunSteps,
     number: int,
     before: Before,
@@ -150,19 +152,19 @@ def _file(
     effects = acting(plan.effects, run.conditions)
     measured = _measured(plan, line, walked, effects)
     tared = {name: measured[name] - float(tare[name].mean()) for name in CELLS}
-    own = _computed(plan, program, others, measured, effects, walked.setting)
-    right = _computed(plan, true_program(plan.cells), others, measured | tared, effects, walked.setting)
-    kept = line.recorded
+    shown = _computed(plan, program, own_programs, measured, effects, walked.setting)
+    right = _computed(plan, true_program(plan.cells), own_programs, measured | tared, effects, walked.setting)
+    rows = line.recorded
     commands = {"SA_CMD": line.SA_CMD, "FZ_CMD": line.FZ_CMD}
     signals = {"t": walked.setting.elapsed_s, **walked.setting.channels, **commands, **measured, **right}
     name = plan.file_name.format(number=number)
     return VirtualFile(
         name=name,
         rotation=run.rotation,
-        columns=acquisition.printed(plan.machine, {k: v[kept] for k, v in (measured | own).items()}),
+        columns=acquisition.printed(plan.machine, {k: v[rows] for k, v in (measured | shown).items()}),
         truth=_truth(name, run, line, walked),
         run=run,
-        signals={symbol: values[kept] for symbol, values in signals.items()},
+        signals={symbol: values[rows] for symbol, values in signals.items()},
     ), walked.after
 
 
@@ -172,7 +174,7 @@ def _measured(plan: Plan, line: Timeline, walked: Walked, effects: Sequence[Appl
     loads = {"FY": hub.FY, "MZ": hub.MZ, "MX": hub.MX, "FZ": hub.FZ}
     at_cells = in_order(effects, "load_cells")
     sensed = through_machine(
-        loads, [one for one in at_cells if one.channel in loads], walked.setting, machine
+        loads, [at_cell for at_cell in at_cells if at_cell.channel in loads], walked.setting, machine
     )
     bridge = cells.sense(
         plan.cells,
@@ -180,7 +182,10 @@ def _measured(plan: Plan, line: Timeline, walked: Walked, effects: Sequence[Appl
     )
     shown = {name: bridge[:, i] for i, name in enumerate(CELLS)}
     shown = through_machine(
-        {**sensed, **shown}, [one for one in at_cells if one.channel in CELLS], walked.setting, machine
+        {**sensed, **shown},
+        [at_cell for at_cell in at_cells if at_cell.channel in CELLS],
+        walked.setting,
+        machine,
     )
     channels = acquisition.digitise(
         plan.acquisition,
@@ -196,22 +201,22 @@ def _measured(plan: Plan, line: Timeline, walked: Walked, effects: Sequence[Appl
 def _computed(
     plan: Plan,
     program: OwnProgram,
-    others: Mapping[str, OwnProgram],
+    own_programs: Mapping[str, OwnProgram],
     channels: Signals,
     effects: Sequence[AppliedEffect],
     setting: Setting,
 ) -> Signals:
     """Return FY [N] and MZ [N·m] as a program makes them of recorded cells, with effects on them."""
-    made = acquisition.own_columns(program, channels)
-    for one in _acquired(effects):
-        if one.effect.replaces_record and one.effect.channel is not None:
-            other = acquisition.own_columns(others[str(one.source)], channels)
-            for name in made:
-                seen = with_source(setting, other[name])
-                made[name] = one.effect.channel(made[name], one.values, seen)
+    signals = acquisition.own_columns(program, channels)
+    for applied in _acquired(effects):
+        if applied.effect.replaces_record and applied.effect.channel is not None:
+            columns = acquisition.own_columns(own_programs[str(applied.source)], channels)
+            for name in signals:
+                replaced = with_source(setting, columns[name])
+                signals[name] = applied.effect.channel(signals[name], applied.values, replaced)
         else:
-            made = through_machine(made, [one], setting, plan.machine)
-    return made
+            signals = through_machine(signals, [applied], setting, plan.machine)
+    return signals
 
 
 def _acquired(effects: Sequence[AppliedEffect]) -> Sequence[AppliedEffect]:
@@ -221,15 +226,15 @@ def _acquired(effects: Sequence[AppliedEffect]) -> Sequence[AppliedEffect]:
 def _truth(name: str, run: RunSteps, line: Timeline, walked: Walked) -> tuple[BlockTruth, ...]:
     place = np.cumsum(line.recorded)
 
-    def block(one: Block) -> BlockTruth:
-        rows = slice(one.start, one.stop)
+    def block(part: Block) -> BlockTruth:
+        rows = slice(part.start, part.stop)
         return BlockTruth(
             file=name,
             rotation=run.rotation,
-            step_SA_rad=one.step_SA_rad,
-            step_FZ_N=one.step_FZ_N,
-            first_row=int(place[one.start]),
-            last_row=int(place[one.stop - 1]),
+            step_SA_rad=part.step_SA_rad,
+            step_FZ_N=part.step_FZ_N,
+            first_row=int(place[part.start]),
+            last_row=int(place[part.stop - 1]),
             SA_rad=float(walked.SA[rows].mean()),
             FZ_N=float(walked.hub.FZ[rows].mean()),
             FY_N=float(walked.hub.FY[rows].mean()),
@@ -237,7 +242,7 @@ def _truth(name: str, run: RunSteps, line: Timeline, walked: Walked) -> tuple[Bl
             MX_Nm=float(walked.hub.MX[rows].mean()),
         )
 
-    return tuple(block(one) for one in line.blocks)
+    return tuple(block(part) for part in line.blocks)
 
 
 def _tare(plan: Plan) -> tuple[Signals, float]:

@@ -62,20 +62,20 @@ def schedule() -> tuple[Point, ...]:
     >>> len(points) >= 30, {point.direction for point in points} == {"up", "down"}
     (True, True)
     """
-    made = [Point(shares=(0.0, 0.0, 0.0), direction="up")]
+    points = [Point(shares=(0.0, 0.0, 0.0), direction="up")]
     for axis, sign in itertools.product(range(3), (1.0, -1.0)):
         for level, direction in ((0.25, "up"), (0.5, "up"), (0.75, "up"), (1.0, "up"), (0.5, "down")):
             shares = [0.0, 0.0, 0.0]
             shares[axis] = sign * level
-            made.append(Point(shares=(shares[0], shares[1], shares[2]), direction=direction))
+            points.append(Point(shares=(shares[0], shares[1], shares[2]), direction=direction))
     for FY, MZ, MX in itertools.product((1.0, -1.0), repeat=3):
         # A lateral force and an overturning moment of opposite signs load E5 most: its capacity limits.
         most = 1.0 if FY == MX else 0.6
         for level, direction in ((0.5, "up"), (1.0, "up"), (0.5, "down")):
             scale = most * level
-            made.append(Point(shares=(FY * scale, MZ * scale, MX * scale), direction=direction))
-    made.append(Point(shares=(0.0, 0.0, 0.0), direction="down"))
-    return tuple(made)
+            points.append(Point(shares=(FY * scale, MZ * scale, MX * scale), direction=direction))
+    points.append(Point(shares=(0.0, 0.0, 0.0), direction="down"))
+    return tuple(points)
 
 
 CHECK = (
@@ -154,11 +154,11 @@ def _zeros(plan: Plan) -> tuple[tuple[str, tuple[float, ...]], ...]:
     rng = np.random.default_rng([plan.seed, 1])
     noise = np.array([cell.noise_V_V for cell in plan.cells.all]) / _AVERAGED
     drift = plan.session.zero_drift_V_V
-    made = []
+    readings = []
     for when, level in (("before", 0.0), ("shunt", shunt_step()), ("after", drift)):
         values = recorded(plan, level + rng.standard_normal(len(CELLS)) * noise) + 0.0
-        made.append((when, tuple(values.tolist())))
-    return tuple(made)
+        readings.append((when, tuple(values.tolist())))
+    return tuple(readings)
 
 
 def loads_csv(session: VirtualSession) -> str:
@@ -187,11 +187,11 @@ def _cells(
     session: VirtualSession, indications: NDArray[np.float64], loads: NDArray[np.float64]
 ) -> list[list[str]]:
     decimals = DECIMALS[session.plan.session.output]
-    made = []
+    rows = []
     for row, reference in zip(indications.tolist(), loads.tolist(), strict=True):
         texts = [f"{value + 0.0:.{decimals}f}" for value in row]
         texts += [
             f"{value + 0.0:.{LOAD_DECIMALS[load]}f}" for value, load in zip(reference, LOADS, strict=True)
         ]
-        made.append(texts)
-    return made
+        rows.append(texts)
+    return rows

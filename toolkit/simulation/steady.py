@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from toolkit.channels import Rotation
 from toolkit.effects.applied import acting
-from toolkit.effects.forward import tire_forces
+from toolkit.effects.forward import Steady, tire_forces
 from toolkit.effects.signals import Drive, Setting, TireForces, drive
-from toolkit.effects.similarity import Steady
+from toolkit.files import write_atomic
 from toolkit.simulation import tire as bakker
 from toolkit.simulation.file_tire import file_forces
 from toolkit.simulation.plan import Plan
@@ -20,7 +21,6 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    # slip angle [rad], load [N], direction -> FY [N], MZ [N·m] in the machine's axes
     Answer = Callable[[float, float, Rotation], tuple[float, float]]
 
 
@@ -29,16 +29,18 @@ def steady_of(plan: Plan, *, rotation: Rotation, facing: float, pressure_Pa: flo
     file = plan.tire_file
     if file is None:
 
-        def published(SA: NDArray[np.float64], one: Drive) -> TireForces:
-            made = bakker.forces(plan.tire, SA=SA, FZ=one.FZ, rotation=rotation, camber=one.IA, facing=facing)
-            return TireForces(FY=made.FY, MZ=made.MZ)
+        def published(SA: NDArray[np.float64], drive: Drive) -> TireForces:
+            forces = bakker.forces(
+                plan.tire, SA=SA, FZ=drive.FZ, rotation=rotation, camber=drive.IA, facing=facing
+            )
+            return TireForces(FY=forces.FY, MZ=forces.MZ)
 
         return published
 
-    def from_file(SA: NDArray[np.float64], one: Drive) -> TireForces:
-        pressure = pressure_Pa + one.pressure_error
+    def from_file(SA: NDArray[np.float64], drive: Drive) -> TireForces:
+        pressure = pressure_Pa + drive.pressure_error
         return file_forces(
-            file, SA=SA, FZ=one.FZ, IA=one.IA, V=one.V, pressure_Pa=pressure, rotation=rotation
+            file, SA=SA, FZ=drive.FZ, IA=drive.IA, V=drive.V, pressure_Pa=pressure, rotation=rotation
         )
 
     return from_file
@@ -75,3 +77,28 @@ def loaded_radius(plan: Plan, FZ: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the distance of the hub from the drum [m], (n,)."""
     truth = plan.tire
     return truth.free_radius_m - np.maximum(FZ, 0.0) / truth.vertical_stiffness_N_m
+
+
+# A maker's flat-surface table: what the plan's tire does on a flat road, as TABLE.csv has it, SAE axes.
+
+
+TABLE = "table_simulated.csv"  # CSV has no place for a remark: the name carries it
+HEADER = "SA [deg],FZ [N],FY [N],MZ [N*m]"
+
+
+def table_csv(plan: Plan) -> str:
+    """Return the table: every load of the plan, at each of its slip angles in rising order."""
+    answer = settled(plan, {})
+    lines = [HEADER]
+    for load in sorted(set(plan.loads_N)):
+        for SA in sorted(set(plan.slip_angles_rad)):
+            FY, MZ = answer(SA, load, "forward")  # machine axes are SAE with the drum forward
+            lines.append(f"{np.degrees(SA):.6g},{load:.6g},{FY:.6g},{MZ:.6g}")
+    return "\n".join(lines) + "\n"
+
+
+def write_table(plan: Plan, folder: Path) -> Path:
+    """Write the table into a folder; return the file."""
+    path = folder / TABLE
+    write_atomic(path, table_csv(plan))
+    return path

@@ -111,7 +111,7 @@ def read_runs(
     """
     if not isinstance(entries, list) or not entries:
         raise _wrong("run is no list of tables", where, entries, "[[run]] with its keys")
-    made: list[RunSteps] = []
+    run_stepses: list[RunSteps] = []
     for number, entry in enumerate(entries, start=1):
         place = f"{where}[{number}]"
         if not isinstance(entry, dict):
@@ -141,8 +141,8 @@ def read_runs(
         times = entry.get("times", 1)
         if isinstance(times, bool) or not isinstance(times, int) or not 1 <= times <= 1000:
             raise _wrong("a count is no whole number", f"{place}.times", times, "a whole number from 1")
-        made += [run] * times
-    return tuple(made)
+        run_stepses += [run] * times
+    return tuple(run_stepses)
 
 
 def read_motion(table: Any, *, where: str) -> Motion:
@@ -175,8 +175,8 @@ def machine_speed(run: RunSteps, machine: Machine) -> float:
 def _positive(table: dict[str, Any], key: str, dimension: str, where: str) -> float | None:
     if key not in table:
         return None
-    known = unit(dimension).dimension if "/" in dimension else dimension
-    value = quantity(table[key], known, f"{where}.{key}")
+    name_of = unit(dimension).dimension if "/" in dimension else dimension
+    value = quantity(table[key], name_of, f"{where}.{key}")
     if not 0 < value < float("inf"):
         raise _wrong("a size is not positive", f"{where}.{key}", table[key], "a number above zero")
     return value

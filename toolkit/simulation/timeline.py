@@ -64,14 +64,14 @@ class _Path:
 
     def to(self, start: float, target: float, rate: float) -> float:
         """Move from where it stands at ``start`` [s]; return when it arrives."""
-        here = self.at(np.array([start])).item() if self.t else target
+        start_value = self.at(np.array([start])).item() if self.t else target
         # A move that was under way ends where it is: the new one goes on from there.
         while self.t and self.t[-1] >= start:
             self.t.pop()
             self.y.pop()
-        arrived = start + abs(target - here) / rate
+        arrived = start + abs(target - start_value) / rate
         self.t += [start, arrived] if arrived > start else [start]
-        self.y += [here, target] if arrived > start else [target]
+        self.y += [start_value, target] if arrived > start else [target]
         return arrived
 
     def at(self, times: NDArray[np.float64]) -> NDArray[np.float64]:

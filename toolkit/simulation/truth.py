@@ -52,10 +52,10 @@ class TruePull:
 
 def true_stiffness(tire: TireTruth | Answer, *, load_N: float, rotation: Rotation) -> TrueStiffness:
     """Return the stiffness of a tire at a load [N]: the published one's, or that of an answer."""
-    one = math.radians(1.0)
+    one_degree = math.radians(1.0)
     answer = _answer(tire)
     slope_FY, slope_MZ = _difference(answer, load_N, rotation, _SMALL)
-    secant_FY, secant_MZ = _difference(answer, load_N, rotation, one)
+    secant_FY, secant_MZ = _difference(answer, load_N, rotation, one_degree)
     return TrueStiffness(
         rotation=rotation,
         slope_cornering=-slope_FY,
@@ -73,7 +73,10 @@ def true_pull(tire: TireTruth | Answer, *, load_N: float) -> TruePull:
     """
     answer = _answer(tire)
     forward, reverse = answer(0.0, load_N, "forward"), answer(0.0, load_N, "reverse")
-    free = [answer(_angle_of_no_force(answer, load_N, one), load_N, one)[1] for one in ("forward", "reverse")]
+    free = [
+        answer(_angle_of_no_force(answer, load_N, rotation), load_N, rotation)[1]
+        for rotation in ("forward", "reverse")
+    ]
     return TruePull(
         conicity=(forward[0] + reverse[0]) / 2,
         plysteer=(forward[0] - reverse[0]) / 2,
@@ -107,7 +110,7 @@ def truth_document(test: VirtualTest) -> dict[str, Any]:
         "machine": plan.machine.name,
         "date": plan.date,
         "seed": plan.seed,
-        "effects": [one.as_dict() for one in plan.effects],
+        "effects": [effect.as_dict() for effect in plan.effects],
         "axes": {"conditions": "machine", "per_load": "SAE"},
         "stages": {
             "tire": {**dataclasses.asdict(plan.tire), "pseudo_camber_rad": pseudo_camber(plan.tire)},
@@ -135,28 +138,31 @@ def truth_document(test: VirtualTest) -> dict[str, Any]:
 
 def _further(plan: Plan) -> dict[str, Any]:
     # Named only where they are not the default, so that a plain test's truth is what it always was.
-    made: dict[str, Any] = {}
+    content: dict[str, Any] = {}
     if plan.record != "dwell":
-        made["record"] = plan.record
+        content["record"] = plan.record
     if plan.motion != Motion():
-        made["motion"] = dataclasses.asdict(plan.motion)
+        content["motion"] = dataclasses.asdict(plan.motion)
     if plan.tire_file is not None:
-        made["tire_file"] = plan.tire_file.path.name
-    return made
+        content["tire_file"] = plan.tire_file.path.name
+    return content
 
 
 def _at(test: VirtualTest, load_N: float) -> dict[str, Any]:
     plan = test.plan
     # The road's and the tire's effects belong to the truth; a tire that no effect touches is its own.
     touched = plan.tire_file is not None or any(
-        one.effect.stage in ("road", "tire") and one.condition is None for one in plan.effects
+        effect.effect.stage in ("road", "tire") and effect.condition is None for effect in plan.effects
     )
-    general = dataclasses.replace(plan, effects=tuple(one for one in plan.effects if one.condition is None))
+    general = dataclasses.replace(
+        plan, effects=tuple(effect for effect in plan.effects if effect.condition is None)
+    )
     tire = settled(general, {}) if touched else plan.tire
     return {
         "load_N": load_N,
         "stiffness": [
-            dataclasses.asdict(true_stiffness(tire, load_N=load_N, rotation=one)) for one in plan.rotations
+            dataclasses.asdict(true_stiffness(tire, load_N=load_N, rotation=rotation))
+            for rotation in plan.rotations
         ],
         "pull": dataclasses.asdict(true_pull(tire, load_N=load_N)),
     }
@@ -168,8 +174,8 @@ def _answer(tire: TireTruth | Answer) -> Answer:
     truth = tire
 
     def answer(SA: float, FZ: float, rotation: Rotation) -> tuple[float, float]:
-        made = forces(truth, SA=SA, FZ=FZ, rotation=rotation)
-        return float(made.FY), float(made.MZ)
+        responses = forces(truth, SA=SA, FZ=FZ, rotation=rotation)
+        return float(responses.FY), float(responses.MZ)
 
     return answer
 

@@ -105,8 +105,7 @@ def _plain(data: bytes, where: object) -> Cells | None:
 
 
 def _text(data: bytes, known: Callable[[str], bool], where: object) -> Cells:
-    from toolkit.recording.csvfile import first_line, split_rows
-    from toolkit.recording.dialect import decode, separator_of
+    from toolkit.recording.csvfile import decode, first_line, separator_of, split_rows
 
     path = Path(str(where))
     text = decode(data, where=path)

@@ -205,7 +205,7 @@ def _numbers(cells: Cells, at: Sequence[int]) -> NDArray[np.float64]:
 
 
 def _decimal(cells: Cells, at: Sequence[int]) -> str:
-    from toolkit.recording.dialect import decimal_sign
+    from toolkit.recording.csvfile import decimal_sign
 
     texts = [cell for cell in chain.from_iterable(cells.columns[one] for one in at) if isinstance(cell, str)]
     try:
@@ -241,7 +241,7 @@ def _ambiguous(cells: Cells, at: Sequence[int], mark: str) -> SessionError:
 def _number(cells: Cells, row: int, column: int, decimal: str) -> float:
     cell = cells.columns[column][row - 1]
     if isinstance(cell, str):
-        from toolkit.recording.dialect import number_or_text
+        from toolkit.recording.csvfile import number_or_text
 
         cell = number_or_text(cell, decimal)
     if isinstance(cell, bool) or not isinstance(cell, int | float):

@@ -1,7 +1,7 @@
 """Every characteristic, one file each: found by scan, never listed by hand.
 
 A file of this package declares one ``CHARACTERISTIC``. What several of them share, the tables that they are
-columns of and the figures that they are series of, is declared in `toolkit.characteristics.layout`.
+columns of and the figures that they are series of, is declared in `toolkit.characteristics.characteristic`.
 """
 
 from __future__ import annotations

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from toolkit.characteristics.budget import CURVE_BUDGET
-from toolkit.characteristics.characteristic import Characteristic
+from toolkit.characteristics.characteristic import AT_ANGLES, CURVE_BUDGET, Characteristic
 from toolkit.characteristics.derivations import CURVE_MZ, curve_value
-from toolkit.characteristics.layout import AT_ANGLES
 
 CHARACTERISTIC = Characteristic(
     name="MZ",

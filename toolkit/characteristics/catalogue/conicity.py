@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from toolkit.characteristics.budget import CURVE_BUDGET
-from toolkit.characteristics.characteristic import Characteristic, Figure
+from toolkit.characteristics.characteristic import CURVE_BUDGET, PULL, Characteristic, Figure
 from toolkit.characteristics.derivations import COVERS_ZERO, CURVE_FY, half_at_zero
-from toolkit.characteristics.layout import PULL
 
 _FIGURE = Figure(name="conicity", title="conicity", text="conicity against load")
 

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from toolkit.characteristics.budget import CURVE_BUDGET
-from toolkit.characteristics.characteristic import Characteristic, Figure
+from toolkit.characteristics.characteristic import CURVE_BUDGET, PRAT_FIGURE, PULL, Characteristic, Figure
 from toolkit.characteristics.derivations import COVERS_ZERO, CURVE_MZ, half_at_zero
-from toolkit.characteristics.layout import PRAT_FIGURE, PULL
 
 CHARACTERISTIC = Characteristic(
     name="PRAT",

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from toolkit.characteristics.budget import CURVE_BUDGET
-from toolkit.characteristics.characteristic import Characteristic, Figure
+from toolkit.characteristics.characteristic import CURVE_BUDGET, PRAT_FIGURE, PULL, Characteristic, Figure
 from toolkit.characteristics.derivations import (
     COVERS_ZERO,
     CURVE_FY,
@@ -11,7 +10,6 @@ from toolkit.characteristics.derivations import (
     ZERO_OF_FY,
     half_without_force,
 )
-from toolkit.characteristics.layout import PRAT_FIGURE, PULL
 
 CHARACTERISTIC = Characteristic(
     name="PRAT_at_FY_zero",

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from toolkit.characteristics.budget import CURVE_BUDGET
-from toolkit.characteristics.characteristic import Characteristic
+from toolkit.characteristics.characteristic import CURVE_BUDGET, PULL_THESIS, Characteristic
 from toolkit.characteristics.derivations import COVERS_ZERO, CURVE_FY, CURVE_MZ, ZERO_OF_FY, residual_moment
-from toolkit.characteristics.layout import PULL_THESIS
 
 CHARACTERISTIC = Characteristic(
     name="residual_forward",

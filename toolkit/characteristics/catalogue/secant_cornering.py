@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
-from toolkit.characteristics.budget import STEP_BUDGET
-from toolkit.characteristics.characteristic import Characteristic
+from toolkit.characteristics.characteristic import (
+    CORNERING_FIGURE,
+    SECANT_LABEL,
+    STEP_BUDGET,
+    STIFFNESS,
+    Characteristic,
+)
 from toolkit.characteristics.derivations import STEPS, secant
-from toolkit.characteristics.layout import CORNERING_FIGURE, SECANT_LABEL, STIFFNESS
 
 CHARACTERISTIC = Characteristic(
     name="secant_cornering",

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
-from toolkit.characteristics.budget import CURVE_BUDGET
-from toolkit.characteristics.characteristic import Characteristic
+from toolkit.characteristics.characteristic import (
+    ALIGNING_FIGURE,
+    CURVE_BUDGET,
+    SLOPE_LABEL,
+    STIFFNESS,
+    Characteristic,
+)
 from toolkit.characteristics.derivations import CURVE_MZ, SLOPE_MZ, slope
-from toolkit.characteristics.layout import ALIGNING_FIGURE, SLOPE_LABEL, STIFFNESS
 
 CHARACTERISTIC = Characteristic(
     name="slope_aligning",

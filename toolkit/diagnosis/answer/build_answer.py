@@ -17,9 +17,8 @@ from toolkit.diagnosis.answer.answer import (
     Verdict,
     recorded,
 )
-from toolkit.diagnosis.answer.classes import equivalent_to
 from toolkit.diagnosis.answer.locate import places
-from toolkit.diagnosis.answer.next_measurements import implausible, next_measurements
+from toolkit.diagnosis.answer.next_measurements import equivalent_to, implausible, next_measurements
 from toolkit.diagnosis.answer.power import not_found
 from toolkit.diagnosis.case.case import Case
 from toolkit.diagnosis.fit.structure import groups
@@ -255,9 +254,9 @@ def _structured(search: Search, name: str) -> tuple[float, NDArray[np.float64]]:
     problem, counted = search.problem, search.problem.kept[name]
     residual = search.refitted.residual[name]
     best, signal = 0.0, np.zeros(problem.rows)
-    wanted = {structure.variables for structure in search.structure_before if structure.output == name}
+    dependences = {structure.variables for structure in search.structure_before if structure.output == name}
     for group in groups(problem, search.refitted):
-        if group.output != name or (wanted and group.variables not in wanted):
+        if group.output != name or (dependences and group.variables not in dependences):
             continue
         fit = np.linalg.lstsq(group.columns[counted], residual[counted], rcond=None)[0]
         smooth = group.columns @ fit

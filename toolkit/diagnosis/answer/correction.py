@@ -38,25 +38,25 @@ def correction_of(model: ModelFile, effect: str, *, reason: str, by: str, date: 
             "an answer that was cut off corrects nothing", model, "complete = false", "a whole search",
             "diagnose the case again with a larger --budget",
         )  # fmt: skip
-    listed, wanted = correctable(), effects().get(effect)
+    listed, catalogued = correctable(), effects().get(effect)
     if effect not in listed:
-        instead = "" if wanted is None else wanted.not_correctable
+        instead = "" if catalogued is None else catalogued.not_correctable
         raise _wrong(
             "this effect cannot become a correction of the machine", model,
             f"{effect}: {instead}" if instead else effect, ", ".join(listed),
             "put right what it names, or name an effect of those expected",
         )  # fmt: skip
-    for one in model.effects:
-        same, applied = one.equivalent_to, one.applied
+    for fitted in model.effects:
+        same, applied = fitted.equivalent_to, fitted.applied
         if effect != applied.effect.name and effect not in same:
             continue
         if applied.runs is not None or applied.condition is not None:
             raise _wrong(
                 "the effect was found in some runs only, and a correction holds in every test", model,
-                f"{one.label} in {', '.join(sorted(applied.runs or ()))}", "an effect in all runs",
+                f"{fitted.label} in {', '.join(sorted(applied.runs or ()))}", "an effect in all runs",
                 "find out what was different in those runs",
             )  # fmt: skip
-        sized, u = _sized(model, one, listed[effect])
+        sized, u = _sized(model, fitted, listed[effect])
         parameter = sized.effect.names[0]
         return Correction(
             effect=effect,
@@ -74,9 +74,11 @@ def correction_of(model: ModelFile, effect: str, *, reason: str, by: str, date: 
             code_version=model.code_version,
             equivalent_to=tuple(name for name in (applied.effect.name, *same) if name != effect),
         )
-    named = ", ".join(name for one in model.effects for name in (one.applied.effect.name, *one.equivalent_to))
+    names = ", ".join(
+        name for effect in model.effects for name in (effect.applied.effect.name, *effect.equivalent_to)
+    )
     raise _wrong(
-        "the answer does not name this effect", model, effect, named or "none", "name an effect of the answer"
+        "the answer does not name this effect", model, effect, names or "none", "name an effect of the answer"
     )
 
 
@@ -91,20 +93,20 @@ def machine_of(model: ModelFile, name: str) -> str | None:
     if model.kind != "machine":
         return None
     file = model.file("machine")
-    told = str(model.simulation.get("machine", "")) if file is None else str(file)
-    fitted = load_machine(told).name
+    machine = str(model.simulation.get("machine", "")) if file is None else str(file)
+    fitted = load_machine(machine).name
     if fitted != name:
         raise _wrong(
             "the answer is one of another machine", model, fitted, name,
             f"correct {fitted}, or diagnose recordings of {name}",
         )  # fmt: skip
-    return sha256_file(machine_file(told))
+    return sha256_file(machine_file(machine))
 
 
 def _sized(model: ModelFile, fitted: FittedEffect, effect: Effect) -> tuple[AppliedEffect, float]:
     """Return the effect as it is corrected, in machine axes, and its standard uncertainty."""
-    own, way = fitted.applied.effect, effect.correctable
-    parameter = own.parameters[0]
+    fitted_effect, way = fitted.applied.effect, effect.correctable
+    parameter = fitted_effect.parameters[0]
     u = fitted.standard_errors.get(parameter.name)
     if u is None:
         raise _wrong(
@@ -112,7 +114,7 @@ def _sized(model: ModelFile, fitted: FittedEffect, effect: Effect) -> tuple[Appl
             fitted.label, "an effect whose size the recordings determine", "record what determines it",
         )  # fmt: skip
     value = fitted.applied.values[parameter.name] * parameter.sign_between(model.axes, "machine")
-    if effect.name == own.name:
+    if effect.name == fitted_effect.name:
         if way is not None and way.channels and model.axes != "machine":
             raise _wrong(
                 f"{effect.name} is a machine's own, and this case does not stand in the machine's axes",
@@ -121,8 +123,8 @@ def _sized(model: ModelFile, fitted: FittedEffect, effect: Effect) -> tuple[Appl
             )  # fmt: skip
         applied = fitted.applied
         return _applied(effect, applied.channel, applied.source, value, applied.units[parameter.name]), u
-    alike, load = own.alike, model.nominal_load_N
-    size = alike.size if alike is not None and _same_class(own, effect) else None
+    alike, load = fitted_effect.alike, model.nominal_load_N
+    size = alike.size if alike is not None and _same_class(fitted_effect, effect) else None
     sizes = None if size is None else (size(value, load), size(u, load))
     if alike is None or sizes is None or sizes[0] is None or sizes[1] is None:
         raise _wrong(
@@ -134,8 +136,8 @@ def _sized(model: ModelFile, fitted: FittedEffect, effect: Effect) -> tuple[Appl
     return _applied(effect, *alike.place, sizes[0], text), abs(sizes[1])
 
 
-def _same_class(one: Effect, other: Effect) -> bool:
-    return one.alike is not None and other.alike is not None and one.alike.group == other.alike.group
+def _same_class(effect: Effect, other: Effect) -> bool:
+    return effect.alike is not None and other.alike is not None and effect.alike.group == other.alike.group
 
 
 def _applied(

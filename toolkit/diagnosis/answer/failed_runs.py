@@ -49,8 +49,8 @@ class FailedRuns:
 
     def findings(self, case: Case) -> tuple[Finding, ...]:
         """Return what is to be told; nothing where every simulation gave numbers."""
-        never = sorted(name for name, (tried, failed) in self._with.items() if tried == failed)
-        made = [
+        never = sorted(name for name, (attempts, failed) in self._with.items() if attempts == failed)
+        lines = [
             Finding(
                 rule="effect-not-simulated",
                 where=f"{case.path.name}: simulation",
@@ -60,7 +60,7 @@ class FailedRuns:
             for name in never
         ]
         if self._failed:
-            made.append(
+            lines.append(
                 Finding(
                     rule="simulator-refuses",
                     where=f"{case.path.name}: simulation",
@@ -68,8 +68,8 @@ class FailedRuns:
                     f"simulation gave no usable output, first {self._first}",
                 )
             )
-        return tuple(made)
+        return tuple(lines)
 
 
-def _told(one: AppliedEffect) -> str:
-    return one.key._replace(source=None).label
+def _told(effect: AppliedEffect) -> str:
+    return effect.key._replace(source=None).label

@@ -117,12 +117,13 @@ def _answer(entries: dict[str, Any]) -> Diagnosis:
     )  # fmt: skip
 
 
-def _recordings(told: Any) -> tuple[Recorded, ...] | None:
+def _recordings(entries: Any) -> tuple[Recorded, ...] | None:
     """Return the recordings of an answer; None where it is older than the key."""
-    if told is None:
+    if entries is None:
         return None
     return tuple(
-        Recorded(name=_text(one["name"]), sha256=_text(one["sha256"]), own=bool(one["own"])) for one in told
+        Recorded(name=_text(entry["name"]), sha256=_text(entry["sha256"]), own=bool(entry["own"]))
+        for entry in entries
     )
 
 
@@ -209,7 +210,7 @@ def _end(value: Any) -> float | str | None:
     return value if value is None or isinstance(value, str) else _number(value)
 
 
-def _one_of(value: Any, known: tuple[str, ...]) -> Any:
-    if value not in known:
-        raise ValueError(f"{value!r} is none of {', '.join(known)}")
+def _one_of(value: Any, choices: tuple[str, ...]) -> Any:
+    if value not in choices:
+        raise ValueError(f"{value!r} is none of {', '.join(choices)}")
     return value

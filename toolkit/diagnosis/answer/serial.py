@@ -103,7 +103,7 @@ def _effect(effect: FoundEffect) -> dict[str, Any]:
 def _finite(value: Any) -> Any:
     """Return a JSON value with null in the place of every number that is none."""
     if isinstance(value, dict):
-        return {key: _finite(one) for key, one in value.items()}
+        return {key: _finite(entry) for key, entry in value.items()}
     if isinstance(value, list | tuple):
-        return [_finite(one) for one in value]
+        return [_finite(entry) for entry in value]
     return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -101,7 +101,9 @@ class Weighing:
         try:
             residual = self._space.residual(self._space.simulated(x))
         except FitError:
-            return np.full(sum(one.n for one in self._layouts.values()) + len(self._space.problem.free), 1e6)
+            return np.full(
+                sum(layout.n for layout in self._layouts.values()) + len(self._space.problem.free), 1e6
+            )
         p, _ = self._space.split(x)
         return np.concatenate([self._whitened(residual), self._space.problem.off_priors(p)])
 
@@ -112,7 +114,11 @@ class Weighing:
 
 
 def descend(
-    space: Space, layouts: dict[str, Layout], x: Array, noise: dict[str, Autoregression], known: Derivatives
+    space: Space,
+    layouts: dict[str, Layout],
+    x: Array,
+    noise: dict[str, Autoregression],
+    derivatives: Derivatives,
 ) -> Array:
     """Return the vector of least squares, searched from ``x``.
 
@@ -128,7 +134,7 @@ def descend(
     weighing = Weighing(space, layouts, noise)
 
     def slope(v: NDArray[np.float64]) -> NDArray[np.float64]:
-        return weighing.slope(known.at(v, weighing))
+        return weighing.slope(derivatives.at(v, weighing))
 
     for _ in range(_AGAIN):
         x = least_squares(
@@ -142,7 +148,7 @@ def descend(
             xtol=1e-5,  # of a parameter's size: the step after it would be smaller by orders
             gtol=1e-9,
         ).x
-        if known.trusted(x, weighing):
+        if derivatives.trusted(x, weighing):
             break
-        known.anew(x)
+        derivatives.anew(x)
     return x

@@ -9,9 +9,15 @@ from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
-from toolkit.diagnosis.fit.covariance import covariance
 from toolkit.diagnosis.fit.descent import Derivatives, descend
-from toolkit.diagnosis.fit.noise import Autoregression, Layout, fit_noise, log_likelihood
+from toolkit.diagnosis.fit.noise import (
+    Autoregression,
+    Layout,
+    autocovariance,
+    fit_noise,
+    log_likelihood,
+    whiten,
+)
 from toolkit.diagnosis.fit.space import Space
 from toolkit.diagnosis.policy import NOISE
 from toolkit.effects.applied import AppliedEffect
@@ -22,6 +28,68 @@ if TYPE_CHECKING:
     from toolkit.diagnosis.fit.problem import Problem
 
     Stacked = dict[str, NDArray[np.float64]]
+
+# The covariance of a joint fit: of generalised least squares, or the sandwich of ordinary ones.
+
+
+_OPEN = 1e12  # variance, in searched units, of what the data leave open altogether
+
+
+def covariance(
+    J: Stacked,
+    prior: NDArray[np.float64],
+    sizes: NDArray[np.float64],
+    layouts: dict[str, Layout],
+    noise: dict[str, Autoregression],
+    *,
+    plain: bool,
+) -> NDArray[np.float64]:
+    """Return the covariance of (p, effects' parameters) in their units.
+
+    Of ordinary least squares it is the sandwich with the residual's autocovariance in it.
+
+    Parameters
+    ----------
+    J : of every output over all rows, d(simulated)/d(x), (rows, k); x are the parameters over ``sizes``
+    prior : rows of the priors, (free, k)
+    """
+    if not len(sizes):
+        return np.zeros((0, 0))
+    parts, spread = [], prior.T @ prior
+    for name, where in layouts.items():
+        columns = J[name][where.index]
+        if plain:
+            weight = 1 / (noise[name].marginal_sd ** 2 * noise[name].correlation_rows)
+            parts.append(columns * math.sqrt(weight))
+            spread = spread + weight**2 * columns.T @ _correlated(columns, where, noise[name])
+        else:
+            parts.append(whiten(columns, where, noise[name]))
+    rows = np.vstack([*parts, prior])
+    size = np.sqrt((rows**2).sum(axis=0))
+    size[size == 0] = 1.0
+    _, s, vt = np.linalg.svd(rows / size, full_matrices=False)
+    keep = s > 1e-10 * s.max()
+    inverse = (vt[keep].T / s[keep] ** 2) @ vt[keep]
+    if plain:
+        inverse = inverse @ (spread / np.outer(size, size)) @ inverse
+    if not keep.all():
+        inverse[np.diag_indices_from(inverse)] += np.where(np.abs(vt[~keep]).max(axis=0) > 0.1, _OPEN, 0.0)
+    scale = sizes / size
+    return np.asarray(inverse * np.outer(scale, scale))
+
+
+def _correlated(columns: NDArray[np.float64], where: Layout, noise: Autoregression) -> NDArray[np.float64]:
+    """Return the noise's covariance matrix times columns, segment by segment."""
+    from scipy.signal import fftconvolve
+
+    products = np.empty_like(columns)
+    for segment in where.segments:
+        n = segment.stop - segment.start
+        gamma = autocovariance(noise, n)
+        kernel = np.concatenate([gamma[:0:-1], gamma])[:, None]
+        products[segment] = fftconvolve(columns[segment], kernel, mode="full", axes=0)[n - 1 : 2 * n - 1]
+    return products
+
 
 _OUTER = 4  # times that the noise is estimated anew
 _BETTER = 0.02  # of the log-likelihood: less is no step worth another round
@@ -78,26 +146,26 @@ def fit(
     plain : ordinary least squares, or not; None lets a specification test decide
     """
     space = Space.of(problem, tuple(active))
-    known = Derivatives(space)
+    derivatives = Derivatives(space)
     layouts = {name: problem.layout(name, rows) for name in problem.names}
     x = space.begin([parameter.value for parameter in problem.free] if start is None else start)
-    made = _coloured(space, layouts, x, noise, 2 if plain else rounds, known)
-    other = None
+    solved = _coloured(space, layouts, x, noise, 2 if plain else rounds, derivatives)
+    alternative = None
     if plain is None:
-        other = _plain(space, layouts, made, known)
-        plain = other is not None and _absorbs(made, other, layouts)
-        chosen = other if plain and other is not None else made
+        alternative = _plain(space, layouts, solved, derivatives)
+        plain = alternative is not None and _absorbs(solved, alternative, layouts)
+        chosen = alternative if plain and alternative is not None else solved
     else:
-        chosen = _plain(space, layouts, made, known) or made if plain else made
-    p, found = space.split(chosen.x)
+        chosen = _plain(space, layouts, solved, derivatives) or solved if plain else solved
+    p, values = space.split(chosen.x)
     return Fit(
         p=tuple(p),
-        active=found,
+        active=values,
         residual=chosen.residual,
         simulated=chosen.simulated,
         noise=chosen.noise,
         log_posterior=chosen.score,
-        covariance=_covariance(space, chosen, None if plain else other, layouts, plain=plain),
+        covariance=_covariance(space, chosen, None if plain else alternative, layouts, plain=plain),
         rows=rows,
         plain=plain,
     )
@@ -113,20 +181,22 @@ def _coloured(
 ) -> _Solved:
     """Return generalised least squares, the noise estimated anew in every round."""
     best: _Solved | None = None
-    known = noise
+    noise_now = noise
     for turn in range(max(rounds, 1)):
-        if known is None:
-            known = _white(space.problem, space.residual(space.simulated(x)), layouts)
-        solved = _solve(space, layouts, x, known, derivatives)
+        if noise_now is None:
+            noise_now = _white(space.problem, space.residual(space.simulated(x)), layouts)
+        solved = _solve(space, layouts, x, noise_now, derivatives)
         if best is not None and solved.score < best.score + _BETTER:
             return solved if solved.score > best.score else best
-        best, x, known = solved, solved.x, solved.noise
+        best, x, noise_now = solved, solved.x, solved.noise
         if not len(x) and turn:
             break
     return cast("_Solved", best)
 
 
-def _plain(space: Space, layouts: dict[str, Layout], from_: _Solved, known: Derivatives) -> _Solved | None:
+def _plain(
+    space: Space, layouts: dict[str, Layout], from_: _Solved, derivatives: Derivatives
+) -> _Solved | None:
     """Return ordinary least squares, each output weighed by what its rows are worth; None for white noise."""
     if not len(from_.x) or not any(autoregression.reflection for autoregression in from_.noise.values()):
         return None
@@ -136,7 +206,7 @@ def _plain(space: Space, layouts: dict[str, Layout], from_: _Solved, known: Deri
         )
         for name, autoregression in from_.noise.items()
     }
-    return _solve(space, layouts, from_.x, weights, known)
+    return _solve(space, layouts, from_.x, weights, derivatives)
 
 
 def _absorbs(coloured: _Solved, plain: _Solved, layouts: dict[str, Layout]) -> bool:
@@ -162,25 +232,25 @@ def _solve(
     layouts: dict[str, Layout],
     x: NDArray[np.float64],
     weights: dict[str, Autoregression],
-    known: Derivatives,
+    derivatives: Derivatives,
 ) -> _Solved:
-    x = descend(space, layouts, x, weights, known)
+    x = descend(space, layouts, x, weights, derivatives)
     simulated = space.simulated(x)
     residual = space.residual(simulated)
     noise = noise_of(space.problem, residual, layouts, used=len(x))
     return _Solved(x, simulated, residual, noise, _score(space, x, residual, layouts, noise))
 
 
-def replace_effects(problem: Problem, made: Fit, active: tuple[AppliedEffect, ...]) -> Fit:
+def replace_effects(problem: Problem, fit: Fit, active: tuple[AppliedEffect, ...]) -> Fit:
     """Return a fit with other effects in it that nothing is fitted of: its covariance has them as known."""
-    simulated = problem.simulate(made.p, active)
-    before, after = _columns(problem, made.active), _columns(problem, active)
+    simulated = problem.simulate(fit.p, active)
+    before, after = _columns(problem, fit.active), _columns(problem, active)
     covariance = np.zeros((len(after), len(after)))
-    there = [i for i, one in enumerate(after) if one in before]
-    known = [before.index(after[i]) for i in there]
-    covariance[np.ix_(there, there)] = made.covariance[np.ix_(known, known)]
+    there = [i for i, applied in enumerate(after) if applied in before]
+    places = [before.index(after[i]) for i in there]
+    covariance[np.ix_(there, there)] = fit.covariance[np.ix_(places, places)]
     residual = {name: problem.observed[name] - column for name, column in simulated.items()}
-    return replace(made, active=active, simulated=simulated, residual=residual, covariance=covariance)
+    return replace(fit, active=active, simulated=simulated, residual=residual, covariance=covariance)
 
 
 def _columns(problem: Problem, active: Sequence[AppliedEffect]) -> list[tuple[object, ...]]:
@@ -216,20 +286,20 @@ def log_prior(problem: Problem, p: Sequence[float]) -> float:
     )
 
 
-def held_out_score(problem: Problem, made: Fit, rows: NDArray[np.bool_]) -> float:
+def held_out_score(problem: Problem, fit: Fit, rows: NDArray[np.bool_]) -> float:
     """Return the log-likelihood of rows that a fit has not seen, under the noise of its training rows."""
     total = 0.0
     for name in problem.names:
         where = problem.layout(name, rows)
         if where.n:
-            total += log_likelihood(made.residual[name][where.index], where, made.noise[name])
+            total += log_likelihood(fit.residual[name][where.index], where, fit.noise[name])
     return total
 
 
-def jacobian(problem: Problem, made: Fit) -> tuple[dict[str, NDArray[np.float64]], NDArray[np.float64]]:
+def jacobian(problem: Problem, fit: Fit) -> tuple[dict[str, NDArray[np.float64]], NDArray[np.float64]]:
     """Return d(simulated)/d(x) over all rows of each output, and the sizes of x; x = (p, effects) / sizes."""
-    space = Space.of(problem, made.active)
-    return space.around(space.at(made.p))[1], space.sizes
+    space = Space.of(problem, fit.active)
+    return space.around(space.at(fit.p))[1], space.sizes
 
 
 def _white(problem: Problem, residual: Stacked, layouts: dict[str, Layout]) -> dict[str, Autoregression]:
@@ -257,7 +327,7 @@ def _score(
 
 
 def _covariance(
-    space: Space, solved: _Solved, other: _Solved | None, layouts: dict[str, Layout], *, plain: bool
+    space: Space, solved: _Solved, alternative: _Solved | None, layouts: dict[str, Layout], *, plain: bool
 ) -> NDArray[np.float64]:
     """Return the covariance of a solution, with what the plain ``other`` disagrees with it beside.
 
@@ -269,9 +339,9 @@ def _covariance(
     J = space.around(solved.x)[1]
     prior = space.problem.prior_rows(space.sizes, len(solved.x))
     matrix = covariance(J, prior, space.sizes, layouts, solved.noise, plain=plain)
-    if other is not None:
-        unsure = np.diag(covariance(J, prior, space.sizes, layouts, other.noise, plain=True))
-        apart = ((other.x - solved.x) * space.sizes) ** 2
+    if alternative is not None:
+        unsure = np.diag(covariance(J, prior, space.sizes, layouts, alternative.noise, plain=True))
+        apart = ((alternative.x - solved.x) * space.sizes) ** 2
         expected = np.maximum(unsure - np.diag(matrix), 0.0)
         matrix = matrix + np.diag(np.where(apart > NOISE.apart**2 * expected, apart, 0.0))
     return matrix

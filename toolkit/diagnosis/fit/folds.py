@@ -32,34 +32,34 @@ class Folds:
         return "contiguous blocks of one run" if runs == 1 else "contiguous blocks of the runs"
 
 
-def folds_of(problem: Problem, made: Fit) -> Folds:
+def folds_of(problem: Problem, fit: Fit) -> Folds:
     """Return the folds of a problem, at most five, runs dealt out in turn.
 
     Where a free parameter belongs to one run alone (its own initial state), a run that is held out whole
     would leave it at its prior: then blocks of every run are held out in its place.
     """
     runs = [rows for rows in problem.slices if rows.stop > rows.start]
-    if len(runs) >= 2 and not _own_parameters(problem, made):
+    if len(runs) >= 2 and not _own_parameters(problem, fit):
         count = min(ROWS.folds, len(runs))
-        held = []
+        masks = []
         for k in range(count):
             mask = np.zeros(problem.rows, dtype=bool)
             for one in runs[k::count]:
                 mask[one] = True
-            held.append(mask)
-        return Folds(held=tuple(held), by_run=True)
-    held = []
+            masks.append(mask)
+        return Folds(held=tuple(masks), by_run=True)
+    masks = []
     for k in range(ROWS.folds):
         mask = np.zeros(problem.rows, dtype=bool)
         for run in runs:
             mask[np.array_split(np.arange(run.start, run.stop), ROWS.folds)[k]] = True
         if mask.any():
-            held.append(mask)
-    return Folds(held=tuple(held), by_run=False)
+            masks.append(mask)
+    return Folds(held=tuple(masks), by_run=False)
 
 
-def _own_parameters(problem: Problem, made: Fit) -> bool:
-    columns, _ = jacobian(problem, made)
+def _own_parameters(problem: Problem, fit: Fit) -> bool:
+    columns, _ = jacobian(problem, fit)
     for i in range(len(problem.free)):
         moved = [
             any(float(np.abs(columns[name][rows, i]).max()) > 0 for name in problem.names)
@@ -89,14 +89,14 @@ def hold_out(problem: Problem, folds: Folds, active: Sequence[AppliedEffect], st
     """Fit a hypothesis without each fold and score it there; the simulation is free over whole runs."""
     scores, fits = [], []
     simulated = {name: np.full(problem.rows, np.nan) for name in problem.names}
-    for held in folds.held:
+    for mask in folds.held:
         trained = fit(
-            problem, active, start=start.p, rows=~held, noise=start.noise, rounds=2, plain=start.plain
+            problem, active, start=start.p, rows=~mask, noise=start.noise, rounds=2, plain=start.plain
         )
-        scores.append(held_out_score(problem, trained, held))
+        scores.append(held_out_score(problem, trained, mask))
         fits.append(trained)
         for name in problem.names:
-            simulated[name][held] = trained.simulated[name][held]
+            simulated[name][mask] = trained.simulated[name][mask]
     return HeldOut(scores=tuple(scores), simulated=simulated, fits=tuple(fits))
 
 

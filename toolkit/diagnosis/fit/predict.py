@@ -68,13 +68,13 @@ def csv_of(columns: Mapping[str, NDArray[np.float64]]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _simulated(problem: Problem, run: Run, made: Fit | None) -> Mapping[str, NDArray[np.float64]]:
+def _simulated(problem: Problem, run: Run, fit: Fit | None) -> Mapping[str, NDArray[np.float64]]:
     values = dict(problem.known)
-    if made is None:
+    if fit is None:
         return problem.model.simulate(run, values, ())
-    values.update(zip((parameter.name for parameter in problem.free), made.p, strict=True))
+    values.update(zip((parameter.name for parameter in problem.free), fit.p, strict=True))
     return problem.model.simulate(
-        run, values, tuple(_spread_to(problem, run, applied) for applied in made.active)
+        run, values, tuple(_spread_to(problem, run, applied) for applied in fit.active)
     )
 
 
@@ -86,8 +86,8 @@ def _spread_to(problem: Problem, run: Run, applied: AppliedEffect) -> AppliedEff
     if applied.runs is None:
         return applied
     for key in applied.effect.confining(run.conditions):
-        inside = {other.conditions.get(key) for other in problem.runs if other.name in applied.runs}
-        outside = {other.conditions.get(key) for other in problem.runs if other.name not in applied.runs}
+        inside = {run.conditions.get(key) for run in problem.runs if run.name in applied.runs}
+        outside = {run.conditions.get(key) for run in problem.runs if run.name not in applied.runs}
         if not inside & outside and run.conditions[key] in inside:
             return replace(applied, runs=applied.runs | {run.name})
     return replace(applied, runs=applied.runs - {run.name})

@@ -58,7 +58,7 @@ class Problem:
     def layout(self, name: str, rows: NDArray[np.bool_] | None = None) -> Layout:
         """Return the layout of an output's kept values, confined to some rows."""
         good = self.kept[name] if rows is None else self.kept[name] & rows
-        return layout([run.t for run in self.runs], [good[one] for one in self.slices])
+        return layout([run.t for run in self.runs], [good[rows] for rows in self.slices])
 
     def simulate(self, p: Sequence[float], active: Sequence[AppliedEffect]) -> Stacked:
         """Return every output over all runs in their order; ``p`` are the free parameters."""
@@ -67,13 +67,13 @@ class Problem:
         outputs = [self.model.simulate(run, values, active) for run in self.runs]
         return {name: np.concatenate([output[name] for output in outputs]) for name in self.names}
 
-    def prepare(self, wanted: Sequence[tuple[Sequence[float], Sequence[AppliedEffect]]]) -> None:
+    def prepare(self, points: Sequence[tuple[Sequence[float], Sequence[AppliedEffect]]]) -> None:
         """Have several simulations made at once where the model can; `simulate` then finds them."""
         together = self.model.capability.together
         if together is None:
             return
         names = [parameter.name for parameter in self.free]
-        sets = [(self.known | dict(zip(names, map(float, p), strict=True)), active) for p, active in wanted]
+        sets = [(self.known | dict(zip(names, map(float, p), strict=True)), active) for p, active in points]
         for run in self.runs:
             together(run, sets)
 

@@ -109,17 +109,17 @@ class Space:
         """
         points = self._moved(x)
         # Together they have the same steps: what these leave is then no part of a difference.
-        self.problem.prepare([self.split(one) for one in (x, *points)])
-        here = self.simulated(x)
-        slopes = {name: np.empty((len(column), len(x))) for name, column in here.items()}
+        self.problem.prepare([self.split(point) for point in (x, *points)])
+        simulated = self.simulated(x)
+        slopes = {name: np.empty((len(column), len(x))) for name, column in simulated.items()}
         for i, moved in enumerate(points):
             try:
                 trial = self.simulated(moved)
             except FitError:
-                trial = here
+                trial = simulated
             for name, column in trial.items():
-                slopes[name][:, i] = (column - here[name]) / (moved[i] - x[i])
-        return here, slopes
+                slopes[name][:, i] = (column - simulated[name]) / (moved[i] - x[i])
+        return simulated, slopes
 
     def _moved(self, x: Array) -> list[Array]:
         points = []

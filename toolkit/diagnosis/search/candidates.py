@@ -2,22 +2,60 @@
 
 from __future__ import annotations
 
+import dataclasses
 import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from toolkit.diagnosis.fit.nuisance import INPUT_NOISE
 from toolkit.diagnosis.policy import STARTS
 from toolkit.diagnosis.search.case_view import CaseView
 from toolkit.effects.applied import AppliedEffect, EffectKey
 from toolkit.effects.catalogue import effects
+from toolkit.effects.effect import Effect, EffectParameter
+from toolkit.effects.facts import Values
+from toolkit.effects.filters import lag
+from toolkit.effects.signals import Drive, Setting, Tire
 
 if TYPE_CHECKING:
     from toolkit.diagnosis.fit.problem import Problem
-    from toolkit.effects.effect import Effect, EffectParameter
     from toolkit.effects.surroundings import Surroundings
+
+# What imitates physics without being any: noise in the recorded slip angle, which every lag smooths away.
+
+
+def _smoothed(drive: Drive, values: Values, setting: Setting, tire: Tire) -> Drive:
+    del setting, tire
+    tau = max(values["time_constant"], 0.0)
+    forward = lag(drive.t, drive.SA, tau)
+    there_and_back = lag(-drive.t[::-1], forward[::-1], tau)[::-1]
+    return dataclasses.replace(drive, SA=there_and_back)
+
+
+INPUT_NOISE = Effect(
+    name="input_noise",
+    stage="carriage",
+    rank=0,
+    in_time=True,
+    nuisance=True,
+    statement="The recorded slip angle is noisy; the wheel's own is smoother.",
+    equation="SA smoothed forward and backward by one time constant",
+    reference="Rauch, Tung and Striebel, AIAA J. 3 (1965)",
+    signature="a gain from smoothing alone, without delay",
+    separates="",
+    parameters=(
+        EffectParameter(
+            name="time_constant",
+            unit="s",
+            text="of the smoothing, each way",
+            typical=(0.005, 0.2),
+            bounds=(0.0, 10.0),
+            starts=(0.01, 0.05, 0.2),
+        ),
+    ),
+    drive=_smoothed,
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

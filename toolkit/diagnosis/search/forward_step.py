@@ -57,23 +57,29 @@ def step_groups(
     if not ranked:
         return []
     near = min(STEP.far_behind * ranked[0].gain, ranked[0].gain - STEP.near)
-    first = [one for one in ranked if one.gain > near][: STEP.refined]
+    first = [scored for scored in ranked if scored.gain > near][: STEP.refined]
     # What the refit may have absorbed is fitted with the first, however small it looks from there.
-    first += [one for one in ranked if one.candidate.key in hidden and all(one is not each for each in first)]
-    behind = [one for one in ranked if all(one is not each for each in first)][: STEP.refined]
+    first += [
+        scored
+        for scored in ranked
+        if scored.candidate.key in hidden and all(scored is not near_best for near_best in first)
+    ]
+    behind = [scored for scored in ranked if all(scored is not near_best for near_best in first)][
+        : STEP.refined
+    ]
     return [(first, least), *([(behind, STEP.least_behind)] if behind else [])]
 
 
 def joint_fits(problem: Problem, base: Fit, promising: Sequence[Scored]) -> tuple[Joint, ...]:
     """Return candidates fitted jointly with what is there, the best first."""
     weight = _weight(problem)
-    made = []
-    for one in promising:
-        fitted = _fitted(problem, base, one.active)
+    joints = []
+    for scored in promising:
+        fitted = _fitted(problem, base, scored.active)
         if fitted is not None:
-            penalty = weight * sum(not each.ends_count for each in one.active.searched)
-            made.append(Joint(scored=one, fit=fitted, score=fitted.log_posterior - penalty))
-    return tuple(sorted(made, key=lambda one: -one.score))
+            penalty = weight * sum(not parameter.ends_count for parameter in scored.active.searched)
+            joints.append(Joint(scored=scored, fit=fitted, score=fitted.log_posterior - penalty))
+    return tuple(sorted(joints, key=lambda joint: -joint.score))
 
 
 def best_step(
@@ -95,43 +101,43 @@ def best_step(
     least : share of an output's held-out mean square that it must take away
     refitted : the held-out rows without any effect
     """
-    form = max((one.effect.form_error for one in base.active), default=0.0)
-    for one in joint[: STEP.judged]:
-        made = one.fit
+    form = max((applied.effect.form_error for applied in base.active), default=0.0)
+    for joint_fit in joint[: STEP.judged]:
+        made = joint_fit.fit
         try:
-            held = hold_out(problem, folds, made.active, made)
+            scores = hold_out(problem, folds, made.active, made)
         except FitError:
             continue
-        gain = held.total - held_base.total
-        if gain < STEP.least_gain or one.score - base.log_posterior < STEP.least_gain:
+        gain = scores.total - held_base.total
+        if gain < STEP.least_gain or joint_fit.score - base.log_posterior < STEP.least_gain:
             continue
         # One that a later effect drives to its bound is no better than one that starts there.
-        if any(at_bound(each) for each in made.active) or not matters(problem, held_base, held, least):
+        if any(at_bound(each) for each in made.active) or not matters(problem, held_base, scores, least):
             continue
-        if not beyond_form(problem, refitted, held_base, held, form):
+        if not beyond_form(problem, refitted, held_base, scores, form):
             continue
-        if made.active[-1].effect.needs_signal and not _shows(problem, held, made.active[-1]):
+        if made.active[-1].effect.needs_signal and not _shows(problem, scores, made.active[-1]):
             continue
         step = Step(
             active=made.active[-1],
-            p_value=p_of[id(one.scored)],
+            p_value=p_of[id(joint_fit.scored)],
             held_out_gain=gain,
             gain=made.log_posterior - base.log_posterior,
-            rivals=rivals(problem, one, joint),
+            rivals=rivals(problem, joint_fit, joint),
         )
-        return made, held, step
+        return made, scores, step
     return None
 
 
-def _shows(problem: Problem, held: HeldOut, one: AppliedEffect) -> bool:
+def _shows(problem: Problem, held_out: HeldOut, effect: AppliedEffect) -> bool:
     """Tell whether an output has the simulated signal in it, and is not only made small by a factor."""
-    name = str(one.channel)
+    name = str(effect.channel)
     if name not in problem.names:
         return True
-    kept = problem.kept[name]
-    simulated = held.simulated[name][kept]
-    left = problem.observed[name][kept] - simulated
-    return float(np.mean(left**2)) < STEP.signal**2 * float(np.mean(simulated**2))
+    rows = problem.kept[name]
+    simulated = held_out.simulated[name][rows]
+    residual = problem.observed[name][rows] - simulated
+    return float(np.mean(residual**2)) < STEP.signal**2 * float(np.mean(simulated**2))
 
 
 def rivals(problem: Problem, chosen: Joint, joint: Sequence[Joint]) -> tuple[Rival, ...]:
@@ -139,19 +145,19 @@ def rivals(problem: Problem, chosen: Joint, joint: Sequence[Joint]) -> tuple[Riv
     weight = _weight(problem)
     return tuple(
         Rival(
-            active=other.fit.active[-1],
-            difference=other.score
+            active=rival.fit.active[-1],
+            difference=rival.score
             - chosen.score
-            + weight * (_shapes(other.scored.active) - _shapes(chosen.scored.active)),
+            + weight * (_shapes(rival.scored.active) - _shapes(chosen.scored.active)),
         )
-        for other in joint
-        if other is not chosen and not other.scored.active.effect.nuisance
+        for rival in joint
+        if rival is not chosen and not rival.scored.active.effect.nuisance
     )
 
 
 def _weight(problem: Problem) -> float:
     """Return what a parameter costs of the log-likelihood (BIC)."""
-    return 0.5 * math.log(sum(int(one.sum()) for one in problem.kept.values()))
+    return 0.5 * math.log(sum(int(rows.sum()) for rows in problem.kept.values()))
 
 
 def _fitted(problem: Problem, base: Fit, added: AppliedEffect) -> Fit | None:
@@ -162,9 +168,11 @@ def _fitted(problem: Problem, base: Fit, added: AppliedEffect) -> Fit | None:
     """
     for share in (1.0, 0.5, 0.25, 0.125) if added.searched else (1.0,):
         values = dict(added.values)
-        for one in added.searched:
-            if one.off is not None and math.isfinite(one.off):
-                values[one.name] = one.off + share * (added.values[one.name] - one.off)
+        for parameter in added.searched:
+            if parameter.off is not None and math.isfinite(parameter.off):
+                values[parameter.name] = parameter.off + share * (
+                    added.values[parameter.name] - parameter.off
+                )
         try:
             return fit(problem, (*base.active, replace(added, values=values)), start=base.p)
         except FitError:
@@ -172,17 +180,17 @@ def _fitted(problem: Problem, base: Fit, added: AppliedEffect) -> Fit | None:
     return None
 
 
-def _shapes(one: AppliedEffect) -> int:
+def _shapes(effect: AppliedEffect) -> int:
     """Return how many parameters only shape an effect: they make it no less able to imitate another."""
-    return sum(each.off is None and not each.ends_count for each in one.searched)
+    return sum(parameter.off is None and not parameter.ends_count for parameter in effect.searched)
 
 
-def at_bound(one: AppliedEffect) -> bool:
+def at_bound(effect: AppliedEffect) -> bool:
     """Tell whether a parameter ends at a bound other than zero: then the effect only imitates another."""
-    for parameter in one.searched:
+    for parameter in effect.searched:
         if parameter.ends_count:
             continue
-        value = one.values[parameter.name]
+        value = effect.values[parameter.name]
         for bound in parameter.bounds:
             if math.isfinite(bound) and bound != 0 and abs(value - bound) < STEP.bound * abs(bound):
                 return True

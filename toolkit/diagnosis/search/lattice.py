@@ -50,8 +50,8 @@ def lattice_of(values: NDArray[np.float64], residual_sd: float) -> Lattice | Non
     counts = np.round(steps / least)
     if np.abs(steps / least - counts).max() > LATTICE.exact * max(float(counts.max()), 1.0):
         return None
-    whole = float(np.sum(counts))
-    step = float(np.sum(steps)) / whole
+    total = float(np.sum(counts))
+    step = float(np.sum(steps)) / total
     printed = _last_place(values)
     rounded = step**2 / 12  # variance of what rounding to a step takes away
     if (
@@ -60,7 +60,7 @@ def lattice_of(values: NDArray[np.float64], residual_sd: float) -> Lattice | Non
     ):
         return None
     ends = _rounding(values, printed)
-    return Lattice(step=step, half_width=ends / whole, log_score_gain=len(values) * math.log(step / printed))
+    return Lattice(step=step, half_width=ends / total, log_score_gain=len(values) * math.log(step / printed))
 
 
 def _rounding(values: NDArray[np.float64], printed: float) -> float:
@@ -68,10 +68,10 @@ def _rounding(values: NDArray[np.float64], printed: float) -> float:
 
     A file prints either to a fixed place or to so many significant digits, then its ends are the coarsest.
     """
-    shown = (f"{abs(one):.12g}".partition("e")[0].replace(".", "").lstrip("0") for one in values.tolist())
+    shown = (f"{abs(value):.12g}".partition("e")[0].replace(".", "").lstrip("0") for value in values.tolist())
     digits = max(map(len, shown))
     ends = (abs(float(values.min())), abs(float(values.max())))
-    places = (10.0 ** (math.floor(math.log10(one)) + 1 - digits) if one > 0 else printed for one in ends)
+    places = (10.0 ** (math.floor(math.log10(end)) + 1 - digits) if end > 0 else printed for end in ends)
     return sum(0.5 * max(printed, place) for place in places)
 
 

@@ -211,15 +211,15 @@ class LinearisedFit:
         """Return all of them, the ``most`` best with their exact gain and the values that reach it."""
         first: list[Scored] = []
         later: list[Scored] = []
-        tried = Counter[object]()
+        starts_of = Counter[object]()
         for trial in sorted(scored, key=lambda trial: -trial.gain):
-            tried[trial.candidate.key] += 1
-            chosen = len(first) < most and tried[trial.candidate.key] <= SCREENING.starts
+            starts_of[trial.candidate.key] += 1
+            chosen = len(first) < most and starts_of[trial.candidate.key] <= SCREENING.starts
             (first if chosen else later).append(trial)
-        sharp = [self._exact(one) for one in first]
-        least = min((one.gain for one in sharp), default=0.0)
+        sharp = [self._exact(scored) for scored in first]
+        least = min((scored.gain for scored in sharp), default=0.0)
         # What was not sharpened keeps its quick gain, but never ranks before what was.
-        return [*sharp, *(replace(one, gain=min(one.gain, least)) for one in later)]
+        return [*sharp, *(replace(scored, gain=min(scored.gain, least)) for scored in later)]
 
     def _exact(self, trial: Scored) -> Scored:
         gain, coefficients, trust = self.gain(trial.directions, fixed=trial.candidate.discrete)
@@ -227,7 +227,11 @@ class LinearisedFit:
             return replace(trial, gain=gain, trust=trust)
         parameters = {parameter.name: parameter for parameter in trial.active.effect.parameters}
         amplitudes = {name: parameters[name] for name in trial.start.amplitudes}
-        off = {name: each.off or 0.0 for name, each in amplitudes.items() if math.isfinite(each.off or 0.0)}
+        off = {
+            name: amplitude.off or 0.0
+            for name, amplitude in amplitudes.items()
+            if math.isfinite(amplitude.off or 0.0)
+        }
         values = trial.start.reached(coefficients, off) if coefficients else dict(trial.start.values)
         if len(off) == 1 and any(values[name] < parameters[name].bounds[0] for name in off):
             # The other sign would fit, and the effect has one only.
@@ -267,8 +271,8 @@ class LinearisedFit:
             matrix = self.columns[name][at]
             if not fixed:
                 matrix = np.hstack([matrix, directions[name][at]])
-            used = noise[name] if noise is not None else Autoregression(reflection=(), sd=_rms(r) or 1.0)
-            white = whiten(np.hstack([matrix, r[:, None]]), where, used)
+            spectrum = noise[name] if noise is not None else Autoregression(reflection=(), sd=_rms(r) or 1.0)
+            white = whiten(np.hstack([matrix, r[:, None]]), where, spectrum)
             blocks.append(white[:, :-1])
             targets.append(white[:, -1])
         free = problem.free
@@ -339,7 +343,7 @@ def best_of(scored: Sequence[Scored]) -> list[Scored]:
         key = trial.candidate.key
         if key not in best or trial.gain > best[key].gain:
             best[key] = trial
-    return sorted(best.values(), key=lambda one: -one.gain)
+    return sorted(best.values(), key=lambda scored: -scored.gain)
 
 
 def _solved(blocks: list[NDArray[np.float64]], targets: list[NDArray[np.float64]]) -> NDArray[np.float64]:

@@ -2,17 +2,81 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
 
 from toolkit.diagnosis.fit.fit import Fit
 from toolkit.diagnosis.fit.problem import Problem
 from toolkit.diagnosis.policy import PRIORS, SCREENING
 from toolkit.diagnosis.search.candidates import CandidateEffect
-from toolkit.diagnosis.search.null import search_p_values
 from toolkit.diagnosis.search.screen import LinearisedFit, Scored, best_of
 from toolkit.effects.applied import EffectKey
 from toolkit.errors import FitError
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+# What the best of a whole search is worth: the null distribution of its largest statistic.
+
+
+def search_p_values(
+    screen: LinearisedFit, blocks: Sequence[NDArray[np.float64]], gains: Sequence[float], seed: int
+) -> list[float]:
+    """Return for every statistic the chance that a search without an effect finds one as improbable.
+
+    Parameters
+    ----------
+    blocks : orthonormal whitened responses of every candidate and start, (values, k)
+    gains : their gains of twice the log-likelihood, each times its trust
+    """
+    if not blocks:
+        return []
+    widths = [block.shape[1] for block in blocks]
+    stacked = np.hstack(blocks)
+    gram = stacked.T @ stacked
+    values, vectors = np.linalg.eigh(gram)
+    keep = values > 1e-9 * max(float(values.max()), 1e-300)
+    root = vectors[:, keep] * np.sqrt(values[keep])
+    n = screen.n
+    dof = max(n - screen.sizes.size - int(keep.sum()), 1)
+    rng = np.random.default_rng(seed)
+    normal = rng.standard_normal((SCREENING.draws, root.shape[1]))
+    z = normal @ root.T
+    total = (normal**2).sum(axis=1) + rng.chisquare(dof, SCREENING.draws)
+    smallest = np.full(SCREENING.draws, math.inf)
+    starts = np.cumsum([0, *widths[:-1]])
+    for width in sorted(set(widths) - {0}):
+        chosen = starts[[i for i, start_width in enumerate(widths) if start_width == width]]
+        part = sum(z[:, chosen + k] ** 2 for k in range(width))
+        share = np.asarray(part) / total[:, None]
+        statistic = -n * np.log1p(-np.minimum(share, 1 - 1e-9))
+        smallest = np.minimum(smallest, _log_p(statistic.max(axis=1), width))
+    smallest.sort()
+    p_values = []
+    for gain, width in zip(gains, widths, strict=True):
+        p = float(_log_p(np.array([max(gain, 0.0)]), max(width, 1))[0])
+        below = int(np.searchsorted(smallest, p, side="right"))
+        if below >= SCREENING.fewest_draws:
+            p_values.append((below + 1) / (SCREENING.draws + 1))
+        else:
+            # Beyond what was drawn: Bonferroni on as many independent tests as the drawn tail shows.
+            tail = float(smallest[int(SCREENING.tail * SCREENING.draws)])
+            p_values.append(min(1.0, math.exp(min(0.0, p - tail)) * SCREENING.tail))
+    return p_values
+
+
+def _log_p(statistic: NDArray[np.float64], dof: int) -> NDArray[np.float64]:
+    """Return the logarithm of chi-squared's upper tail; far out by its leading term."""
+    from scipy.special import gammaincc, gammaln
+
+    half = 0.5 * statistic
+    tail = gammaincc(0.5 * dof, half)
+    far = (0.5 * dof - 1) * np.log(np.maximum(half, 1e-300)) - half - gammaln(0.5 * dof)
+    return np.where(tail > 1e-290, np.log(np.maximum(tail, 1e-300)), far)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -39,19 +103,19 @@ def look(problem: Problem, base: Fit, listed: Sequence[CandidateEffect], *, turn
     seed : of the null's draws
     """
     screen = LinearisedFit.of(problem, base)
-    taken = {applied.key for applied in base.active}
+    present = {applied.key for applied in base.active}
     candidates = [
-        candidate for candidate in listed if candidate.key not in taken and _is_sought(candidate, turn)
+        candidate for candidate in listed if candidate.key not in present and _is_sought(candidate, turn)
     ]
     screen.prepare(candidates)
     scored = screen.sharpened(
-        [one for candidate in candidates for one in screen.score(candidate)], SCREENING.sharpened
+        [score for candidate in candidates for score in screen.score(candidate)], SCREENING.sharpened
     )
     p_values = search_p_values(
         screen, [trial.block for trial in scored], [trial.gain * trial.trust for trial in scored], seed
     )
     p_of = {id(trial): p for trial, p in zip(scored, p_values, strict=True)}
-    significant = tuple(one for one in best_of(scored) if p_of[id(one)] < SCREENING.alpha)
+    significant = tuple(score for score in best_of(scored) if p_of[id(score)] < SCREENING.alpha)
     return Look(screen, tuple(candidates), tuple(scored), significant, p_of)
 
 
@@ -91,5 +155,5 @@ def masked(problem: Problem, base: Fit, candidates: Sequence[CandidateEffect]) -
         return frozenset()
     residual = {name: problem.observed[name] - values for name, values in simulated.items()}
     screen = LinearisedFit.of(problem, replace(base, p=declared, simulated=simulated, residual=residual))
-    ranked = best_of([one for candidate in candidates for one in screen.score(candidate)])
+    ranked = best_of([score for candidate in candidates for score in screen.score(candidate)])
     return frozenset(trial.candidate.key for trial in ranked[: PRIORS.masked])

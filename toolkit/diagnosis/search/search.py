@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
+import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
@@ -16,7 +18,6 @@ from toolkit.diagnosis.policy import STEP
 from toolkit.diagnosis.search.candidates import candidates
 from toolkit.diagnosis.search.forward_step import Step, best_step, joint_fits, step_groups
 from toolkit.diagnosis.search.lattice import lattice_of
-from toolkit.diagnosis.search.nuisance_refit import refined, without
 from toolkit.diagnosis.search.screen import LinearisedFit, Scored
 from toolkit.diagnosis.search.screen_step import look, masked
 from toolkit.diagnosis.search.time_budget import BudgetSpentError, TimeBudget
@@ -25,6 +26,83 @@ from toolkit.errors import FitError
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
+
+    from toolkit.diagnosis.search.candidates import CandidateEffect
+    from toolkit.effects.applied import AppliedEffect
+
+# What of a found effect matters for its size alone: the zero beneath it, the noise that went through it.
+
+
+def refined(
+    problem: Problem, folds: Folds, base: Fit, held_out: HeldOut, listed: Sequence[CandidateEffect]
+) -> tuple[Fit, HeldOut]:
+    """Return the hypothesis that a search found with what its effects' sizes depend on.
+
+    Under every drift with the temperature a free zero, as a nuisance: the effect counts from the first
+    row's temperature, and nobody recorded at which one the channel was zeroed. A dead band whose noise
+    comes before it, where the recording is more likely so.
+
+    Parameters
+    ----------
+    base, held : the hypothesis found, fitted to all rows and by folds
+    listed : every candidate of the case
+    """
+    with_zeros = _better(problem, base, _with_zeros(base, listed), -sys.float_info.max)
+    if with_zeros is not base:
+        with contextlib.suppress(FitError):
+            held_out = hold_out(problem, folds, with_zeros.active, with_zeros)
+            base = with_zeros
+    # Rows inside a band have no noise, so that a fold's noise, and its score, hang on which rows it has: the
+    # noise before a band is for the band's width alone, and the score stays that of the sharp one.
+    for applied in base.active:
+        base = _better(problem, base, _with_noise(base, applied), STEP.band_noise)
+    return base, held_out
+
+
+def without(active: Sequence[AppliedEffect], effect: AppliedEffect) -> tuple[AppliedEffect, ...]:
+    """Return effects without one of them; a drift with the temperature goes with its zero."""
+    zero = (effect.channel, None, None)
+
+    def belongs(effect: AppliedEffect) -> bool:
+        return effect.effect.frees_zero and effect.effect.is_zero and effect.key[1:] == zero
+
+    return tuple(applied for applied in active if applied.key != effect.key and not belongs(applied))
+
+
+def _better(problem: Problem, base: Fit, active: tuple[AppliedEffect, ...] | None, least: float) -> Fit:
+    """Return the fit with other effects where it can be made, and gains so much."""
+    if active is None:
+        return base
+    try:
+        refitted = fit(problem, active, start=base.p)
+    except FitError:
+        return base
+    return refitted if refitted.log_posterior >= base.log_posterior + least else base
+
+
+def _with_zeros(base: Fit, listed: Sequence[CandidateEffect]) -> tuple[AppliedEffect, ...] | None:
+    there = {applied.channel for applied in base.active if applied.effect.is_zero}
+    free_zeros = {applied.channel for applied in base.active if applied.effect.frees_zero} - there
+    zeros = tuple(
+        replace(channel.active, values=channel.starts[0].values | {channel.active.effect.names[0]: 0.0})
+        for channel in listed
+        if channel.active.effect.is_zero
+        and channel.active.channel in free_zeros
+        and channel.active.runs is None
+    )
+    return (*base.active, *zeros) if zeros else None
+
+
+def _with_noise(base: Fit, effect: AppliedEffect) -> tuple[AppliedEffect, ...] | None:
+    noise, key = base.noise.get(str(effect.channel)), effect.effect.noise_key
+    if key is None or noise is None:
+        return None
+    return tuple(
+        replace(applied, values={**applied.values, key: noise.marginal_sd})
+        if applied.key == effect.key
+        else applied
+        for applied in base.active
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -138,11 +216,13 @@ def _is_nuisance(step: Step, steps: Sequence[Step]) -> bool:
         return True
     if not effect.is_zero:
         return False
-    beside = [other.active for other in steps if other.active.channel == step.active.channel]
+    beside = [
+        step_before.active for step_before in steps if step_before.active.channel == step.active.channel
+    ]
     offset = abs(step.active.values[effect.names[0]])
     return any(
-        other.effect.zero_beside is not None and offset <= other.effect.zero_beside(other.values)
-        for other in beside
+        active.effect.zero_beside is not None and offset <= active.effect.zero_beside(active.values)
+        for active in beside
     )
 
 
@@ -167,13 +247,13 @@ def _stepped(
         )
         steps = [*steps, step]
         with_steps = replace_effects(problem, base, (*base.active, active))
-        held = HeldOut(
+        held_out = HeldOut(
             scores=held_base.scores,
             simulated={**held_base.simulated, name: _rounded(held_base.simulated[name], lattice.step)},
             fits=held_base.fits,
         )
-        if matters(problem, held_base, held, STEP.first):
-            held_base = held
+        if matters(problem, held_base, held_out, STEP.first):
+            held_base = held_out
         base = with_steps
     return base, held_base, steps
 
@@ -192,11 +272,11 @@ def _pruned(
         remaining = without(base.active, steps[i].active)
         try:
             pruned = fit(problem, remaining, start=base.p)
-            held = hold_out(problem, folds, pruned.active, pruned)
+            scores = hold_out(problem, folds, pruned.active, pruned)
         except FitError:  # what is left cannot be simulated: the effect is needed
             continue
-        if held_base.total - held.total < STEP.least_gain:
-            base, held_base = pruned, held
+        if held_base.total - scores.total < STEP.least_gain:
+            base, held_base = pruned, scores
             keys = {applied.key for applied in remaining}
             steps = [step for step in steps if step.active.key in keys]
             return _pruned(problem, folds, base, held_base, steps)

@@ -29,7 +29,7 @@ class AcquisitionModel:
     """The acquisition program's arithmetic: a record's coefficients on the recorded cells."""
 
     def __init__(self, case: Case, record: CalibrationRecord, others: Sequence[CalibrationRecord]) -> None:
-        declared = {one.name: one for one in case.channels}
+        declared = {channel.name: channel for channel in case.channels}
         missing = [name for name in record.indications if name not in declared]
         if missing or not all(declared[name].role == "input" for name in record.indications):
             raise ConfigError(
@@ -44,7 +44,7 @@ class AcquisitionModel:
             raise ConfigError(
                 "an acquisition program has no free parameter",
                 where=f"{case.path}: simulation.parameters",
-                got=", ".join(one.name for one in case.parameters),
+                got=", ".join(parameter.name for parameter in case.parameters),
                 expected="none: a record's coefficients are known exactly",
                 next_step="remove them, or declare the cells as outputs and name the tire",
                 rule="case",
@@ -59,18 +59,18 @@ class AcquisitionModel:
             together=None,
             motion=None,
         )
-        self._others = {one.id: one for one in others if one.id != record.id}
+        self._others = {candidate.id: candidate for candidate in others if candidate.id != record.id}
         self.parameters = case.parameters
         self.outputs = tuple(
-            Output(name=one.name, unit=one.unit, sd=one.sd)
-            for one in case.outputs
-            if one.name in ("FY", "MZ")
+            Output(name=output.name, unit=output.unit, sd=output.sd)
+            for output in case.outputs
+            if output.name in ("FY", "MZ")
         )
         if len(self.outputs) != len(case.outputs):
             raise ConfigError(
                 "an output is nothing that a calibration gives",
                 where=f"{case.path}: recording.channels",
-                got=", ".join(one.name for one in case.outputs),
+                got=", ".join(output.name for output in case.outputs),
                 expected="FY, MZ",
                 next_step="change its role",
                 rule="case",
@@ -78,7 +78,9 @@ class AcquisitionModel:
 
     def observed(self, run: Run) -> dict[str, NDArray[np.float64]]:
         """Return FY and MZ as the program wrote them."""
-        return {one.name: run.columns[one.name] for one in self.outputs if one.name in run.columns}
+        return {
+            output.name: run.columns[output.name] for output in self.outputs if output.name in run.columns
+        }
 
     def simulate(
         self,
@@ -88,22 +90,22 @@ class AcquisitionModel:
     ) -> dict[str, NDArray[np.float64]]:
         """Return FY and MZ by the record on cells with effects in them, then effects on FY and MZ."""
         del p  # a record's coefficients are known exactly
-        here = setting(self.case, run, nominal_load_N=nominal_load(self.case))
+        around = setting(self.case, run, nominal_load_N=nominal_load(self.case))
         record = self.record
-        for one in active:
-            if one.effect.replaces_record and one.source is not None and one.acts_in(run):
-                record = self._others[one.source]
+        for applied in active:
+            if applied.effect.replaces_record and applied.source is not None and applied.acts_in(run):
+                record = self._others[applied.source]
         cells = through_channels(
-            {name: run.columns[name] for name in self.record.indications}, active, run, here, run.columns
+            {name: run.columns[name] for name in self.record.indications}, active, run, around, run.columns
         )
         units = dict(zip(record.indications, record.indication_units, strict=True))
         scaled = {
             name: cells[name] * unit(self.case.unit(name)).factor / unit(units[name]).factor
             for name in record.indications
         }
-        loads = apply_record(record, scaled, units=units, only=[one.name for one in self.outputs])
-        made = {one.name: loads[one.name] / unit(one.unit).factor for one in self.outputs}
-        return through_channels(made, active, run, here, run.columns)
+        loads = apply_record(record, scaled, units=units, only=[output.name for output in self.outputs])
+        simulated = {output.name: loads[output.name] / unit(output.unit).factor for output in self.outputs}
+        return through_channels(simulated, active, run, around, run.columns)
 
     def places(self, effect: Effect) -> list[tuple[str | None, str | None]]:
         """Return the cells, the loads and the records on which an effect could act."""
@@ -112,7 +114,7 @@ class AcquisitionModel:
         if effect.replaces_record:
             return [(None, name) for name, record in self._others.items() if self._fits(record)]
         cells = list(self.record.indications)
-        loads = [one.name for one in self.outputs]
+        loads = [output.name for output in self.outputs]
         if effect.exchanges:
             return [(a, b) for group in (cells, loads) for i, a in enumerate(group) for b in group[i + 1 :]]
         made: list[tuple[str | None, str | None]] = []
@@ -125,7 +127,7 @@ class AcquisitionModel:
     def _fits(self, record: CalibrationRecord) -> bool:
         if not set(record.indications) <= set(self.record.indications):
             return False
-        if not {one.name for one in self.outputs} <= {one.load for one in record.loads}:
+        if not {output.name for output in self.outputs} <= {load.load for load in record.loads}:
             return False
         try:
             return all(

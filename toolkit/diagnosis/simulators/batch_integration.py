@@ -60,11 +60,13 @@ def takes_columns(
         ]
         try:
             alone = [np.asarray(rhs(t, states[:, k].copy(), dict(u), dict(sets[k])), float) for k in range(3)]
-            made = np.asarray(rhs(t, states.copy(), dict(u), columns_of(sets)), dtype=np.float64)
+            together = np.asarray(rhs(t, states.copy(), dict(u), columns_of(sets)), dtype=np.float64)
         except Exception:  # noqa: BLE001 - whatever a user's code raises: it does not take columns
             return False
-        wanted = np.stack(alone, axis=1)
-        if made.shape != wanted.shape or not np.allclose(made, wanted, rtol=_SAME, atol=0, equal_nan=True):
+        expected = np.stack(alone, axis=1)
+        if together.shape != expected.shape or not np.allclose(
+            together, expected, rtol=_SAME, atol=0, equal_nan=True
+        ):
             return False
     return True
 
@@ -89,8 +91,8 @@ def integrate_together(
         the equation turns stiff in some column, or runs off
     """
     x = starts.copy()
-    made = np.empty((len(t), *x.shape))
-    made[0] = x
+    solution = np.empty((len(t), *x.shape))
+    solution[0] = x
     atol = atol.reshape(len(x), -1)
     h = float(t[1] - t[0]) if len(t) > 1 else 1.0
     k, held = rates(float(t[0]), x), HeldColumns(slides)
@@ -98,8 +100,8 @@ def integrate_together(
         x, k, h = _advance(rates, float(t[i]), float(t[i + 1]), x, k, atol, h, held)
         if not (np.abs(x) < OFF).all():
             raise NotTogetherError
-        made[i + 1] = x
-    return made
+        solution[i + 1] = x
+    return solution
 
 
 def _advance(
@@ -110,30 +112,30 @@ def _advance(
     first: Array,
     atol: Array,
     step: float,
-    held: HeldColumns,
+    columns: HeldColumns,
 ) -> tuple[Array, Array, float]:
     """Go from one row to the next as `integrate` does with one state; the worst column rules the step."""
     k = np.empty((7, x.size))
     k[0] = first.ravel()
     h = min(step, end - t)
-    held.begin(x)
-    for _ in range(MANY + (TURNING - MANY) * held.turning):
+    columns.begin(x)
+    for _ in range(MANY + (TURNING - MANY) * columns.turning):
         last = t + h >= end - 1e-12 * max(abs(end), h)
         if last:
             h = end - t
         try:
             for j, (c, row) in enumerate(zip(C, _ROWS, strict=True), start=1):
                 y = x + h * (row @ k[:j]).reshape(x.shape)
-                held.hold(y)
+                columns.hold(y)
                 k[j] = rates(t + c * h, y).ravel()
             y = x + h * (_WEIGHTS @ k[:6]).reshape(x.shape)
-            held.hold(y)
+            columns.hold(y)
             k[6] = rates(t + h, y).ravel()
         except TurnedError:
             continue
         size = atol + RTOL * np.maximum(np.abs(x), np.abs(y))
         share = h * (_ERROR @ k).reshape(x.shape) / size
-        held.known(share)
+        columns.known(share)
         error = float(np.sqrt(np.mean(share**2, axis=0)).max())
         if not np.isfinite(error):
             h *= 0.2
@@ -144,6 +146,6 @@ def _advance(
                 return y, k[6].reshape(x.shape).copy(), h * grow
             t, x = t + h, y
             k[0] = k[6]
-        held.begin(x)
+        columns.begin(x)
         h *= grow
     raise NotTogetherError

@@ -48,7 +48,7 @@ class _BuiltIn:
 
     def at(self, p: Mapping[str, float]) -> AppliedEffect:
         """Return the effect with its values of these parameters."""
-        values = {one.parameter: p[one.name] * one.factor for one in self.told}
+        values = {parameter.parameter: p[parameter.name] * parameter.factor for parameter in self.told}
         return dataclasses.replace(self.active, values={**self.active.values, **values})
 
 
@@ -63,14 +63,14 @@ class WithEffects:
 
     def __init__(self, case: Case, plain: Model) -> None:
         self._plain = plain
-        self._own = {one.name for one in plain.parameters}
+        self._own = {parameter.name for parameter in plain.parameters}
         pairs = [
             _built(case, plain, effect, names)
             for effect, names in zip(case.effects, parameter_names(case.effects), strict=True)
         ]
         self._effects = [effect for effect, _ in pairs]
         self.outputs = plain.outputs
-        self.parameters = (*plain.parameters, *(one for _, free in pairs for one in free))
+        self.parameters = (*plain.parameters, *(parameter for _, free in pairs for parameter in free))
         self.capability = self._wrapped(plain.capability)
 
     def _wrapped(self, plain: Capability) -> Capability:
@@ -98,7 +98,7 @@ class WithEffects:
         return {name: value for name, value in p.items() if name in self._own}
 
     def _all(self, p: Mapping[str, float], active: Sequence[AppliedEffect]) -> tuple[AppliedEffect, ...]:
-        return (*(one.at(p) for one in self._effects), *active)
+        return (*(effect.at(p) for effect in self._effects), *active)
 
     def observed(self, run: Run) -> Arrays:
         """Return what was recorded of every output."""
@@ -124,14 +124,14 @@ def parameter_names(effects: Sequence[FittedEffect]) -> tuple[tuple[str, ...], .
 
     Those of a second effect at one place are counted: ``NAME.CHANNEL#2.PARAMETER``.
     """
-    seen: dict[str, int] = {}
-    made = []
-    for one in effects:
-        label = one.applied.key.dotted
-        seen[label] = seen.get(label, 0) + 1
-        label += f"#{seen[label]}" if seen[label] > 1 else ""
-        made.append(tuple(f"{label}.{name}" for name in one.applied.effect.names))
-    return tuple(made)
+    counts: dict[str, int] = {}
+    names = []
+    for effect in effects:
+        label = effect.applied.key.dotted
+        counts[label] = counts.get(label, 0) + 1
+        label += f"#{counts[label]}" if counts[label] > 1 else ""
+        names.append(tuple(f"{label}.{name}" for name in effect.applied.effect.names))
+    return tuple(names)
 
 
 def _built(
@@ -153,7 +153,7 @@ def _built(
         values=applied.numerics,
         units={},
     )
-    told, free = [], []
+    stated, free = [], []
     for name, parameter in zip(names, effect.parameters, strict=True):
         sense = parameter.sign_in(one.axes or case.axes)
         low, high = (sense * bound for bound in parameter.bounds)
@@ -170,38 +170,39 @@ def _built(
                 bounds=(min(low, high) / scale, max(low, high) / scale),
             )
         )
-        told.append(_Told(name=name, parameter=parameter.name, factor=sense * scale))
-    return _BuiltIn(active=active, told=tuple(told)), free
+        stated.append(_Told(name=name, parameter=parameter.name, factor=sense * scale))
+    return _BuiltIn(active=active, told=tuple(stated)), free
 
 
 def _scale(case: Case, model: Model, active: AppliedEffect, name: str, text: str) -> float:
     """Return the factor from a parameter's unit to that of the same parameter in this case."""
-    here = unit_of(case, model, active, name)
-    if here == text:
+    case_unit = unit_of(case, model, active, name)
+    if case_unit == text:
         return 1.0
-    given, own = unit(text), unit(here)
-    if given.dimension != own.dimension:
+    file_unit, expected = unit(text), unit(case_unit)
+    if file_unit.dimension != expected.dimension:
         raise ConfigError(
             "a parameter of the model does not fit the case's units",
-            where=f"{case.path}: {active.effect.name}.{name}", got=text, expected=here,
+            where=f"{case.path}: {active.effect.name}.{name}", got=text, expected=case_unit,
             next_step="give the channel the dimension that it had when the model was fitted",
             rule="model-place",
         )  # fmt: skip
-    return given.factor / own.factor
+    return file_unit.factor / expected.factor
 
 
 def built_in_findings(case: Case) -> tuple[Finding, ...]:
     """Return notes on the effects that the simulation has from the start."""
-    made = []
-    for one in case.effects:
-        runs = [run.name for run in case.runs if one.applied.acts_in(run)]
+    findings = []
+    for effect in case.effects:
+        runs = [run.name for run in case.runs if effect.applied.acts_in(run)]
         where = "all runs" if len(runs) == len(case.runs) else ", ".join(runs) or "none of the case's runs"
-        made.append(
+        findings.append(
             Finding(
                 rule="case-model",
-                where=one.origin or case.path.name,
+                where=effect.origin or case.path.name,
                 level="note",
-                message=f"the simulation has an effect of an earlier answer in it: {one.label}, in {where}",
+                message="the simulation has an effect of an earlier answer in it: "
+                f"{effect.label}, in {where}",
             )
         )
-    return tuple(made)
+    return tuple(findings)

@@ -33,7 +33,7 @@ class CaseCells:
     """Recorded cells and the record that turns them into loads, with the tare of the case's tare runs."""
 
     def __init__(self, case: Case, record: CalibrationRecord) -> None:
-        declared = {one.name: one for one in case.channels}
+        declared = {channel.name: channel for channel in case.channels}
         missing = [name for name in record.indications if name not in declared]
         if missing:
             raise ConfigError(
@@ -46,7 +46,7 @@ class CaseCells:
             )
         self.case, self.record = case, record
         self.names = record.indications
-        self.loads = tuple(one.load for one in record.loads if one.load in ("FY", "MZ"))
+        self.loads = tuple(load.load for load in record.loads if load.load in ("FY", "MZ"))
         self._units = {name: declared[name].unit for name in self.names}
         self._noise = {name: declared[name].sd for name in self.names}
         self._recorded_unit = dict(zip(record.indications, record.indication_units, strict=True))
@@ -61,17 +61,17 @@ class CaseCells:
         )
 
     def _cell(self, run: Run, name: str) -> NDArray[np.float64]:
-        here, there = unit(self._units[name]), unit(self._recorded_unit[name])
-        if here.dimension != there.dimension:
+        cell_unit, there = unit(self._units[name]), unit(self._recorded_unit[name])
+        if cell_unit.dimension != there.dimension:
             raise ConfigError(
                 "a cell's unit is not the calibration's",
                 where=f"{self.case.path}: {name}",
-                got=here.text,
+                got=cell_unit.text,
                 expected=there.text,
                 next_step="correct the unit, or name the right calibration",
                 rule="case",
             )
-        return run.columns[name] * (here.factor / there.factor)
+        return run.columns[name] * (cell_unit.factor / there.factor)
 
     def load(self, run: Run, name: str) -> NDArray[np.float64]:
         """Return FY [N] or MZ [N·m] from the recorded cells, (n,)."""
@@ -89,14 +89,14 @@ class CaseCells:
     def noise(self, load: str) -> float | None:
         """Return a load's noise from the cells' stated noise, None where a cell has none."""
         fit = self.record.load(load)
-        known = dict(zip(fit.terms, fit.coefficients, strict=True))
+        coefficients = dict(zip(fit.terms, fit.coefficients, strict=True))
         total = 0.0
         for name in self.names:
             sd = self._noise[name]
-            if sd is None or name not in known:
+            if sd is None or name not in coefficients:
                 return None
             factor = unit(self._units[name]).factor / unit(self._recorded_unit[name]).factor
-            total += (known[name] * sd * factor) ** 2
+            total += (coefficients[name] * sd * factor) ** 2
         return float(np.sqrt(total)) * unit(fit.unit).factor
 
     def _carried(
@@ -111,7 +111,7 @@ class CaseCells:
         The cell's noise is in FY and MZ as well: an effect in proportion to what was recorded would explain
         that noise, and be found where nothing is wrong.
         """
-        columns = [values[one.name] for one in outputs if one.name in self.loads]
+        columns = [values[output.name] for output in outputs if output.name in self.loads]
         columns += [run.columns[name] for name in ("FZ",) if np.isfinite(run.columns.get(name, np.nan)).all()]
         there = np.column_stack([*columns, np.ones(len(shown))])
         good = np.isfinite(there).all(axis=1) & np.isfinite(shown)
@@ -127,7 +127,7 @@ class CaseCells:
         Three cells carry more than two loads say; least squares over the case's runs give what went with
         FY and MZ there, a constant included.
         """
-        known = [one for one in outputs if one.name in self.loads]
+        recorded = [output for output in outputs if output.name in self.loads]
         runs = [run for run in self.case.runs if all(name in run.columns for name in self.names)]
         if not runs:
             raise ConfigError(
@@ -140,14 +140,16 @@ class CaseCells:
             )
         shown = {name: np.concatenate([self._cell(run, name) for run in runs]) for name in self.names}
         loads = self.loads_of(shown)
-        there = np.column_stack([loads[one.name] for one in known] + [np.ones(len(shown[self.names[0]]))])
+        there = np.column_stack(
+            [loads[output.name] for output in recorded] + [np.ones(len(shown[self.names[0]]))]
+        )
         good = np.isfinite(there).all(axis=1) & np.isfinite(np.stack(list(shown.values()))).all(axis=0)
-        here = np.column_stack(
-            [values[one.name] * unit(one.unit).factor for one in known]
+        shifted = np.column_stack(
+            [values[output.name] * unit(output.unit).factor for output in recorded]
             + [np.ones(len(next(iter(values.values()))))]
         )
         return {
-            name: here @ np.linalg.lstsq(there[good], column[good], rcond=None)[0]
+            name: shifted @ np.linalg.lstsq(there[good], column[good], rcond=None)[0]
             for name, column in shown.items()
         }
 
@@ -171,49 +173,52 @@ class CaseCells:
         showed, by the record, is what the effect adds to the simulation.
         """
         acting = [
-            (one, one.effect.on_channel)
-            for one in active
-            if one.effect.on_channel is not None and one.channel in self.names and one.acts_in(run)
+            (applied, applied.effect.on_channel)
+            for applied in active
+            if applied.effect.on_channel is not None
+            and applied.channel in self.names
+            and applied.acts_in(run)
         ]
         if not acting:
             return values
         if all(name in run.columns for name in self.names):
             recorded = {name: self._cell(run, name) for name in self.names}
-            for name in {str(one.channel) for one, facts in acting if facts.by_value}:
+            for name in {str(applied.channel) for applied, facts in acting if facts.by_value}:
                 recorded[name] = self._carried(run, recorded[name], values, outputs)
         else:
             recorded = self._foretold(values, outputs)
         true = dict(recorded)
         tare = None if self._tare is None else dict(self._tare)
-        for one, facts in reversed(acting):
-            name = str(one.channel)
-            true[name] = undone(true[name], one, setting, true)
+        for applied, facts in reversed(acting):
+            name = str(applied.channel)
+            true[name] = undone(true[name], applied, setting, true)
             if tare is not None and facts.tare == "alike":
                 # The tare was read through the same fault; what came later (creep, drift) is not in it.
-                tare[name] = float(undone(np.array([tare[name]]), one, setting, true)[0])
+                tare[name] = float(undone(np.array([tare[name]]), applied, setting, true)[0])
         shown, without = self.loads_of(recorded), self._loads(true, tare)
-        made = dict(values)
+        shown_values = dict(values)
         for output in outputs:
             if output.name in self.loads:
-                made[output.name] = (
-                    made[output.name] + (shown[output.name] - without[output.name]) / unit(output.unit).factor
+                shown_values[output.name] = (
+                    shown_values[output.name]
+                    + (shown[output.name] - without[output.name]) / unit(output.unit).factor
                 )
-        return made
+        return shown_values
 
 
 def record_of(case: Case, calibrations: Path | None) -> CalibrationRecord:
     """Return the calibration that a case names: a path beside the case file, or a registry's id."""
-    named = case.simulation.calibration
-    path = case.path.parent / named
+    record_id = case.simulation.calibration
+    path = case.path.parent / record_id
     if path.is_file():
         return from_bytes(read_bytes(path), where=path)
     if calibrations is None:
         raise ConfigError(
             "the case names a calibration and there is no registry",
             where=f"{case.path}: simulation.calibration",
-            got=named,
+            got=record_id,
             expected="the path of a record beside the case, or a home with calibrations/",
             next_step="give --calibrations DIR",
             rule="case",
         )
-    return Registry(calibrations).load(named)
+    return Registry(calibrations).load(record_id)

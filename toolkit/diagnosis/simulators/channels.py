@@ -53,8 +53,8 @@ def channel_places(
     return [(name, None) for name, _ in outputs]
 
 
-def _both_loads(one: str, other: str) -> bool:
-    return dimension(one) in _FORCE_LIKE and dimension(other) in _FORCE_LIKE
+def _both_loads(channel: str, source: str) -> bool:
+    return dimension(channel) in _FORCE_LIKE and dimension(source) in _FORCE_LIKE
 
 
 def through_channels(
@@ -81,10 +81,10 @@ def slopes(
 
     A channel that is saturated shows nothing of it; what takes time to show it is taken as if it did not.
     """
-    made = {}
+    disturbed = {}
     shown = through_channels(values, active, run, setting, observed)
     for name, column in values.items():
         step = 1e-6 * (float(np.ptp(column)) or float(np.abs(column).max(initial=0.0)) or 1.0)
         moved = through_channels({**values, name: column + step}, active, run, setting, observed)
-        made[name] = (moved[name] - shown[name]) / step
-    return made
+        disturbed[name] = (moved[name] - shown[name]) / step
+    return disturbed

@@ -46,8 +46,8 @@ class ColumnsModel(AlongMotion):
 
     def __init__(self, case: Case) -> None:
         self.case = case
-        named = dict(case.simulation.simulated)
-        missing = [one.name for one in case.outputs if one.name not in named]
+        column_of = dict(case.simulation.simulated)
+        missing = [output.name for output in case.outputs if output.name not in column_of]
         if missing:
             raise ConfigError(
                 "an output has no simulated column",
@@ -57,19 +57,21 @@ class ColumnsModel(AlongMotion):
                 next_step="name it, or drop the output",
                 rule="case",
             )
-        extra = [name for name in named if name not in {one.name for one in case.outputs}]
+        extra = [name for name in column_of if name not in {output.name for output in case.outputs}]
         if extra:
-            near = difflib.get_close_matches(extra[0], [one.name for one in case.outputs], n=1, cutoff=0.5)
+            near = difflib.get_close_matches(
+                extra[0], [output.name for output in case.outputs], n=1, cutoff=0.5
+            )
             raise ConfigError(
                 "a simulated column stands for no output",
                 where=f"{case.path}: simulation.simulated",
                 got=", ".join(extra),
-                expected=", ".join(one.name for one in case.outputs),
+                expected=", ".join(output.name for output in case.outputs),
                 next_step=f"did you mean {near[0]!r}?" if near else "declare the channel with role = output",
                 rule="case",
             )
-        allowed = {f"{name}_{what}" for name in named for what in ("gain", "offset")}
-        unknown = [one.name for one in case.parameters if one.name not in allowed]
+        allowed = {f"{name}_{what}" for name in column_of for what in ("gain", "offset")}
+        unknown = [parameter.name for parameter in case.parameters if parameter.name not in allowed]
         if unknown:
             raise ConfigError(
                 "a simulation that cannot be run again has no such parameter",
@@ -80,11 +82,13 @@ class ColumnsModel(AlongMotion):
                 rule="case",
             )
         self.parameters = case.parameters
-        self.outputs = tuple(Output(name=one.name, unit=one.unit, sd=one.sd) for one in case.outputs)
+        self.outputs = tuple(
+            Output(name=output.name, unit=output.unit, sd=output.sd) for output in case.outputs
+        )
         self._load = nominal_load(case)
         self._settings: dict[Run, Setting] = {}
-        drivers = {one.name for one in case.drivers}
-        is_tire = bool(drivers & {"SA", "SA_CMD"}) and bool({"FY", "MZ"} & set(named))
+        drivers = {driver.name for driver in case.drivers}
+        is_tire = bool(drivers & {"SA", "SA_CMD"}) and bool({"FY", "MZ"} & set(column_of))
         self._surface = Surface(case) if is_tire else None
         self.motion: Motion | None = None if is_tire else motion_of(case)
         findings = () if self._surface is None else self._surface.too_coarse()
@@ -101,34 +105,36 @@ class ColumnsModel(AlongMotion):
     def observed(self, run: Run) -> dict[str, NDArray[np.float64]]:
         """Return what was recorded of every output, where the other program has a value too."""
         return {
-            one.name: np.where(np.isfinite(run.simulated[one.name]), run.columns[one.name], np.nan)
-            for one in self.outputs
-            if one.name in run.columns
+            output.name: np.where(np.isfinite(run.simulated[output.name]), run.columns[output.name], np.nan)
+            for output in self.outputs
+            if output.name in run.columns
         }
 
     def simulate(
         self, run: Run, p: Mapping[str, float], active: Sequence[AppliedEffect]
     ) -> dict[str, NDArray[np.float64]]:
         """Return every output of a run with effects in it."""
-        here = self.setting(run)
-        made = {
-            one.name: _whole(run, one.name) * p.get(f"{one.name}_gain", 1.0)
-            + p.get(f"{one.name}_offset", 0.0)
-            for one in self.outputs
+        around = self.setting(run)
+        simulated = {
+            output.name: _whole(run, output.name) * p.get(f"{output.name}_gain", 1.0)
+            + p.get(f"{output.name}_offset", 0.0)
+            for output in self.outputs
         }
         if self._surface is not None and any(
-            one.effect.drive is not None and one.acts_in(run) for one in active
+            applied.effect.drive is not None and applied.acts_in(run) for applied in active
         ):
-            made = self._tire(run, made, active, here)
-        forces = [one for one in active if one.effect.stage == "dynamics" and one.acts_in(run)]
+            simulated = self._tire(run, simulated, active, around)
+        forces = [
+            applied for applied in active if applied.effect.stage == "dynamics" and applied.acts_in(run)
+        ]
         if forces and self.motion is not None:
-            made = self.motion.disturbed(made, forces, run)
-        return through_channels(made, active, run, here, run.columns)
+            simulated = self.motion.disturbed(simulated, forces, run)
+        return through_channels(simulated, active, run, around, run.columns)
 
     def places(self, effect: Effect) -> list[tuple[str | None, str | None]]:
         """Return where an effect could act."""
         found: list[tuple[str | None, str | None]] = []
-        drivers = {one.name for one in self.case.drivers}
+        drivers = {driver.name for driver in self.case.drivers}
         if self._surface is not None and self._surface.good:
             found += tire_places(
                 effect,
@@ -138,8 +144,10 @@ class ColumnsModel(AlongMotion):
             )
         if self.motion is not None:
             found += self.motion.places(effect)
-        others = [(one.name, one.unit) for one in self.case.drivers]
-        return found + channel_places(effect, [(one.name, one.unit) for one in self.outputs], others, drivers)
+        others = [(driver.name, driver.unit) for driver in self.case.drivers]
+        return found + channel_places(
+            effect, [(output.name, output.unit) for output in self.outputs], others, drivers
+        )
 
     def setting(self, run: Run) -> Setting:
         """Return a run's setting."""
@@ -154,20 +162,26 @@ class ColumnsModel(AlongMotion):
         return self._settings[run]
 
     def _work_before(self, run: Run) -> float:
-        if self._surface is None or "FY" not in {one.name for one in self.outputs}:
+        if self._surface is None or "FY" not in {output.name for output in self.outputs}:
             return 0.0
         factor = unit(self.case.unit("FY")).factor
-        return slip_work_before(self.case, run, lambda one, _: _whole(one, "FY") * factor, load_N=self._load)
+        return slip_work_before(
+            self.case, run, lambda earlier, _: _whole(earlier, "FY") * factor, load_N=self._load
+        )
 
     def _tire(
-        self, run: Run, made: dict[str, NDArray[np.float64]], active: Sequence[AppliedEffect], here: Setting
+        self,
+        run: Run,
+        simulated: dict[str, NDArray[np.float64]],
+        active: Sequence[AppliedEffect],
+        setting: Setting,
     ) -> dict[str, NDArray[np.float64]]:
         surface, case = self._surface, self.case
         if surface is None:
-            return made
+            return simulated
         start = base_drive(case, run, load_N=self._load, outputs=False)
         turn, back = tire_signs(case.axes, "machine", run), tire_signs("machine", case.axes, run)
-        units = {name: unit(case.unit(name)).factor for name in ("FY", "MZ") if name in made}
+        units = {name: unit(case.unit(name)).factor for name in ("FY", "MZ") if name in simulated}
         zero = np.zeros(run.rows)
 
         def steady(SA: NDArray[np.float64], drive: Drive) -> TireForces:
@@ -175,18 +189,18 @@ class ColumnsModel(AlongMotion):
             got = {
                 name: turn[name]
                 * units[name]
-                * (made[name] + surface.difference(name, run, SA, drive.FZ, start))
+                * (simulated[name] + surface.difference(name, run, SA, drive.FZ, start))
                 for name in units
             }
             return TireForces(FY=got.get("FY", zero), MZ=got.get("MZ", zero))
 
-        forces = through_tire(start, steady, active, run, here)
-        result = dict(made)
+        forces = through_tire(start, steady, active, run, setting)
+        result = dict(simulated)
         for name, factor in units.items():
             result[name] = getattr(forces, name) * back[name] / factor
         if "FZ" in result:
-            loads = dataclasses.replace(start, FZ=made["FZ"])
-            loaded = late(loads, active, run, here, lambda one: steady(one.SA, one))
+            loads = dataclasses.replace(start, FZ=simulated["FZ"])
+            loaded = late(loads, active, run, setting, lambda drive: steady(drive.SA, drive))
             result["FZ"] = result["FZ"] if loaded is None else loaded.FZ
         return result
 

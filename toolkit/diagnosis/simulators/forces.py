@@ -118,6 +118,6 @@ class Forces:
                 rate[i] -= term.force(float(x[one.position]), float(x[i]), values)
 
 
-def _reach(one: AppliedEffect) -> float:
-    term = one.effect.term
-    return 0.0 if term is None or term.bristle is None else term.bristle(one.values)[1]
+def _reach(effect: AppliedEffect) -> float:
+    term = effect.effect.term
+    return 0.0 if term is None or term.bristle is None else term.bristle(effect.values)[1]

@@ -68,8 +68,8 @@ def integrate(
     IntegrationError
         the state runs off to no number, even the stiff solver gives up, or there is not one rate a state
     """
-    made = np.empty((len(start), len(t)))
-    made[:, 0] = x = start
+    solution = np.empty((len(start), len(t)))
+    solution[:, 0] = x = start
     step = float(t[1] - t[0]) if len(t) > 1 else 1.0
     rates = rate(float(t[0]), start)
     if rates.shape != start.shape:
@@ -82,8 +82,8 @@ def integrate(
             k = rate(float(t[i + 1]), x).tolist()
         if not (np.abs(x) < OFF).all():
             raise IntegrationError(f"the state has run off at {t[i + 1]:g} s")
-        made[:, i + 1] = x
-    return made
+        solution[:, i + 1] = x
+    return solution
 
 
 def _advance(
@@ -155,8 +155,8 @@ def _advance(
 def _at(rate: Rate, t: float, y: list[float], hold: Callable[[list[float]], None] | None) -> list[float]:
     if hold is not None:
         hold(y)
-    made: list[float] = rate(t, np.array(y)).tolist()
-    return made
+    rates: list[float] = rate(t, np.array(y)).tolist()
+    return rates
 
 
 def _stiff(
@@ -164,17 +164,17 @@ def _stiff(
 ) -> NDArray[np.float64]:
     from scipy.integrate import solve_ivp
 
-    left = _MOST
+    calls_left = _MOST
 
     def counted(at: float, state: NDArray[np.float64]) -> NDArray[np.float64]:
         # Before a state that runs off within finite time, the solver's steps would shrink for ever.
-        nonlocal left
-        left -= 1
-        if left < 0:
+        nonlocal calls_left
+        calls_left -= 1
+        if calls_left < 0:
             raise IntegrationError(f"no end is reached near {at:g} s")
         return rate(at, state)
 
-    made = solve_ivp(counted, (t, end), x, method="LSODA", rtol=RTOL, atol=atol)
-    if not made.success or not np.isfinite(made.y[:, -1]).all():
-        raise IntegrationError(str(made.message))
-    return np.asarray(made.y[:, -1], dtype=np.float64)
+    solved = solve_ivp(counted, (t, end), x, method="LSODA", rtol=RTOL, atol=atol)
+    if not solved.success or not np.isfinite(solved.y[:, -1]).all():
+        raise IntegrationError(str(solved.message))
+    return np.asarray(solved.y[:, -1], dtype=np.float64)

@@ -45,22 +45,22 @@ def propagated(
     n, count = x.shape
     slopes = np.empty((count, n, n))
     for k, now in enumerate(t.tolist()):
-        here = rate(now, x[:, k])
+        rates = rate(now, x[:, k])
         for i in range(n):
             moved = x[:, k].copy()
             moved[i] += _STEP * sizes[i]
-            slopes[k, :, i] = (rate(now, moved) - here) / (_STEP * sizes[i])
+            slopes[k, :, i] = (rate(now, moved) - rates) / (_STEP * sizes[i])
     half = 0.5 * np.diff(t)[:, None, None]
     ahead = np.eye(n) - half * slopes[1:]
     on = np.linalg.solve(ahead, np.eye(n) + half * slopes[:-1])
     entry = np.zeros((count - 1, n, 1))
     entry[:, at, 0] = half[:, 0, 0]
     entry = np.linalg.solve(ahead, entry)
-    both = pushes[1:] + pushes[:-1]
-    made = np.zeros((count, n, pushes.shape[1]))
+    sums = pushes[1:] + pushes[:-1]
+    responses = np.zeros((count, n, pushes.shape[1]))
     for k in range(count - 1):
-        made[k + 1] = on[k] @ made[k] + entry[k] * both[k]
-    return made
+        responses[k + 1] = on[k] @ responses[k] + entry[k] * sums[k]
+    return responses
 
 
 def integrated(t: NDArray[np.float64], pushes: NDArray[np.float64]) -> NDArray[np.float64]:

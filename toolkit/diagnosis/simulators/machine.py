@@ -15,7 +15,6 @@ from toolkit.diagnosis.simulators.cells import CaseCells, record_of
 from toolkit.diagnosis.simulators.channels import channel_places, through_channels
 from toolkit.diagnosis.simulators.setting import setting, si
 from toolkit.diagnosis.simulators.simulator import Capability, Output
-from toolkit.diagnosis.simulators.tir_tire import TirTire
 from toolkit.diagnosis.simulators.tire import (
     base_drive,
     delays_load,
@@ -32,7 +31,10 @@ from toolkit.effects.effect import Effect
 from toolkit.effects.signals import Drive, TireForces, drive
 from toolkit.errors import ConfigError
 from toolkit.machine import load_machine
-from toolkit.tires.tir import TirFile, read_tir
+from toolkit.tires import mf52, mf61
+from toolkit.tires.slip import state
+from toolkit.tires.tir import FOREIGN, TirFile, read_tir
+from toolkit.tires.tir_units import si_number
 from toolkit.units import unit
 
 if TYPE_CHECKING:
@@ -42,6 +44,68 @@ if TYPE_CHECKING:
 
     from toolkit.calibration.records.record import CalibrationRecord
     from toolkit.diagnosis.case.case import Case, Run
+
+# A tire file as a function of slip angle, load, camber and pressure, with some coefficients replaced.
+
+
+_SCALES = tuple(
+    "LFZO LCX LMUX LEX LKX LHX LVX LGAX LCY LMUY LEY LKY LHY LVY LGAY LTR LRES LGAZ LXAL LYKA LVYKA LS "
+    "LMUV LKYC LKZC".split()
+)
+
+
+class TirTire:
+    """Pure lateral and aligning force of a tire file, ISO-W, SI."""
+
+    def __init__(self, tir: TirFile) -> None:
+        self._version = tir.version
+        self._p = dict(tir.coefficients())
+        self.FNOMIN = si_number(tir, "FNOMIN")
+        self._radius = si_number(tir, "UNLOADED_RADIUS")
+        self._speed = si_number(tir, "LONGVL", 0.0) or None
+        self._nominal = si_number(tir, "NOMPRES", 0.0)
+        self._inflation = si_number(tir, "INFLPRES", self._nominal)
+        self.names = frozenset((*self._p, *_SCALES, *mf61.LATERAL, *mf61.ALIGNING)) - FOREIGN[self._version]
+        self.has_pressure = self._version != "5.2" and self._nominal > 0 and any(
+            self._p.get(name) for name in ("PPY1", "PPY2", "PPY3", "PPY4", "PPZ1", "PPZ2")
+        )  # fmt: skip
+        self.has_camber = any(
+            self._p.get(name)
+            for name in ("PKY6", "PKY7", "PVY3", "PVY4", "PHY3", "PDY3", "QDZ8", "QDZ9", "QHZ3", "QHZ4")
+        )
+
+    def __call__(
+        self,
+        p: Mapping[str, float],
+        *,
+        SA: NDArray[np.float64],
+        FZ: NDArray[np.float64],
+        IA: NDArray[np.float64],
+        V: NDArray[np.float64],
+        P: NDArray[np.float64] | None,
+        pressure_error: NDArray[np.float64] | float,
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return FY [N] and MZ [N·m], each (n,); nothing where there is no load.
+
+        ``p`` replaces coefficients by name; ``P`` [Pa], None for the file's own pressure;
+        ``pressure_error`` [Pa] is added to it.
+        """
+        loaded = FZ > 0
+        load = np.where(loaded, FZ, self.FNOMIN)
+        change: NDArray[np.float64] | float = 0.0
+        if self._version != "5.2" and self._nominal > 0:
+            change = ((self._inflation if P is None else P) + pressure_error) / self._nominal - 1
+        values = {**self._p, **p}
+        with np.errstate(all="ignore"):
+            q = state(
+                values, SA=SA, FZ=load, FNOMIN=self.FNOMIN, IA=IA, KAPPA=0.0, pressure_change=change,
+                V=V, V0=self._speed if self._version == "6.x" else None, angles="star",
+            )  # fmt: skip
+            responses = (mf52 if self._version == "5.2" else mf61).forces(
+                values, q, UNLOADED_RADIUS=self._radius
+            )
+        return np.where(loaded, responses.FY, 0.0), np.where(loaded, responses.MZ, 0.0)
+
 
 # Numbers of the machine definition that the simulation of FY and MZ depends on or may be asked for.
 _MACHINE_NUMBERS = {"drum.speed": "speed", "drum.circumference": "length", "cells.pitch_diameter": "length"}
@@ -67,39 +131,39 @@ class MachineModel:
             motion=None,
         )
         self.parameters = case.parameters
-        for one in case.parameters:
-            if one.name in _MACHINE_NUMBERS:
-                _check_dimension(case, one.name, one.unit)
-            elif one.name not in self._tire.names:
+        for parameter in case.parameters:
+            if parameter.name in _MACHINE_NUMBERS:
+                _check_dimension(case, parameter.name, parameter.unit)
+            elif parameter.name not in self._tire.names:
                 near = difflib.get_close_matches(
-                    one.name, sorted((*self._tire.names, *_MACHINE_NUMBERS)), n=1
+                    parameter.name, sorted((*self._tire.names, *_MACHINE_NUMBERS)), n=1
                 )
                 raise ConfigError(
-                    f"the simulation has no parameter {one.name!r}",
+                    f"the simulation has no parameter {parameter.name!r}",
                     where=f"{case.path}: simulation.parameters",
-                    got=one.name,
+                    got=parameter.name,
                     expected="a coefficient or scale factor of the tire file, or a number of the machine: "
                     + ", ".join(_MACHINE_NUMBERS),
                     next_step=f"did you mean {near[0]!r}?" if near else "correct the name",
                     rule="case",
                 )
-        self._direct = {one.name for one in case.outputs}
+        self._direct = {output.name for output in case.outputs}
         self.outputs = self._outputs()
         self._settings: dict[Run, Any] = {}
 
     def _outputs(self) -> tuple[Output, ...]:
-        made = []
-        direct = {one.name: one for one in self.case.outputs}
+        outputs = []
+        direct = {output.name: output for output in self.case.outputs}
         for name, text in _FORCES.items():
             if name in direct:
-                made.append(Output(name=name, unit=direct[name].unit, sd=direct[name].sd))
+                outputs.append(Output(name=name, unit=direct[name].unit, sd=direct[name].sd))
             elif self.cells is not None and name in self.cells.loads:
-                made.append(Output(name=name, unit=text, sd=self.cells.noise(name)))
+                outputs.append(Output(name=name, unit=text, sd=self.cells.noise(name)))
         if "FZ" in direct:
-            made.append(Output(name="FZ", unit=direct["FZ"].unit, sd=direct["FZ"].sd))
-        known = {one.name for one in made} | (set(self.cells.names) if self.cells else set())
-        unknown = [name for name in direct if name not in known]
-        if unknown or not made:
+            outputs.append(Output(name="FZ", unit=direct["FZ"].unit, sd=direct["FZ"].sd))
+        names = {output.name for output in outputs} | (set(self.cells.names) if self.cells else set())
+        unknown = [name for name in direct if name not in names]
+        if unknown or not outputs:
             raise ConfigError(
                 "an output is nothing that the machine simulates",
                 where=f"{self.case.path}: recording.channels",
@@ -108,27 +172,27 @@ class MachineModel:
                 next_step="change the channel's role, or name the calibration",
                 rule="case",
             )
-        return tuple(made)
+        return tuple(outputs)
 
     def observed(self, run: Run) -> dict[str, NDArray[np.float64]]:
         """Return FY and MZ as recorded, or from the cells by the calibration; FZ where it is judged."""
-        made = {}
-        for one in self.outputs:
+        columns = {}
+        for output in self.outputs:
             # The acquisition program's own FY beside the cells is judged only where its role says so.
-            if one.name in self._direct:
-                if one.name in run.columns:
-                    made[one.name] = run.columns[one.name]
+            if output.name in self._direct:
+                if output.name in run.columns:
+                    columns[output.name] = run.columns[output.name]
             elif self.cells is not None and all(cell in run.columns for cell in self.cells.names):
-                made[one.name] = self.cells.load(run, one.name) / unit(one.unit).factor
-        return made
+                columns[output.name] = self.cells.load(run, output.name) / unit(output.unit).factor
+        return columns
 
     def simulate(
         self, run: Run, p: Mapping[str, float], active: Sequence[AppliedEffect]
     ) -> dict[str, NDArray[np.float64]]:
         """Return every output of a run with effects in it."""
-        case, here = self.case, self._setting(run)
+        case, around = self.case, self._setting(run)
         start = base_drive(case, run, load_N=self._load, speed_m_s=self._drum_speed(p))
-        start = dataclasses.replace(start, FZ=start.FZ - self._shown_too_much(run, active, here))
+        start = dataclasses.replace(start, FZ=start.FZ - self._shown_too_much(run, active, around))
         reverse = rotation(run) == "reverse"
         pressure = first_of(case, run, "P_INFL", "P")
 
@@ -146,37 +210,41 @@ class MachineModel:
 
         # A load that was measured is late already: its lag shows in FZ against the command, not in the tire.
         measured = first_of(case, run, "FZ") is not None
-        on_tire = [one for one in active if not (measured and delays_load(one))]
-        forces = through_tire(start, steady, on_tire, run, here)
+        on_tire = [applied for applied in active if not (measured and delays_load(applied))]
+        forces = through_tire(start, steady, on_tire, run, around)
         turn = tire_signs("machine", case.axes, run)
-        made = {}
-        for one in self.outputs:
-            if one.name in _FORCES:
-                made[one.name] = turn[one.name] * getattr(forces, one.name) / unit(one.unit).factor
+        columns = {}
+        for output in self.outputs:
+            if output.name in _FORCES:
+                columns[output.name] = (
+                    turn[output.name] * getattr(forces, output.name) / unit(output.unit).factor
+                )
             else:
-                made["FZ"] = self._load_output(run, active) / unit(one.unit).factor
-        values = through_channels(made, active, run, here, run.columns)
-        return values if self.cells is None else self.cells.disturbed(values, active, run, here, self.outputs)
+                columns["FZ"] = self._load_output(run, active) / unit(output.unit).factor
+        values = through_channels(columns, active, run, around, run.columns)
+        return (
+            values if self.cells is None else self.cells.disturbed(values, active, run, around, self.outputs)
+        )
 
     def _drum_speed(self, p: Mapping[str, float]) -> float:
         """Return the surface speed [m/s]: that of the machine definition, unless a parameter frees it."""
-        for one in self.parameters:
-            if one.name == "drum.speed":
-                return p[one.name] * unit(one.unit).factor
+        for parameter in self.parameters:
+            if parameter.name == "drum.speed":
+                return p[parameter.name] * unit(parameter.unit).factor
         return self._speed
 
     def _shown_too_much(
-        self, run: Run, active: Sequence[AppliedEffect], here: Any
+        self, run: Run, active: Sequence[AppliedEffect], around: Any
     ) -> NDArray[np.float64] | float:
         """Return by how much [N] a channel of FZ that is disturbed shows more than the load on the tire."""
-        if not any(one.channel == "FZ" and one.acts_in(run) for one in active):
+        if not any(applied.channel == "FZ" and applied.acts_in(run) for applied in active):
             return 0.0
         if "FZ" not in self._direct or first_of(self.case, run, "FZ") is None:
             return 0.0
         factor = unit(self.case.unit("FZ")).factor
         load = self._load_output(run, active) / factor
-        on_load = [one for one in active if one.channel == "FZ"]
-        return (through_channels({"FZ": load}, on_load, run, here, run.columns)["FZ"] - load) * factor
+        on_load = [applied for applied in active if applied.channel == "FZ"]
+        return (through_channels({"FZ": load}, on_load, run, around, run.columns)["FZ"] - load) * factor
 
     def _load_output(self, run: Run, active: Sequence[AppliedEffect]) -> NDArray[np.float64]:
         commanded = first_of(self.case, run, "FZ_CMD")
@@ -189,18 +257,22 @@ class MachineModel:
     def places(self, effect: Effect) -> list[tuple[str | None, str | None]]:
         """Return where an effect could act: on the machine, on an output, or on a cell."""
         case = self.case
-        names = {one.name for one in case.channels}
-        drivers = {one.name for one in case.drivers}
+        names = {channel.name for channel in case.channels}
+        drivers = {driver.name for driver in case.drivers}
         found = tire_places(
             effect,
             has_IA=self._tire.has_camber,
             has_P=self._tire.has_pressure,
             varies={"load_commanded": "FZ_CMD" in names},
         )
-        others = [(one.name, one.unit) for one in case.drivers if one.name in ("FZ", "FZ_CMD", "FX")]
-        if "FZ" in {one.name for one in self.outputs}:
-            others = [one for one in others if one[0] != "FZ"]
-        found += channel_places(effect, [(one.name, one.unit) for one in self.outputs], others, drivers)
+        others = [
+            (driver.name, driver.unit) for driver in case.drivers if driver.name in ("FZ", "FZ_CMD", "FX")
+        ]
+        if "FZ" in {output.name for output in self.outputs}:
+            others = [channel for channel in others if channel[0] != "FZ"]
+        found += channel_places(
+            effect, [(output.name, output.unit) for output in self.outputs], others, drivers
+        )
         if self.cells is not None:
             found += self.cells.places(effect, drivers)
         return found
@@ -217,7 +289,7 @@ class MachineModel:
         return self._settings[run]
 
     def _work_before(self, run: Run) -> float:
-        values = {one.name: one.value for one in self.parameters}
+        values = {parameter.name: parameter.value for parameter in self.parameters}
 
         def lateral(_: Run, start: Drive) -> NDArray[np.float64]:
             return self._tire(
@@ -253,7 +325,7 @@ def build(case: Case, calibrations: Path | None) -> MachineModel | AcquisitionMo
     """
     machine = load_machine(case.simulation.machine)
     record = record_of(case, calibrations) if case.simulation.calibration else None
-    roles = {one.name: one.role for one in case.channels}
+    roles = {channel.name: channel.role for channel in case.channels}
     if record is not None and all(roles.get(name) == "input" for name in record.indications):
         return AcquisitionModel(case, record, _others(calibrations))
     if case.simulation.tire is None:

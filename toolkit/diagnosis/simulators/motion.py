@@ -81,7 +81,7 @@ class Motion:
 
     def _scales(self) -> tuple[float, float, float]:
         """Return sizes of acceleration, velocity and position of an output that moves."""
-        run = max(self.case.runs, key=lambda one: one.rows)
+        run = max(self.case.runs, key=lambda run: run.rows)
         y = run.columns[self.output]
         good = np.isfinite(y)
         span = float(np.ptp(run.t)) or 1.0
@@ -97,20 +97,20 @@ class Motion:
         """
         name = self.position or ""
         columns = [run.columns[name] for run in self.case.runs if name in run.columns]
-        columns = [one[np.isfinite(one)] for one in columns]
-        spans = [float(np.ptp(one)) for one in columns if len(one)]
-        steps = [np.abs(np.diff(one)) for one in columns if len(one) > 1]
+        columns = [column[np.isfinite(column)] for column in columns]
+        spans = [float(np.ptp(column)) for column in columns if len(column)]
+        steps = [np.abs(np.diff(column)) for column in columns if len(column) > 1]
         unseen = bool(steps) and self.kind != "force"
         return max(spans, default=0.0), float(np.median(np.concatenate(steps))) if unseen else 0.0
 
     def pushed(
         self,
-        made: Mapping[str, NDArray[np.float64]],
+        simulated: Mapping[str, NDArray[np.float64]],
         run: Run,
         pattern: Callable[[NDArray[np.float64]], NDArray[np.float64]],
     ) -> dict[str, NDArray[np.float64]]:
         """Return what small forces of a pattern over the position add to every output, (rows, forces)."""
-        x = made.get(str(self.position), run.columns.get(str(self.position)))
+        x = simulated.get(str(self.position), run.columns.get(str(self.position)))
         if x is None:
             return {}
         pushes = pattern(x)
@@ -119,36 +119,36 @@ class Motion:
             if self.kind == "position":
                 pushes = integrated(run.t, pushes)
         none = np.zeros_like(pushes)
-        return {name: pushes if name == self.output else none for name in made}
+        return {name: pushes if name == self.output else none for name in simulated}
 
     def disturbed(
-        self, made: Mapping[str, NDArray[np.float64]], forces: Sequence[AppliedEffect], run: Run
+        self, simulated: Mapping[str, NDArray[np.float64]], forces: Sequence[AppliedEffect], run: Run
     ) -> dict[str, NDArray[np.float64]]:
         """Return the outputs with force-like terms in the equation of motion."""
-        result = dict(made)
+        result = dict(simulated)
         if self.kind == "force":
             zero = np.zeros(run.rows)
             x = zero if self.position is None else run.columns[self.position]
             v = zero if self.velocity is None else run.columns[self.velocity]
-            result[self.output] = made[self.output] + resisting(forces, run.t, x, v)
+            result[self.output] = simulated[self.output] + resisting(forces, run.t, x, v)
             return result
         return self._moved(result, forces, run)
 
     def _moved(
-        self, made: dict[str, NDArray[np.float64]], forces: Sequence[AppliedEffect], run: Run
+        self, simulated: dict[str, NDArray[np.float64]], forces: Sequence[AppliedEffect], run: Run
     ) -> dict[str, NDArray[np.float64]]:
         from scipy.interpolate import CubicSpline
 
         if run.rows < 4:
-            return made
+            return simulated
         t = run.t
         is_position = self.kind == "position"
         if is_position:
-            spline = CubicSpline(t, made[self.output])
+            spline = CubicSpline(t, simulated[self.output])
             x0, v0 = float(spline(t[0])), float(spline(t[0], 1))
             acceleration = spline.derivative(2)
         else:
-            spline = CubicSpline(t, made[self.output])
+            spline = CubicSpline(t, simulated[self.output])
             x0, v0 = 0.0, float(spline(t[0]))
             acceleration = spline.derivative(1)
         x, v = np.empty(run.rows), np.empty(run.rows)
@@ -160,7 +160,7 @@ class Motion:
                 a, b = _step(acceleration, forces, at, h, a, b)
                 at += h
             x[i + 1], v[i + 1] = a, b
-        result = dict(made)
+        result = dict(simulated)
         result[self.output] = x if is_position else v
         if is_position and self.velocity in result:
             result[str(self.velocity)] = v
@@ -194,7 +194,9 @@ class AlongMotion(ABC):
         def pushed(
             run: Run, p: Mapping[str, float], active: Sequence[AppliedEffect], _: str | None, pattern: Pattern
         ) -> dict[str, NDArray[np.float64]]:
-            simulated = self.simulate(run, p, [one for one in active if one.effect.channel is None])
+            simulated = self.simulate(
+                run, p, [applied for applied in active if applied.effect.channel is None]
+            )
             shown = slopes(simulated, active, run, self.setting(run), run.columns)
             responses = motion.pushed(simulated, run, pattern)
             return {name: shown[name][:, None] * column for name, column in responses.items()}
@@ -215,9 +217,9 @@ def _step(
 ) -> tuple[float, float]:
     """Return position and velocity after a step of Runge and Kutta's fourth order."""
     terms = [
-        (one.effect.term.force, one.values)
-        for one in forces
-        if one.effect.term is not None and one.effect.term.force is not None
+        (force.effect.term.force, force.values)
+        for force in forces
+        if force.effect.term is not None and force.effect.term.force is not None
     ]
 
     def rate(at: float, position: float, speed: float) -> tuple[float, float]:
@@ -236,8 +238,8 @@ def _step(
 
 def motion_of(case: Case) -> Motion | None:
     """Return how dynamic terms could enter a case, None where its units show no motion."""
-    inputs = {one.name: dimension(one.unit) for one in case.drivers}
-    outputs = {one.name: dimension(one.unit) for one in case.outputs}
+    inputs = {driver.name: dimension(driver.unit) for driver in case.drivers}
+    outputs = {output.name: dimension(output.unit) for output in case.outputs}
     velocity = next((name for name, kind in inputs.items() if _is_speed(case, name, kind)), None)
     position = next((name for name, kind in inputs.items() if kind in _LENGTHS), None)
     force = next((name for name, kind in outputs.items() if kind in ("force", "moment")), None)

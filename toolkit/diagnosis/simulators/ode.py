@@ -52,13 +52,15 @@ class OdeModel:
     ) -> None:
         self.case, self._equation = case, Equation(case, rhs, outputs, initial)
         self.parameters = case.parameters
-        self.outputs = tuple(Output(name=one.name, unit=one.unit, sd=one.sd) for one in case.outputs)
-        self._drivers = tuple(one.name for one in case.drivers)
+        self.outputs = tuple(
+            Output(name=output.name, unit=output.unit, sd=output.sd) for output in case.outputs
+        )
+        self._drivers = tuple(driver.name for driver in case.drivers)
         self._settings: dict[Run, Setting] = {}
         self._fine: dict[Run, Run] = {}
         self._held = 0  # bytes of what is kept
         self._kept: dict[Any, dict[str, NDArray[np.float64]] | FitError] = {}
-        p = {one.name: one.value for one in case.parameters}
+        p = {parameter.name: parameter.value for parameter in case.parameters}
         start = self._equation.start(case.runs[0], p)
         names = case.simulation.states or tuple(f"x{i}" for i in range(len(start)))
         if len(names) != len(start):
@@ -118,15 +120,15 @@ class OdeModel:
         self._dimensions = dimensions(states[0], self._equation.shown(runs[0], p, states[0]), self.outputs)
         x = np.concatenate(states, axis=1)
         rates = [
-            np.gradient(one, run.t, axis=1) if run.rows > 2 else np.zeros_like(one)
-            for one, run in zip(states, runs, strict=True)
+            np.gradient(state, run.t, axis=1) if run.rows > 2 else np.zeros_like(state)
+            for state, run in zip(states, runs, strict=True)
         ]
         fastest = np.abs(np.concatenate(rates, axis=1)).max(axis=1)
-        steps = [np.abs(np.diff(one, axis=1)) for one in states]
+        steps = [np.abs(np.diff(state, axis=1)) for state in states]
         self._ways = {
             name: (
-                max(float(np.ptp(one[i])) for one in states),
-                float(np.median(np.concatenate([each[i] for each in steps] or [np.zeros(1)]))),
+                max(float(np.ptp(state[i])) for state in states),
+                float(np.median(np.concatenate([step[i] for step in steps] or [np.zeros(1)]))),
             )
             for i, name in enumerate(self.states)
         }
@@ -147,18 +149,18 @@ class OdeModel:
 
     def _motion_sizes(self, channel: str | None, _: Largest) -> MotionSizes:
         state = str(channel)
-        rate, own = self.scale[state]
+        rate, size = self.scale[state]
         position = self.position_of(state)
-        place = own if position is None else self.scale[position][1]
+        place = size if position is None else self.scale[position][1]
         fastest, farthest = self._reach[state]
         return MotionSizes(
-            force=rate, speed=own, place=place, fastest=fastest, farthest=farthest,
+            force=rate, speed=size, place=place, fastest=fastest, farthest=farthest,
             # A state that starts at zero and only falls has no level to run over.
             level=self._largest[state] or place, has_position=position is not None,
         )  # fmt: skip
 
     def _motion_units(self, channel: str | None) -> tuple[str, str, str]:
-        state, recorded = str(channel), {one.name: one.unit for one in self.case.channels}
+        state, recorded = str(channel), {channel.name: channel.unit for channel in self.case.channels}
         force = self.force_units.get(state) or f"{recorded.get(state, '1')}/s"
         rate = "m/s^2" if force == "N/kg" else force
 
@@ -186,8 +188,10 @@ class OdeModel:
         They have the shape (rows, forces).
         """
         at = self.states.index(str(channel))
-        forces = [one for one in active if one.effect.stage == "dynamics" and one.acts_in(run)]
-        acting, own = self._forces(forces), len(self.states)
+        forces = [
+            applied for applied in active if applied.effect.stage == "dynamics" and applied.acts_in(run)
+        ]
+        acting, own_states = self._forces(forces), len(self.states)
         x = self._integrate(run, p, forces)
         if run.rows < 2:
             return {}
@@ -201,16 +205,16 @@ class OdeModel:
                 )[::_FINER]
         except (Exception, SystemExit) as error:
             raise failed(self.case, run, f"rhs: {type(error).__name__}: {error}") from error
-        here = self._equation.shown(run, p, x[:own])
-        made = {name: np.zeros((run.rows, moved.shape[2])) for name in here}
-        for i in range(own):
-            shifted = x[:own].copy()
+        outputs = self._equation.shown(run, p, x[:own_states])
+        responses = {name: np.zeros((run.rows, moved.shape[2])) for name in outputs}
+        for i in range(own_states):
+            shifted = x[:own_states].copy()
             shifted[i] += 1e-6 * sizes[i]
             there = self._equation.shown(run, p, shifted)
-            for name, column in made.items():
-                column += ((there[name] - here[name]) / (1e-6 * sizes[i]))[:, None] * moved[:, i]
-        shown = slopes(here, active, run, self.setting(run), run.columns)
-        return {name: shown[name][:, None] * column for name, column in made.items()}
+            for name, column in responses.items():
+                column += ((there[name] - outputs[name]) / (1e-6 * sizes[i]))[:, None] * moved[:, i]
+        shown = slopes(outputs, active, run, self.setting(run), run.columns)
+        return {name: shown[name][:, None] * column for name, column in responses.items()}
 
     def position_of(self, name: str) -> str | None:
         """Return the state whose rate is this state, None where there is none."""
@@ -219,7 +223,9 @@ class OdeModel:
 
     def observed(self, run: Run) -> dict[str, NDArray[np.float64]]:
         """Return what was recorded of every output."""
-        return {one.name: run.columns[one.name] for one in self.outputs if one.name in run.columns}
+        return {
+            output.name: run.columns[output.name] for output in self.outputs if output.name in run.columns
+        }
 
     def simulate(
         self, run: Run, p: Mapping[str, float], active: Sequence[AppliedEffect]
@@ -228,35 +234,35 @@ class OdeModel:
         key, forces = self._key(run, p, active)
         if key not in self._kept:
             self._keep(key, self._made(run, p, forces, self._integrate(run, p, forces), between=key[1]))
-        kept = self._kept[key]
-        if isinstance(kept, FitError):
-            raise kept
+        simulated = self._kept[key]
+        if isinstance(simulated, FitError):
+            raise simulated
         if not key[1]:
-            return through_channels(kept, active, run, self.setting(run), run.columns)
+            return through_channels(simulated, active, run, self.setting(run), run.columns)
         # An equation's outputs have a corner at each row, where its inputs have one.
         fine = [
-            replace(one, values={**one.values, STRAIGHT: 1.0}) if _between_rows(one) else one
-            for one in active
+            replace(applied, values={**applied.values, STRAIGHT: 1.0}) if _between_rows(applied) else applied
+            for applied in active
         ]
         finer = self._finer(run)
-        made = through_channels(kept, fine, finer, self.setting(finer), finer.columns)
-        return {name: values[::_FINER] for name, values in made.items()}
+        shown = through_channels(simulated, fine, finer, self.setting(finer), finer.columns)
+        return {name: values[::_FINER] for name, values in shown.items()}
 
     def _prepare(
-        self, run: Run, wanted: Sequence[tuple[Mapping[str, float], Sequence[AppliedEffect]]]
+        self, run: Run, points: Sequence[tuple[Mapping[str, float], Sequence[AppliedEffect]]]
     ) -> None:
         """Integrate several sets of parameters and effects at once, for `simulate` to find."""
         if not self._takes_columns or run.rows < 2:
             return
         listed = {}
-        for p, active in wanted:
+        for p, active in points:
             key, forces = self._key(run, p, active)
             listed[key] = (p, forces)
         # Those that are known already are done again with the others: their steps are then the same, and
         # differences between them are free of what the steps leave.
         if len(listed) < 2 or all(key in self._kept for key in listed):
             return
-        self._together(run, [(key, *one) for key, one in listed.items()])
+        self._together(run, [(key, *point) for key, point in listed.items()])
 
     def _together(self, run: Run, listed: list[tuple[Any, Mapping[str, float], list[AppliedEffect]]]) -> None:
         """Integrate sets together; in halves where one of them stands in the way, and that one not at all."""
@@ -265,14 +271,14 @@ class OdeModel:
         sets = [p for _, p, _ in listed]
         try:
             starts = np.stack([self._equation.start(run, p) for p in sets], axis=1)
-            forces = [self._forces(one) for *_, one in listed]
+            forces = [self._forces(active) for *_, active in listed]
             rates = self._equation.rates_together(run, columns_of(sets), forces, len(self.states))
-            own, added = len(self.states), max(one.added for one in forces)
-            atol = np.stack([self._tolerance(starts[:, 0], one, added) for one in forces], axis=1)
+            own_states, added = len(self.states), max(force.added for force in forces)
+            atol = np.stack([self._tolerance(starts[:, 0], force, added) for force in forces], axis=1)
             starts = np.vstack([starts, np.zeros((added, len(sets)))])
-            slides = [(k, slide) for k, one in enumerate(forces) for slide in one.slides(own)]
+            slides = [(k, slide) for k, force in enumerate(forces) for slide in force.slides(own_states)]
             with silenced():
-                made = integrate_together(rates, run.t, starts, atol, slides)
+                solutions = integrate_together(rates, run.t, starts, atol, slides)
         except NotTogetherError:
             middle = len(listed) // 2
             self._together(run, listed[:middle])
@@ -280,10 +286,11 @@ class OdeModel:
             return
         except (Exception, SystemExit):  # noqa: BLE001 - whatever it is, the same set alone raises it by name
             return
-        for k, (key, p, one) in enumerate(listed):
+        for k, (key, p, active) in enumerate(listed):
             try:
                 self._keep(
-                    key, self._made(run, p, one, np.ascontiguousarray(made[:, :, k].T), between=key[1])
+                    key,
+                    self._made(run, p, active, np.ascontiguousarray(solutions[:, :, k].T), between=key[1]),
                 )
             except FitError as error:
                 self._keep(key, error)
@@ -300,17 +307,23 @@ class OdeModel:
     def _key(
         self, run: Run, p: Mapping[str, float], active: Sequence[AppliedEffect]
     ) -> tuple[tuple[Any, ...], list[AppliedEffect]]:
-        forces = [one for one in active if one.effect.stage == "dynamics" and one.acts_in(run)]
-        told = tuple((one.effect.name, one.channel, tuple(one.values.values())) for one in forces)
-        between = any(_between_rows(one) and one.acts_in(run) for one in active)
-        return (run, between and run.rows > 1, tuple(p.values()), told), forces
+        forces = [
+            applied for applied in active if applied.effect.stage == "dynamics" and applied.acts_in(run)
+        ]
+        forces_key = tuple(
+            (force.effect.name, force.channel, tuple(force.values.values())) for force in forces
+        )
+        between = any(_between_rows(applied) and applied.acts_in(run) for applied in active)
+        return (run, between and run.rows > 1, tuple(p.values()), forces_key), forces
 
-    def _keep(self, key: tuple[Any, ...], made: dict[str, NDArray[np.float64]] | FitError) -> None:
+    def _keep(self, key: tuple[Any, ...], simulated: dict[str, NDArray[np.float64]] | FitError) -> None:
         if len(self._kept) > 400 or self._held > _MOST_HELD:
             self._kept.clear()
             self._held = 0
-        self._kept[key] = made
-        self._held += 0 if isinstance(made, FitError) else sum(one.nbytes for one in made.values())
+        self._kept[key] = simulated
+        self._held += (
+            0 if isinstance(simulated, FitError) else sum(column.nbytes for column in simulated.values())
+        )
 
     def _integrate(
         self, run: Run, p: Mapping[str, float], forces: Sequence[AppliedEffect]
@@ -335,7 +348,9 @@ class OdeModel:
         if not self.scale:
             return 0.01 * ATOL * np.maximum(np.abs(start), 1.0)
         sizes = [self.scale[name][1] for name in self.states]
-        return ATOL * np.array([*sizes, *(10 * one for one in acting.sizes), *[1.0] * (added - acting.added)])
+        return ATOL * np.array(
+            [*sizes, *(10 * size for size in acting.sizes), *[1.0] * (added - acting.added)]
+        )
 
     def _forces(self, active: Sequence[AppliedEffect]) -> Forces:
         return Forces.of(active, self.states, self._derivative_of, self.scale)
@@ -377,10 +392,12 @@ class OdeModel:
             if effect.term.of == "state":
                 return [(name, None) for i, name in enumerate(self.states) if i not in self._derivative_of]
             at = [self.states.index(name) for name in self.force_units]
-            known = {} if self.case.simulation.force_terms else self._dimensions
-            return [(self.states[i], None) for i in fitting(effect.term, at, self._derivative_of, known)]
-        others = [(one.name, one.unit) for one in self.case.drivers]
-        return channel_places(effect, [(one.name, one.unit) for one in self.outputs], others, drivers)
+            dimensions = {} if self.case.simulation.force_terms else self._dimensions
+            return [(self.states[i], None) for i in fitting(effect.term, at, self._derivative_of, dimensions)]
+        others = [(driver.name, driver.unit) for driver in self.case.drivers]
+        return channel_places(
+            effect, [(output.name, output.unit) for output in self.outputs], others, drivers
+        )
 
     def setting(self, run: Run) -> Setting:
         """Return a run's setting."""

@@ -17,11 +17,18 @@ def unit_of(case: Case, model: Model, active: AppliedEffect, name: str) -> str:
         return text
     if active.effect.stage == "dynamics":
         motion = model.capability.motion
-        own = channel_unit(case, model, active.channel)
-        force, velocity, position = (own, "1", "1") if motion is None else motion.units(active.channel)
+        output_unit = channel_unit(case, model, active.channel)
+        force, velocity, position = (
+            (output_unit, "1", "1") if motion is None else motion.units(active.channel)
+        )
         return reduced(text.format(force=force, velocity=velocity, position=position))
-    own, other = channel_unit(case, model, active.channel), channel_unit(case, model, active.source)
-    return reduced(text.format_map({"channel": _bracketed(own, text), "from": _bracketed(other, text)}))
+    output_unit, source_unit = (
+        channel_unit(case, model, active.channel),
+        channel_unit(case, model, active.source),
+    )
+    return reduced(
+        text.format_map({"channel": _bracketed(output_unit, text), "from": _bracketed(source_unit, text)})
+    )
 
 
 def _bracketed(unit: str, text: str) -> str:
@@ -31,12 +38,12 @@ def _bracketed(unit: str, text: str) -> str:
 
 def channel_unit(case: Case, model: Model, name: str | None) -> str:
     """Return the stated unit of an output or a channel, "1" of none."""
-    for one in model.outputs:
-        if one.name == name:
-            return one.unit
-    for each in case.channels:
-        if each.name == name:
-            return each.unit
+    for output in model.outputs:
+        if output.name == name:
+            return output.unit
+    for channel in case.channels:
+        if channel.name == name:
+            return channel.unit
     return "1"
 
 
@@ -54,34 +61,34 @@ def reduced(text: str) -> str:
         return text
     factors = _product(iter(parts), 1)
     names = [name for name, _ in factors]
-    ones = names.count("1") - (len(names) > 1 and text.startswith("1/"))
-    if len(set(names)) == len(names) and (ones <= 0 or text == "1"):
+    plain_ones = names.count("1") - (len(names) > 1 and text.startswith("1/"))
+    if len(set(names)) == len(names) and (plain_ones <= 0 or text == "1"):
         return text
     powers: dict[str, int] = {}
     for name, power in factors:
         powers[name] = powers.get(name, 0) + power
-    left = {name: power for name, power in powers.items() if power and name != "1"}
-    over = [_raised(name, power) for name, power in left.items() if power > 0]
-    under = [_raised(name, -power) for name, power in left.items() if power < 0]
+    remaining = {name: power for name, power in powers.items() if power and name != "1"}
+    over = [_raised(name, power) for name, power in remaining.items() if power > 0]
+    under = [_raised(name, -power) for name, power in remaining.items() if power < 0]
     below = under[0] if len(under) == 1 else f"({'*'.join(under)})"
     return ("*".join(over) or "1") + (f"/{below}" if under else "")
 
 
 def _product(parts: Iterator[str], sign: int) -> list[tuple[str, int]]:
     """Return names and powers up to the closing bracket, from left to right."""
-    made: list[tuple[str, int]] = []
+    powers: list[tuple[str, int]] = []
     last: list[tuple[str, int]] = []
     power = sign
-    for one in parts:
-        if one == ")":
+    for part in parts:
+        if part == ")":
             break
-        if one.startswith("^"):
-            last = [(name, each * int(one[1:])) for name, each in last]
-        elif one in "*/":
-            made, power = made + last, sign if one == "*" else -sign
+        if part.startswith("^"):
+            last = [(name, exponent * int(part[1:])) for name, exponent in last]
+        elif part in "*/":
+            powers, power = powers + last, sign if part == "*" else -sign
         else:
-            last = _product(parts, power) if one == "(" else [(one, power)]
-    return made + last
+            last = _product(parts, power) if part == "(" else [(part, power)]
+    return powers + last
 
 
 def _raised(name: str, power: int) -> str:

@@ -46,14 +46,16 @@ class PythonModel(AlongMotion):
     def __init__(self, case: Case, function: Callable[..., Any]) -> None:
         self.case, self._function = case, function
         self.parameters = case.parameters
-        self.outputs = tuple(Output(name=one.name, unit=one.unit, sd=one.sd) for one in case.outputs)
-        self._names = {one.name for one in case.channels}
+        self.outputs = tuple(
+            Output(name=output.name, unit=output.unit, sd=output.sd) for output in case.outputs
+        )
+        self._names = {channel.name for channel in case.channels}
         self._load = nominal_load(case)
         self._settings: dict[Run, Setting] = {}
         self._kept: dict[tuple[Run, tuple[float, ...]], dict[str, NDArray[np.float64]]] = {}
-        drivers = {one.name for one in case.drivers}
+        drivers = {driver.name for driver in case.drivers}
         self._is_tire = bool(drivers & {"SA", "SA_CMD"}) and bool(
-            {"FY", "MZ"} & {one.name for one in self.outputs}
+            {"FY", "MZ"} & {output.name for output in self.outputs}
         )
         self.motion: Motion | None = None if self._is_tire else motion_of(case)
         self.capability = Capability(
@@ -68,21 +70,27 @@ class PythonModel(AlongMotion):
 
     def observed(self, run: Run) -> dict[str, NDArray[np.float64]]:
         """Return what was recorded of every output."""
-        return {one.name: run.columns[one.name] for one in self.outputs if one.name in run.columns}
+        return {
+            output.name: run.columns[output.name] for output in self.outputs if output.name in run.columns
+        }
 
     def simulate(
         self, run: Run, p: Mapping[str, float], active: Sequence[AppliedEffect]
     ) -> dict[str, NDArray[np.float64]]:
         """Return every output of a run with effects in it."""
-        here = self.setting(run)
-        if self._is_tire and any(one.effect.drive is not None and one.acts_in(run) for one in active):
-            made = self._tire(run, p, active, here)
+        around = self.setting(run)
+        if self._is_tire and any(
+            applied.effect.drive is not None and applied.acts_in(run) for applied in active
+        ):
+            simulated = self._tire(run, p, active, around)
         else:
-            made = self.call(run, p, {})
-        forces = [one for one in active if one.effect.stage == "dynamics" and one.acts_in(run)]
+            simulated = self.call(run, p, {})
+        forces = [
+            applied for applied in active if applied.effect.stage == "dynamics" and applied.acts_in(run)
+        ]
         if forces and self.motion is not None:
-            made = self.motion.disturbed(made, forces, run)
-        return through_channels(made, active, run, here, run.columns)
+            simulated = self.motion.disturbed(simulated, forces, run)
+        return through_channels(simulated, active, run, around, run.columns)
 
     def call(
         self, run: Run, p: Mapping[str, float], changed: Mapping[str, NDArray[np.float64]]
@@ -102,9 +110,9 @@ class PythonModel(AlongMotion):
 
     def _repeats(self, run: Run, p: Mapping[str, float]) -> None:
         """Refuse a simulator that answers one question in two ways: its noise would pass for physics."""
-        first, again = self.call(run, p, {}), self._called(run, p, {})
+        first, second = self.call(run, p, {}), self._called(run, p, {})
         for name, values in first.items():
-            if not np.allclose(values, again[name], rtol=1e-9, atol=1e-12 * float(np.abs(values).max())):
+            if not np.allclose(values, second[name], rtol=1e-9, atol=1e-12 * float(np.abs(values).max())):
                 raise _failed(
                     self.case, run, f"other values of {name!r} on a second call with the same inputs"
                 )
@@ -121,34 +129,36 @@ class PythonModel(AlongMotion):
         inputs = pd.DataFrame(columns)
         try:
             with silenced():
-                made = self._function(inputs, dict(p))
+                answer = self._function(inputs, dict(p))
         except (Exception, SystemExit) as error:
             raise _failed(self.case, run, f"{type(error).__name__}: {error}") from error
-        if not isinstance(made, pd.DataFrame):
-            raise _failed(self.case, run, f"a {type(made).__name__}, not a pandas.DataFrame")
-        if len(made) != run.rows:
-            raise _failed(self.case, run, f"{len(made)} rows for {run.rows} rows of inputs")
+        if not isinstance(answer, pd.DataFrame):
+            raise _failed(self.case, run, f"a {type(answer).__name__}, not a pandas.DataFrame")
+        if len(answer) != run.rows:
+            raise _failed(self.case, run, f"{len(answer)} rows for {run.rows} rows of inputs")
         result = {}
-        for one in self.outputs:
-            if one.name not in made.columns:
+        for output in self.outputs:
+            if output.name not in answer.columns:
                 raise _failed(
-                    self.case, run, f"no column {one.name!r}; it has {', '.join(map(str, made.columns))}"
+                    self.case, run, f"no column {output.name!r}; it has {', '.join(map(str, answer.columns))}"
                 )
-            values = _numbers(made, one.name)
+            values = _numbers(answer, output.name)
             if values is None or values.ndim != 1:
                 got = "no numbers" if values is None else "several columns of one name"
-                raise _failed(self.case, run, f"{got} in column {one.name!r}")
+                raise _failed(self.case, run, f"{got} in column {output.name!r}")
             if not np.isfinite(values).all():
-                raise _failed(self.case, run, f"no number in column {one.name!r}, row {_first_bad(values)}")
+                raise _failed(
+                    self.case, run, f"no number in column {output.name!r}, row {_first_bad(values)}"
+                )
             if np.abs(values).max(initial=0.0) > _LARGEST:
-                raise _failed(self.case, run, f"values beyond {_LARGEST:.0e} in column {one.name!r}")
-            result[one.name] = values
+                raise _failed(self.case, run, f"values beyond {_LARGEST:.0e} in column {output.name!r}")
+            result[output.name] = values
         return result
 
     def places(self, effect: Effect) -> list[tuple[str | None, str | None]]:
         """Return where an effect could act."""
         found: list[tuple[str | None, str | None]] = []
-        drivers = {one.name for one in self.case.drivers}
+        drivers = {driver.name for driver in self.case.drivers}
         if self._is_tire:
             found += tire_places(
                 effect, has_IA="IA" in drivers, has_P=bool({"P", "P_INFL"} & drivers),
@@ -156,8 +166,10 @@ class PythonModel(AlongMotion):
             )  # fmt: skip
         if self.motion is not None:
             found += self.motion.places(effect)
-        others = [(one.name, one.unit) for one in self.case.drivers]
-        return found + channel_places(effect, [(one.name, one.unit) for one in self.outputs], others, drivers)
+        others = [(driver.name, driver.unit) for driver in self.case.drivers]
+        return found + channel_places(
+            effect, [(output.name, output.unit) for output in self.outputs], others, drivers
+        )
 
     def setting(self, run: Run) -> Setting:
         """Return a run's setting."""
@@ -172,16 +184,19 @@ class PythonModel(AlongMotion):
         return self._settings[run]
 
     def _work_before(self, run: Run) -> float:
-        if not self._is_tire or "FY" not in {one.name for one in self.outputs}:
+        if not self._is_tire or "FY" not in {output.name for output in self.outputs}:
             return 0.0
-        values = {one.name: one.value for one in self.parameters}
+        values = {parameter.name: parameter.value for parameter in self.parameters}
         factor = unit(self.case.unit("FY")).factor
         return slip_work_before(
-            self.case, run, lambda one, _: self.call(one, values, {})["FY"] * factor, load_N=self._load
+            self.case,
+            run,
+            lambda earlier, _: self.call(earlier, values, {})["FY"] * factor,
+            load_N=self._load,
         )
 
     def _tire(
-        self, run: Run, p: Mapping[str, float], active: Sequence[AppliedEffect], here: Setting
+        self, run: Run, p: Mapping[str, float], active: Sequence[AppliedEffect], setting: Setting
     ) -> dict[str, NDArray[np.float64]]:
         case = self.case
         start = base_drive(case, run, load_N=self._load, outputs=False)
@@ -201,21 +216,21 @@ class PythonModel(AlongMotion):
             return self.call(run, p, changed)
 
         def steady(SA: NDArray[np.float64], drive: Drive) -> TireForces:
-            made = raw(SA, drive)
+            forces = raw(SA, drive)
             zero = np.zeros(run.rows)
             return TireForces(
-                FY=made["FY"] * units["FY"] * to_machine["FY"] if "FY" in made else zero,
-                MZ=made["MZ"] * units["MZ"] * to_machine["MZ"] if "MZ" in made else zero,
+                FY=forces["FY"] * units["FY"] * to_machine["FY"] if "FY" in forces else zero,
+                MZ=forces["MZ"] * units["MZ"] * to_machine["MZ"] if "MZ" in forces else zero,
             )
 
-        forces = through_tire(start, steady, active, run, here)
+        forces = through_tire(start, steady, active, run, setting)
         back = tire_signs("machine", case.axes, run)
         made = dict(self.call(run, p, {}))
         for name in ("FY", "MZ"):
             if name in made:
                 made[name] = getattr(forces, name) * back[name] / units[name]
         if "FZ" in made:
-            loaded = late(start, active, run, here, lambda one: steady(one.SA, one))
+            loaded = late(start, active, run, setting, lambda drive: steady(drive.SA, drive))
             made["FZ"] = made["FZ"] if loaded is None else raw(loaded.SA, loaded)["FZ"]
         return made
 
@@ -237,7 +252,7 @@ def _numbers(made: Any, name: str) -> NDArray[np.float64] | None:
     """Return a column's numbers, None where it has texts or complex numbers."""
     column = made[name]
     kind = getattr(getattr(column, "dtype", None), "kind", "O")
-    if kind not in "iufb" and not all(isinstance(one, Real) for one in np.ravel(column)):
+    if kind not in "iufb" and not all(isinstance(entry, Real) for entry in np.ravel(column)):
         return None
     try:
         return np.asarray(column, dtype=np.float64)

@@ -23,8 +23,8 @@ _NOMINAL_LOADS = frozenset({"FZ0", "FZNOM", "FZNOMINAL", "FNOMIN", "FNOM", "NOMI
 
 def si(case: Case, name: str, values: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return a channel's values in SI."""
-    known = unit(case.unit(name))
-    return values * known.factor + known.offset
+    stated = unit(case.unit(name))
+    return values * stated.factor + stated.offset
 
 
 def setting(
@@ -63,8 +63,8 @@ def elapsed(case: Case, run: Run) -> NDArray[np.float64]:
     Where the runs' clocks go on from one to the next, they are one clock; where each run begins anew, the
     time is that within the run: what passed between runs is not known.
     """
-    starts = [one.t[0] for one in case.runs if one.rows]
-    ends = [one.t[-1] for one in case.runs if one.rows]
+    starts = [run.t[0] for run in case.runs if run.rows]
+    ends = [run.t[-1] for run in case.runs if run.rows]
     onward = all(starts[i] >= ends[i - 1] for i in range(1, len(starts)))
     return run.t - (starts[0] if onward and starts else (run.t[0] if run.rows else 0.0))
 
@@ -86,8 +86,8 @@ def nominal_load(case: Case) -> float:
     if case.nominal_load_N is not None:
         return case.nominal_load_N
     for parameter in case.parameters:
-        named = parameter.name.replace("_", "").upper() in _NOMINAL_LOADS
-        if named and dimension(parameter.unit) == dimension("N") and parameter.value > 0:
+        is_nominal = parameter.name.replace("_", "").upper() in _NOMINAL_LOADS
+        if is_nominal and dimension(parameter.unit) == dimension("N") and parameter.value > 0:
             return parameter.value * unit(parameter.unit).factor
     loads = [
         si(case, name, run.columns[name])

@@ -73,13 +73,13 @@ class HeldColumns:
 
     def __init__(self, slides: Sequence[tuple[int, Slide]]) -> None:
         """Take pairs of column and slide."""
-        listed = [one for _, one in slides]
+        listed = [slide for _, slide in slides]
         self._column = np.array([column for column, _ in slides], dtype=np.intp)
         self._bend, self._velocity, self._place = (
-            np.array([getattr(one, name) for one in listed], dtype=np.intp)
+            np.array([getattr(slide, name) for slide in listed], dtype=np.intp)
             for name in ("bend", "velocity", "way")
         )
-        self._reach = np.array([one.reach for one in listed])
+        self._reach = np.array([slide.reach for slide in listed])
         self._on = np.zeros(len(listed), dtype=bool)
 
     @property

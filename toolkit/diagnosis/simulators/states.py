@@ -34,21 +34,21 @@ def dimensions(
     x : the states of a run, shape (states, rows)
     shown : the outputs at them, shape (rows,) each
     """
-    found = {}
-    for one in outputs:
+    meanings = {}
+    for output in outputs:
         for i, state in enumerate(x):
             at = int(np.argmax(np.abs(state)))
             if np.ptp(state) == 0 or state[at] == 0:
                 continue
-            ratio = shown[one.name][at] / state[at]
-            off = np.abs(shown[one.name] - ratio * state).max()
+            ratio = shown[output.name][at] / state[at]
+            off = np.abs(shown[output.name] - ratio * state).max()
             if ratio and off <= 1e-9 * abs(ratio * state[at]):
-                found[i] = dimension(one.unit)
-    return {i: one for i, one in found.items() if one not in _OPEN}
+                meanings[i] = dimension(output.unit)
+    return {i: meaning for i, meaning in meanings.items() if meaning not in _OPEN}
 
 
 def fitting(
-    term: Term, states: Sequence[int], velocities: Mapping[int, int], known: Mapping[int, str]
+    term: Term, states: Sequence[int], velocities: Mapping[int, int], meanings: Mapping[int, str]
 ) -> list[int]:
     """Return those of the states whose equation a term of a motion could enter.
 
@@ -59,18 +59,18 @@ def fitting(
     """
     pairs = [i for i in states if i in velocities]
     if term.of == "velocity":
-        return _motions(states, pairs, known, _SPEEDS)
+        return _motions(states, pairs, meanings, _SPEEDS)
     if term.of != "position":
         return list(states)
     if pairs:
         return pairs
-    return _motions(states, [], known, _PLACES) if term.on_place else []
+    return _motions(states, [], meanings, _PLACES) if term.on_place else []
 
 
 def _motions(
-    states: Sequence[int], pairs: list[int], known: Mapping[int, str], wanted: frozenset[str]
+    states: Sequence[int], pairs: list[int], meanings: Mapping[int, str], allowed: frozenset[str]
 ) -> list[int]:
-    if not known:
+    if not meanings:
         return list(states)
     # Beside states of another kind, one of which nothing is known is of theirs.
-    return [i for i in states if i in pairs or known.get(i) in wanted]
+    return [i for i in states if i in pairs or meanings.get(i) in allowed]

@@ -11,9 +11,8 @@ from toolkit.channels import Axes, Rotation, signs
 from toolkit.diagnosis.simulators.setting import NOMINAL_SPEED, si
 from toolkit.effects.applied import AppliedEffect
 from toolkit.effects.effect import Effect
-from toolkit.effects.forward import driven, tire_forces
+from toolkit.effects.forward import Steady, driven, tire_forces
 from toolkit.effects.signals import Drive, Setting, Tire, TireForces, drive
-from toolkit.effects.similarity import Steady
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -33,7 +32,7 @@ def tire_signs(source: Axes, target: Axes, run: Run) -> dict[str, int]:
 
 def first_of(case: Case, run: Run, *names: str, outputs: bool = True) -> NDArray[np.float64] | None:
     """Return the first of these drivers, or of these outputs, in SI; None where the run has none."""
-    among = {one.name for one in (case.channels if outputs else case.drivers)}
+    among = {channel.name for channel in (case.channels if outputs else case.drivers)}
     for name in names:
         if name in run.columns and name in among:
             values = si(case, name, run.columns[name])

@@ -44,20 +44,21 @@ def load_functions(path: Path, *names: str) -> tuple[Callable[..., Any], ...]:
             expected=f"a Python file with {names[0]}(..)", next_step="run the file by itself and mend it",
             rule="simulator",
         ) from error  # fmt: skip
-    made = []
+    lines = []
     for name in names:
         function = getattr(space, name, None)
         if not callable(function):
-            own = [key for key, one in vars(space).items() if callable(one) and not key.startswith("_")]
-            near = difflib.get_close_matches(name, own, n=1, cutoff=0.5)
+            functions = [key for key, var in vars(space).items() if callable(var) and not key.startswith("_")]
+            near = difflib.get_close_matches(name, functions, n=1, cutoff=0.5)
             raise ConfigError(
-                f"the simulator has no function {name!r}", where=path, got=", ".join(own) or "no functions",
+                f"the simulator has no function {name!r}", where=path,
+                got=", ".join(functions) or "no functions",
                 expected=f"def {name}(..)",
                 next_step=f"did you mean {near[0]!r}?" if near else "name the function in the case",
                 rule="simulator",
             )  # fmt: skip
-        made.append(cast("Callable[..., Any]", function))
-    return tuple(made)
+        lines.append(cast("Callable[..., Any]", function))
+    return tuple(lines)
 
 
 @contextlib.contextmanager

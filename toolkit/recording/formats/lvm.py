@@ -18,7 +18,7 @@ import numpy as np
 
 from toolkit.errors import ColumnError, RecordingError, UnreadableError
 from toolkit.machine import Machine
-from toolkit.recording.dialect import number_or_text
+from toolkit.recording.csvfile import number_or_text
 from toolkit.recording.formats.vectors import Vector, Vectors, one_table
 from toolkit.recording.integrity.refuse import damaged, truncated
 from toolkit.recording.table import judge, refuse_cell

@@ -24,8 +24,7 @@ if TYPE_CHECKING:
     from toolkit.audit.archive import ArchiveAudit
     from toolkit.audit.linked import Linked, PastReport
     from toolkit.audit.since_good import Drift
-    from toolkit.audit.timeline import Timeline
-    from toolkit.audit.traces import Trace
+    from toolkit.audit.timeline import Timeline, Trace
     from toolkit.calibration.records.use import CalibrationUse
     from toolkit.findings import Finding
 

@@ -36,21 +36,21 @@ _BINS = 24
 _WIDE = 200.0  # errors over noise from which a chart goes by powers of ten
 
 
-def error_bars(made: Diagnosis) -> bytes:
+def error_bars(diagnosis: Diagnosis) -> bytes:
     """Return the chart of the first ten seconds: held-out error over noise, three bars an output."""
-    names = [one.channel for one in made.held_out]
+    names = [one.channel for one in diagnosis.held_out]
 
     def draw(figure: Figure) -> None:
         from matplotlib.patches import Rectangle
 
         axes = figure.add_subplot()
         steps = [("as declared", GREY), ("refitted", ORANGE), ("with the effect", BLUE)]
-        if not made.effects:
+        if not diagnosis.effects:
             steps = steps[:2]
         for i, (label, colour) in enumerate(steps):
             values = [
                 (one.nominal_rmse, one.refitted_rmse, one.augmented_rmse)[i] / max(one.noise_floor, 1e-300)
-                for one in made.held_out
+                for one in diagnosis.held_out
             ]
             at = np.arange(len(names)) + (i - (len(steps) - 1) / 2) * 0.26
             bars = axes.barh(at, values, height=0.24, color=colour, label=label)
@@ -79,20 +79,20 @@ def error_bars(made: Diagnosis) -> bytes:
     return draw_svg((8.6, 1.5 + 0.85 * max(len(names), 1)), draw)
 
 
-def mismatch_map(found: Search, channel: str, place: Place, *, after: bool) -> bytes | None:
+def mismatch_map(search: Search, channel: str, place: Place, *, after: bool) -> bytes | None:
     """Return an output's residual over the variable that holds its mismatch, before and after."""
-    problem = found.problem
-    x = variable_of(found, place.variable)
+    problem = search.problem
+    x = variable_of(search, place.variable)
     if x is None:
         return None
     kept = problem.kept[channel]
-    unit = next(one.unit for one in problem.model.outputs if one.name == channel)
+    unit = next(output.unit for output in problem.model.outputs if output.name == channel)
 
     def draw(figure: Figure) -> None:
         axes = figure.add_subplot()
-        series = [("refitted", ORANGE, found.refitted.residual[channel])]
+        series = [("refitted", ORANGE, search.refitted.residual[channel])]
         if after:
-            series.append(("with the effect", BLUE, found.augmented.residual[channel]))
+            series.append(("with the effect", BLUE, search.augmented.residual[channel]))
         for label, colour, residual in series:
             some = np.flatnonzero(kept)
             some = some[:: max(1, len(some) // _MOST)]
@@ -109,19 +109,19 @@ def mismatch_map(found: Search, channel: str, place: Place, *, after: bool) -> b
     return draw_svg((8.6, 3.6), draw)
 
 
-def worst_run(found: Search, channel: str) -> int:
+def worst_run(search: Search, channel: str) -> int:
     """Return the number of the run with the largest mismatch of an output."""
-    problem = found.problem
-    residual = np.where(problem.kept[channel], found.refitted.residual[channel], 0.0)
+    problem = search.problem
+    residual = np.where(problem.kept[channel], search.refitted.residual[channel], 0.0)
     return int(np.argmax([float(np.sum(residual[one] ** 2)) for one in problem.slices]))
 
 
-def run_in_time(found: Search, channel: str, *, after: bool) -> bytes:
+def run_in_time(search: Search, channel: str, *, after: bool) -> bytes:
     """Return the run with the largest mismatch of an output: recorded and simulated, residuals beneath."""
-    problem = found.problem
-    which = worst_run(found, channel)
+    problem = search.problem
+    which = worst_run(search, channel)
     rows, run = problem.slices[which], problem.runs[which]
-    unit = next(one.unit for one in problem.model.outputs if one.name == channel)
+    unit = next(output.unit for output in problem.model.outputs if output.name == channel)
 
     def draw(figure: Figure) -> None:
         upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(1.5, 1))
@@ -130,9 +130,9 @@ def run_in_time(found: Search, channel: str, *, after: bool) -> bytes:
         # Large enough to be seen under a line that goes through them.
         dots = 5.0 if run.rows < _FEW else 2.5
         upper.plot(t, problem.observed[channel][rows], ".", markersize=dots, color=GREY, label="recorded")
-        fits = [("refitted", ORANGE, found.refitted)]
+        fits = [("refitted", ORANGE, search.refitted)]
         if after:
-            fits.append(("with the effect", BLUE, found.augmented))
+            fits.append(("with the effect", BLUE, search.augmented))
         for label, colour, fit in fits:
             upper.plot(t, fit.simulated[channel][rows], color=colour, linewidth=1.2, label=label)
             lower.plot(t, fit.residual[channel][rows], color=colour, linewidth=0.8)
@@ -147,12 +147,12 @@ def run_in_time(found: Search, channel: str, *, after: bool) -> bytes:
     return draw_svg((8.6, 4.4), draw)
 
 
-def run_map(found: Search, made: Diagnosis, *, after: bool) -> bytes:
+def run_map(search: Search, diagnosis: Diagnosis, *, after: bool) -> bytes:
     """Return root mean square residuals over the noise of the first chart, by run and output."""
-    problem = found.problem
-    floors = {one.channel: one.noise_floor for one in made.held_out}
+    problem = search.problem
+    floors = {one.channel: one.noise_floor for one in diagnosis.held_out}
     names = [name for name in problem.names if name in floors]
-    fits = [("refitted", found.refitted)] + ([("with the effect", found.augmented)] if after else [])
+    fits = [("refitted", search.refitted)] + ([("with the effect", search.augmented)] if after else [])
 
     def table(fit: Any) -> NDArray[np.float64]:
         share = np.zeros((len(names), len(problem.runs)))
@@ -175,7 +175,7 @@ def run_map(found: Search, made: Diagnosis, *, after: bool) -> bytes:
             axes.grid(visible=False)
             _write_cells(axes, values, most)
         panels[-1].set_xticks(
-            range(len(problem.runs)), [_short(one.name) for one in problem.runs],
+            range(len(problem.runs)), [_short(run.name) for run in problem.runs],
             rotation=0 if len(problem.runs) < 9 else 90,
         )  # fmt: skip
 
@@ -196,11 +196,11 @@ def _short(name: str) -> str:
     return name.removesuffix(".csv").removesuffix(".xlsx")
 
 
-def variable_of(found: Search, name: str) -> NDArray[np.float64] | None:
+def variable_of(search: Search, name: str) -> NDArray[np.float64] | None:
     """Return the values of a place's variable over all runs (n,), None where it has no numbers."""
-    problem = found.problem
+    problem = search.problem
     if name in problem.names:
-        return found.refitted.simulated[name]
+        return search.refitted.simulated[name]
     if name == "time":
         return np.concatenate([run.t for run in problem.runs]) / time_unit(problem.case)[1]
     if all(name in run.columns for run in problem.runs):

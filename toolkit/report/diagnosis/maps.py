@@ -28,36 +28,36 @@ _BINS = 12
 Variable = tuple[str, "NDArray[np.float64]", tuple[str, ...]]
 
 
-def variables(found: Search) -> list[Variable]:
+def variables(search: Search) -> list[Variable]:
     """Return what a residual is mapped over: slip angle, load, conditions, revolutions, time, the rest."""
-    problem = found.problem
+    problem = search.problem
     drivers = {
-        one.name: one.unit
-        for one in problem.case.drivers
-        if all(one.name in run.columns for run in problem.runs)
+        driver.name: driver.unit
+        for driver in problem.case.drivers
+        if all(driver.name in run.columns for run in problem.runs)
     }
     order = [name for name in _FIRST if name in drivers]
     rest = [name for name in drivers if name not in (*_FIRST, *_TURNS)]
-    made = [_channel(found, name, drivers[name]) for name in order]
-    made += _conditions(found)
-    made += [_revolution(found, name, drivers[name]) for name in _TURNS if name in drivers]
+    made = [_channel(search, name, drivers[name]) for name in order]
+    made += _conditions(search)
+    made += [_revolution(search, name, drivers[name]) for name in _TURNS if name in drivers]
     if problem.case.has_time:
         text, seconds = time_unit(problem.case)
         made.append((f"time [{text}]", np.concatenate([run.t for run in problem.runs]) / seconds, ()))
-    made += [_channel(found, name, drivers[name]) for name in rest]
+    made += [_channel(search, name, drivers[name]) for name in rest]
     return [one for one in made if np.isfinite(one[1]).any() and np.nanmax(one[1]) > np.nanmin(one[1])]
 
 
-def size_maps(found: Search, made: Diagnosis, channel: str, *, after: bool) -> bytes | None:
+def size_maps(search: Search, diagnosis: Diagnosis, channel: str, *, after: bool) -> bytes | None:
     """Return an output's root mean square residual over its noise, a panel for each variable."""
-    noise = max(next((one.noise_floor for one in made.held_out if one.channel == channel), 0.0), 1e-300)
-    chosen = variables(found)[:_PANELS]
-    kept = found.problem.kept[channel]
+    noise = max(next((one.noise_floor for one in diagnosis.held_out if one.channel == channel), 0.0), 1e-300)
+    chosen = variables(search)[:_PANELS]
+    kept = search.problem.kept[channel]
     if not chosen or not kept.any():
         return None
-    fits = [("refitted", ORANGE, found.refitted)]
+    fits = [("refitted", ORANGE, search.refitted)]
     if after:
-        fits.append(("with the effect", BLUE, found.augmented))
+        fits.append(("with the effect", BLUE, search.augmented))
     across = 4 if len(chosen) == 4 else min(_ACROSS, len(chosen))
     down = -(-len(chosen) // across)
 
@@ -101,28 +101,28 @@ def _panel(
         axes.plot(centre, np.sqrt(mean), ".-", color=colour, linewidth=1.4, markersize=4, label=label)
         return
     sizes = [residual[x == i] for i in range(len(levels))]
-    heights = [float(np.sqrt(np.mean(one**2))) if len(one) else 0.0 for one in sizes]
+    heights = [float(np.sqrt(np.mean(size**2))) if len(size) else 0.0 for size in sizes]
     axes.bar(np.arange(len(levels)) + at[0] * at[1], heights, width=at[1], color=colour, label=label)
     axes.set_xticks(range(len(levels)), levels)
     axes.grid(visible=False, axis="x")
 
 
-def _channel(found: Search, name: str, measure: str) -> Variable:
-    return (f"{name} [{measure}]", np.concatenate([run.columns[name] for run in found.problem.runs]), ())
+def _channel(search: Search, name: str, measure: str) -> Variable:
+    return (f"{name} [{measure}]", np.concatenate([run.columns[name] for run in search.problem.runs]), ())
 
 
-def _revolution(found: Search, name: str, measure: str) -> Variable:
+def _revolution(search: Search, name: str, measure: str) -> Variable:
     """Return where in its turn the tire or the drum stands [deg]: what is locked to it stands still there."""
-    _, angle, _ = _channel(found, name, measure)
+    _, angle, _ = _channel(search, name, measure)
     return f"{name} in one turn [deg]", np.rad2deg(angle * unit(measure).factor) % 360.0, ()
 
 
-def _conditions(found: Search) -> list[Variable]:
-    runs = found.problem.runs
-    made: list[Variable] = []
+def _conditions(search: Search) -> list[Variable]:
+    runs = search.problem.runs
+    variables: list[Variable] = []
     for key in dict.fromkeys(key for run in runs for key in run.conditions):
         levels = tuple(dict.fromkeys(run.conditions.get(key, "-") for run in runs))
         if 1 < len(levels) <= _LEVELS:
             at = [np.full(run.rows, float(levels.index(run.conditions.get(key, "-")))) for run in runs]
-            made.append((key, np.concatenate(at), levels))
-    return made
+            variables.append((key, np.concatenate(at), levels))
+    return variables

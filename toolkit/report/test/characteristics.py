@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from toolkit.characteristics.budget import COLUMNS as BUDGET
 from toolkit.characteristics.catalogue import columns, summary, tables
+from toolkit.characteristics.characteristic import COLUMNS as BUDGET
 from toolkit.estimate import round_to_uncertainty
 from toolkit.report.content import Cell
 from toolkit.report.document import DeclaredTable, Rows

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from toolkit.calibration.records.use import DRAFT, UNVERIFIED, CalibrationUse
 from toolkit.characteristics.catalogue import columns
-from toolkit.characteristics.layout import PULL, STIFFNESS
+from toolkit.characteristics.characteristic import PULL, STIFFNESS
 from toolkit.files import sha256_bytes
 from toolkit.report.content import IMPOSSIBLE, ReportContent, say_plot, say_table, say_values
 from toolkit.report.document import Chapter, Document
