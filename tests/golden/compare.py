@@ -9,6 +9,7 @@ standard error
     nominal parameter by 1e-9 of its prior's, evidence and errors of prediction by a relative 1e-7: they
     follow the values.
 A sentence for people may be worded anew: where its numbers are the same, the difference is one of wording.
+The list of a template's tags may grow: what is new in it is an addition.
 """
 
 from __future__ import annotations
@@ -19,27 +20,32 @@ import math
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 SHARE_OF_STANDARD_ERROR = 1e-9
 SHARE_OF_EVIDENCE = 1e-7
 BY_STANDARD_ERROR = ("diagnosis", "proof")
 """Areas that are compared by standard errors."""
-SENTENCES = frozenset("message statement reason note why equation reference description".split())
-"""Keys of sentences for people."""
+SENTENCES = frozenset("message statement reason note why equation reference".split())
+"""Keys of sentences for people about results."""
+HELP = "description"
+"""Key of a sentence about a tag: its numbers are no results."""
+GROWING = ("answer.tags",)
+"""Key paths of lists that may grow."""
+Kind = Literal["result", "wording", "addition"]
 _NUMBER = re.compile(r"[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
 _NORMAL_95 = 1.959963984540054
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Difference:
-    """What differs at a key path; ``wording`` where only a sentence was worded anew."""
+    """What differs at a key path: a result, the wording of a sentence, or an entry that was added."""
 
     path: str
     frozen: str
     today: str
     by: str = ""
-    wording: bool = False
+    kind: Kind = "result"
 
     def __str__(self) -> str:
         by = f"  ({self.by})" if self.by else ""
@@ -95,7 +101,8 @@ def _walk(frozen: Any, today: Any, place: _Place) -> Iterator[Difference]:
             if key not in today:
                 yield Difference(path=inner.path, frozen=_short(frozen[key]), today="(missing)")
             elif key not in frozen:
-                yield Difference(path=inner.path, frozen="(missing)", today=_short(today[key]))
+                kind: Kind = "addition" if place.path in GROWING else "result"
+                yield Difference(path=inner.path, frozen="(missing)", today=_short(today[key]), kind=kind)
             else:
                 yield from _walk(frozen[key], today[key], inner)
     elif isinstance(frozen, list) and isinstance(today, list):
@@ -124,13 +131,12 @@ def _numbers(frozen: float, today: float, place: _Place) -> Iterator[Difference]
 
 
 def _texts(frozen: Any, today: Any, place: _Place) -> Difference:
-    worded = (
-        place.key in SENTENCES
-        and isinstance(frozen, str)
-        and isinstance(today, str)
-        and _NUMBER.findall(frozen) == _NUMBER.findall(today)
+    sentence = isinstance(frozen, str) and isinstance(today, str)
+    worded = sentence and (
+        place.key == HELP or (place.key in SENTENCES and _NUMBER.findall(frozen) == _NUMBER.findall(today))
     )
-    return Difference(path=place.path, frozen=_short(frozen), today=_short(today), wording=worded)
+    kind: Kind = "wording" if worded else "result"
+    return Difference(path=place.path, frozen=_short(frozen), today=_short(today), kind=kind)
 
 
 def _is_number(value: Any) -> bool:
