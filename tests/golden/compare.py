@@ -6,7 +6,7 @@ bit-equal
     The same JSON: a number that differs in its last bit differs, so does 1 from 1.0.
 standard error
     Of a diagnosis: a value and its interval may differ by 1e-9 of the value's standard error, a shift of a
-    nominal parameter by 1e-9 of its prior's, evidence and errors of prediction by a relative 1e-7: they
+    nominal parameter by 1e-9 of its prior's; evidence, errors and predicted curves by a relative 1e-7: they
     follow the values.
 A sentence for people may be worded anew: where its numbers are the same, the difference is one of wording.
 The list of a template's tags may grow: what is new in it is an addition.
@@ -76,6 +76,15 @@ class _Place:
         """Return the place of an entry of a list."""
         return dataclasses.replace(self, path=f"{self.path}[{number}]")
 
+    def series(self, values: list[Any]) -> _Place:
+        """Return the place of a curve: its numbers count by the largest, so that a zero crossing is free."""
+        if not self.by_standard_error or self.scale is not None or len(values) <= 3:
+            return self
+        if not all(isinstance(value, float) for value in values):
+            return self
+        share = SHARE_OF_EVIDENCE / SHARE_OF_STANDARD_ERROR
+        return dataclasses.replace(self, scale=share * max(map(abs, values)))
+
     def allowed(self, frozen: float) -> float:
         """Return how far a number may be from the frozen one."""
         if not self.by_standard_error:
@@ -89,6 +98,8 @@ def _scale(key: str, parent: Mapping[str, Any]) -> float | None:
     """Return the standard error in which a number counts; None where nothing states one."""
     if key in ("value", "ci95") and isinstance(interval := parent.get("ci95"), list) and None not in interval:
         return float(interval[1] - interval[0]) / (2 * _NORMAL_95)
+    if key == "value" and isinstance(parent.get("standard_error"), float):
+        return float(parent["standard_error"])
     if key in ("before", "after", "prior_sd") and parent.get("prior_sd"):
         return float(parent["prior_sd"])
     return 1.0 if key == "shift_in_sd" else None
@@ -108,6 +119,7 @@ def _walk(frozen: Any, today: Any, place: _Place) -> Iterator[Difference]:
     elif isinstance(frozen, list) and isinstance(today, list):
         if len(frozen) != len(today):
             yield Difference(path=place.path, frozen=f"{len(frozen)} rows", today=f"{len(today)} rows")
+        place = place.series(frozen)
         for number, (before, after) in enumerate(zip(frozen, today, strict=False)):
             yield from _walk(before, after, place.row(number))
     elif _is_number(frozen) and _is_number(today):

@@ -81,6 +81,14 @@ def test_a_diagnosis_may_move_by_less_than_a_billionth_of_a_standard_error() -> 
         assert len(differences(frozen, today, "diagnosis")) == told
 
 
+def test_a_curve_counts_by_its_largest_value() -> None:
+    frozen = {"FY": [1000.0, 1.0, 1e-6, -1000.0]}
+    for shift, count in ((1e-3, 1), (1e-5, 0)):
+        today = {"FY": [1000.0, 1.0, 1e-6 + shift, -1000.0]}
+        assert len(differences(frozen, today, "diagnosis")) == count
+        assert len(differences(frozen, today, "reduction")) == 1
+
+
 @pytest.mark.parametrize(
     ("frozen", "today", "kinds"),
     [
