@@ -112,13 +112,13 @@ def pages_missing(root: Path) -> list[Mention]:
     return [
         Mention(place, line, cited)
         for place, line, text in _prose(root, pages.values())
-        for cited in _missing(text, pages, root)
+        for cited in _missing(text, pages, root, (root / place).parent)
     ]
 
 
-def _missing(text: str, pages: dict[str, Path], root: Path) -> Iterator[str]:
+def _missing(text: str, pages: dict[str, Path], root: Path, folder: Path) -> Iterator[str]:
     for match in _PAGE.finditer(text):
-        page = _page(match[1], pages, root)
+        page = _page(match[1], pages, root, folder)
         title = _SECTION.match(text, match.end(1) - 3)
         section = match[2] or (title and title[1])
         if page is None or (section and not _has_section(page, section)):
@@ -134,11 +134,12 @@ def _pages(root: Path) -> Iterator[Path]:
     yield from (root / PACKAGE).rglob("*.md")
 
 
-def _page(cited: str, pages: dict[str, Path], root: Path) -> Path | None:
+def _page(cited: str, pages: dict[str, Path], root: Path, folder: Path) -> Path | None:
     if cited in pages:
         return pages[cited]
     if "/" in cited:
-        return root / cited if (root / cited).is_file() else None
+        # From the root of the checkout, or as a link of the page that cites.
+        return next((path for path in (root / cited, folder / cited) if path.is_file()), None)
     return next((path for name, path in pages.items() if name.rsplit("/", 1)[-1] == cited), None)
 
 
@@ -152,11 +153,17 @@ def _anchor(title: str) -> str:
 
 
 def _prose(root: Path, pages: Iterable[Path]) -> Iterator[tuple[str, int, str]]:
-    """Yield place, line and text of every comment, string and page; strings of many lines line by line."""
+    """Yield place, line and text of every comment, string and page; strings of many lines line by line.
+
+    What is fenced in a page is an example: its files need not be there.
+    """
     for page in pages:
         if page.name != "CHANGELOG.md":
+            fenced = False
             for number, text in enumerate(page.read_text(encoding="utf-8").splitlines(), start=1):
-                yield page.relative_to(root).as_posix(), number, text
+                fenced ^= text.startswith("```")
+                if not fenced:
+                    yield page.relative_to(root).as_posix(), number, text
     for folder in (PACKAGE, "tests", "proof"):
         for path in sorted((root / folder).rglob("*.py")):
             text = path.read_text(encoding="utf-8")
