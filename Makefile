@@ -50,8 +50,8 @@ coverage: setup
 # A new sealed batch of concealed effects, the tool once on every case, then the answers opened. Resumable.
 CASES ?= 400
 proof: setup
-	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m tests.concealed all --out build/proof \
-	  --cases $(CASES) --workers $(JOBS) --proof . --log tests/concealed/batches.jsonl
+	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m proof all --out build/proof \
+	  --cases $(CASES) --workers $(JOBS) --proof . --log proof/batches.jsonl
 
 # The virtual environment from the lock file: exact versions, each with its hash.
 $(STAMP): requirements.lock pyproject.toml
