@@ -13,9 +13,10 @@ from toolkit.declared import json_schema, plain, read, read_text, reference, sta
 from toolkit.machine.definition import Machine, load_machine, machine_file, machine_names, machine_of_text
 from toolkit.machine.protocol import Protocol
 from toolkit.recording.details import StatedTest
+from toolkit.simulation.plan_file import PlanFile
 
 ROOT = Path(__file__).resolve().parents[2]
-FORMATS = [Machine, Protocol, SessionFile, StatedTest]
+FORMATS = [Machine, Protocol, SessionFile, StatedTest, PlanFile]
 
 
 @pytest.mark.parametrize("cls", FORMATS)

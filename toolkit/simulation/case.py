@@ -15,7 +15,7 @@ import numpy as np
 from toolkit.effects.signals import Drive, drive
 from toolkit.errors import ConfigError
 from toolkit.files import read_bytes, write_atomic
-from toolkit.simulation.case_plan import COLUMNS, Free
+from toolkit.simulation.case_plan import COLUMNS, CaseParameter
 from toolkit.simulation.cells import CELLS
 from toolkit.simulation.columns import shown, unit_of
 from toolkit.simulation.file_tire import FileTire
@@ -167,7 +167,7 @@ def _role(name: str) -> str:
     return "input" if name in ("SA", "FZ", "V", "SA_CMD", "FZ_CMD") else "covariate"
 
 
-def _parameter(one: Free) -> list[str]:
+def _parameter(one: CaseParameter) -> list[str]:
     lines = [f"value = {one.value!r}", f"unit = {_text(one.unit)}"]
     if one.sd is not None:
         lines.append(f"sd = {one.sd!r}")
