@@ -44,7 +44,7 @@ def _binds(node: ast.stmt, name: str) -> bool:
     return any(isinstance(target, ast.Name) and target.id == name for target in targets)
 
 
-PLAN_KEYS = ("toolkit.simulation.plan", "toolkit.simulation.plan_sections")
+PLAN_KEYS = ("toolkit.simulation.plan", "toolkit.simulation.plan_file")
 """Modules in which such words are keys of a plan's sections: the truth of the virtual machine, a format."""
 
 
