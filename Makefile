@@ -10,7 +10,7 @@ JOBS   ?= 2
 
 APT_PACKAGES := libreoffice-writer-nogui fonts-crosextra-carlito fonts-crosextra-caladea fonts-liberation2 poppler-utils
 
-.PHONY: demo test check golden house bench coverage proof setup lock clean
+.PHONY: demo test check golden house pages bench coverage proof setup lock clean
 
 setup: $(STAMP) $(SYSTEM)
 
@@ -33,6 +33,10 @@ golden: setup
 # The house in figures: sizes, names, commands, effects named outside their file, imports up, pages.
 house: $(STAMP)
 	$(BIN)/python -m tests.house
+
+# The pages of docs/ that are printed from declarations: formats, effects, characteristics, rules, tags.
+pages: $(STAMP)
+	$(BIN)/python -m tests.house.pages
 
 bench: setup
 	$(BIN)/python -m tests.benchmarks
