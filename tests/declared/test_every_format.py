@@ -10,13 +10,14 @@ import pytest
 
 from toolkit.calibration.session.session_file import SessionFile
 from toolkit.declared import json_schema, plain, read, read_text, reference, starter, table_of, toml_text
+from toolkit.diagnosis.case.case_file import CaseFile, ModelCaseFile
 from toolkit.machine.definition import Machine, load_machine, machine_file, machine_names, machine_of_text
 from toolkit.machine.protocol import Protocol
 from toolkit.recording.details import StatedTest
 from toolkit.simulation.plan_file import PlanFile
 
 ROOT = Path(__file__).resolve().parents[2]
-FORMATS = [Machine, Protocol, SessionFile, StatedTest, PlanFile]
+FORMATS = [Machine, Protocol, SessionFile, StatedTest, PlanFile, CaseFile, ModelCaseFile]
 
 
 @pytest.mark.parametrize("cls", FORMATS)
