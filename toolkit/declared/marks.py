@@ -201,7 +201,8 @@ class Format:
     A table inside another one goes by the format of the outer one unless it has its own.
 
     ``title`` names the file in messages and pages (``machine definition``); ``wrong`` and ``missing`` are the
-    rule ids of a value that cannot be used and of an entry that is not there; ``next_step`` tells what to do
+    rule ids of a value that cannot be used and of an entry that is not there, ``unit`` that of a unit that
+    nobody knows; ``next_step`` tells what to do
     about it, and may name the entry: ``correct {key}``. ``schema`` is the number of the newest form, None
     where a file has none; ``schema_required`` whether a file must state it; ``older`` turns the parsed file
     of an older number into one of the next.
@@ -210,6 +211,7 @@ class Format:
     title: str = "settings file"
     wrong: str = "wrong-value"
     missing: str = "missing-key"
+    unit: str = "unknown-unit"
     next_step: str = "correct the line"
     schema: int | None = None
     schema_required: bool = False

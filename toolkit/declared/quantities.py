@@ -82,7 +82,7 @@ class QuantityKind(Kind):
         try:
             si_unit = unit(text)
         except UnitError as error:
-            place.refuse(text, self.examples() or str(error.expected), what=error.what, rule="unknown-unit")
+            place.refuse(text, self.examples() or str(error.expected), what=error.what, rule=place.form.unit)
             return None
         dimensions = [unit(name).dimension for name in self.unit.units]
         if dimensions and si_unit.dimension not in dimensions:
@@ -184,7 +184,7 @@ class UnitKind(Kind):
         try:
             si_unit = unit(value)
         except UnitError as error:
-            return place.refuse(value, str(error.expected), what=error.what, rule="unknown-unit")
+            return place.refuse(value, str(error.expected), what=error.what, rule=place.form.unit)
         if self.mark.dimensions and si_unit.dimension not in self.mark.dimensions:
             return place.refuse(
                 f"{value} ({si_unit.dimension})", self.expected, rule="unit-dimension",

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING, Annotated, ClassVar
 
 import numpy as np
 
-from toolkit.diagnosis.case.case import Case, CaseChannel, Role
-from toolkit.diagnosis.case.entries import number_of, text_of, wrong
+from toolkit.declared import Format, Keyed, build
+from toolkit.diagnosis.case.case import Case, CaseChannel
 from toolkit.diagnosis.case.model_file import corrections_of, parameters_of, simulation_of
 from toolkit.diagnosis.case.recordings import read_run
 from toolkit.diagnosis.fit.predict import csv_of, prediction_names
@@ -24,6 +25,15 @@ if TYPE_CHECKING:
     from toolkit.diagnosis.case.case import Run
     from toolkit.findings import Finding
     from toolkit.simulation.model_file import ModelFile
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Channels:
+    """The channels of a model file, which are those of its case."""
+
+    FORMAT: ClassVar[Format] = Format(title="model file", wrong="case", missing="case", unit="case")
+
+    channels: Annotated[tuple[CaseChannel, ...], Keyed(by="name")]
 
 
 def simulate_model(
@@ -71,9 +81,7 @@ def _outputs(case: Case, calibrations: Path | None) -> tuple[tuple[str, str], ..
 def case_of(model: ModelFile, inputs: Sequence[Path], conditions: Mapping[str, str]) -> Case:
     """Return a model and inputs as a case without recorded outputs."""
     simulation = simulation_of(model)
-    channels = tuple(
-        _channel(name, entry, f"{model.path}: channels.{name}") for name, entry in model.channels.items()
-    )
+    channels = build(_Channels, {"channels": model.channels}, model.path).channels
     time = next((channel for channel in channels if channel.name == model.time), None)
     if not inputs:
         raise ConfigError(
@@ -110,17 +118,6 @@ def case_of(model: ModelFile, inputs: Sequence[Path], conditions: Mapping[str, s
         effects=(*model.effects, *corrections_of(simulation)),
         nominal_load_N=model.nominal_load_N,
         model=model.path,
-    )
-
-
-def _channel(name: str, entry: object, where: str) -> CaseChannel:
-    if not isinstance(entry, dict) or entry.get("role") not in ("time", "input", "output", "covariate"):
-        raise wrong("a channel of the model has no role", where, entry, '{ unit = "N", role = "input" }')
-    return CaseChannel(
-        name=name,
-        unit=text_of(entry.get("unit"), f"{where}.unit"),
-        role=cast("Role", entry["role"]),
-        sd=number_of(entry["sd"], f"{where}.sd") if "sd" in entry else None,
     )
 
 

@@ -1,6 +1,7 @@
 """A case file: every entry checked, with its place and the nearest known word; nothing guessed."""
 
 import os
+import re
 import tomllib
 
 import numpy as np
@@ -21,8 +22,8 @@ from toolkit.lab.rules import RULES_FILE
         ('time = "t"', 'tyme = "t"', "unknown key", "time"),
         ('role = "time"', 'rol = "time"', "unknown key", "role"),
         ('"python"', '"pyhton"', "kind", "python"),
-        ('role = "input"', 'role = "inputs"', "role", "input"),
-        ("[recording]\n", '[recording]\naxes = "iso-w"\n', "axis system", "ISO-W"),
+        ('role = "input" }\na', 'role = "inputs" }\na', "role", "input"),
+        ("[recording]\n", '[recording]\naxes = "iso-w"\n', "recording.axes", "ISO-W"),
         ('file = "r1.csv"', 'file = "r1.csv"\nrotation = "foward"', "condition", "forward"),
         ('file = "r1.csv"', 'file = "r1.csv"\nphase = "tar"', "condition", "tare"),
     ],
@@ -31,43 +32,100 @@ def test_a_word_that_is_not_known_names_the_nearest_one(tmp_path, old, new, what
     assert old in HEAD + TWO
     with pytest.raises(ConfigError, match=what) as caught:
         read_case(write_case(tmp_path, (HEAD + TWO).replace(old, new)))
-    assert repr(nearest) in str(caught.value.next_step)
+    assert f"did you mean {nearest!r}?" in str(caught.value)
     assert "CASE.toml" in str(caught.value.where)
 
 
 @pytest.mark.parametrize(
     ("old", "new", "what", "where"),
     [
-        ('unit = "m/s", ', "", "no unit", "channels.v.unit"),
-        ('unit = "m/s", ', 'unit = "mm/sx", ', "unit is unknown", "channels.v.unit"),
-        ('unit = "kg"\n', "", "no unit", "parameters.mass.unit"),
-        ('unit = "kg"\n', 'unit = "kgg"\n', "unit is unknown", "parameters.mass.unit"),
-        ("value = 94.0", 'value = "94"', "no number", "parameters.mass.value"),
-        ("value = 94.0", "value = inf", "no number", "parameters.mass.value"),
-        ("value = 94.0", f"value = {10**400}", "no number", "parameters.mass.value"),
-        ("value = 94.0", "", "no number", "parameters.mass.value"),
-        ("sd = 5.0", "sd = 0.0", "no width", "parameters.mass.sd"),
-        ("[80.0, 110.0]", "[110.0, 80.0]", "bounds", "parameters.mass.bounds"),
-        ("[80.0, 110.0]", "[95.0, 110.0]", "bounds", "parameters.mass.bounds"),
-        ("schema = 1", "schema = 2", "schema", "schema"),
-        ('unit = "s"', 'unit = "m"', "unit of time", "channels.t"),
+        ('unit = "m/s", ', "", "is missing", "recording.channels.v.unit"),
+        ('unit = "m/s", ', 'unit = "mm/sx", ', "unknown unit 'mm/sx'", "recording.channels.v.unit"),
+        ('unit = "m/s", ', "unit = 3, ", 'unit = "N"', "recording.channels.v.unit"),
+        ('role = "output"', 'role = "output", sd = 0', "a positive number", "recording.channels.F.sd"),
+        ('role = "output"', "role = 1", "time, input, output", "recording.channels.F.role"),
+        ('F = { unit = "N", role = "output" }', "F = 3", "unit, role, sd", "recording.channels.F"),
+        ("[recording.channels]", "[recording.channel]", "did you mean 'channels'", "recording"),
+        ('unit = "kg"\n', "", "is missing", "simulation.parameters.mass.unit"),
+        ('unit = "kg"\n', 'unit = "kgg"\n', "unknown unit 'kgg'", "simulation.parameters.mass.unit"),
+        ("value = 94.0", 'value = "94"', "a finite number", "simulation.parameters.mass.value"),
+        ("value = 94.0", "value = inf", "a finite number", "simulation.parameters.mass.value"),
+        ("value = 94.0", f"value = {10**400}", "a finite number", "simulation.parameters.mass.value"),
+        ("value = 94.0", "value = true", "a finite number", "simulation.parameters.mass.value"),
+        ("value = 94.0", "", "is missing", "simulation.parameters.mass.value"),
+        ("sd = 5.0", "sd = 0.0", "a number above zero", "simulation.parameters.mass.sd"),
+        ("[80.0, 110.0]", "[110.0, 80.0]", "outside its bounds", "simulation.parameters.mass.bounds"),
+        ("[80.0, 110.0]", "[95.0, 110.0]", "outside its bounds", "simulation.parameters.mass.bounds"),
+        ("[80.0, 110.0]", "[80.0]", "a finite number, a finite", "simulation.parameters.mass.bounds"),
+        ("[80.0, 110.0]", '["80", 110.0]', "a finite number", "simulation.parameters.mass.bounds[1]"),
+        ("schema = 1", "schema = 2", "newer version", "schema"),
+        ("schema = 1", "", "schema = 1", "schema"),
+        ('title = "A carriage"', 'title = ["x"]', "a text", "title"),
+        ('kind = "python"', "", "is missing", "simulation.kind"),
+        ('kind = "python"', 'kind = ["python"]', "machine, python, ode, columns", "simulation.kind"),
+        ('kind = "python"', 'kind = "ode"', "unknown key 'function'", "simulation"),
+        ('path = "sim.py"', "", "is missing", "simulation.path"),
+        ('path = "sim.py"', "path = 3", 'path = "FILE"', "simulation.path"),
+        ('function = "simulate"', "function = 3", "a text", "simulation.function"),
+        ('time = "t"', "time = 3", "a text", "recording.time"),
+        ('time = "t"', 'time = "v"', "not declared", "recording.time"),
+        ('time = "t"\n', "axes = 3\n", "machine", "recording.axes"),
+        ('unit = "s"', 'unit = "m"', "unit of time", "recording.channels.t"),
         ('role = "output"', 'role = "input"', "judged", "recording.channels"),
-        ('file = "r1.csv"', 'file = "r0.csv"', "stands twice", "run[2].file"),
-        ('file = "r1.csv"', 'file = ""', "no file", "run[2].file"),
+        ('file = "r1.csv"', 'file = "r0.csv"', "stands twice", "recording.run[2].file"),
+        ('file = "r1.csv"', 'file = ""', "no file", "recording.run[2].file"),
+        ('file = "r1.csv"', "file = 3", "no file", "recording.run[2].file"),
+        ('file = "r1.csv"', "", "no file", "recording.run[2].file"),
+        (
+            'file = "r1.csv"',
+            'file = "r1.csv"\nmounting = ["x"]',
+            "normal, turned",
+            "recording.run[2].mounting",
+        ),
         (TWO, ONE + 'phase = "tare"\n', "every recording is a tare", "recording.run"),
-        (TWO, "", "no recording", "recording"),
+        (TWO, "", "is missing", "recording.run"),
+        (TWO, ONE + "[[recording.predict]]\n", "no file", "recording.predict[1].file"),
+        (TWO, "[recording.run]\n", "[[recording.run]]", "recording.run"),
     ],
 )
 def test_a_wrong_entry_is_refused_at_its_place(tmp_path, old, new, what, where):
     assert old in HEAD + TWO
-    with pytest.raises(ConfigError, match=what) as caught:
+    with pytest.raises(ConfigError, match=re.escape(what)) as caught:
         read_case(write_case(tmp_path, (HEAD + TWO).replace(old, new)))
     error = caught.value
-    assert str(error.where).endswith(where)
+    assert str(error.where).endswith(f"CASE.toml: {where}")
+    assert error.line or where in ("schema", "recording.run")
     assert error.got is not None
     assert error.expected
-    assert error.next_step
-    assert error.rule
+    assert "toolkit explain case" in str(error.next_step)
+    assert error.rule == ("unknown-key" if "unknown key" in what or "did you mean" in what else "case")
+
+
+@pytest.mark.parametrize(
+    ("simulation", "what", "where"),
+    [
+        ("simulation = 3", "a table with kind", "simulation"),
+        ('[simulation]\nkind = "ode"\npath = "sim.py"\nstates = "x"', "a list", "simulation.states"),
+        ('[simulation]\nkind = "ode"\npath = "sim.py"\nstates = ["x", "x"]', "twice", "simulation.states"),
+        ('[simulation]\nkind = "ode"\npath = "sim.py"\nstates = [1]', "a text", "simulation.states[1]"),
+        ('[simulation]\nkind = "ode"\npath = "sim.py"\nforce_terms = { v = "N/kgg" }', "unknown unit",
+         "simulation.force_terms.v"),
+        ('[simulation]\nkind = "columns"', "is missing", "simulation.simulated"),
+        ('[simulation]\nkind = "columns"\nsimulated = {}', "FY_sim", "simulation.simulated"),
+        ('[simulation]\nkind = "columns"\nsimulated = { FY = 3 }', "a text", "simulation.simulated.FY"),
+        ('[simulation]\nkind = "machine"\ntire = 3', "path of a file", "simulation.tire"),
+        ('[simulation]\nkind = "machine"\nmachine = 3', "a text", "simulation.machine"),
+        ("[simulation]\nmodel = 3", "path of a file", "simulation.model"),
+        ('[simulation]\nmodel = "m.toml"\nparameters = []', "a table", "simulation.parameters"),
+    ],
+)  # fmt: skip
+def test_a_wrong_simulation_is_refused_at_its_place(tmp_path, simulation, what, where):
+    channels = HEAD[HEAD.index("[recording]") :]
+    with pytest.raises(ConfigError, match=re.escape(what)) as caught:
+        read_case(write_case(tmp_path, f"schema = 1\n{simulation}\n{channels}{TWO}"))
+    assert str(caught.value.where).endswith(f"CASE.toml: {where}")
+    assert caught.value.line
+    assert caught.value.rule == "case"
 
 
 @pytest.mark.parametrize(

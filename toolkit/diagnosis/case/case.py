@@ -5,31 +5,21 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, get_args
+from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args
 
 from toolkit.channels import Axes
+from toolkit.declared import Above, Entry, UnitName
 
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+    from toolkit.simulation.case_plan import CaseParameter
     from toolkit.simulation.model_file import FittedEffect
 
 Role = Literal["time", "input", "output", "covariate"]
 Kind = Literal["machine", "python", "ode", "columns"]
-ROLES: tuple[Role, ...] = get_args(Role)
 KINDS: tuple[Kind, ...] = get_args(Kind)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class CaseParameter:
-    """A parameter of the simulation in its own unit; without ``sd`` it is known exactly."""
-
-    name: str
-    value: float
-    unit: str
-    sd: float | None = None
-    bounds: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -37,9 +27,9 @@ class CaseChannel:
     """A column that is used: its unit, its role, and its total sensor noise where it is stated."""
 
     name: str
-    unit: str
-    role: Role
-    sd: float | None = None
+    unit: Annotated[str, UnitName(as_written=True), Entry("of the column", expected='unit = "N"')]
+    role: Annotated[Role, Entry("what it is to the simulation")]
+    sd: Annotated[float | None, Above(0), Entry("total noise of the sensor, from its certificate")] = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -73,11 +63,11 @@ class Simulation:
     """What a case says of its simulation; fields of other kinds are empty."""
 
     kind: Kind
-    machine: str = ""
+    machine: str = "m15"
     calibration: str = ""
     tire: Path | None = None
     path: Path | None = None
-    function: str = ""
+    function: str = "simulate"
     states: tuple[str, ...] = ()
     force_terms: tuple[tuple[str, str], ...] = ()
     simulated: tuple[tuple[str, str], ...] = ()

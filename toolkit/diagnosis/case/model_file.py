@@ -6,9 +6,10 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from toolkit.diagnosis.case.case import KINDS, CaseParameter, Simulation
+from toolkit.diagnosis.case.case import KINDS, Simulation
 from toolkit.errors import ConfigError
 from toolkit.machine import load_machine
+from toolkit.simulation.case_plan import CaseParameter
 from toolkit.simulation.model_file import FittedEffect, ModelFile, read_model
 
 

@@ -5,29 +5,19 @@ from __future__ import annotations
 import hashlib
 import os
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any
 
-from toolkit.channels import AXES, Axes
-from toolkit.diagnosis.case.case import ROLES, Case, CaseChannel, Role, Run, Simulation
-from toolkit.diagnosis.case.entries import known_unit, none_of, number_of, table_of, wrong
+from toolkit.declared import Fault, Source, build, refuse
+from toolkit.diagnosis.case.case import Case, CaseChannel, Run, Simulation
+from toolkit.diagnosis.case.case_file import CaseFile, ModelCaseFile, Recording
 from toolkit.diagnosis.case.model_file import corrections_of
 from toolkit.diagnosis.case.recordings import read_run
-from toolkit.diagnosis.case.simulation import read_simulation
+from toolkit.diagnosis.case.simulation import FORMAT
 from toolkit.errors import ConfigError
-from toolkit.files import check_keys, parse_toml, read_bytes, read_regular
-from toolkit.units import unit
+from toolkit.files import parse_toml, read_bytes, read_regular
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
-
-_TOP = ("schema", "title", "simulation", "recording")
-_RECORDING = ("time", "axes", "channels", "run", "predict")
-_CHANNEL = ("unit", "role", "sd")
-_CONDITIONS = {
-    "rotation": ("forward", "reverse"),
-    "mounting": ("normal", "turned"),
-    "phase": ("tare", "test"),
-}
 
 
 def read_case(path: Path, *, model: Path | None = None) -> Case:
@@ -39,138 +29,53 @@ def read_case(path: Path, *, model: Path | None = None) -> Case:
         an unknown key, a missing column or unit, a parameter without unit, a file that cannot be read
     """
     data = read_bytes(path)
+    source = Source(where=path, text=data.decode("utf-8-sig", errors="replace"))
     table = parse_toml(data, where=path)
-    check_keys(table, _TOP, where=path)
-    if table.get("schema") != 1:
-        raise wrong(
-            "a case says which schema it follows", f"{path}: schema", table.get("schema"), "schema = 1"
-        )
-    declared = table.get("simulation") if model is None else {"model": str(model.absolute())}
-    simulation, parameters, taken = read_simulation(declared, path)
-    recording = table_of(table.get("recording"), f"{path}: recording")
-    check_keys(recording, _RECORDING, where=f"{path}: recording")
-    axes = recording.get("axes", "machine")
-    if axes not in AXES:
-        raise none_of("unknown axis system", f"{path}: recording.axes", axes, AXES)
-    channels = _channels(recording.get("channels"), f"{path}: recording.channels")
-    time = _time(recording, channels, path)
+    if model is not None:
+        table["simulation"] = {"model": str(model.absolute())}
+    entries = table.get("simulation")
+    taken_up = isinstance(entries, dict) and "model" in entries
+    stated = build(ModelCaseFile, table, source) if taken_up else build(CaseFile, table, source)
+    simulation, parameters, model_file = stated.simulation.resolve(path)
+    if stated.simulation.kind not in (None, simulation.kind):
+        key, what = ("simulation", "kind"), "the model is of another kind"
+        got = stated.simulation.kind
+        refuse([Fault(key=key, got=got, expected=simulation.kind, what=what, form=FORMAT)], source)
+    recording, time = stated.recording, stated.recording.time_channel
     digest = hashlib.sha256(data)
-    _different_files(_list(recording, "run", path), path)
-    runs = [
-        _run(
-            entry,
-            f"{path}: recording.run[{i}]",
-            path.parent,
-            channels,
-            time,
-            simulation,
-            digest,
-            predict=False,
+    _different_files(recording, path, source)
+    runs, predict = (
+        tuple(
+            _run(run, path.parent, recording.channels, time, simulation, digest, predict=outputs_absent)
+            for run in entries
         )
-        for i, entry in enumerate(_list(recording, "run", path), start=1)
-    ]
-    _different_content(runs, [channel.name for channel in channels if channel.role == "output"], path)
-    if not runs:
-        raise wrong(
-            "a case has no recording", f"{path}: recording", "no [[recording.run]]", "one run or more"
-        )
-    if all(run.conditions.get("phase") == "tare" for run in runs):
-        raise wrong(
-            "every recording is a tare", f"{path}: recording.run", 'phase = "tare"', 'a run of phase = "test"'
-        )
-    predict = [
-        _run(
-            entry,
-            f"{path}: recording.predict[{i}]",
-            path.parent,
-            channels,
-            time,
-            simulation,
-            digest,
-            predict=True,
-        )
-        for i, entry in enumerate(_list(recording, "predict", path), start=1)
-    ]
+        for entries, outputs_absent in ((recording.run, False), (recording.predict, True))
+    )
+    _different_content(runs, recording, source)
     definition = Path(simulation.machine) if simulation.machine.endswith(".toml") else None
-    source = None if taken is None else taken.path
-    for one in (simulation.path, simulation.tire, _record_beside(simulation, path), definition, source):
-        if one is not None:
-            digest.update(_content(one))
-    if not any(channel.role == "output" for channel in channels):
-        raise wrong(
-            "a case has nothing to be judged on",
-            f"{path}: recording.channels",
-            "no output",
-            'a channel with role = "output"',
-        )
+    model_path = None if model_file is None else model_file.path
+    for file in (simulation.path, simulation.tire, _record_beside(simulation, path), definition, model_path):
+        if file is not None:
+            digest.update(_content(file))
     return Case(
         path=path,
-        title=str(table.get("title", path.stem)),
+        title=path.stem if stated.title is None else stated.title,
         simulation=simulation,
         parameters=parameters,
-        axes=cast("Axes", axes),
+        axes=recording.axes,
         has_time=time is not None,
-        channels=channels,
-        runs=tuple(runs),
-        predict=tuple(predict),
+        channels=recording.channels,
+        runs=runs,
+        predict=predict,
         sha256=digest.hexdigest(),
-        effects=(*(() if taken is None else taken.effects), *corrections_of(simulation)),
-        nominal_load_N=None if taken is None else taken.nominal_load_N,
-        model=source,
+        effects=(*(() if model_file is None else model_file.effects), *corrections_of(simulation)),
+        nominal_load_N=None if model_file is None else model_file.nominal_load_N,
+        model=model_path,
     )
 
 
-def _channels(entry: object, where: str) -> tuple[CaseChannel, ...]:
-    made = []
-    for name, one in table_of(entry, where).items():
-        table = table_of(one, f"{where}.{name}")
-        check_keys(table, _CHANNEL, where=f"{where}.{name}")
-        text = table.get("unit")
-        if not isinstance(text, str):
-            raise wrong("a channel has no unit", f"{where}.{name}.unit", text, 'unit = "N"')
-        known_unit(text, f"{where}.{name}.unit")
-        role = table.get("role")
-        if role not in ROLES:
-            raise none_of("a channel has no known role", f"{where}.{name}.role", role, ROLES)
-        sd = None if "sd" not in table else number_of(table["sd"], f"{where}.{name}.sd")
-        if sd is not None and sd <= 0:
-            raise wrong("a channel's noise is not positive", f"{where}.{name}.sd", sd, "a number above zero")
-        made.append(CaseChannel(name=name, unit=text, role=cast("Role", role), sd=sd))
-    return tuple(made)
-
-
-def _time(recording: dict[str, Any], channels: tuple[CaseChannel, ...], path: Path) -> CaseChannel | None:
-    named = recording.get("time")
-    timed = [channel for channel in channels if channel.role == "time"]
-    if named is not None:
-        timed = [channel for channel in channels if channel.name == named]
-        if not timed or timed[0].role != "time":
-            raise wrong(
-                "the time channel is not declared",
-                f"{path}: recording.time",
-                named,
-                'a channel of that name with role = "time"',
-            )
-    if len(timed) > 1:
-        raise wrong(
-            "more than one channel is the time",
-            f"{path}: recording.channels",
-            ", ".join(one.name for one in timed),
-            "one",
-        )
-    if timed and unit(timed[0].unit).dimension != "time":
-        raise wrong(
-            "the time is in no unit of time",
-            f"{path}: recording.channels.{timed[0].name}",
-            timed[0].unit,
-            "s",
-        )
-    return timed[0] if timed else None
-
-
 def _run(
-    entry: object,
-    where: str,
+    declared: Mapping[str, Any],
     folder: Path,
     channels: tuple[CaseChannel, ...],
     time: CaseChannel | None,
@@ -179,34 +84,20 @@ def _run(
     *,
     predict: bool,
 ) -> Run:
-    table = table_of(entry, where)
-    file = table.get("file")
-    if not isinstance(file, str) or not file:
-        raise wrong("a run has no file", f"{where}.file", file, 'file = "run01.csv"')
-    for key, value in table.items():
-        if key in _CONDITIONS and value not in _CONDITIONS[key]:
-            raise none_of("unknown condition", f"{where}.{key}", value, _CONDITIONS[key])
-    path = folder / file
+    path = folder / declared["file"]
     data = _content(path)
     digest.update(data)
     return read_run(
         path,
         data,
-        name=file,
+        name=declared["file"],
         channels=channels,
         time=time,
-        declared=table,
+        declared=declared,
         simulated=dict(simulation.simulated),
         machine=simulation.machine if simulation.kind == "machine" else "",
         predict=predict,
     )
-
-
-def _list(table: Mapping[str, Any], key: str, path: Path) -> list[Any]:
-    entry = table.get(key, [])
-    if not isinstance(entry, list):
-        raise wrong(f"{key} is no list of tables", f"{path}: recording.{key}", entry, f"[[recording.{key}]]")
-    return entry
 
 
 def _content(path: Path) -> bytes:
@@ -230,35 +121,32 @@ def _record_beside(simulation: Simulation, path: Path) -> Path | None:
     return named if simulation.calibration and named.is_file() else None
 
 
-def _different_files(entries: list[Any], path: Path) -> None:
+def _different_files(recording: Recording, path: Path, source: Source) -> None:
     """Refuse a recording that stands twice: held out as one run, it would be seen as the other."""
-    seen: set[Path] = set()
-    for i, entry in enumerate(entries, start=1):
-        file = entry.get("file") if isinstance(entry, dict) else None
-        if not isinstance(file, str):
-            continue
+    files: set[Path] = set()
+    for number, run in enumerate(recording.run):
         # Links that lead nowhere but in a circle are told where the file is read.
-        real = Path(os.path.realpath(path.parent / file))
-        if real in seen:
-            raise wrong(
-                "a recording stands twice",
-                f"{path}: recording.run[{i}].file",
-                file,
-                "another file: a run that is held out must not have been seen",
-            )
-        seen.add(real)
+        file = Path(os.path.realpath(path.parent / run["file"]))
+        if file in files:
+            _refuse_twice(number, run["file"], "another file", source)
+        files.add(file)
 
 
-def _different_content(runs: list[Run], outputs: list[str], path: Path) -> None:
+def _different_content(runs: tuple[Run, ...], recording: Recording, source: Source) -> None:
     """Refuse a copy of a recording under another name: no noise repeats itself to the last digit."""
+    outputs = [channel.name for channel in recording.channels if channel.role == "output"]
     first: dict[str, str] = {}
-    for i, run in enumerate(runs, start=1):
+    for number, run in enumerate(runs):
         # An output that stands still may well repeat itself.
         if run.sha256 in first and any(len(set(run.columns.get(output, ()))) > 1 for output in outputs):
-            raise wrong(
-                "a recording stands twice",
-                f"{path}: recording.run[{i}].file",
-                f"{run.name}, the same bytes as {first[run.sha256]}",
-                "another recording: a run that is held out must not have been seen",
-            )
+            same = f"{run.name}, the same bytes as {first[run.sha256]}"
+            _refuse_twice(number, same, "another recording", source)
         first.setdefault(run.sha256, run.name)
+
+
+def _refuse_twice(number: int, file: str, other: str, source: Source) -> None:
+    fault = Fault(
+        key=("recording", "run", number, "file"), got=file, what="a recording stands twice",
+        expected=f"{other}: a run that is held out must not have been seen", form=FORMAT,
+    )  # fmt: skip
+    refuse([fault], source)

@@ -17,8 +17,9 @@ from toolkit.errors import FitError
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from toolkit.diagnosis.case.case import Case, CaseParameter, Run
+    from toolkit.diagnosis.case.case import Case, Run
     from toolkit.diagnosis.simulators.simulator import Pattern
+    from toolkit.simulation.case_plan import CaseParameter
 
     Stacked = dict[str, NDArray[np.float64]]
 

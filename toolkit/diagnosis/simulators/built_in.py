@@ -11,12 +11,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from toolkit.diagnosis.case.case import CaseParameter
 from toolkit.diagnosis.simulators.parameter_units import unit_of
 from toolkit.diagnosis.simulators.simulator import Capability, Model
 from toolkit.effects.applied import AppliedEffect
 from toolkit.errors import ConfigError
 from toolkit.findings import Finding
+from toolkit.simulation.case_plan import CaseParameter
 from toolkit.units import unit
 
 if TYPE_CHECKING:

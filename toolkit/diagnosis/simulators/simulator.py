@@ -16,10 +16,11 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from toolkit.diagnosis.case.case import CaseParameter, Run
+    from toolkit.diagnosis.case.case import Run
     from toolkit.effects.applied import AppliedEffect
     from toolkit.effects.effect import Effect
     from toolkit.effects.surroundings import MotionSizes
+    from toolkit.simulation.case_plan import CaseParameter
 
     Arrays = dict[str, NDArray[np.float64]]
     # Positions of shape (n,) to force-like terms of shape (n, forces)
