@@ -17,9 +17,15 @@ from tests.house.pages import GENERATED, written
 from tests.house.source import ROOT, contracts, layers
 from tests.recipes import new_files
 from toolkit.cli import main
+from toolkit.declared import Source, build
 from toolkit.diagnosis.answer.serial import as_json
 from toolkit.diagnosis.case.reader import read_case
-from toolkit.diagnosis.case.simulation import read_simulation
+from toolkit.diagnosis.case.simulation import (
+    ColumnsSimulation,
+    MachineSimulation,
+    OdeSimulation,
+    PythonSimulation,
+)
 from toolkit.diagnosis.diagnose import diagnose
 
 DOCS = ROOT / "docs"
@@ -133,10 +139,14 @@ def test_the_case_of_the_page_is_read(tmp_path: Path) -> None:
     more = carriage(seed=3).drop(columns="F")
     case = read_case(write_case(tmp_path, case_file, simulator=SIMULATOR, **runs, more__csv=more))
     assert [run.conditions.get("surface") for run in case.runs] == [None, "wet"]
-    kinds = {
-        read_simulation(tomllib.loads(block)["simulation"], tmp_path / "case.toml")[0].kind
-        for block in simulations
+    forms = {
+        "python": PythonSimulation,
+        "ode": OdeSimulation,
+        "machine": MachineSimulation,
+        "columns": ColumnsSimulation,
     }
+    tables = [tomllib.loads(block)["simulation"] for block in simulations]
+    kinds = {build(forms[table["kind"]], table, Source(where="case.md")).kind for table in tables}
     assert kinds | {case.simulation.kind} == {"python", "ode", "machine", "columns"}
 
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, ClassVar
 
 import numpy as np
 
-from toolkit.declared import Format, Keyed, build
+from toolkit.declared import Entry, Format, Keyed, build
 from toolkit.diagnosis.case.case import Case, CaseChannel
 from toolkit.diagnosis.case.model_file import corrections_of, parameters_of, simulation_of
 from toolkit.diagnosis.case.recordings import read_run
@@ -31,9 +31,11 @@ if TYPE_CHECKING:
 class _Channels:
     """The channels of a model file, which are those of its case."""
 
-    FORMAT: ClassVar[Format] = Format(title="model file", wrong="case", missing="case", unit="case")
+    FORMAT: ClassVar[Format] = Format(
+        title="channels of a model file", wrong="case", missing="case", unit="case"
+    )
 
-    channels: Annotated[tuple[CaseChannel, ...], Keyed(by="name")]
+    channels: Annotated[tuple[CaseChannel, ...], Keyed(by="name"), Entry("inputs and outputs by name")]
 
 
 def simulate_model(

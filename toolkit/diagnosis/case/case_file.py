@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated, Any, ClassVar
 
 from toolkit.channels import Axes
@@ -134,6 +134,6 @@ class CaseFile(_CaseEntries):
 class ModelCaseFile(_CaseEntries):
     """A case whose simulation is a model file: an earlier answer, taken up as it was left."""
 
-    FORMAT: ClassVar[Format] = FORMAT
+    FORMAT: ClassVar[Format] = replace(FORMAT, title="case on a model file")
 
     simulation: Annotated[ModelSimulation, Entry("what is to be judged")]
