@@ -49,7 +49,7 @@ def _check(chosen: list[Entry], options: argparse.Namespace) -> int:
     if read_fingerprint(options.frozen) != fingerprint():
         _say(OTHER_ARITHMETIC)
         return 2
-    changed, worded = 0, 0
+    changed, harmless = 0, 0
     with workplace() as place:
         for entry in chosen:
             started = time.perf_counter()
@@ -65,9 +65,9 @@ def _check(chosen: list[Entry], options: argparse.Namespace) -> int:
                 changed += 1
                 continue
             found = differences(frozen[entry.name], today, entry.area)
-            results = [row for row in found if not row.wording]
+            results = [row for row in found if row.kind == "result"]
             changed += bool(results)
-            worded += len(found) - len(results)
+            harmless += len(found) - len(results)
             shown = found if options.wording else results
             verdict = "differs" if results else "same"
             _say(f"{time.perf_counter() - started:6.1f} s  {verdict:<8}{entry.name}")
@@ -75,7 +75,9 @@ def _check(chosen: list[Entry], options: argparse.Namespace) -> int:
                 _say(f"  {row}")
             if len(shown) > options.most:
                 _say(f"  and {len(shown) - options.most} more (--most)")
-    _say(f"{len(chosen)} entries asked of {package_folder()}: {changed} differ, {worded} sentences reworded")
+    _say(f"{len(chosen)} entries asked of {package_folder()}: {changed} differ")
+    if harmless:
+        _say(f"{harmless} sentences are reworded or tags added (--wording shows them)")
     return 1 if changed else 0
 
 
@@ -100,7 +102,9 @@ def main(arguments: list[str] | None = None) -> int:
         if name == "check":
             step.add_argument("--frozen", type=Path, default=FROZEN, help="folder of the frozen files")
             step.add_argument("--most", type=int, default=20, help="differences printed of one entry")
-            step.add_argument("--wording", action="store_true", help="print reworded sentences too")
+            step.add_argument(
+                "--wording", action="store_true", help="print reworded sentences and added tags too"
+            )
     options = parser.parse_args(arguments)
     chosen = entries(quick=options.quick, only=options.only)
     if options.step == "list":

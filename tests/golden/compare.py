@@ -6,9 +6,10 @@ bit-equal
     The same JSON: a number that differs in its last bit differs, so does 1 from 1.0.
 standard error
     Of a diagnosis: a value and its interval may differ by 1e-9 of the value's standard error, a shift of a
-    nominal parameter by 1e-9 of its prior's, evidence and errors of prediction by a relative 1e-7: they
+    nominal parameter by 1e-9 of its prior's; evidence, errors and predicted curves by a relative 1e-7: they
     follow the values.
 A sentence for people may be worded anew: where its numbers are the same, the difference is one of wording.
+The list of a template's tags may grow: what is new in it is an addition.
 """
 
 from __future__ import annotations
@@ -19,27 +20,32 @@ import math
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 SHARE_OF_STANDARD_ERROR = 1e-9
 SHARE_OF_EVIDENCE = 1e-7
 BY_STANDARD_ERROR = ("diagnosis", "proof")
 """Areas that are compared by standard errors."""
-SENTENCES = frozenset("message statement reason note why equation reference description".split())
-"""Keys of sentences for people."""
+SENTENCES = frozenset("message statement reason note why equation reference".split())
+"""Keys of sentences for people about results."""
+HELP = "description"
+"""Key of a sentence about a tag: its numbers are no results."""
+GROWING = ("answer.tags",)
+"""Key paths of lists that may grow."""
+Kind = Literal["result", "wording", "addition"]
 _NUMBER = re.compile(r"[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
 _NORMAL_95 = 1.959963984540054
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Difference:
-    """What differs at a key path; ``wording`` where only a sentence was worded anew."""
+    """What differs at a key path: a result, the wording of a sentence, or an entry that was added."""
 
     path: str
     frozen: str
     today: str
     by: str = ""
-    wording: bool = False
+    kind: Kind = "result"
 
     def __str__(self) -> str:
         by = f"  ({self.by})" if self.by else ""
@@ -70,6 +76,15 @@ class _Place:
         """Return the place of an entry of a list."""
         return dataclasses.replace(self, path=f"{self.path}[{number}]")
 
+    def series(self, values: list[Any]) -> _Place:
+        """Return the place of a curve: its numbers count by the largest, so that a zero crossing is free."""
+        if not self.by_standard_error or self.scale is not None or len(values) <= 3:
+            return self
+        if not all(isinstance(value, float) for value in values):
+            return self
+        share = SHARE_OF_EVIDENCE / SHARE_OF_STANDARD_ERROR
+        return dataclasses.replace(self, scale=share * max(map(abs, values)))
+
     def allowed(self, frozen: float) -> float:
         """Return how far a number may be from the frozen one."""
         if not self.by_standard_error:
@@ -83,6 +98,8 @@ def _scale(key: str, parent: Mapping[str, Any]) -> float | None:
     """Return the standard error in which a number counts; None where nothing states one."""
     if key in ("value", "ci95") and isinstance(interval := parent.get("ci95"), list) and None not in interval:
         return float(interval[1] - interval[0]) / (2 * _NORMAL_95)
+    if key == "value" and isinstance(parent.get("standard_error"), float):
+        return float(parent["standard_error"])
     if key in ("before", "after", "prior_sd") and parent.get("prior_sd"):
         return float(parent["prior_sd"])
     return 1.0 if key == "shift_in_sd" else None
@@ -95,12 +112,14 @@ def _walk(frozen: Any, today: Any, place: _Place) -> Iterator[Difference]:
             if key not in today:
                 yield Difference(path=inner.path, frozen=_short(frozen[key]), today="(missing)")
             elif key not in frozen:
-                yield Difference(path=inner.path, frozen="(missing)", today=_short(today[key]))
+                kind: Kind = "addition" if place.path in GROWING else "result"
+                yield Difference(path=inner.path, frozen="(missing)", today=_short(today[key]), kind=kind)
             else:
                 yield from _walk(frozen[key], today[key], inner)
     elif isinstance(frozen, list) and isinstance(today, list):
         if len(frozen) != len(today):
             yield Difference(path=place.path, frozen=f"{len(frozen)} rows", today=f"{len(today)} rows")
+        place = place.series(frozen)
         for number, (before, after) in enumerate(zip(frozen, today, strict=False)):
             yield from _walk(before, after, place.row(number))
     elif _is_number(frozen) and _is_number(today):
@@ -124,13 +143,12 @@ def _numbers(frozen: float, today: float, place: _Place) -> Iterator[Difference]
 
 
 def _texts(frozen: Any, today: Any, place: _Place) -> Difference:
-    worded = (
-        place.key in SENTENCES
-        and isinstance(frozen, str)
-        and isinstance(today, str)
-        and _NUMBER.findall(frozen) == _NUMBER.findall(today)
+    sentence = isinstance(frozen, str) and isinstance(today, str)
+    worded = sentence and (
+        place.key == HELP or (place.key in SENTENCES and _NUMBER.findall(frozen) == _NUMBER.findall(today))
     )
-    return Difference(path=place.path, frozen=_short(frozen), today=_short(today), wording=worded)
+    kind: Kind = "wording" if worded else "result"
+    return Difference(path=place.path, frozen=_short(frozen), today=_short(today), kind=kind)
 
 
 def _is_number(value: Any) -> bool:

@@ -27,6 +27,12 @@ def _by_name(answer: dict[str, Any]) -> dict[str, Any]:
     return answer
 
 
+def _numbers(path: Path) -> dict[str, list[float | None]]:
+    """Return the columns of a CSV file as numbers; an empty cell is None."""
+    columns = csv_columns(path).items()
+    return {name: [float(cell) if cell else None for cell in cells] for name, cells in columns}
+
+
 def _model(place: Workplace) -> dict[str, Any] | None:
     path = place.folder / "answer" / "model.toml"
     return toml_values(path) if path.exists() else None
@@ -38,7 +44,7 @@ def _register_cases() -> None:
         def question(place: Workplace, files: Any = files) -> Any:
             answer = diagnosed(place, place.write(files(), "case") / "CASE.toml")
             predicted = sorted((place.folder / "answer" / "predictions").glob("*.csv"))
-            answer["predictions"] = {path.name: csv_columns(path) for path in predicted}
+            answer["predictions"] = {path.name: _numbers(path) for path in predicted}
             answer["model"] = _model(place)
             return answer
 
@@ -60,5 +66,5 @@ def model_file(place: Workplace) -> Any:
     simulated = place.answer(
         "simulate", model, "--inputs", inputs, "--out", "simulated", calibrations=CALIBRATIONS
     )
-    columns = {path.name: csv_columns(path) for path in sorted((place.folder / "simulated").glob("*.csv"))}
+    columns = {path.name: _numbers(path) for path in sorted((place.folder / "simulated").glob("*.csv"))}
     return {"again": again, "simulated": simulated, "columns": columns}

@@ -29,7 +29,7 @@ def test_the_answer_is_the_frozen_one(entry: Entry, place: Workplace) -> None:
         pytest.skip("the arithmetic is not that of the frozen files: python -m tests.golden check tells more")
     frozen = read_frozen(FROZEN, entry.area)
     found = differences(frozen[entry.name], ask(entry, place), entry.area)
-    results = [row for row in found if not row.wording]
+    results = [row for row in found if row.kind == "result"]
     assert not results, "\n".join(map(str, results[:20]))
 
 
@@ -81,26 +81,34 @@ def test_a_diagnosis_may_move_by_less_than_a_billionth_of_a_standard_error() -> 
         assert len(differences(frozen, today, "diagnosis")) == told
 
 
+def test_a_curve_counts_by_its_largest_value() -> None:
+    frozen = {"FY": [1000.0, 1.0, 1e-6, -1000.0]}
+    for shift, count in ((1e-3, 1), (1e-5, 0)):
+        today = {"FY": [1000.0, 1.0, 1e-6 + shift, -1000.0]}
+        assert len(differences(frozen, today, "diagnosis")) == count
+        assert len(differences(frozen, today, "reduction")) == 1
+
+
 @pytest.mark.parametrize(
-    ("frozen", "today", "told", "worded"),
+    ("frozen", "today", "kinds"),
     [
-        ({"message": "off by 2.5 N"}, {"message": "2.5 N off"}, 1, True),
-        ({"message": "off by 2.5 N"}, {"message": "off by 2.6 N"}, 1, False),
-        ({"text": "off by 2.5 N"}, {"text": "2.5 N off"}, 1, False),
-        ({"rule": "a"}, {"rule": "b"}, 1, False),
-        ({"n": 1}, {"n": 1.0}, 1, False),
-        ({"n": 0.0}, {"n": -0.0}, 1, False),
-        ({"n": True}, {"n": 1}, 1, False),
-        ({"n": None}, {}, 1, False),
-        ({}, {"n": None}, 1, False),
-        ({"n": [1.0]}, {"n": [1.0, 2.0]}, 1, False),
-        ({"n": [1.0]}, {"n": [1.0]}, 0, False),
+        ({"message": "off by 2.5 N"}, {"message": "2.5 N off"}, ["wording"]),
+        ({"message": "off by 2.5 N"}, {"message": "off by 2.6 N"}, ["result"]),
+        ({"text": "off by 2.5 N"}, {"text": "2.5 N off"}, ["result"]),
+        ({"rule": "a"}, {"rule": "b"}, ["result"]),
+        ({"n": 1}, {"n": 1.0}, ["result"]),
+        ({"n": 0.0}, {"n": -0.0}, ["result"]),
+        ({"n": True}, {"n": 1}, ["result"]),
+        ({"n": None}, {}, ["result"]),
+        ({}, {"n": None}, ["result"]),
+        ({"n": [1.0]}, {"n": [1.0, 2.0]}, ["result"]),
+        ({"n": [1.0]}, {"n": [1.0]}, []),
+        ({"answer": {"tags": {"a": 1}}}, {"answer": {"tags": {"a": 1, "b": 2}}}, ["addition"]),
+        ({"answer": {"tags": {"a": 1, "b": 2}}}, {"answer": {"tags": {"a": 1}}}, ["result"]),
     ],
 )
-def test_what_is_told(frozen: Any, today: Any, told: int, worded: bool) -> None:
-    found = differences(frozen, today, "calibration")
-    assert len(found) == told
-    assert all(row.wording is worded for row in found)
+def test_what_differs_and_how(frozen: Any, today: Any, kinds: list[str]) -> None:
+    assert [row.kind for row in differences(frozen, today, "calibration")] == kinds
 
 
 def test_the_fingerprint_is_of_the_arithmetic_alone() -> None:

@@ -25,11 +25,10 @@ OTHER_MEANINGS = {
     "characteristics": (PULL, "characteristics of a tire that a test has as results"),
     "report": (PULL, "characteristics of a tire that a test has as results"),
     "calibration": ({"creep"}, "a statement on a cell in the file of a session, by the word of its standard"),
-    "simulation/plan_sections.py": (
-        {*PULL, "steer_offset", "camber_offset", "zero_offset", "zero_drift", "crosstalk"},
-        "keys of the sections of a plan: the truth of the virtual machine, a format of its own",
+    "simulation/plan_file.py": (
+        PULL,
+        "the tire's own pull, by the keys of [tire], and an example of --effect",
     ),
-    "simulation/plan.py": (PULL, "keys of the section [tire] of a plan"),
 }
 
 
@@ -39,9 +38,21 @@ def docstrings(tree: ast.Module) -> set[int]:
     return {id(body[0].value) for body in bodies if body and isinstance(body[0], ast.Expr)}
 
 
+def entry_keys(tree: ast.Module) -> set[int]:
+    """Keys that an entry of a declared format has: words of that file."""
+    calls = [node for node in ast.walk(tree) if isinstance(node, ast.Call)]
+    return {
+        id(word.value)
+        for call in calls
+        if isinstance(call.func, ast.Name) and call.func.id == "Entry"
+        for word in call.keywords
+        if word.arg == "key"
+    }
+
+
 def named(path: Path) -> Iterator[tuple[int, str]]:
     tree = ast.parse(path.read_text(encoding="utf-8"))
-    skipped = docstrings(tree)
+    skipped = docstrings(tree) | entry_keys(tree)
     names = "|".join(name for name in effects() if "_" in name)
     words = "|".join(name for name in effects() if "_" not in name)
     written = re.compile(rf"\b({names})\b|\A({words})\Z|\b({words})[.=@](?=\S)")
