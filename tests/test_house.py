@@ -11,6 +11,11 @@ import grimp
 import toolkit
 
 ROOT = Path(toolkit.__file__).parent
+TESTS = Path(__file__).parent
+APART = {"golden", "benchmarks", "campaigns", "coverage", "house", "proof"}
+"""Folders that test more than the package, or measure it."""
+OF_THE_CHECKOUT = {"test_docs", "test_front_door", "test_house", "test_readme", "test_recipes"}
+"""Tests of the checkout's pages and of the package as a whole; no others stand beside the mirror."""
 
 
 def test_no_import_cycles() -> None:
@@ -57,3 +62,27 @@ def test_every_module_of_the_command_line_holds_a_command() -> None:
     homes = {callback.__module__.rpartition(".")[2] for callback in commands if callback is not None}
     modules = {path.stem for path in (ROOT / "cli").glob("*.py")}
     assert modules - homes == {"__init__", "console", "main"}
+
+
+def mirrored(test: Path) -> bool:
+    """Return whether a test's folder is a package and its name begins with a module of it or with its own."""
+    package = ROOT / test.parent.relative_to(TESTS)
+    modules = {path.stem for path in package.glob("*.py")} - {"__init__"}
+    packages = {path.parent.name for path in package.glob("*/__init__.py")} | {package.name}
+    name = test.stem.removeprefix("test_")
+    return (package / "__init__.py").is_file() and any(
+        name == tested or name.startswith(f"{tested}_") for tested in modules | packages
+    )
+
+
+def test_tests_lie_where_the_package_has_what_they_test() -> None:
+    tests = [path for path in TESTS.rglob("test_*.py") if path.relative_to(TESTS).parts[0] not in APART]
+    astray = {path for path in tests if not mirrored(path)}
+    assert {path.relative_to(TESTS).as_posix() for path in astray} == {
+        f"{name}.py" for name in OF_THE_CHECKOUT
+    }
+
+
+def test_every_folder_of_tests_is_a_package() -> None:
+    folders = {path.parent for path in TESTS.rglob("*.py")}
+    assert {path for path in folders if not (path / "__init__.py").is_file()} == set()
