@@ -10,7 +10,7 @@ JOBS   ?= 2
 
 APT_PACKAGES := libreoffice-writer-nogui fonts-crosextra-carlito fonts-crosextra-caladea fonts-liberation2 poppler-utils
 
-.PHONY: demo test check golden house bench coverage proof setup lock clean
+.PHONY: demo test check golden house pages bench coverage proof setup lock clean
 
 setup: $(STAMP) $(SYSTEM)
 
@@ -34,6 +34,10 @@ golden: setup
 house: $(STAMP)
 	$(BIN)/python -m tests.house
 
+# The pages of docs/ that are printed from declarations: formats, effects, characteristics, rules, tags.
+pages: $(STAMP)
+	$(BIN)/python -m tests.house.pages
+
 bench: setup
 	$(BIN)/python -m tests.benchmarks
 
@@ -46,8 +50,8 @@ coverage: setup
 # A new sealed batch of concealed effects, the tool once on every case, then the answers opened. Resumable.
 CASES ?= 400
 proof: setup
-	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m tests.concealed all --out build/proof \
-	  --cases $(CASES) --workers $(JOBS) --proof . --log tests/concealed/batches.jsonl
+	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m proof all --out build/proof \
+	  --cases $(CASES) --workers $(JOBS) --proof . --log proof/batches.jsonl
 
 # The virtual environment from the lock file: exact versions, each with its hash.
 $(STAMP): requirements.lock pyproject.toml

@@ -84,14 +84,3 @@ def test_the_test_folder_is_one(tmp_path: Path) -> None:
     assert test.tare_file == tmp_path / "tare.xlsx"
     assert test.rotation_of(tmp_path / "run_14.xlsx") == "reverse"
     assert test.info.tire_size == "205/55R16"
-
-
-def test_the_layers_are_those_of_the_project() -> None:
-    import tomllib
-
-    project = tomllib.loads((README.parent / "pyproject.toml").read_text())
-    layers = project["tool"]["importlinter"]["contracts"][0]["layers"]
-    text = " ".join(README.read_text().split())
-    for layer in layers:
-        for name in layer.split(" | "):
-            assert name in text

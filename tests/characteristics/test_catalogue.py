@@ -14,6 +14,7 @@ import openpyxl
 import pytest
 from tire_factory import LOAD, M15, reduced_test
 
+from tests.recipes import file_of
 from toolkit.characteristics.catalogue import (
     by_channel,
     characteristics,
@@ -145,54 +146,6 @@ def test_the_line_of_a_lacking_row_is_not_the_line_of_another_load() -> None:
     assert found.at("conicity", LOAD, "forward") is None
 
 
-# One more characteristic, as a file of the catalogue: the pneumatic trail at small slip, in a new unit.
-TRAIL = '''
-from dataclasses import replace
-
-from toolkit.characteristics.characteristic import CURVE_BUDGET
-from toolkit.characteristics.characteristic import Characteristic, Figure
-from toolkit.characteristics.derivations import SLOPE_FY, SLOPE_MZ
-from toolkit.characteristics.characteristic import STIFFNESS
-from toolkit.characteristics.uncertain import weighted
-
-
-def trail(what, run):
-    """Aligning over cornering stiffness at SA = 0 [m], to first order in what makes both uncertain."""
-    FY, MZ = run.slope("FY"), run.slope("MZ")
-    if FY is None or MZ is None:
-        return None
-    moment, force = MZ.scaled(-1 / FY.value, "m"), FY.scaled(MZ.value / FY.value**2, "m")
-    return replace(weighted([(1.0, moment), (1.0, force)]), value=moment.value)
-
-
-CHARACTERISTIC = Characteristic(
-    name="pneumatic_trail",
-    symbol="t_0",
-    title="pneumatic trail at 0 deg",
-    title_de="Reifennachlauf bei 0 deg",
-    definition="Aligning stiffness over cornering stiffness, both by the slope at zero slip angle.",
-    formula="-(dMZ/dSA) / (dFY/dSA) at SA = 0",
-    term="pneumatic trail",
-    source="SAE J670",
-    channel="MZ",
-    unit="m",
-    digits=1,
-    order=5,
-    table=STIFFNESS,
-    read=trail,
-    needs=(SLOPE_FY, SLOPE_MZ),
-    budget=CURVE_BUDGET,
-    column_text="pneumatic trail, aligning over cornering stiffness at 0 deg",
-    figure=Figure(name="trail", title="pneumatic trail", text="pneumatic trail against load"),
-    label="slope at 0 deg",
-    compared=True,
-    comparison_figure=Figure(name="trail", title="pneumatic trail"),
-    summary="trail",
-    summary_text="pneumatic trail there, forward",
-    console_heading="trail",
-)
-'''
-
 # The program with a folder of further characteristics, as if they stood in the catalogue.
 PROGRAM = """
 import sys
@@ -237,7 +190,7 @@ def test_one_more_characteristic_is_one_file(
     """The answer, the sheets, the report, comparisons, tags and the explanation have it, without a list."""
     folder = tmp_path / "more"
     folder.mkdir()
-    (folder / "pneumatic_trail.py").write_text(TRAIL)
+    (folder / "pneumatic_trail.py").write_text(file_of("Add a characteristic"))
     home = ("--calibrations", packaged_home() / "calibrations", "--json")
 
     whole = tmp_path / "whole.xlsx"
@@ -290,7 +243,7 @@ def test_a_file_from_before_a_characteristic_is_read_and_keeps_its_hash(
         folder.mkdir()
     whole = tmp_path / "whole.xlsx"
     program(empty, "process", virtual_test, "--out", whole, *home)
-    (more / "pneumatic_trail.py").write_text(TRAIL)
+    (more / "pneumatic_trail.py").write_text(file_of("Add a characteristic"))
     content = program(more, whole, code=CONTENT.replace('content.plots["trail"].alt', "None"))
     place = content["columns"].index("pneumatic_trail")
     assert {row[place] for row in map(tuple, content["rows"])} == {None}

@@ -8,14 +8,14 @@ from pathlib import Path
 
 import pytest
 
+from tests.house.pages import formats
 from toolkit.calibration.session.session_file import SessionFile
 from toolkit.declared import json_schema, plain, read, read_text, reference, starter, table_of, toml_text
-from toolkit.machine.definition import Machine, load_machine, machine_file, machine_names, machine_of_text
-from toolkit.machine.protocol import Protocol
+from toolkit.machine.definition import load_machine, machine_file, machine_names, machine_of_text
 from toolkit.recording.details import StatedTest
 
 ROOT = Path(__file__).resolve().parents[2]
-FORMATS = [Machine, Protocol, SessionFile, StatedTest]
+FORMATS = formats()
 
 
 @pytest.mark.parametrize("cls", FORMATS)

@@ -1,11 +1,11 @@
 """Public recordings whose left-out physics is known and stands in no case: the quick ones of the real layer.
 
-Sources stand with the cases in `tests.concealed.real_cases`; all of them are run by the proof.
+Sources stand with the cases in `proof.real_cases`; all of them are run by the proof.
 """
 
 import pytest
 
-from tests.concealed.real_cases import CASES
+from proof.real_cases import CASES
 from tests.conftest import EXAMPLES, SHARED_DATA
 from toolkit.diagnosis.case.reader import read_case
 from toolkit.diagnosis.diagnose import diagnose

@@ -11,6 +11,7 @@ import pytest
 
 from tests.diagnosis.cases import CELL, TWO, cell_case, write_case
 from tests.effects import test_facts
+from tests.recipes import file_of
 from toolkit.cli.main import run
 from toolkit.diagnosis.case.reader import read_case
 from toolkit.diagnosis.diagnose import diagnose
@@ -19,49 +20,12 @@ from toolkit.diagnosis.search.candidates import candidates
 from toolkit.diagnosis.simulators.build_simulator import model_of
 from toolkit.effects import catalogue
 
-NEW = '''"""A cell that is stiffer in tension than in compression."""
-
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
-import numpy as np
-
-from toolkit.effects.effect import Effect, EffectParameter
-from toolkit.effects.facts import ChannelFacts, Values
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from toolkit.effects.signals import Setting
-
-
-def _one_sided(y: NDArray[np.float64], values: Values, setting: Setting) -> NDArray[np.float64]:
-    return np.where(y > 0, (1 + values["gain"]) * y, y)
-
-
-EFFECT = Effect(
-    name="tension_gain",
-    stage="load_cells",
-    rank=9,
-    in_time=False,
-    statement="The channel reads tension and compression by two sensitivities.",
-    equation="y = (1 + gain) y_model where y_model > 0",
-    reference="a test",
-    signature="two slopes that meet at zero",
-    separates="loads of both signs",
-    parameters=(EffectParameter(name="gain", unit="1", text="of tension", typical=(0.005, 0.1)),),
-    channel=_one_sided,
-    on_channel=ChannelFacts(where=("output", "cell"), tare="own", by_value=True),
-)
-'''
-
 
 @pytest.fixture
 def tension_gain(tmp_path, monkeypatch):
     folder = tmp_path / "more"
     folder.mkdir()
-    (folder / "tension_gain.py").write_text(NEW)
+    (folder / "tension_gain.py").write_text(file_of("Add an effect"))
     monkeypatch.setattr(catalogue, "__path__", [*catalogue.__path__, str(folder)])
     catalogue.effects.cache_clear()
     yield catalogue.effect("tension_gain")

@@ -14,7 +14,7 @@ CALIBRATIONS = ROOT / "calibrations"
 TEMPLATES = ROOT / "report_templates"
 PLANS = ROOT / "toolkit" / "examples" / "virtual"
 FIGURE_4_4 = ROOT / "toolkit" / "examples" / "fig4_4" / "M15_fig4_4.xlsx"
-PROOFS = ROOT / "tests" / "concealed"
+PROOFS = ROOT / "proof"
 
 
 def run_command(arguments: list[str]) -> int:
@@ -44,7 +44,7 @@ def make_archive(folder: Path, *, files: int, rows: int, seed: int) -> tuple[Pat
 
 def read_proof(name: str) -> tuple[int, dict[str, Any], dict[str, Any]]:
     """Return an opened batch: its seed, the sealed truth and the tool's answer of each case."""
-    from tests.concealed import proof_file
+    from proof import proof_file
 
     proof = proof_file.read(PROOFS / f"proof-{name}.jsonl.gz")
     return proof.seed, proof.sealed, {case: row.answer for case, row in proof.cases.items()}
@@ -52,8 +52,8 @@ def read_proof(name: str) -> tuple[int, dict[str, Any], dict[str, Any]]:
 
 def write_proof_case(folder: Path, *, seed: int, index: int, bucket: str) -> dict[str, Any]:
     """Draw one case of a batch again and write it; return what is true of it."""
-    from tests.concealed.draw import draw_case
-    from tests.concealed.files import write_case
+    from proof.draw import draw_case
+    from proof.files import write_case
 
     drawn = draw_case(seed, index, bucket)
     write_case(drawn.scenario, drawn.measured, folder)
@@ -62,7 +62,7 @@ def write_proof_case(folder: Path, *, seed: int, index: int, bucket: str) -> dic
 
 def enter_proof_sessions(case: Path, calibrations: Path) -> bool:
     """Enter the sessions of a proof case into a new registry, where it has any; return whether it has."""
-    from tests.concealed.files import SESSIONS, enter
+    from proof.files import SESSIONS, enter
 
     if not (case / SESSIONS).is_dir():
         return False

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import io
+import posixpath
 import re
 import tokenize
 from collections.abc import Iterable, Iterator, Sequence
@@ -106,19 +107,20 @@ def pages_missing(root: Path) -> list[Mention]:
 
     Read are docstrings, comments and messages of the package and its tests, and the pages themselves: every
     ``page.md``, ``docs/...``, ``page.md#section`` and ``page.md, "Section"``. A page may be cited by its path
-    or by its name alone. The CHANGELOG tells of pages that were, and these tests of pages that never are.
+    from the checkout, by that from the citing page, or by its name alone. The CHANGELOG tells of pages that
+    were, these tests of pages that never are, and what a console prints in an example cites nothing.
     """
     pages = {path.relative_to(root).as_posix(): path for path in _pages(root)}
     return [
         Mention(place, line, cited)
         for place, line, text in _prose(root, pages.values())
-        for cited in _missing(text, pages, root)
+        for cited in _missing(text, pages, root, place)
     ]
 
 
-def _missing(text: str, pages: dict[str, Path], root: Path) -> Iterator[str]:
+def _missing(text: str, pages: dict[str, Path], root: Path, place: str) -> Iterator[str]:
     for match in _PAGE.finditer(text):
-        page = _page(match[1], pages, root)
+        page = _page(match[1], pages, root, place)
         title = _SECTION.match(text, match.end(1) - 3)
         section = match[2] or (title and title[1])
         if page is None or (section and not _has_section(page, section)):
@@ -134,9 +136,11 @@ def _pages(root: Path) -> Iterator[Path]:
     yield from (root / PACKAGE).rglob("*.md")
 
 
-def _page(cited: str, pages: dict[str, Path], root: Path) -> Path | None:
-    if cited in pages:
-        return pages[cited]
+def _page(cited: str, pages: dict[str, Path], root: Path, place: str) -> Path | None:
+    beside = posixpath.normpath(posixpath.join(posixpath.dirname(place), cited))
+    for path in (cited, beside):
+        if path in pages:
+            return pages[path]
     if "/" in cited:
         return root / cited if (root / cited).is_file() else None
     return next((path for name, path in pages.items() if name.rsplit("/", 1)[-1] == cited), None)
@@ -155,7 +159,12 @@ def _prose(root: Path, pages: Iterable[Path]) -> Iterator[tuple[str, int, str]]:
     """Yield place, line and text of every comment, string and page; strings of many lines line by line."""
     for page in pages:
         if page.name != "CHANGELOG.md":
+            console = False
             for number, text in enumerate(page.read_text(encoding="utf-8").splitlines(), start=1):
+                if text.startswith("```"):
+                    console = text == "```console"
+                if console:
+                    continue
                 yield page.relative_to(root).as_posix(), number, text
     for folder in (PACKAGE, "tests", "proof"):
         for path in sorted((root / folder).rglob("*.py")):

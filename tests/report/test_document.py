@@ -12,6 +12,7 @@ from report_factory import make_record, make_result
 from template_factory import FOLDER, make, p, tbl, texts
 
 import toolkit.report.test
+from tests.recipes import file_of
 from toolkit.report.kinds import VOCABULARIES, check, list_tags, reference_page, write_manual
 from toolkit.report.style import Style
 from toolkit.report.test.content import REPORT, build_content
@@ -41,23 +42,6 @@ WORDS = Vocabulary(
     required=(),
     marks={},
 )
-MODULE = '''
-from toolkit.report.test.content import REPORT
-
-
-@REPORT.table(
-    "heaviest",
-    "the conditions with the largest load",
-    """
-    file|recording
-    FZ ±|measured load|force|.0f
-    """,
-)
-def heaviest(report, _style):
-    """Return the heaviest condition."""
-    condition = max(report.used, key=lambda condition: condition.FZ)
-    return [{"file": condition.file, "FZ": condition.FZ, "U_FZ": 20.0}]
-'''
 
 
 @pytest.mark.parametrize("name", KINDS)
@@ -109,7 +93,7 @@ def test_a_report_of_one_kind_is_not_asked_for_the_tags_of_the_others() -> None:
 
 
 def test_a_new_table_is_one_declaration(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    (tmp_path / "heaviest.py").write_text(MODULE)
+    (tmp_path / "heaviest.py").write_text(file_of("Add a report table"))
     monkeypatch.setattr(toolkit.report.test, "__path__", [*toolkit.report.test.__path__, str(tmp_path)])
     for derived in ("declarations", "vocabulary"):
         monkeypatch.delitem(vars(REPORT), derived, raising=False)

@@ -13,13 +13,14 @@ from xml.etree import ElementTree as ET
 import jinja2
 import pytest
 
+import proof
 import toolkit
 from toolkit.report.pages.drawing import Drawing
 from toolkit.report.pages.kit import Column, Figure, Table, environment, facts, page_parts, quantity, table
 
 TOOLKIT = Path(toolkit.__file__).parent
-CONCEALED = Path(__file__).parents[2] / "concealed"
-PAGES = sorted(path.parent for folder in (TOOLKIT, CONCEALED) for path in folder.rglob("page.html.j2"))
+PROOF = Path(proof.__file__).parent
+PAGES = sorted(path.parent for folder in (TOOLKIT, PROOF) for path in folder.rglob("page.html.j2"))
 HOSTILE = (
     "<script>alert(1)</script>", "</script><img src=x onerror=alert(1)>", "\" onload='x' y=\"", "{{ 7 * 7 }}",
     "\u202eright to left \u05e9\u05dc\u05d5\u05dd", "tire \U0001f6de", "a & b &amp; c", "javascript:alert(1)",
@@ -198,7 +199,7 @@ def contrast(ink: str, paper: str) -> float:
 
 def test_no_template_switches_escaping_off_or_acts_by_an_attribute():
     assert len(PAGES) == 3
-    templates = [path for folder in (TOOLKIT, CONCEALED) for path in folder.rglob("*.j2")]
+    templates = [path for folder in (TOOLKIT, PROOF) for path in folder.rglob("*.j2")]
     for path in templates:
         text = path.read_text(encoding="utf-8")
         assert not re.search(r"\|\s*safe\b|autoescape|\bstyle=|\bon\w+=|\b(?:src|href)=\"(?!\{\{)", text), (
@@ -210,7 +211,7 @@ def test_no_module_writes_html_by_string():
     tag = re.compile(
         r"</(?:table|tr|td|th|p|ul|li|details|section)>|</?(?:html|head|body|div|span|h[1-6]|svg)\b"
     )
-    modules = [*TOOLKIT.rglob("*.py"), CONCEALED / "page.py"]
+    modules = [*TOOLKIT.rglob("*.py"), PROOF / "page.py"]
     for path in modules:
         tree = ast.parse(path.read_text(encoding="utf-8"))
         texts = [

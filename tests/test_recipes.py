@@ -1,0 +1,31 @@
+"""The recipes of CONTRIBUTING.md do what they promise: each is followed in a copy of the checkout."""
+
+from __future__ import annotations
+
+import doctest
+from pathlib import Path
+
+import pytest
+
+from tests.recipes import follow, new_files, recipes
+
+PROMISED = ("effect", "tire model", "characteristic", "report table", "file format", "rule", "command")
+SAME = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
+
+
+def test_there_is_a_recipe_for_each_kind_of_addition() -> None:
+    assert tuple(title.partition(" ")[2].partition(" ")[2] for title in recipes()) == PROMISED
+
+
+@pytest.mark.parametrize("title", recipes())
+def test_a_recipe_does_what_it_promises(title: str, tmp_path: Path) -> None:
+    printed = follow(title, tmp_path)
+    assert printed, "a recipe shows by a command that it worked"
+    for command, expected, got in printed:
+        assert doctest.OutputChecker().check_output(expected, got, SAME), f"$ {command}\n{got}"
+
+
+@pytest.mark.parametrize("title", recipes())
+def test_an_addition_is_one_file_and_its_test(title: str) -> None:
+    package = [path for path in new_files()[title] if path.startswith("toolkit/")]
+    assert len(package) == 1
