@@ -90,20 +90,6 @@ def test_every_file_that_is_named_exists(page: Path) -> None:
 
 
 @EACH
-def test_every_link_leads_somewhere(page: Path) -> None:
-    text = FENCES.sub("", page.read_text(encoding="utf-8"))
-    for target in re.findall(r"\]\(([^)\s]+)\)", text):
-        if "://" in target:
-            continue
-        path, _, anchor = target.partition("#")
-        linked = page if not path else page.parent / path
-        assert linked.exists(), target
-        if anchor:
-            titles = re.findall(r"(?m)^#+ (.+)$", linked.read_text(encoding="utf-8"))
-            assert anchor in {re.sub(r"[^\w -]", "", title.lower()).replace(" ", "-") for title in titles}
-
-
-@EACH
 def test_every_command_that_is_named_exists(page: Path) -> None:
     main._register()
     root = typer.main.get_command(main.app)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import doctest
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -23,6 +25,9 @@ def test_a_recipe_does_what_it_promises(title: str, tmp_path: Path) -> None:
     assert printed, "a recipe shows by a command that it worked"
     for command, expected, got in printed:
         assert doctest.OutputChecker().check_output(expected, got, SAME), f"$ {command}\n{got}"
+    lint = [sys.executable, "-m", "ruff", "check", "--no-cache", "--quiet", *new_files()[title]]
+    linted = subprocess.run(lint, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert linted.returncode == 0, linted.stdout + linted.stderr
 
 
 @pytest.mark.parametrize("title", recipes())

@@ -2,12 +2,8 @@
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
-
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 from tests.benchmarks import archive_factory as factory
 
 HEADER = {"FZ": "FZ load", "D52": "D52 (Filtered)", "D51": "D51 (Filtered)", "E5": "E5 (Filtered)",

@@ -22,10 +22,10 @@ from types import SimpleNamespace
 import dask
 import distributed
 import pytest
-from archive_made import FY, dated, recording, write
 from typer.testing import CliRunner
-from worker_jobs import make
 
+from tests.audit.archive_made import FY, dated, recording, write
+from tests.audit.worker_jobs import make
 from toolkit import __version__
 from toolkit.audit import archive as archive_module
 from toolkit.audit import cluster as cluster_module
@@ -85,7 +85,7 @@ class Cluster:
         settings = {
             "DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES": "0",
             "DASK_DISTRIBUTED__COMM__TIMEOUTS__CONNECT": f"{PATIENCE_S}s",
-            "PYTHONPATH": str(Path(__file__).parent),
+            "PYTHONPATH": str(HOME),
         }
         with (self.folder / "log").open("ab") as log:
             self.started.append(

@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 import openpyxl
 import pytest
-from archive_made import FY, HEADER, MZ, dated, factory, recording, write
 
+from tests.audit.archive_made import FY, HEADER, MZ, dated, factory, recording, write
 from toolkit.audit.archive import audit_archive
 from toolkit.audit.corrected import INDEX, check_target, write_copies
 from toolkit.calibration.registry.approval import approve

@@ -2,7 +2,10 @@ import datetime as dt
 
 import numpy as np
 import pytest
-from audit_factory import (
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tests.audit.audit_factory import (
     FY,
     MZ,
     R1,
@@ -15,9 +18,6 @@ from audit_factory import (
     record,
     seven_digits,
 )
-from hypothesis import given, settings
-from hypothesis import strategies as st
-
 from toolkit.audit.columns import columns_of
 from toolkit.audit.identify import identify_columns, recompute, repair
 from toolkit.examples.fig4_4 import packaged_fig4_4

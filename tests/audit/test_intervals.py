@@ -1,6 +1,6 @@
 import numpy as np
-from audit_factory import FY, columns
 
+from tests.audit.audit_factory import FY, columns
 from toolkit.audit.columns import columns_of
 from toolkit.audit.intervals import coefficient_intervals, interval_bounds
 from toolkit.examples.fig4_4 import packaged_fig4_4

@@ -7,8 +7,8 @@ import json
 from pathlib import Path
 
 import pytest
-from archive_made import FY, dated, recording, write
 
+from tests.audit.archive_made import FY, dated, recording, write
 from toolkit.audit.archive import audit_archive
 from toolkit.audit.linked import PastReport, link, read_reports
 from toolkit.calibration.registry.registry import Registry

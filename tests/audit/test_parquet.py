@@ -11,9 +11,9 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
-from archive_made import FY, dated, recording, write
 from typer.testing import CliRunner
 
+from tests.audit.archive_made import FY, dated, recording, write
 from toolkit.audit.archive import audit_archive
 from toolkit.audit.parquet import check_parquet, write_parquet
 from toolkit.calibration.registry.registry import Registry

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
-from archive_made import HEADER, recording, write
 
+from tests.audit.archive_made import HEADER, recording, write
 from toolkit.audit.quality import quality
 from toolkit.machine import load_machine
 from toolkit.recording.read import read_recording

@@ -6,8 +6,8 @@ import itertools
 
 import numpy as np
 import pytest
-from audit_factory import FY, MZ, R1, R2, columns, negative, record
 
+from tests.audit.audit_factory import FY, MZ, R1, R2, columns, negative, record
 from toolkit.audit.candidates import group_of, orders
 from toolkit.audit.screen import screen_of
 

@@ -9,9 +9,9 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from archive_made import FY, MZ, dated, recording, write
 from typer.testing import CliRunner
 
+from tests.audit.archive_made import FY, MZ, dated, recording, write
 from toolkit.audit.archive import audit_archive
 from toolkit.audit.since_good import drift_since, drifted_files, drifted_tests
 from toolkit.calibration.control.calibrate import calibrate

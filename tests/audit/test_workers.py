@@ -10,8 +10,8 @@ import time
 from pathlib import Path
 
 import pytest
-from worker_jobs import make
 
+from tests.audit.worker_jobs import make
 from toolkit.audit.workers import Lost, run_isolated
 from toolkit.errors import ConfigError
 
@@ -69,7 +69,7 @@ def test_workers_that_never_start_end_the_run_with_an_error():
 
 ABANDONED = """
 import os
-from test_workers import slow
+from tests.audit.test_workers import slow
 from toolkit.audit.workers import run_isolated
 
 if __name__ == "__main__":
@@ -85,7 +85,7 @@ def slow():
 def test_workers_whose_run_was_killed_end_without_a_word(tmp_path):
     script = tmp_path / "script.py"
     script.write_text(ABANDONED)
-    env = {**os.environ, "PYTHONPATH": str(Path(__file__).parent)}
+    env = {**os.environ, "PYTHONPATH": str(Path(__file__).resolve().parents[2])}
     # The pipes close when the last worker has ended: a timeout means that one is left.
     done = subprocess.run(
         [sys.executable, str(script)], capture_output=True, text=True, timeout=120, env=env, check=False

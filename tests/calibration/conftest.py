@@ -7,9 +7,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from calibration_factory import CELLS, LOADS, UNITS, csv_text, hub_data, session_text
 from numpy.typing import NDArray
 
+from tests.calibration.calibration_factory import CELLS, LOADS, UNITS, csv_text, hub_data, session_text
 from toolkit.calibration.registry.candidate import calibrate
 from toolkit.calibration.registry.registry import Registry
 

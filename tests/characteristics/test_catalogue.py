@@ -12,8 +12,8 @@ from typing import Any
 
 import openpyxl
 import pytest
-from tire_factory import LOAD, M15, reduced_test
 
+from tests.characteristics.tire_factory import LOAD, M15, reduced_test
 from tests.recipes import file_of
 from toolkit.characteristics.catalogue import (
     by_channel,

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
-from tire_factory import (
+
+from tests.characteristics.tire_factory import (
     C_FY,
     C_MZ,
     CONICITY,
@@ -24,8 +25,7 @@ from tire_factory import (
     curve,
     reduced_test,
 )
-from weighted_sums import calibration_u
-
+from tests.characteristics.weighted_sums import calibration_u
 from toolkit.characteristics.characterise import characterise
 from toolkit.characteristics.groups import group
 from toolkit.characteristics.model import Characteristics

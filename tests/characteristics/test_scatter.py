@@ -7,8 +7,8 @@ import dataclasses
 import numpy as np
 import pytest
 from scipy.stats import chi2
-from tire_factory import LOAD, M15, at_load, reduced_test
 
+from tests.characteristics.tire_factory import LOAD, M15, at_load, reduced_test
 from toolkit.characteristics.characterise import characterise
 from toolkit.characteristics.groups import directions_of
 from toolkit.characteristics.scatter import Scatter, scatter_of

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
-from weighted_sums import calibration_u
 
+from tests.characteristics.weighted_sums import calibration_u
 from toolkit.calibration.registry.registry import Registry
 from toolkit.calibration.uncertainty.propagation import record_covariance
 from toolkit.characteristics.characterise import characterise

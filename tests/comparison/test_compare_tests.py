@@ -22,8 +22,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-from comparison_factory import conicity
 
+from tests.comparison.comparison_factory import conicity
 from toolkit.calibration.registry.registry import Registry
 from toolkit.characteristics.characterise import characterise
 from toolkit.comparison.compare import compare

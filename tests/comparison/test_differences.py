@@ -6,10 +6,10 @@ import math
 
 import numpy as np
 import pytest
-from comparison_factory import LOADS, conicity, entry, own, row
 from scipy import stats
 from statsmodels.stats.multitest import multipletests
 
+from tests.comparison.comparison_factory import LOADS, conicity, entry, own, row
 from toolkit.characteristics.uncertain import Part
 from toolkit.comparison.at_load import at_load
 from toolkit.comparison.differences import differences

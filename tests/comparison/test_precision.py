@@ -6,9 +6,9 @@ import math
 
 import numpy as np
 import pytest
-from comparison_factory import conicity
 from scipy import stats
 
+from tests.comparison.comparison_factory import conicity
 from toolkit.comparison.precision import factor_spread, factors_of, repeats_of, spread
 from toolkit.comparison.significance import grubbs_p
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from tests.effects.rig import driven, setting, tire
-from tests.effects.test_contract import ALL, by_name, usual
+from tests.effects.test_effect_contract import ALL, by_name, usual
 from toolkit.channels import CHANNELS
 from toolkit.effects.effect import Effect
 from toolkit.effects.facts import Where

@@ -44,7 +44,7 @@ def _binds(node: ast.stmt, name: str) -> bool:
     return any(isinstance(target, ast.Name) and target.id == name for target in targets)
 
 
-PLAN_KEYS = ("toolkit.simulation.plan", "toolkit.simulation.plan_sections")
+PLAN_KEYS = ("toolkit.simulation.plan_file",)
 """Modules in which such words are keys of a plan's sections: the truth of the virtual machine, a format."""
 
 
@@ -84,6 +84,14 @@ def _words(tree: ast.Module, names: frozenset[str]) -> Iterator[tuple[int, str]]
     nodes = list(ast.walk(tree))
     # Strings that stand as statements: docstrings, and remarks below attributes.
     free = {id(node.value) for node in nodes if isinstance(node, ast.Expr)}
+    # Keys of a declared entry are words of that file.
+    free |= {
+        id(word.value)
+        for node in nodes
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "Entry"
+        for word in node.keywords
+        if word.arg == "key"
+    }
     for node in nodes:
         match node:
             case ast.Constant(value=str(text)) if id(node) not in free:

@@ -170,6 +170,11 @@ def test_effects_in_effects_and_words_of_other_layers(tmp_path: Path) -> None:
 def test_pages_that_are_cited_have_to_exist(tmp_path: Path) -> None:
     (tmp_path / "docs").mkdir()
     (tmp_path / "docs" / "physics.md").write_text("# Physics\n\n## The drum\nsee formats.md\n")
+    (tmp_path / "docs" / "files").mkdir()
+    (tmp_path / "docs" / "files" / "test.md").write_text(
+        "[drum](../physics.md#the-drum) [belt](../physics.md#the-belt) [none](../none.md)\n"
+        "```console\ndocs/example.md\n```\n"
+    )
     text = '''"""See docs/physics.md, "The drum", physics.md#the-drum and docs/none.md."""
 x = "told in physics.md, 'The belt'"  # and absent.md, docs/pictures/drum.png
 y = "*.md"
@@ -177,7 +182,15 @@ y = "*.md"
     write(tmp_path, {"m": text})
     cited = [row.word for row in citations.pages_missing(tmp_path)]
     assert sorted(cited) == sorted(
-        ["formats.md", "docs/none.md", "physics.md, The belt", "absent.md", "docs/pictures/drum.png"]
+        [
+            "formats.md",
+            "docs/none.md",
+            "physics.md, The belt",
+            "absent.md",
+            "docs/pictures/drum.png",
+            "../physics.md#the-belt",
+            "../none.md",
+        ]
     )
 
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from format_checks import M15, ROWS
-from format_factory import HEADER
 
+from tests.recording.format_checks import M15, ROWS
+from tests.recording.format_factory import HEADER
 from toolkit.recording import read_recording
 
 

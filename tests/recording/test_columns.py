@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import pytest
-from format_checks import whole
-from workbook_factory import HEADERS
 
+from tests.recording.format_checks import whole
+from tests.recording.workbook_factory import HEADERS
 from toolkit.errors import ColumnError
 from toolkit.machine import load_machine
 from toolkit.recording.columns import assign_columns

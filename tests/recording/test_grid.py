@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from workbook_factory import (
+
+from tests.recording.workbook_factory import (
     DATA,
     HEADERS,
     MAIN,
@@ -23,7 +24,6 @@ from workbook_factory import (
     sheet_xml,
     table_xml,
 )
-
 from toolkit.errors import ToolkitError
 from toolkit.machine import load_machine
 from toolkit.recording import read_recording

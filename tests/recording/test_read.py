@@ -4,9 +4,18 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from format_checks import whole
-from workbook_factory import DATA, HEADERS, members, packed, sheet_xml, table_xml, with_cell, workbook
 
+from tests.recording.format_checks import whole
+from tests.recording.workbook_factory import (
+    DATA,
+    HEADERS,
+    members,
+    packed,
+    sheet_xml,
+    table_xml,
+    with_cell,
+    workbook,
+)
 from toolkit.errors import CellError, ColumnError, RecordingError, ToolkitError, UnreadableError
 from toolkit.machine import load_machine
 from toolkit.recording import read_recording

@@ -7,8 +7,7 @@ import zipfile
 from collections.abc import Callable
 from pathlib import Path
 
-from template_factory import W, grey_png
-
+from tests.report.template_factory import W, grey_png
 from toolkit.report.word.xml import NS
 
 _SPACES = " ".join(f'xmlns:{prefix}="{uri}"' for prefix, uri in NS.items()) + (

@@ -6,8 +6,8 @@ import datetime as dt
 from pathlib import Path
 
 import pytest
-from report_factory import make_record, make_result
 
+from tests.report.report_factory import make_record, make_result
 from toolkit.report.deliver import Delivered, deliver
 from toolkit.report.drawer import Drawer
 from toolkit.report.style import read_style

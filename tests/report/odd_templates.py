@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from alien_factory import (
+from tests.report.alien_factory import (
     BOUND,
     SHOWING,
     build,

@@ -11,9 +11,9 @@ import subprocess
 from pathlib import Path
 
 import pytest
-from report_factory import make_record, make_result
-from template_factory import opened, p, run, sdt, tbl
 
+from tests.report.report_factory import make_record, make_result
+from tests.report.template_factory import opened, p, run, sdt, tbl
 from toolkit.errors import OutputError, RenderError, TemplateError
 from toolkit.recording.marks import is_own_output
 from toolkit.report import deliver as deliver_module

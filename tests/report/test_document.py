@@ -8,11 +8,11 @@ import zipfile
 from pathlib import Path
 
 import pytest
-from report_factory import make_record, make_result
-from template_factory import FOLDER, make, p, tbl, texts
 
 import toolkit.report.test
 from tests.recipes import file_of
+from tests.report.report_factory import make_record, make_result
+from tests.report.template_factory import FOLDER, make, p, tbl, texts
 from toolkit.report.kinds import VOCABULARIES, check, list_tags, reference_page, write_manual
 from toolkit.report.style import Style
 from toolkit.report.test.content import REPORT, build_content

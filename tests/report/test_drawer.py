@@ -1,8 +1,8 @@
 from __future__ import annotations
 
 import pytest
-from report_factory import make_record, make_result
 
+from tests.report.report_factory import make_record, make_result
 from toolkit.report.drawer import Drawer
 from toolkit.report.figures import Picture, draw
 from toolkit.report.test.content import build_content

@@ -13,7 +13,7 @@ from toolkit.diagnosis.case.reader import read_case
 from toolkit.diagnosis.simulators.build_simulator import model_of
 from toolkit.errors import ConfigError
 from toolkit.simulation.case import write_case, write_runs
-from toolkit.simulation.case_plan import CasePlan, Free
+from toolkit.simulation.case_plan import CaseParameter, CasePlan
 from toolkit.simulation.cells import CELLS
 from toolkit.simulation.plan import read_plan, with_effects
 from toolkit.simulation.run import simulate
@@ -98,7 +98,7 @@ def test_no_word_of_an_effect(plan, tmp_path):
 
 
 def test_parameters_and_columns_of_the_plan(plan, tmp_path):
-    free = Free(name="LMUY", value=1.0, unit="1", sd=0.02, bounds=(0.8, 1.2))
+    free = CaseParameter(name="LMUY", value=1.0, unit="1", sd=0.02, bounds=(0.8, 1.2))
     wanted = dataclasses.replace(
         plan, case=CasePlan(columns=("DRUM_ANGLE",), load="judged", parameters=(free,))
     )
@@ -120,7 +120,7 @@ def test_columns_that_never_vary_are_left_out(plan, tmp_path):
 @pytest.mark.parametrize(
     "case",
     [CasePlan(outputs="cells"), CasePlan(load="commanded"),
-     CasePlan(parameters=(Free(name="LMUY", value=1.0, unit="1", sd=None, bounds=None),))],
+     CasePlan(parameters=(CaseParameter(name="LMUY", value=1.0, unit="1", sd=None, bounds=None),))],
 )  # fmt: skip
 def test_what_a_published_tire_cannot_be(virtual_plan, tmp_path, case):
     short = dataclasses.replace(virtual_plan, slip_angles_rad=(0.0,), case=case)

@@ -82,7 +82,7 @@ def test_sizes_come_from_the_file(plan):
     ("line", "told"),
     [
         ("file = 'none.tir'", "none.tir"),
-        ("file = 5", "no name"),
+        ("file = 5", "tire.tir"),
         (f"file = '{TIRE}'\nplysteer = {{ value = 1, unit = 'deg' }}", "plysteer"),
         ("file = 'bad.tir'", "FITTYP"),
         ("file = 'flat.tir'", "UNLOADED_RADIUS"),

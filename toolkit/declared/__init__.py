@@ -76,7 +76,7 @@ renames, ``Entry(output=False)`` leaves out. **Pages**: `starter`, `reference`, 
 **To convert a format**: (1) write its malformed files as a parametrised test; (2) declare the classes
 with the field names that the code uses; (3) give ``FORMAT`` the rule ids of today; (4) turn checks
 between entries into ``faults``; (5) delete the reader; (6) add the class to
-`tests/declared/test_every_format.py`, which holds that its starter file is valid and its written form
+`tests/declared/test_declared_formats.py`, which holds that its starter file is valid and its written form
 reads back equal.
 '''
 

@@ -99,9 +99,13 @@ class Short:
 
 @dataclass(frozen=True)
 class UnitName:
-    """A text that names a unit, of one of ``dimensions`` where some are given; held in its one spelling."""
+    """A text that names a unit, of one of ``dimensions`` where some are given; held in its one spelling.
+
+    ``as_written``: held as it stands in the file, for what is printed again.
+    """
 
     dimensions: tuple[str, ...] = ()
+    as_written: bool = False
 
 
 @dataclass(frozen=True, init=False)

@@ -190,7 +190,7 @@ class UnitKind(Kind):
                 f"{value} ({si_unit.dimension})", self.expected, rule="unit-dimension",
                 what=f"{value} is a unit of {si_unit.dimension}",
             )  # fmt: skip
-        return si_unit.text
+        return value if self.mark.as_written else si_unit.text
 
     def schema(self) -> dict[str, Any]:
         """Return the schema of a unit's name."""

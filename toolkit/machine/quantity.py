@@ -1,8 +1,7 @@
-"""Numbers with units, and words of a list, as machine definitions, protocols and tests write them."""
+"""A number with its unit, as sessions write it."""
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 from toolkit.errors import ConfigError
@@ -31,34 +30,3 @@ def quantity(entry: dict[str, Any], dimension: str, where: object) -> float:
     if found.dimension == dimension:
         return float(entry["value"]) * found.factor + found.offset
     return float(entry["value"]) * si_scale(entry["unit"], dimension, where=where)
-
-
-def quantities(entry: dict[str, Any], dimension: str, where: object) -> tuple[float, ...]:
-    """Return ``{ value = [..], unit }`` as floats in SI, all finite, at least one."""
-    values = entry.get("value") if isinstance(entry, dict) else None
-    if not isinstance(values, list) or not values:
-        raise ConfigError(
-            "a list of quantities is no list", where=where, got=entry,
-            expected='{ value = [NUMBER, ...], unit = "..." }', next_step="write the list and its unit",
-            rule="wrong-value",
-        )  # fmt: skip
-    found = tuple(quantity({"value": v, "unit": entry.get("unit")}, dimension, where) for v in values)
-    if not all(map(math.isfinite, found)):
-        raise ConfigError(
-            "a list of quantities has one that is not finite", where=where, got=values,
-            expected="finite numbers", next_step="correct the list", rule="wrong-value",
-        )  # fmt: skip
-    return found
-
-
-def one_of(value: str, allowed: tuple[str, ...], where: object) -> str:
-    """Return a word of a list, or refuse it."""
-    if value not in allowed:
-        raise ConfigError(
-            "a setting has a value that is not known",
-            where=where,
-            got=value,
-            expected=", ".join(allowed),
-            next_step="use one of those expected",
-        )
-    return value

@@ -9,10 +9,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import numpy as np
 
+from toolkit.declared import AtLeast, Entry, Unit
 from toolkit.simulation.cells import CELLS, CellsTruth
 from toolkit.units import from_si
 
@@ -35,11 +36,18 @@ class AcquisitionTruth:
     ``negated`` names the channels whose terms the program has with the wrong sign.
     """
 
-    filter_time_constant_s: float = 0.05
-    rows_per_revolution: int = 100
-    FZ_noise_N: float = 2.5
-    SA_noise_rad: float = math.radians(0.003)
-    negated: tuple[str, ...] = ("E5",)
+    filter_time_constant_s: Annotated[
+        float, Unit("s"), Entry("of cells and slip angle", key="filter_time_constant")
+    ] = 0.05
+    rows_per_revolution: Annotated[int, AtLeast(1), Entry("of the tire")] = 100
+    FZ_noise_N: Annotated[float, Unit("N"), Entry("1 sd of a sample", key="FZ_noise")] = 2.5
+    SA_noise_rad: Annotated[float, Unit("deg"), Entry("1 sd of a sample", key="SA_noise")] = math.radians(
+        0.003
+    )
+    negated: Annotated[
+        tuple[Literal["D51", "D52", "E5"], ...],
+        Entry("cells whose terms the program has with the wrong sign"),
+    ] = ("E5",)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

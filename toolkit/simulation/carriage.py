@@ -8,10 +8,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, Annotated, TypeVar
 
 import numpy as np
 
+from toolkit.declared import Entry, Unit
 from toolkit.simulation.tire import TireForces
 from toolkit.units import to_si
 
@@ -30,12 +31,20 @@ class CarriageTruth:
     ``overturning_Nm`` moment of the wheel's own weight about the hub.
     """
 
-    steering_zero_rad: float = math.radians(-0.3)
-    steer_offset_rad: float = 0.0
-    camber_offset_rad: float = 0.0
-    load_spread: float = 0.03
+    steering_zero_rad: Annotated[
+        float,
+        Unit("deg"),
+        Entry("true angle at the rack's zero, which the sensor shows", key="steering_zero"),
+    ] = math.radians(-0.3)
+    steer_offset_rad: Annotated[
+        float, Unit("deg"), Entry("what the slip-angle sensor shows too much", key="steer_offset")
+    ] = 0.0
+    camber_offset_rad: Annotated[float, Unit("deg"), Entry("of the wheel", key="camber_offset")] = 0.0
+    load_spread: Annotated[float, Unit("1"), Entry("largest deviation, as a share of the load")] = 0.03
     # Fitted to the moment of the ten rows of Figure 4.4: 28.9 lbf·m at no lateral force.
-    overturning_Nm: float = float(to_si(28.9, "lbf"))
+    overturning_Nm: Annotated[
+        float, Unit("N*m"), Entry("moment of the wheel's weight about the hub", key="overturning")
+    ] = float(to_si(28.9, "lbf"))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -15,7 +15,7 @@ import numpy as np
 from toolkit.effects.signals import Drive, drive
 from toolkit.errors import ConfigError
 from toolkit.files import read_bytes, write_atomic
-from toolkit.simulation.case_plan import COLUMNS, Free
+from toolkit.simulation.case_plan import COLUMNS, CaseParameter
 from toolkit.simulation.cells import CELLS
 from toolkit.simulation.file_tire import FileTire
 from toolkit.simulation.plan import Plan
@@ -175,12 +175,12 @@ def _role(name: str) -> str:
     return "input" if name in ("SA", "FZ", "V", "SA_CMD", "FZ_CMD") else "covariate"
 
 
-def _parameter(free: Free) -> list[str]:
-    lines = [f"value = {free.value!r}", f"unit = {_text(free.unit)}"]
-    if free.sd is not None:
-        lines.append(f"sd = {free.sd!r}")
-    if free.bounds is not None:
-        lines.append(f"bounds = [{free.bounds[0]!r}, {free.bounds[1]!r}]")
+def _parameter(parameter: CaseParameter) -> list[str]:
+    lines = [f"value = {parameter.value!r}", f"unit = {_text(parameter.unit)}"]
+    if parameter.sd is not None:
+        lines.append(f"sd = {parameter.sd!r}")
+    if parameter.bounds is not None:
+        lines.append(f"bounds = [{parameter.bounds[0]!r}, {parameter.bounds[1]!r}]")
     return lines
 
 

@@ -8,43 +8,28 @@ A number is written with its unit, ``plysteer = { value = 0.12, unit = "deg" }``
 from __future__ import annotations
 
 import dataclasses
-import datetime as dt
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Literal, cast
 
-from toolkit.channels import ROTATIONS, Rotation
+from toolkit.channels import Rotation
+from toolkit.declared import Fault, Source, read_text, refuse
 from toolkit.effects.applied import AppliedEffect
 from toolkit.errors import ConfigError
-from toolkit.files import check_keys, read_toml
+from toolkit.files import read_bytes
 from toolkit.machine.definition import Machine, load_machine
-from toolkit.machine.quantity import quantity
 from toolkit.simulation.acquisition import AcquisitionTruth
 from toolkit.simulation.carriage import CarriageTruth
-from toolkit.simulation.case_plan import CasePlan, read_case_plan
+from toolkit.simulation.case_plan import CasePlan
 from toolkit.simulation.cells import CellsTruth
 from toolkit.simulation.effect_text import parse_effect
 from toolkit.simulation.file_tire import FileTire, read_file_tire
+from toolkit.simulation.plan_file import Kind, PlanFile, Record, SessionTruth, TireEntries, filled
 from toolkit.simulation.plan_model import model_tire
-from toolkit.simulation.plan_sections import (
-    CARRIAGE,
-    ROAD,
-    TIRE,
-    SessionTruth,
-    acquisition_of,
-    cells_of,
-    choice,
-    section_of,
-    session_of,
-    whole,
-)
 from toolkit.simulation.road import RoadTruth
-from toolkit.simulation.steps import Motion, RunSteps, protocol_runs, read_motion, read_runs
+from toolkit.simulation.steps import Motion, RunSteps, protocol_runs, stated_runs
 from toolkit.simulation.tire import TireTruth
 from toolkit.tires.tir_units import si_number
-
-Kind = Literal["test", "session", "table"]
-Record = Literal["dwell", "continuous"]
+from toolkit.units import to_si
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -85,79 +70,51 @@ class Plan:
         return self.runs or protocol_runs(self.rotations, self.slip_angles_rad, self.loads_N)
 
 
-_TOP = (
-    "schema kind title date machine seed rotations slip_angles loads pressure file_name label "
-    "tire road carriage cells acquisition session motion run effects case"
-).split()
-_LABEL = ("size", "company", "DOT", "series", "construction", "rim")
-
-
 def read_plan(path: Path, *, seed: int | None = None) -> Plan:
     """Read a plan; ``seed`` replaces the plan's own.
 
     Raises
     ------
     ConfigError
-        no TOML, an unknown key, a number without a unit, a unit of another dimension, an unknown machine or
-        effect, a tire file that cannot be used
+        no TOML; every entry that is unknown, missing or cannot be used; an unknown machine or effect, a tire
+        file that cannot be used
     """
-    table = read_toml(path)
-    check_keys(table, _TOP, where=path)
-    kind = choice(table.get("kind", "test"), ("test", "session", "table"), f"{path}: kind")
-    machine = load_machine(str(table.get("machine", "m15-virtual")))
+    data = read_bytes(path)
+    stated = read_text(PlanFile, data, where=path)
+    machine = load_machine(stated.machine)
     if not machine.simulated:
-        raise ConfigError(
-            "a real machine cannot be simulated under its own name",
-            where=f"{path}: machine",
-            got=machine.name,
-            expected='a machine definition with kind = "simulated", such as m15-virtual',
-            next_step="change the plan's machine",
-        )
-    protocol = machine.protocol
-    rotations = table.get("rotations", list(machine.rotations))
-    if not isinstance(rotations, list) or not rotations:
-        raise ConfigError(
-            "a test needs a direction of rotation", where=f"{path}: rotations", got=rotations,
-            expected=", ".join(ROTATIONS), next_step="name one or both in a list", rule="wrong-value",
-        )  # fmt: skip
-    for one in rotations:
-        choice(one, ROTATIONS, f"{path}: rotations")
-    label = table.get("label", {})
-    check_keys(label, _LABEL, where=f"{path}: label")
-    angles = _list(table, "slip_angles", "angle", protocol.slip_angles_rad, path)
-    loads = _list(table, "loads", "force", protocol.loads_N, path)
-    recording = dict(table.get("acquisition", {}))
-    record = choice(recording.pop("record", "dwell"), ("dwell", "continuous"), f"{path}: acquisition.record")
-    tire, file, taken = _tire(table.get("tire", {}), path)
+        expected = 'a machine definition with kind = "simulated", such as m15-virtual'
+        what = "a real machine cannot be simulated under its own name"
+        fault = Fault(key=("machine",), got=machine.name, expected=expected, what=what, form=PlanFile.FORMAT)
+        refuse([fault], Source(where=path, text=data.decode("utf-8-sig")))
+    angles = stated.slip_angles_rad or machine.protocol.slip_angles_rad
+    loads = stated.loads_N or machine.protocol.loads_N
+    tire, file, model_effects = _tire(stated.tire, path)
     plan = Plan(
-        kind=cast("Kind", kind),
-        title=str(table.get("title", path.stem)),
-        date=_date(table.get("date"), path),
+        kind=stated.kind,
+        title=path.stem if stated.title is None else stated.title,
+        date=stated.date,
         machine=machine,
-        seed=whole(table.get("seed", 0) if seed is None else seed, f"{path}: seed", least=0),
-        label=tuple((key, str(value)) for key, value in label.items()),
-        rotations=tuple(cast("Rotation", one) for one in rotations),
+        seed=stated.seed if seed is None else seed,
+        label=stated.label,
+        rotations=stated.rotations or machine.rotations,
         slip_angles_rad=angles,
         loads_N=loads,
-        pressure_Pa=quantity(table["pressure"], "pressure", path)
-        if "pressure" in table
-        else _stated_pressure(file),
-        file_name=_file_name(table.get("file_name", "FM_run_{number}.xlsx"), path),
+        pressure_Pa=_stated_pressure(file) if stated.pressure_Pa is None else stated.pressure_Pa,
+        file_name=stated.file_name,
         tire=tire,
-        road=section_of(RoadTruth(), table.get("road", {}), ROAD, f"{path}: road"),
-        carriage=section_of(CarriageTruth(), table.get("carriage", {}), CARRIAGE, f"{path}: carriage"),
-        cells=cells_of(table.get("cells", {}), f"{path}: cells"),
-        acquisition=acquisition_of(recording, f"{path}: acquisition"),
-        session=session_of(table.get("session", {}), f"{path}: session"),
-        record=cast("Record", record),
-        motion=read_motion(table.get("motion", {}), where=f"{path}: motion"),
-        runs=read_runs(table["run"], slip_angles_rad=angles, loads_N=loads, where=f"{path}: run")
-        if "run" in table
-        else (),
+        road=stated.road,
+        carriage=stated.carriage,
+        cells=stated.cells.truth(),
+        acquisition=filled(AcquisitionTruth(), stated.acquisition),
+        session=stated.session,
+        record=stated.acquisition.record,
+        motion=stated.motion,
+        runs=stated_runs(stated.run or (), slip_angles_rad=angles, loads_N=loads),
         tire_file=file,
-        case=read_case_plan(table.get("case", {}), where=f"{path}: case"),
+        case=stated.case,
     )
-    return with_effects(plan, [*taken, *_texts(table.get("effects", []), f"{path}: effects")])
+    return with_effects(plan, [*model_effects, *stated.effects])
 
 
 def with_effects(plan: Plan, given: list[str]) -> Plan:
@@ -203,23 +160,15 @@ def _check_runs(plan: Plan, one: AppliedEffect, text: str) -> None:
     )  # fmt: skip
 
 
-def _tire(table: dict[str, Any], path: Path) -> tuple[TireTruth, FileTire | None, tuple[str, ...]]:
+def _tire(entries: TireEntries, path: Path) -> tuple[TireTruth, FileTire | None, tuple[str, ...]]:
     """Return the published tire, or a file's; of a model file its effects too."""
-    where = f"{path}: tire"
-    if not isinstance(table, dict) or "file" not in table:
-        return section_of(TireTruth(), table, TIRE, where), None, ()
-    name = table["file"]
-    if not isinstance(name, str) or not name:
-        raise ConfigError(
-            "the tire's file has no name", where=f"{where}.file", got=name,
-            expected='file = "tire.tir", or a model file of toolkit diagnose',
-            next_step="write the path, relative to the plan", rule="wrong-value",
-        )  # fmt: skip
-    taken: tuple[str, ...] = ()
-    if name.endswith(".toml"):
-        file, taken = model_tire(path.parent / name, where=f"{where}.file")
+    if entries.file is None:
+        return filled(TireTruth(), entries), None, ()
+    effects: tuple[str, ...] = ()
+    if entries.file.name.endswith(".toml"):
+        file, effects = model_tire(path.parent / entries.file, where=f"{path}: tire.file")
     else:
-        file = read_file_tire(path.parent / name)
+        file = read_file_tire(path.parent / entries.file)
     default = TireTruth(
         plysteer_rad=0.0,
         aligning_shift_rad=0.0,
@@ -228,60 +177,10 @@ def _tire(table: dict[str, Any], path: Path) -> tuple[TireTruth, FileTire | None
         free_radius_m=file.UNLOADED_RADIUS,
         vertical_stiffness_N_m=si_number(file.tir, "VERTICAL_STIFFNESS", TireTruth().vertical_stiffness_N_m),
     )
-    rest = {key: entry for key, entry in table.items() if key != "file"}
-    own = {key: entry for key, entry in TIRE.items() if key not in ("plysteer", "aligning_shift", "conicity")}
-    return section_of(default, rest, own, where), file, taken
+    return filled(default, entries), file, effects
 
 
 def _stated_pressure(file: FileTire | None) -> float:
     if file is not None and file.INFLPRES > 0:
         return file.INFLPRES
-    return quantity({"value": 34, "unit": "psi"}, "pressure", "pressure")
-
-
-def _texts(value: object, where: str) -> list[str]:
-    if not isinstance(value, list) or not all(isinstance(one, str) for one in value):
-        raise ConfigError(
-            "effects are a list of texts", where=where, got=value,
-            expected='["NAME=VALUE"], each as --effect takes it',
-            next_step="write each effect in quotes", rule="wrong-value",
-        )  # fmt: skip
-    return list(value)
-
-
-def _list(
-    table: dict[str, Any], key: str, dimension: str, default: tuple[float, ...], path: Path
-) -> tuple[float, ...]:
-    if key not in table:
-        return default
-    entry, where = table[key], f"{path}: {key}"
-    values = entry.get("value") if isinstance(entry, dict) else None
-    if not isinstance(values, list) or not values:
-        raise ConfigError(
-            f"{key} is no list with a unit", where=where, got=entry,
-            expected='{ value = [..], unit = ".." }', next_step="write the values and their unit",
-        )  # fmt: skip
-    return tuple(quantity({**entry, "value": one}, dimension, where) for one in values)
-
-
-def _date(value: object, path: Path) -> str:
-    if isinstance(value, dt.date) and not isinstance(value, dt.datetime):
-        return value.isoformat()
-    try:
-        return dt.date.fromisoformat(str(value)).isoformat()
-    except ValueError as error:
-        raise ConfigError(
-            "a plan needs the day on which it is run", where=f"{path}: date", got=value,
-            expected="a date such as 2026-03-17", next_step="write date = 2026-03-17",
-        ) from error  # fmt: skip
-
-
-def _file_name(value: object, path: Path) -> str:
-    name = str(value)
-    if "{number}" not in name or Path(name).name != name or not name.endswith(".xlsx"):
-        raise ConfigError(
-            "the files' name does not count up", where=f"{path}: file_name", got=name,
-            expected="a plain file name with {number} that ends in .xlsx",
-            next_step='write it like "FM_run_{number}.xlsx"',
-        )  # fmt: skip
-    return name
+    return float(to_si(34, "psi"))

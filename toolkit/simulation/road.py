@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
+
+from toolkit.declared import Entry, Unit
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -15,10 +17,16 @@ if TYPE_CHECKING:
 class RoadTruth:
     """Run-out as load variation at the drum's revolution and at twice that; phases against drum angle 0."""
 
-    runout_1_N: float = 20.0
-    runout_1_phase_rad: float = 0.6
-    runout_2_N: float = 5.0
-    runout_2_phase_rad: float = 2.1
+    runout_1_N: Annotated[
+        float, Unit("N"), Entry("load variation once a revolution of the drum", key="drum_runout_1")
+    ] = 20.0
+    runout_1_phase_rad: Annotated[
+        float, Unit("deg"), Entry("against drum angle 0", key="drum_runout_1_phase")
+    ] = 0.6
+    runout_2_N: Annotated[float, Unit("N"), Entry("twice a revolution", key="drum_runout_2")] = 5.0
+    runout_2_phase_rad: Annotated[
+        float, Unit("deg"), Entry("against drum angle 0", key="drum_runout_2_phase")
+    ] = 2.1
 
 
 def drum_angle(

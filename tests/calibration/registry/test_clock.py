@@ -1,0 +1,142 @@
+"""Days and times that cannot be: refused when they are written, and seen by verify."""
+
+from __future__ import annotations
+
+import datetime as dt
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from tests.calibration.control_factory import enter, write_session
+from tests.calibration.registry.test_legacy import GOOD
+from toolkit.calibration.registry import approval, candidate, clock
+from toolkit.calibration.registry.approval import approve, withdraw
+from toolkit.calibration.registry.ledger import HEAD, LEDGER, START, head_bytes, next_line
+from toolkit.calibration.registry.legacy import import_legacy
+from toolkit.calibration.registry.registry import Registry
+from toolkit.calibration.registry.verify import verify_registry
+from toolkit.errors import RegistryError
+
+SESSION = dt.date(2025, 3, 10)
+TODAY = clock.today()
+LATER = TODAY + dt.timedelta(days=3)
+
+
+@pytest.fixture
+def entered(tmp_path: Path) -> Registry:
+    registry = Registry(tmp_path / "cal")
+    enter(registry, tmp_path / "s", SESSION)
+    return registry
+
+
+def refused(registry: Registry, act: Callable[[], object]) -> RegistryError:
+    """Return the error of an act that must change nothing."""
+    before = registry.head("cell")
+    with pytest.raises(RegistryError) as caught:
+        act()
+    assert registry.head("cell") == before
+    error = caught.value
+    assert (error.rule, error.exit_code) == ("time", 2)
+    assert all((error.what, error.where, error.got, error.expected, error.next_step))
+    return error
+
+
+def test_a_session_or_a_source_in_the_future_is_not_entered(tmp_path: Path) -> None:
+    registry = Registry(tmp_path / "cal")
+    registry.folder.mkdir()
+    refused(registry, lambda: candidate.calibrate(write_session(tmp_path / "s", LATER), registry))
+    (tmp_path / "old.toml").write_text(GOOD.replace("1999-01-01", LATER.isoformat()))
+    refused(registry, lambda: import_legacy(tmp_path / "old.toml", registry))
+    assert not list(registry.folder.iterdir())
+
+
+def test_a_decision_has_its_day_between_its_session_and_today(entered: Registry) -> None:
+    def decide(day: dt.date, reason: str | None) -> Callable[[], object]:
+        return lambda: approve(
+            entered, "cell-r1", in_force_from=SESSION, checked_by="B", known_on=day, reason=reason
+        )
+
+    assert "future" in refused(entered, decide(LATER, "planned")).what
+    assert "before the session" in refused(entered, decide(SESSION - dt.timedelta(days=1), "late")).what
+    assert "dated back" in refused(entered, decide(SESSION, None)).what
+    assert "dated back" in refused(entered, decide(SESSION, "  ")).what
+    assert approve(
+        entered, "cell-r1", in_force_from=SESSION, checked_by="B", known_on=SESSION, reason="on paper"
+    ).done
+    assert "future" in refused(entered, lambda: withdraw(entered, "cell-r1", on=LATER, reason="x")).what
+    early = SESSION - dt.timedelta(days=1)
+    assert "before" in refused(entered, lambda: withdraw(entered, "cell-r1", on=early, reason="x")).what
+
+
+def test_a_withdrawal_that_is_dated_back_is_noted(entered: Registry) -> None:
+    withdraw(entered, "cell-r1", on=TODAY - dt.timedelta(days=1), reason="dropped")
+    assert entered.ledger("cell").entries[-1].note == "entered 1 day after it became known"
+
+
+def test_a_withdrawal_of_today_has_no_note(entered: Registry) -> None:
+    withdraw(entered, "cell-r1", on=TODAY, reason="dropped")
+    assert entered.ledger("cell").entries[-1].note is None
+
+
+def test_a_clock_that_was_set_back_writes_nothing(entered: Registry, monkeypatch: pytest.MonkeyPatch) -> None:
+    last = entered.ledger("cell").entries[-1].time
+    before = (clock.moment(last) - dt.timedelta(seconds=1)).strftime("%Y-%m-%dT%H:%M:%SZ")
+    monkeypatch.setattr(approval, "now", lambda: before)
+    error = refused(entered, lambda: approve(entered, "cell-r1", in_force_from=SESSION, checked_by="B"))
+    assert (error.got, error.expected) == (before, f"a time from {last} on")
+    monkeypatch.setattr(approval, "now", lambda: last)
+    assert approve(entered, "cell-r1", in_force_from=SESSION, checked_by="B").done
+
+
+def rewrite(registry: Registry, change: Callable[[int, dict[str, object]], None]) -> None:
+    """Write an instrument's ledger anew, its chain intact."""
+    folder = registry.folder / "cell"
+    lines, prev = b"", START
+    bodies = [json.loads(line) for line in (folder / LEDGER).read_text().splitlines()]
+    for seq, body in enumerate(bodies, start=1):
+        event = {key: value for key, value in body.items() if key not in ("seq", "prev", "sha256")}
+        change(seq, event)
+        line, prev = next_line(seq, prev, event)
+        lines += line
+    (folder / LEDGER).write_bytes(lines)
+    (folder / HEAD).write_bytes(head_bytes(len(bodies), prev))
+
+
+@pytest.mark.parametrize(
+    ("line", "key", "value", "row", "words"),
+    [
+        (1, "time", "2999-01-01T00:00:00Z", LEDGER, "a clock was set back"),
+        (1, "time", "2025-03-09T09:59:59Z", "cell-r1", "lies after its entry"),
+        (2, "known_on", "2025-03-09", "cell-r1", "before its session"),
+        (2, "known_on", "2999-01-01", "cell-r1", "by a decision of 2999-01-01"),
+    ],
+)
+def test_verify_sees_what_was_written_so(
+    entered: Registry, line: int, key: str, value: str, row: str, words: str
+) -> None:
+    assert approve(entered, "cell-r1", in_force_from=SESSION, checked_by="B").done
+    assert all(one.ok for one in verify_registry(entered))
+
+    def change(seq: int, event: dict[str, object]) -> None:
+        if seq == line:
+            event[key] = value
+
+    rewrite(entered, change)
+    (bad,) = [one for one in verify_registry(entered) if not one.ok]
+    assert (bad.id, (bad.reason or "").split(":")[0]) == (row, "time")
+    assert words in (bad.reason or "")
+
+
+def test_no_laboratory_is_refused_for_its_time_zone() -> None:
+    # At 10:00 UTC the next day begins on the Line Islands, UTC+14.
+    noon = dt.datetime(2026, 3, 1, 10, 0, tzinfo=dt.UTC)
+    assert clock.begun(dt.date(2026, 3, 2), noon)
+    assert not clock.begun(dt.date(2026, 3, 2), noon - dt.timedelta(seconds=1))
+    assert not clock.begun(dt.date(2026, 3, 3), noon)
+
+
+def test_the_projects_ledgers_are_in_order() -> None:
+    project = Registry(Path(__file__).resolve().parents[3] / "calibrations")
+    assert all(row.ok for row in verify_registry(project))

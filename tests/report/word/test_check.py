@@ -1,0 +1,281 @@
+# ruff: noqa: E501  lines of WordprocessingML read best whole
+from __future__ import annotations
+
+import zipfile
+from pathlib import Path
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from tests.report.template_factory import FOLDER, make, opened, p, run, sdt, tbl
+from toolkit.errors import TemplateError, ToolkitError
+from toolkit.report.kinds import check as check_template
+from toolkit.report.style import Style
+from toolkit.report.word.check import RULES
+from toolkit.report.word.package import read_template
+
+CHECKOUT = Path(__file__).resolve().parents[3]
+
+
+def rules(folder: Path, body: str, style: Style | None = None, **more: object) -> list[str]:
+    return [one.rule for one in check_template(opened(folder, body, **more), style or Style(), fonts=False)]
+
+
+FIELD = (
+    '<w:r><w:fldChar w:fldCharType="begin"/></w:r><w:r><w:instrText>{}</w:instrText></w:r>'
+    '<w:r><w:fldChar w:fldCharType="separate"/></w:r>'
+    + run("x")
+    + '<w:r><w:fldChar w:fldCharType="end"/></w:r>'
+)
+
+
+@pytest.mark.parametrize(
+    ("body", "rule"),
+    [
+        (p("{{tk:tire.sise}}"), "unknown-tag"),
+        (p("{{tk:figure.fy}}"), "unknown-tag"),
+        (sdt("tk:if.rain", p("x")), "unknown-tag"),
+        (p("{{tk:tire.size|.2f}}"), "bad-format"),
+        (p("{{tk:test.date|%d}}"), "bad-format"),
+        (p("{{tk:summary.load|.2q}}"), "bad-format"),
+        (p("{{tk:tire.size"), "malformed-tag"),
+        (p("{{tk:}}"), "malformed-tag"),
+        (p("{{Tk:tire.size}}"), "malformed-tag"),
+        (p("{{", " TK", " : tire.size}}"), "malformed-tag"),
+        (p("{{tk :tire.size}}"), "malformed-tag"),
+        (p(sdt("TK:tire.size", run("x"))), "malformed-tag"),
+        (p("{{tk:figure.gough}}") + p("{{tk:figure.gough}}"), "doubled-tag"),
+        (sdt("tk:figure.gough", p("")) + p("{{tk:figure.gough}}"), "doubled-tag"),
+        (p("{{tk:row.SA}}"), "wrong-place"),
+        (p("{{tk:if.pull}}"), "wrong-place"),
+        ('<w:p><w:pPr><w:pStyle w:val="Heading1"/></w:pPr>' + sdt("tk:figure.gough", run("x")) + "</w:p>", "wrong-place"),
+        (p(sdt("tk:tire.size", sdt("tk:tire.company", run("x")))), "overlapping-tags"),
+        (p("{{tk:table.results}}") + p("no table"), "no-table"),
+        (p("{{tk:table.files}}") + tbl(["a", "b", "c"]), "prototype"),
+        (p("{{tk:table.files}}") + tbl(["a", "b"], ["x", "y"]), "column-count"),
+        (p("{{tk:table.files}}") + tbl(["a"], ["{{tk:row.FY}}"]), "unknown-column"),
+        (p("{{tk:table.files}}") + tbl(["{{tk:row.file}}"], ["{{tk:row.sha256}}"]), "prototype"),
+        (p("{{tk:table.files}}") + tbl(["a"], ["{{tk:row.file|.1f}}"]), "bad-format"),
+        (p(FIELD.format("DATE")), "date-field"),
+        (p(FIELD.format("IF 1 = 1 yes no")), "if-field"),
+        (p('<w:ins w:id="1" w:author="x">' + run("new") + "</w:ins>"), "tracked-changes"),
+    ],
+)  # fmt: skip
+def test_each_rule(tmp_path: Path, body: str, rule: str) -> None:
+    assert rules(tmp_path, body) == [rule]
+    assert rule in RULES
+
+
+def test_a_tag_in_a_tracked_deletion_would_be_printed(tmp_path: Path) -> None:
+    gone = "<w:r><w:delText>{{tk:ti</w:delText></w:r><w:r><w:delText>re.DOT}}</w:delText></w:r>"
+    deleted = f'<w:del w:id="1" w:author="x">{gone}</w:del>'
+    found = check_template(opened(tmp_path, p(deleted)), Style())
+    assert {(one.rule, one.level) for one in found} == {
+        ("tracked-changes", "error"),
+        ("tracked-changes", "warning"),
+    }
+
+
+def test_other_words_and_controls_of_others_are_left_alone(tmp_path: Path) -> None:
+    body = p("{{ticket: 7}} tk: as in {tk:x}") + p(sdt("tkt:ticket", run("x")))
+    assert rules(tmp_path, body) == []
+
+
+def test_column_count_names_both(tmp_path: Path) -> None:
+    found = check_template(opened(tmp_path, p("{{tk:table.files}}") + tbl(["a", "b"], ["x", "y"])), Style())
+    assert "2 cells" in found[0].message
+    assert "3 columns" in found[0].message
+
+
+def test_no_tags_and_missing_required(tmp_path: Path) -> None:
+    assert rules(tmp_path, p("text"), hash_=False) == ["no-tags", "missing-required"]
+    style = Style(required=("tk:calibration.hash", "tk:report.id"), styles=(("caption", "Legende"),))
+    assert rules(tmp_path, p("x"), style) == ["missing-required", "missing-style"]
+
+
+def test_a_value_may_be_used_any_number_of_times(tmp_path: Path) -> None:
+    assert rules(tmp_path, p("{{tk:tire.size}} {{tk:tire.size}}"), header=p("{{tk:tire.size}}")) == []
+
+
+REL = '<Relationship Id="rId90" Type="http://schemas.openxmlformats.org/officeDocument/2006/relationships/{}" Target="{}" {}/>'
+EXTERNAL = 'TargetMode="External"'
+
+
+def add_rel(kind: str, target: str, mode: str = EXTERNAL, rels: str = "word/_rels/document.xml.rels"):
+    def edit(members: dict[str, bytes]) -> None:
+        blank = b'<Relationships xmlns="http://schemas.openxmlformats.org/package/2006/relationships"></Relationships>'
+        old = members.get(rels, blank)
+        members[rels] = old.replace(
+            b"</Relationships>", REL.format(kind, target, mode).encode() + b"</Relationships>"
+        )
+
+    return edit
+
+
+def put(name: str, data: bytes):
+    return lambda members: members.__setitem__(name, data)
+
+
+def swap(name: str, old: bytes, new: bytes):
+    return lambda members: members.__setitem__(name, members[name].replace(old, new))
+
+
+MACRO = b"application/vnd.ms-word.document.macroEnabled.main+xml"
+PLAIN = b"application/vnd.openxmlformats-officedocument.wordprocessingml.document.main+xml"
+DTD = b'<?xml version="1.0"?><!DOCTYPE x [<!ENTITY a "b">]><x/>'
+
+
+@pytest.mark.parametrize(
+    ("edit", "rule"),
+    [
+        (add_rel("image", "http://example.org/x.png"), "external-content"),
+        (add_rel("image", "file:///etc/passwd"), "external-content"),
+        (add_rel("oleObject", "file:///x.xlsx"), "ole-object"),
+        (add_rel("oleObject", "embeddings/o.bin", ""), "ole-object"),
+        (add_rel("subDocument", "b.docx"), "sub-document"),
+        (add_rel("frame", "b.htm"), "frames"),
+        (add_rel("aFChunk", "x.html", ""), "alt-chunk"),
+        (add_rel("attachedTemplate", "http://example.org/t.dotm", rels="word/_rels/settings.xml.rels"), "attached-template"),
+        (add_rel("attachedTemplate", " HTTPS://example.org/t.dotm", rels="word/_rels/settings.xml.rels"), "attached-template"),
+        (put("word/vbaProject.bin", b"x"), "macros"),
+        (swap("[Content_Types].xml", PLAIN, MACRO), "macros"),
+        (put("word/embeddings/a.xlsx", b"x"), "ole-object"),
+        (put("word/extra.xml", DTD), "dtd"),
+        (put("customXml/item1.xml", DTD.decode().encode("utf-16")), "dtd"),
+        (put("word/media/a.svg", b'<svg xmlns="http://www.w3.org/2000/svg"><image href="http://x.org/a"/></svg>'), "external-content"),
+        (put("word/bad.xml", b"<a><b>"), "zip-damaged"),
+        (put("../escape.xml", b"<a/>"), "not-word"),
+        (put("word/bomb.xml", b"<a>" + b" " * 40_000_000 + b"</a>"), "too-large"),
+        (lambda m: m.pop("word/document.xml"), "not-word"),
+    ],
+)  # fmt: skip
+def test_unsafe_files_are_refused(tmp_path: Path, edit, rule: str) -> None:
+    if rule == "too-large":
+        path = make(tmp_path, p("x"))
+        with zipfile.ZipFile(path, "a", zipfile.ZIP_DEFLATED) as archive:
+            archive.writestr("word/bomb.xml", b"<a>" + b" " * 40_000_000 + b"</a>")
+    else:
+        path = make(tmp_path, p("x"), edit=edit)
+    with pytest.raises(TemplateError) as caught:
+        read_template(path)
+    assert caught.value.rule == rule
+    assert caught.value.where
+    assert caught.value.next_step
+
+
+@pytest.mark.parametrize(
+    ("data", "got"), [(b"", "an empty file"), (b"MZ\x90", "b'MZ"), (b"PK\x03\x04cut", "not a zip")]
+)
+def test_what_is_no_word_file_holds_nothing_to_remove(tmp_path: Path, data: bytes, got: str) -> None:
+    (tmp_path / "x.docx").write_bytes(data)
+    with pytest.raises(TemplateError) as caught:
+        read_template(tmp_path / "x.docx")
+    assert got in str(caught.value.got)
+    assert caught.value.rule in ("not-word", "zip-damaged")
+    assert caught.value.next_step.startswith("copy it again")
+
+
+@pytest.mark.parametrize(
+    "code",
+    [
+        'INCLUDETEXT "/etc/passwd"',
+        " includepicture http://x ",
+        "DDEAUTO cmd",
+        'LINK Excel.Sheet "x"',
+        "DDE a b",
+    ],
+)
+def test_fields_that_read_other_files_are_refused(tmp_path: Path, code: str) -> None:
+    half = len(code) // 2
+    split = FIELD.format(code[:half] + "</w:instrText></w:r><w:r><w:instrText>" + code[half:])
+    simple = f"<w:fldSimple w:instr='{code}'>{run('x')}</w:fldSimple>"
+    for body in (p(split), p(simple)):
+        with pytest.raises(TemplateError) as caught:
+            opened(tmp_path, body)
+        assert caught.value.rule == "unsafe-field"
+
+
+@pytest.mark.parametrize("tag", ["altChunk", "subDoc"])
+def test_elements_that_import_are_refused(tmp_path: Path, tag: str) -> None:
+    with pytest.raises(TemplateError):
+        opened(tmp_path, f'<w:{tag} r:id="rId1"/>')
+
+
+def test_hyperlinks_are_allowed_and_a_file_template_is_dropped(tmp_path: Path) -> None:
+    assert (
+        read_template(make(tmp_path, p("x"), edit=add_rel("hyperlink", "http://example.org"))).dropped == ()
+    )
+    path = make(
+        tmp_path,
+        p("x"),
+        edit=add_rel("attachedTemplate", "file:///C:/x.dotx", rels="word/_rels/settings.xml.rels"),
+    )
+    template = read_template(path)
+    assert template.dropped == ("file:///C:/x.dotx",)
+    assert b"x.dotx" not in template.data
+    assert [one.rule for one in check_template(template, Style(), fonts=False)] == ["attached-template"]
+
+
+@pytest.mark.parametrize("data", [b"", b"not word", b"PK\x03\x04 torn", b"{\\rtf1}"])
+def test_what_is_no_word_file(tmp_path: Path, data: bytes) -> None:
+    path = tmp_path / "t.docx"
+    path.write_bytes(data)
+    with pytest.raises(TemplateError):
+        read_template(path)
+    with pytest.raises(TemplateError) as caught:
+        read_template(tmp_path / "absent.docx")
+    assert caught.value.rule == "no-template"
+
+
+WHOLE = (FOLDER / "org.docx").read_bytes()
+
+
+@settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(st.integers(0, len(WHOLE) - 1), st.binary(min_size=1, max_size=40), st.booleans())
+def test_mutated_files_give_findings_or_a_clear_error(
+    tmp_path: Path, at: int, junk: bytes, cut: bool
+) -> None:
+    path = tmp_path / "t.docx"
+    path.write_bytes(WHOLE[:at] if cut else WHOLE[:at] + junk + WHOLE[at + len(junk) :])
+    try:
+        check_template(read_template(path), Style(), fonts=False)
+    except ToolkitError as error:
+        assert error.rule  # noqa: PT017
+
+
+def test_a_literal_of_another_tag_inside_a_control_is_found_and_its_own_prompt_is_not(tmp_path: Path) -> None:
+    assert rules(tmp_path, p(sdt("tk:tire.size", run("{{tk:tire.size}}")))) == []
+    assert rules(tmp_path, sdt("tk:tire.size", p("{{tk:ti", "re.size}}"))) == []
+    assert rules(tmp_path, p(sdt("tk:tire.size", run("{{tk:tire.company}}")))) == ["overlapping-tags"]
+    assert rules(tmp_path, sdt("tk:figure.gough", p("{{tk:tire.company}}"))) == ["overlapping-tags"]
+
+
+def test_a_tag_where_nothing_is_filled_is_found(tmp_path: Path) -> None:
+    math = "http://schemas.openxmlformats.org/officeDocument/2006/math"
+    formula = f'<m:oMath xmlns:m="{math}"><m:r><m:t>{{{{tk:tire.size}}}}</m:t></m:r></m:oMath>'
+    assert rules(tmp_path, p(formula)) == ["wrong-place"]
+
+
+def test_a_table_tag_reaches_its_table_through_a_control(tmp_path: Path) -> None:
+    table = tbl(["a", "b", "c"], ["1", "2", "3"])
+    assert rules(tmp_path, p("{{tk:table.files}}") + sdt("tk:if.files", table)) == []
+    assert rules(tmp_path, p("{{tk:table.files}}") + sdt("Company", table)) == []
+    assert rules(tmp_path, p("{{tk:table.files}}") + sdt("Company", p("x"))) == ["no-table"]
+
+
+CONTENTS = FIELD.format('TOC \\o "1-3" \\h')
+
+
+def test_contents_that_are_written_need_no_finding_and_others_do(tmp_path: Path) -> None:
+    assert rules(tmp_path, p(CONTENTS)) == []
+    assert rules(tmp_path, p(FIELD.format('TOC \\h \\z \\c "Figure"'))) == []
+    assert rules(tmp_path, p(FIELD.format("TOC \\f"))) == ["contents"]
+    assert rules(tmp_path, p(FIELD.format("INDEX"))) == ["contents"]
+    assert rules(tmp_path, p("x"), header=p(CONTENTS)) == ["contents"]
+
+
+def test_a_tag_may_ask_for_any_result_as_a_condition(tmp_path: Path) -> None:
+    for name in ("figure.gough", "table.pull", "caption.gough", "calibration.FY.E5", "report.opinions"):
+        expected = ["unknown-tag"] if name == "report.opinions" else []
+        assert rules(tmp_path, sdt(f"tk:if.{name}", p("x"))) == expected, name
